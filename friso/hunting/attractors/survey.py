@@ -261,7 +261,8 @@ class Survey:
         swinging = ends.completed & ~ends.rest & ~self._known_to_attract(owners, ends)
         ready = swinging & (ends.repeats.swings > 0)
         if early:
-            ready &= (ends.repeats.deviation < SETTLED) & ~self._repels(owners, ends)
+            leave = self._repels(owners, ends) & ~self._stay(owners, ends)
+            ready &= (ends.repeats.deviation < SETTLED) & ~leave
         if not self.prove:
             ready &= ~self._exact(owners, ends)
         self._close(runs, owners, ends, np.flatnonzero(ready))
@@ -373,9 +374,15 @@ class Survey:
         has to be proved, and unlike any closed cycle that repels."""
         repeats, unlike = ends.repeats, (ends.repeats.swings > 0) & ~_like(self._closed, owners, ends)
         if self.prove:
-            return unlike & (repeats.deviation < EXACT)
+            return (unlike & (repeats.deviation < EXACT)) | self._stay(owners, ends)
         approaches = (repeats.deviation < SETTLED) & (repeats.deviation < APPROACHES * repeats.earlier)
         return unlike & ((repeats.deviation < CONVERGED) | approaches)
+
+    def _stay(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
+        """Which runs repeat themselves beside a closed cycle that repels more exactly than they would on their way from
+        it: they are on another one."""
+        offsets = np.abs(self._beside(owners, ends).offsets)
+        return (ends.repeats.swings > 0) & (ends.repeats.deviation < EXACT * offsets)
 
     def _observe(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
         repeats = ends.repeats
