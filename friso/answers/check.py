@@ -67,10 +67,10 @@ class CheckAnswer(Answer):
     @property
     def failure(self) -> str:
         """Whether the run of a case was not completed."""
-        lost = [case for case in self.result.values() if not case.solver.done]
-        if lost and all(case.runs_away for case in lost):
-            return "there is no verdict on hunting for a motion that runs away"
-        return "the computation could not be completed; see the status above" if lost else ""
+        if any(not case.solver.done and not case.runs_away for case in self.result.values()):
+            return "the computation could not be completed; see the status above"
+        away = any(case.runs_away for case in self.result.values())
+        return "there is no verdict on hunting for a motion that runs away" if away else ""
 
     def sentences(self) -> Sequence[str]:
         """The verdicts, and the chances where keys are uncertain."""

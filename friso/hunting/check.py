@@ -86,9 +86,8 @@ class Case:
 
     @property
     def runs_away(self) -> bool:
-        """Whether the motion leaves its reference for good, as it may where the loop is unstable: nothing else was to
-        be found of it."""
-        return bool(self.unstable) and self.solver.status == Status.DIVERGED.text
+        """Whether the motion leaves its reference for good because the loop is unstable: there is no other verdict."""
+        return self.verdict == "failed" and self.judgement.runs_away and bool(self.unstable)
 
     @property
     def unmoved(self) -> bool:

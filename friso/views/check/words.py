@@ -53,7 +53,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     loop = _loop(case)
     says = {"hunts": _hunting, "bistable": _bistable, "transient": _transient, "settles": _settling}
     if case.runs_away:
-        return " ".join([*loop, "runs away from its reference during this motion."])
+        return " ".join([*loop, "runs away from its reference for good."])
     if case.verdict not in says and case.solver.done:
         return " ".join([*loop, f"{case.verdict}: {_UNFINISHED}."])
     if case.verdict not in says:
