@@ -6,10 +6,13 @@ import base64
 import gzip
 import json
 
+LEVEL = 6
+"""Of gzip: the tightest takes half as long again for two thousandths of the size."""
+
 
 def packed(text: str) -> str:
     """The text compressed by gzip, in base64: the same bytes for the same text."""
-    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
+    return base64.b64encode(gzip.compress(text.encode(), LEVEL, mtime=0)).decode("ascii")
 
 
 def packed_json(value: object) -> str:

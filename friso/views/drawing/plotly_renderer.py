@@ -64,7 +64,9 @@ def script() -> str:
 def fragment(figure: Figure) -> str:
     """The figure as an HTML element of its height, and beside it, packed, what plotly draws into it, and the layout on
     a narrow screen with the places of the colour bars there."""
-    drawn = _on_both(render(figure).to_plotly_json(), _checked(narrow_parts(figure)).to_plotly_json())
+    narrow = narrow_parts(figure)  # its traces are those of the wide one but for their colour bars' places
+    narrow["layout"] = _checked([], narrow["layout"]).to_plotly_json()["layout"]
+    drawn = _on_both(render(figure).to_plotly_json(), narrow)
     return (
         f'<div id="figure-{figure.name}" style="height: {drawn["layout"]["height"]}px"></div>\n'
         f'<script type="application/gzip" class="figure">{packed_json({**_single(drawn), "config": _CONFIG})}</script>'
@@ -103,12 +105,13 @@ def _single(part: Any) -> Any:
 
 def render(figure: Figure) -> go.Figure:
     """The figure for plotly; its traces carry the arrays of `drawable(figure)`, in the same order."""
-    return _checked(parts(figure))
+    plain = parts(figure)
+    return _checked(plain["data"], plain["layout"])
 
 
-def _checked(plain: dict[str, Any]) -> go.Figure:
+def _checked(traces: list[Any], layout: dict[str, Any]) -> go.Figure:
     """What plotly draws as a figure of its own, which has checked it."""
-    return go.Figure(plain["data"], {"template": "none", **plain["layout"]})
+    return go.Figure(traces, {"template": "none", **layout})
 
 
 def narrow_parts(figure: Figure) -> dict[str, Any]:
