@@ -697,6 +697,7 @@ def test_a_narrow_range_in_which_nothing_attracts_is_found(first: float, machine
 
     search.clear = clear  # pyright: ignore[reportAttributeAccessIssue]
     search.share = lambda batch: np.ones(len(batch))  # pyright: ignore[reportAttributeAccessIssue]
+    search._closer = lambda point, wanted: []  # pyright: ignore[reportAttributeAccessIssue]
     assert [*search.surveyed()]
     assert np.diff(np.sort(attracted)).min() > 0.03
 
@@ -711,8 +712,29 @@ def test_settings_next_to_the_best_are_taken_where_those_miss_the_goal_on_fresh_
     search = Search(Remedy.settled_on("", rigid), Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
     search.clear = lambda batch: np.ones(len(batch), bool)  # pyright: ignore[reportAttributeAccessIssue]
     search.share = lambda batch: 0.92 + 0.5 * batch[:, 0]  # pyright: ignore[reportAttributeAccessIssue]
+    search._closer = lambda point, wanted: []  # pyright: ignore[reportAttributeAccessIssue]
     enough = (Goal().surely(machines.count) - 0.92) / 0.5  # not reached by the first of those that are looked at
     assert enough <= next(search.surveyed())[0] < enough + 0.1
+
+
+def test_points_next_to_one_beyond_the_edge_of_what_works_are_tried(machines: Fleet, rigid: Stage) -> None:
+    """The search had converged where something attracts: the first point without, far from there, was taken as it was,
+    and a brute search found one that settles in 89 % of its time."""
+    shares = np.array([0.0, 0.02, 0.04, 0.5, 0.6])
+
+    def measured(points: np.ndarray) -> TriedPoints:
+        return TriedPoints(points, 1 + points[:, 0], *np.ones((7, len(points))))
+
+    remedy = Remedy("", rigid, (of_key("controller.crossover", 1, 50, 8),))
+    tried = [measured(shares[:, None])]
+    search = Search(remedy, Goal(), machines, machines, rigid, TINY, lambda label: None, tried)
+    search.measured = lambda batch, *_: measured(batch)  # pyright: ignore[reportAttributeAccessIssue]
+    search.share = lambda batch: np.ones(len(batch))  # pyright: ignore[reportAttributeAccessIssue]
+    search.clear = lambda batch: batch[:, 0] > 0.46  # pyright: ignore[reportAttributeAccessIssue]
+    first, *others = [float(point[0]) for point in search.surveyed()]
+    assert 0.46 < first < 0.47
+    assert sorted([first, *others]) == [first, *others]
+    assert 0.5 in others
 
 
 def test_the_least_change_is_sought_off_the_line_where_something_attracts_all_along_it(
@@ -729,6 +751,7 @@ def test_the_least_change_is_sought_off_the_line_where_something_attracts_all_al
     search.measured = lambda batch: replace(points, shares=batch).take(np.arange(len(batch)))  # pyright: ignore[reportAttributeAccessIssue]
     search.share = lambda batch: np.ones(len(batch))  # pyright: ignore[reportAttributeAccessIssue]
     search.clear = lambda batch: batch[:, 0] > 0.6  # pyright: ignore[reportAttributeAccessIssue]
+    search._closer = lambda point, wanted: []  # pyright: ignore[reportAttributeAccessIssue]
     assert 0.6 < next(candidates(search))[0] < 0.7
 
 

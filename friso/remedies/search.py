@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, differential_evolution
+from scipy.stats import qmc
 
 from friso.engine.allowance import Exhausted, allowance
 from friso.frequency.bandwidth import loop_bandwidths
@@ -57,6 +58,9 @@ FIRST = 3
 
 WIDE = 12
 """Points that are looked at on fresh machines at once."""
+
+AROUND, CLOSE, CLOSER = 64, 0.02, 4
+"""Points that are drawn around one beyond the edge of what works, within what share of the ranges, and how often."""
 
 WIDENED = 1.5
 """By what factor the next points are farther away after a batch with all of which something attracts machines."""
@@ -331,6 +335,7 @@ class Search:
         away = np.full(len(left), np.inf)  # from those that were looked at
         enough, any_clear = self.goal.surely(self.fresh.count), False
         best, most = np.zeros((0, points.shares.shape[1])), 0.0
+        soonest = left[:1]
         for _ in range(MOST):
             left, away = left[away > ALIKE], away[away > ALIKE]
             if not len(left):
@@ -347,12 +352,35 @@ class Search:
             few = _apart(batch[share >= enough], BATCH, APART)
             clear = self.clear(few) if len(few) else np.zeros(0, bool)
             any_clear |= bool(clear.any())
+            if clear.any() and not _same(few[clear][:1], soonest).any():
+                yield from self._closer(few[clear][0], wanted)
             yield from few[clear]
             apart = ALIKE if clear.any() else WIDENED * max(apart, APART if len(few) else ALIKE)
             away = np.minimum(away, _distance(left, np.concatenate([batch[share < enough], few])))
             away[_distance(left, few[~clear]) <= APART] = 0.0
         if not any_clear and len(best) and most < enough:
             yield from best[self.clear(best)]
+
+    def _closer(self, point: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> list[np.ndarray]:
+        """Better points than one, (variables,), that was taken since something attracts with those that are better, or
+        too few machines meet the goal with them: of those drawn around it, and then around the one that is taken
+        instead, the best first."""
+        goal, closer = self.goal, list[np.ndarray]()
+        cost = self.measured(point[None]).cost(goal, None if wanted is None else wanted(point[None]))[0]
+        for number in range(CLOSER):
+            low, high = np.clip(point - CLOSE, 0, 1), np.clip(point + CLOSE, 0, 1)
+            drawn = low + (high - low) * qmc.Sobol(point.size, rng=SEED + number).random(AROUND)
+            small = None if wanted is None else wanted(drawn)
+            self.tried.append(tried := self.measured(drawn, cost, small))
+            costs = np.where(tried.whole, tried.cost(goal, small), np.inf)
+            better = _apart(drawn[np.argsort(costs, kind="stable")[: np.count_nonzero(costs < cost)]], WIDE, ALIKE)
+            robust = better[self.share(better) >= goal.surely(self.fresh.count)] if len(better) else better
+            taken = next((one for one in robust if self.clear(one[None])[0]), None)
+            if taken is None:
+                continue
+            point, cost = taken, costs[_same(taken[None], drawn)[0]][0]
+            closer.insert(0, point)
+        return closer
 
 
 def _order(points: TriedPoints, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
