@@ -39,12 +39,13 @@ from friso.hunting.measures import measured_run
 from friso.hunting.verdict import BANDWIDTHS
 from friso.remedies import method
 from friso.remedies import search as search_module
+from friso.remedies import verified as verified_module
 from friso.remedies.catalogue import Remedy, remedies
 from friso.remedies.change import ChangeSize, change_size
 from friso.remedies.goal import Goal
 from friso.remedies.least import LEAST, candidates, change_costs, least_remedy
 from friso.remedies.machines import Fleet, draw_fleet
-from friso.remedies.method import UNSEEN, Advice, _not_seen, _Session, tune
+from friso.remedies.method import UNSEEN, Advice, _not_seen, _Session, pairs, tune
 from friso.remedies.relax import WIDER, _tolerances, relaxations
 from friso.remedies.search import WORST, Budget, Search, TriedPoints, _evolve
 from friso.remedies.sensitivities import SMOOTH, Sensitivities, _is_smooth, _of_settling, sensitivity
@@ -471,11 +472,43 @@ def test_its_figures_can_be_drawn(tuning: Advice) -> None:
 
 
 def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning: Advice) -> None:
-    """Not even one whose moves settle: 11 Hz is closer to the edge than wanted."""
-    near = rigid.replace({"controller.crossover": "11 Hz"})
+    """Not even one with which some moves settle: 11.5 Hz is closer to the edge than wanted."""
+    near = rigid.replace({"controller.crossover": "11.5 Hz"})
     measured, case = performance_of(near, tuning.machines, goal, near), check_given(near)
     assert "distance" in unmet_goals(case, measured, goal)
     assert "hunting" in unmet_goals(case, measured, goal)
+
+
+def test_what_attracts_is_surveyed_only_where_the_rest_of_the_goal_is_met(
+    rigid: Stage, machines: Fleet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A survey of a machine that hunts takes longest, and that it misses the goal is known from its move."""
+    surveyed: list[int] = []
+    real = verified_module.attraction
+
+    def counted(remedy: Remedy, shares: np.ndarray, some: Fleet, goal: Goal) -> Attraction:
+        surveyed.append(some.count)
+        return real(remedy, shares, some, goal)
+
+    monkeypatch.setattr(verified_module, "attraction", counted)
+    assert performance_of(rigid, machines, Goal(within=1e-9), rigid).share(Goal()).probability == 0
+    assert not surveyed
+    near = rigid.replace({"controller.crossover": "11.5 Hz"})
+    measured = performance_of(near, machines, Goal(), near)
+    parts = measured.meets(Goal())
+    assert surveyed == [np.count_nonzero(parts["settling"])]
+    assert 0 < surveyed[0] < machines.count
+    assert np.array_equal(measured.share(Goal()).probability, np.mean(parts["settling"] & parts["hunting"]))
+
+
+def test_a_pair_is_tried_only_where_no_change_of_the_controller_works(rigid: Stage, goal: Goal) -> None:
+    limit = next(remedy for remedy in remedies(rigid, goal) if remedy.name == "integral limit")
+    points = TriedPoints(np.zeros((1, 1)), *np.full((8, 1), np.inf))
+    closest = RemedyOutcome(limit, None, None, None, (), (), points)
+    assert [pair.name for pair in pairs([closest], goal)] == ["integral limit, and bandwidth"]
+    assert not pairs([closest, working(Remedy.settled_on("bandwidth", rigid), rigid)], goal)
+    isolator = working(Remedy.settled_on("isolator", rigid, buys_joint=True), rigid)
+    assert pairs([closest, isolator], goal)
 
 
 def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, wording: Wording) -> None:
@@ -640,6 +673,32 @@ def test_sensitivities_and_gains_are_those_behind_the_drive_as_built(tuning: Adv
         assert 1 / np.nanmax(series.y) == pytest.approx(margin, rel=2e-3)
     (gains,) = (line for line in gain_lines(advice) if "N*m/rad" in line)
     assert "bandwidth" in gains
+
+
+def test_what_decides_is_drawn_and_named(tuning: Advice) -> None:
+    """Nine lines were drawn over each other, and what the window is of was called a number."""
+    (works,) = tuning.working
+    assert works.stage is not None
+    assert works.measured is not None
+    later = replace(works.measured, moves=replace(works.measured.moves, settling=works.measured.moves.settling + 1))
+    way = partial(replace, works.remedy)
+    larger = tuning.stage.replace({"controller.crossover": "60 Hz", "controller.beta": 3})
+    outcomes = [
+        works,
+        replace(works, remedy=way(name="slow and large"), stage=larger, measured=later),
+        replace(works, remedy=way(name="isolator", buys_joint=True), measured=later),
+        replace(works, remedy=way(name="isolator and gains", buys_joint=True), stage=larger),
+    ]
+    advice = replace(tuning, outcomes=tuple(outcomes), goal=replace(tuning.goal, margin=0.6))
+    labels = ["as it is", works.remedy.name, "isolator", "isolator and gains"]
+    (figure,) = figures(advice)
+    response, settling, loops, window = figure.panels
+    for panel in (response, settling, loops):
+        assert [series.label for series in panel.series][:4] == labels
+    assert loops.series[-1].label == "margin of 0.6"
+    assert loops.series[-1].y[0] == pytest.approx(1 / 0.6)
+    assert window.y.words == tuple(part.name.removeprefix("controller.") for part in works.windows)
+    assert response.x.limits == (0.0, pytest.approx(3 * later.slowest(tuning.goal)))
 
 
 def test_a_way_that_the_app_takes_over_keeps_the_machine_as_built(

@@ -50,6 +50,11 @@ class Remedy:
         """Whether cycles can verify it: not where a dither keeps the stage from coming to rest."""
         return not settings_of(self.stage.flat()).dither
 
+    @property
+    def of_setting(self) -> bool:
+        """Whether it is a setting against friction alone, with the present gains."""
+        return self.name in {setting.name for setting in SETTINGS.values()}
+
     @classmethod
     def settled_on(cls, name: str, stage: Stage, buys_joint: bool = False) -> Remedy:
         """A stage as it is, with nothing to vary."""

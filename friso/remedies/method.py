@@ -14,7 +14,6 @@ from friso.design_method.leaves_for_joint import leaves_for_joint
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import last_corner
-from friso.equations.settings import SETTINGS
 from friso.equations.structure import structure
 from friso.errors import InputError, StageError
 from friso.frequency.crossover import Limits, limits
@@ -132,10 +131,11 @@ class Advice:
     @property
     def fastest(self) -> RemedyOutcome | None:
         """The remedy that works and settles soonest."""
-        return min(self.working, key=lambda outcome: _slowest(outcome, self.goal), default=None)
+        return min(self.working, key=lambda outcome: slowest(outcome, self.goal), default=None)
 
 
-def _slowest(outcome: RemedyOutcome, goal: Goal) -> float:
+def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
+    """The settling time [s] of the slowest twentieth with a remedy; infinite where it was not measured."""
     return np.inf if outcome.measured is None else outcome.measured.slowest(goal)
 
 
@@ -367,9 +367,11 @@ class _Session:
 
 
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
-    """The settings against friction that came closest to the goal, or met it, each together with the bandwidth."""
-    names = {setting.name for setting in SETTINGS.values()}
-    several = (outcome for outcome in outcomes if outcome.remedy.name in names and outcome.remedy.verifiable)
+    """The settings against friction that came closest to the goal, each together with the bandwidth: only where nothing
+    works that changes the controller alone. They change more than the bandwidth, and bring less than the gains do."""
+    if any(outcome.certainty == "works" and not outcome.remedy.buys_joint for outcome in outcomes):
+        return []
+    several = (outcome for outcome in outcomes if outcome.remedy.of_setting and outcome.remedy.verifiable)
     tried = [outcome for outcome in several if outcome.points]
     closest = sorted(tried, key=lambda outcome: outcome.least_cost(goal))
     return [with_bandwidth(outcome.remedy) for outcome in closest[:PAIRS]]

@@ -37,6 +37,10 @@ MOST_POINTS = 40
 WORK = 6e8
 """Work of a search (see `friso.engine.allowance`): about 7 s on one core. Moves that chatter take most of it."""
 
+OF_SETTING = 1 / 3
+"""Share of that for a setting against friction alone: with gains with which a stage hunts, most runs of a setting that
+does not work go on to the end."""
+
 FAR_ABOVE = 1.5
 """Factor of the limit of the bandwidth above which it is far above."""
 
@@ -177,7 +181,7 @@ class Search:
         `wanted` small, from points (points, variables) to numbers (points,). A search of several variables begins with
         the points `start`, if any."""
         try:
-            with allowance(WORK):
+            with allowance(WORK * (OF_SETTING if self.remedy.of_setting else 1.0)):
                 self._optimise(wanted, start)
         except Exhausted:
             self.cut = True

@@ -98,6 +98,18 @@ class Attraction:
     decided: np.ndarray
     certain: np.ndarray
 
+    @classmethod
+    def none(cls, machines: int) -> Attraction:
+        """One point, with which nothing attracts so many machines."""
+        return cls(np.zeros((1, machines), bool), *(np.ones((1, machines), bool) for _ in range(2)))
+
+    def of_some(self, other: Attraction, machines: np.ndarray) -> Attraction:
+        """The same but for machines, given by their numbers, of which another one tells."""
+        columns = {name: column.copy() for name, column in vars(self).items()}
+        for name, column in columns.items():
+            column[:, machines] = getattr(other, name)
+        return Attraction(**columns)
+
     @property
     def clear(self) -> np.ndarray:
         """Which machines have nothing that attracts, as far as simulations reach."""

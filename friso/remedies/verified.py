@@ -136,19 +136,25 @@ class RemedyOutcome:
 
 @np.errstate(all="ignore")
 def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
-    """A stage on machines, with the sampling and delay of the stage `drive` for its margins."""
+    """A stage on machines, with the sampling and delay of the stage `drive` for its margins. What attracts them is
+    surveyed only of those that meet the rest of the goal: of others nothing is said to."""
     remedy = Remedy.settled_on("", stage)
     flat = stage.flat()
     stiffness = proportional_stiffness(flat)
     if flat.get("joint.locked") is False:
         stiffness = in_series(stiffness, flat["joint.stiffness"])
-    return Performance(
+    measured = Performance(
         moves_of_points(remedy, ONE, machines, goal),
         modulus_margins(remedy, ONE, machines, drive),
-        attraction(remedy, ONE, machines, goal),
+        Attraction.none(machines.count),
         settled_margin(linear_flat(drive, {**flat, **timing(drive)})),
         float(stiffness),
     )
+    some = np.flatnonzero(measured._meets_all(goal))
+    if not some.size:
+        return measured
+    surveyed = attraction(remedy, ONE, machines.take(some), goal)
+    return replace(measured, attraction=measured.attraction.of_some(surveyed, some))
 
 
 def verified(stage: Stage) -> Case:

@@ -12,9 +12,10 @@ from friso.equations.motion import last_corner
 from friso.frequency.drive import DriveTiming
 from friso.frequency.loops import response
 from friso.frequency.members import limit_cases
-from friso.remedies.method import Advice
+from friso.remedies.method import Advice, slowest
 from friso.remedies.verified import RemedyOutcome
 from friso.stage import Stage
+from friso.stage.controllers import CONTROLLER
 from friso.studies.compare.options import linear_flat
 from friso.views.drawing.figure import (
     BLUE,
@@ -40,6 +41,9 @@ COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)
 SAMPLES = 4000
 """Samples of a time response."""
 
+SHOWN = 3.0
+"""The responses are drawn for so many times as long as the slowest twentieth of machines takes with what works."""
+
 RTOL = 1e-7
 """Relative tolerance of the responses that are drawn."""
 
@@ -52,7 +56,8 @@ def figures(tuning: Advice) -> list[Figure]:
         "Deviation of the stage of the file from its reference after the last corner of its own motion; the share of "
         f"fresh machines in position within {with_unit(tuning.goal.within, 'm')}; the sensitivity of the loop in its "
         "limit cases, whose largest value is one over the modulus margin; the numbers between which the least change "
-        "works, each varied by itself."
+        "works, each varied by itself. Drawn are what changes least and what settles soonest, with the controller "
+        "alone and with a joint; the table has all."
     )
     return [Figure("tune", "Before and after", caption, panels, subject=tuning.stage.name)]
 
@@ -70,14 +75,28 @@ Lines = Sequence[ShownRemedy]
 
 
 def drawn_stages(tuning: Advice) -> list[ShownRemedy]:
-    """The stages that are drawn: as it is, and with each remedy that has settings."""
+    """The stages that are drawn: as it is, and those that change least and settle soonest with the controller alone,
+    and with a joint; where none works, those that are not sure to."""
     lines: list[ShownRemedy] = [(tuning.stage, None, RemedyLine("as it is", INK, "solid"))]
-    for outcome in tuning.outcomes:
-        if outcome.stage is not None:
-            again, number = divmod(len(lines) - 1, len(COLOURS))
-            line = RemedyLine(_name(outcome), COLOURS[number], "dashed" if again else "solid")
-            lines.append((outcome.stage, outcome, line))
+    for outcome in _shown(tuning):
+        assert outcome.stage is not None
+        again, number = divmod(len(lines) - 1, len(COLOURS))
+        line = RemedyLine(_name(outcome), COLOURS[number], "dashed" if again else "solid")
+        lines.append((outcome.stage, outcome, line))
     return lines
+
+
+def _shown(tuning: Advice) -> list[RemedyOutcome]:
+    """The remedies that are drawn."""
+    if not tuning.working:
+        return [outcome for outcome in tuning.outcomes if outcome.stage is not None]
+    listed: list[RemedyOutcome] = []
+    for joint in (False, True):
+        some = [outcome for outcome in tuning.working if outcome.remedy.buys_joint == joint]
+        if some:
+            soonest = min(some, key=lambda outcome: slowest(outcome, tuning.goal))
+            listed += [some[0]] if soonest is some[0] else [some[0], soonest]
+    return listed
 
 
 def _name(outcome: RemedyOutcome) -> str:
@@ -95,7 +114,11 @@ def _response(tuning: Advice, lines: Lines) -> Panel:
         if outcome is None:  # what it does in the end is to be seen
             shown_to = max(shown_to, 1.2 * float(np.abs(off[len(off) // 2 :]).max()))
     y = Axis("Deviation", "m", (-shown_to, shown_to))
-    return Panel("The same move", Axis("Time after the move", "s"), y, tuple(series))
+    settled = [slowest(outcome, tuning.goal) for _, outcome, _ in lines if outcome]
+    end = min(
+        flat["motion.duration"] - corner, SHOWN * max((time for time in settled if np.isfinite(time)), default=np.inf)
+    )
+    return Panel("The same move", Axis("Time after the move", "s", (0.0, end)), y, tuple(series))
 
 
 def _settling(tuning: Advice, lines: Lines) -> Panel:
@@ -126,17 +149,15 @@ def _windows(tuning: Advice) -> list[Panel]:
         return []
     tuned = [float(v.at(share)) for v, share in zip(least.remedy.variables, least.shares, strict=True)]
     ends = [(window.low / at, window.high / at) for window, at in zip(least.windows, tuned, strict=True)]
-    rows = [str(number) for number in range(1, len(ends) + 1)]
+    rows = tuple(window.name.removeprefix(f"{CONTROLLER}.") for window in least.windows)
     series = tuple(
-        Series(
-            np.array(pair), np.full(2, float(row)), f"{rows[row]}: {window.name}", COLOURS[row % len(COLOURS)], width=6
-        )
-        for row, (window, pair) in enumerate(zip(least.windows, ends, strict=True))
+        Series(np.array(pair), np.full(2, float(row)), "works" * (row == 0), BLUE, width=6)
+        for row, pair in enumerate(ends)
     )
     marks = (Markers(np.ones(len(rows)), np.arange(len(rows), dtype=float), "as tuned", INK),)
     reach = 1.2 * max(1.2, *(max(high, 1 / low) for low, high in ends))
     x, y = Axis("Factor of the tuned number", "", (1 / reach, reach), log=True), (-0.5, len(rows) - 0.5)
-    return [Panel("Where the least change works", x, Axis("Number", "", y, words=tuple(rows)), series, marks)]
+    return [Panel("Where the least change works", x, Axis("Setting", "", y, words=rows), series, marks)]
 
 
 def _sensitivity(tuning: Advice, lines: Lines) -> Panel:
@@ -150,10 +171,16 @@ def _sensitivity(tuning: Advice, lines: Lines) -> Panel:
         loops = [response(flat, case, drive)(within) for case in limit_cases(flat).values()]
         worst = np.max([1 / np.abs(1 + loop) for loop in loops], axis=0)
         series.append(Series(within / (2 * np.pi), worst, *line))
-    limit = Series(np.array([omega[0], omega[-1]]) / (2 * np.pi), np.full(2, 2.0), "margin of 0.5", GREY, "dashed")
+    limit = Series(
+        np.array([omega[0], omega[-1]]) / (2 * np.pi),
+        np.full(2, 1 / tuning.goal.margin),
+        f"margin of {tuning.goal.margin:g}",
+        GREY,
+        "dashed",
+    )
     return Panel(
         "Loops: the largest sensitivity of the limit cases",
         Axis.of_frequency(omega / (2 * np.pi)),
-        Axis("Sensitivity", "", (1e-2, 10.0), log=True),
+        Axis("Sensitivity", "", (0.05, 5.0), log=True),
         (*series, limit),
     )

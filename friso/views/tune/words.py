@@ -394,7 +394,7 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
         "margin": f"No setting keeps {margin} on {percent(goal.share)} of the machines: the best has "
         f"{points.margin.max(initial=0.0):.2f}.",
         "settling": f"{tried} brings {percent(goal.share)} of the machines to rest in position in time.",
-        "distance": f"{tried} still does so at {1 / goal.distance:.2f} of its bandwidth: the edge of hunting is too "
+        "distance": f"{tried} still settles at {1 / goal.distance:.2f} of its bandwidth: the edge of hunting is too "
         "close.",
         "force": f"{settle} take more force than there is.",
         "settle": f"{settle} do so too late.",
@@ -522,6 +522,10 @@ def assumptions(tuning: Advice) -> list[str]:
     """What is not known of the machine, what is assumed instead, and how the machines were drawn."""
     lines, stage, machines = [], tuning.stage, tuning.machines
     lines += _without_friction(stage.flat(), tuning.goal)
+    if any(outcome.remedy.of_setting for outcome in tuning.outcomes) and any(
+        not outcome.remedy.buys_joint for outcome in tuning.working
+    ):
+        lines.append("Settings against friction were not tried together with the bandwidth, as less than both works.")
     lines.append(
         "Margins include sampling, delay and current loop of the file; hunting and moves are those of a controller in "
         f"continuous time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), "
