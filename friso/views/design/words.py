@@ -40,8 +40,8 @@ def headline(design: Design) -> list[tuple[str, str]]:
         (ORANGE if design.needed else GREEN, need(design)),
         (
             GREEN,
-            f"The isolator: {leaves(design)}; stroke {size(design.fitted.task.stroke)} mm to each side, crossover "
-            f"{hertz(design.controller.crossover)}.",
+            f"The isolator{'' if design.needed else ', designed nevertheless'}: {leaves(design)}; stroke "
+            f"{size(design.fitted.task.stroke)} mm to each side, crossover {hertz(design.controller.crossover)}.",
         ),
         _verified(design),
         *([(GREEN, across_laws(design))] if len(design.by_law) > 1 else []),
@@ -118,18 +118,18 @@ def leaf_words(geometry: Geometry) -> str:
 
 def _verified(design: Design) -> tuple[str, str]:
     free, locked, limit = design.verification.free, design.verification.locked, design.spec.position.settling_time
-    held = f" (with the joint locked, {restless(locked)})" if locked.missed else ""
+    held = f" With the joint locked, {restless(locked)}." if locked.missed else ""
     if design.needed and not locked.missed:
         held = (
-            f" (with the joint locked as well: it does not hunt in this sample, but lies closer to the edge of hunting "
-            f"than the safety factor of {design.spec.safety.hunting:g} allows)"
+            f" With the joint locked, all do as well: it does not hunt in this sample, but lies closer to the edge of "
+            f"hunting than the safety factor of {design.spec.safety.hunting:g} allows."
         )
-    text = f"Of {free.tried} simulated moves {restless(free)}{held}: {probability(free)}. {settling(free)}"
+    text = f"Of {free.tried} simulated moves {restless(free)}: {probability(free)}. {settling(free)}"
     if limit is None:
-        return (VERMILLION if free.missed else GREEN), f"{text}."
+        return (VERMILLION if free.missed else GREEN), f"{text}.{held}"
     met = free.slower_than(0.05) <= limit
     colour = VERMILLION if free.missed or not met else GREEN
-    return colour, f"{text}; {'as' if met else 'not as'} specified ({seconds(float(limit))})."
+    return colour, f"{text}; {'as' if met else 'not as'} specified ({seconds(float(limit))}).{held}"
 
 
 def restless(outcome: MachineOutcomes) -> str:
