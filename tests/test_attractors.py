@@ -509,6 +509,12 @@ def test_swings_that_are_smaller_than_is_looked_for_leave_a_doubt() -> None:
     assert judgement.followed > 5 * 3600
 
 
+@pytest.mark.parametrize(("series", "seed", "number"), [("stages", 6101, 8), ("machines", 5201, 26)])
+def test_a_fall_of_friction_too_slow_to_feed_a_cycle_leaves_no_doubt(series: str, seed: int, number: int) -> None:
+    """By 0.06 and 0.13 %, over speeds at which a cycle would be a hundred times as large as these could feed."""
+    assert hunting(draw(seed, number, series)).certain
+
+
 SMALL_SWINGS = {  # static and Coulomb friction, Stribeck velocity, exponent, crossover; half of peak to peak [mm]
     "g4": ("3 N", "2.8 N", "300 mm/s", 0.25, "1 Hz", 0.514),
     "p2": ("3 N", "2.7 N", "300 mm/s", 0.5, "0.5 Hz", 1.835),
