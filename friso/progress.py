@@ -25,8 +25,19 @@ def share_of(progress: Progress, number: int, count: int) -> Progress:
     return report
 
 
-PERCENT = 100
-"""Steps as which a piece of work counts."""
+def between(progress: Progress, first: float, last: float, label: str = "") -> Progress:
+    """The progress of work that goes from one share of all to another, 0 to 1; a `label` stands for those of its
+    pieces."""
+
+    def report(done: int, total: int, piece: str, /) -> None:
+        share = first + (last - first) * (done / total if total else 0.0)
+        progress(round(FINELY * share), FINELY, label or piece)
+
+    return report
+
+
+PERCENT, FINELY = 100, 1000
+"""Steps as which a piece of work counts, one of equal ones and one of its own share."""
 
 
 class Tally:

@@ -213,6 +213,8 @@ def test_one_message_holds_the_command_that_tells_all(
     status, _, text = run(capsys, *first)
     assert status == 2
     assert '"u" = "N"' in (tmp_path / "bare.csv.friso.toml").read_text()
+    assert "kept for the next time" in text
+    assert "bare.csv.friso.toml" in text
     assert not (tmp_path / "out").exists()
     command = next(line for line in text.splitlines() if "friso identify" in line).partition("friso identify")[2]
     assert run(capsys, *shlex.split(command))[0] == 130

@@ -21,6 +21,9 @@ from friso.system import cause_of, path_of
 if TYPE_CHECKING:
     from friso.answers.answer import Answer
 
+DRAWING = "drawing the page"
+"""What is being done once an answer is there."""
+
 Details = Annotated[bool, typer.Option("--details", help="Also print what the answer rests on.")]
 
 
@@ -55,6 +58,7 @@ def ask(
             answer = question(*about, **options, progress=progress)
         speak_of(answer.axis_kind)
         if target is not None:
+            progress(0, 0, DRAWING)
             files, unwritten = tried(lambda: target.write(answer.files(), progress))
     show(answer, files, as_json, details, unwritten)
 

@@ -42,9 +42,13 @@ from friso.identification.quality import Quality
 from friso.identification.readings.common import noise_of
 from friso.identification.readings.ramps import force_ramps
 from friso.identification.slow_records import with_unexplained_inertia, without_sliding
-from friso.progress import Progress, silent
+from friso.progress import Progress, between, silent
 from friso.quantities import percent
 from friso.stage.controllers import CONTROLLER
+
+FITTED, REPEATED = 0.8, 0.92
+"""Shares of the work up to the ends of its parts: the fit, and its repetition on simulated logs; the last is the fit of
+either direction alone."""
 
 
 @dataclass(frozen=True)
@@ -107,14 +111,15 @@ def identify_moves(
     mass, coulomb = starts[MASS], starts.get("friction.coulomb", np.inf)
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
     noise = noise_of(log["force"][part])
-    answer = fit_identifiable(follows, loop, covered, inverse.bandwidth, noise, progress)
+    answer = fit_identifiable(follows, loop, covered, inverse.bandwidth, noise, between(progress, 0, FITTED))
     fit = answer.fit
     quality = quality_of(log, inverse, fit, noise, share)
     if not fit.problem.closed:
-        fit = as_far_off_as_repeated(fit, log, part, inverse.bandwidth, noise, progress)
+        fit = as_far_off_as_repeated(fit, log, part, inverse.bandwidth, noise, between(progress, FITTED, REPEATED))
     if not fit.explains(noise):
         fit = fit if fit.problem.closed else late_by_a_sample(fit)
-        fit, quality = _with_directions(fit, quality, moved.velocity, log.unit("force"))
+        way = between(progress, REPEATED, 1, "moves: forward and backward motion alone")
+        fit, quality = _with_directions(fit, quality, moved.velocity, log.unit("force"), way)
     if not (quality.failed or quality.rejected or is_free(flat)):
         fit, quality = _with_compliance(fit, quality, log["position"][part], log.sample_time, inverse.bandwidth)
     fit, quality = _with_delay(fit, quality, log, inverse.bandwidth)
@@ -151,11 +156,11 @@ def identify_moves(
 
 
 def _with_directions(
-    fit: OutputErrorFit, quality: Quality, velocity: np.ndarray, unit: str
+    fit: OutputErrorFit, quality: Quality, velocity: np.ndarray, unit: str, progress: Progress
 ) -> tuple[OutputErrorFit, Quality]:
     """A fit with intervals that allow for friction that differs by direction, and the quality that says so where the
     model, of one friction for both, cannot describe it; `velocity` [m/s] is smooth, `unit` that of the force."""
-    apart = either_way(fit, velocity, quality.lacks_something)
+    apart = either_way(fit, velocity, quality.lacks_something, progress)
     if apart.less is None:
         return apart.fit, quality
     doubt = (

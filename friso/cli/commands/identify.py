@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from friso.axis import speak_of
-from friso.cli.asking import Details, named_as_options, show, tried
+from friso.cli.asking import DRAWING, Details, named_as_options, show, tried
 from friso.cli.command import MACHINE, Choices, Command
-from friso.cli.common import AsJson, Overrides
+from friso.cli.common import AsJson, Overrides, say
 from friso.cli.log_options import AxisOption, Logs, Maps, SampleTime, Scales, Units
 from friso.cli.output import DefaultFolder, Overwrite
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
+from friso.escapes import one_line
 from friso.system import shell_word
 
 if TYPE_CHECKING:
@@ -97,6 +98,7 @@ def identify(
             _keep(error.mappings, target)
             raise InputError(error.key, error.actual, error.expected, _command(error.options), error.origin) from None
         speak_of(answer.axis_kind)
+        progress(0, 0, DRAWING)
         with drawing_beside():
             files, unwritten = tried(lambda: target.write(answer.files(), progress))
     show(answer, [*files, *kept] if files else [], as_json, details, unwritten)
@@ -119,6 +121,10 @@ def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> list[Path]:
         target.write({}, beside=texts)  # so that the folder is known for its own next time
     else:
         write(texts, [*filter(Path.is_file, texts)])  # mappings too, as they could be read
+    if texts:
+        first, *more = texts
+        others = f" and {len(more)} more" if more else ""
+        say(f"kept for the next time, how the log was read (options override it): {one_line(str(first))}{others}")
     return [*texts]
 
 

@@ -12,7 +12,7 @@ from friso.errors import InputError, LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.checks import rises_evenly, samples_held
 from friso.identification.logs.log import ROLES
-from friso.identification.logs.mapping import option
+from friso.identification.logs.mapping import guess, option
 from friso.identification.logs.roles import (
     MEASURED,
     AssignedRole,
@@ -83,14 +83,17 @@ def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> N
         names = " and ".join(quoted(channel.name) for channel in channels)
         likely, why = _of_alike(role, channels[0], channels)
         example = option("--map", role, likely.name) if likely else ""
-        gaps.append(LogError(role, f"{len(channels)} candidates: {names}{why}", "one channel", example, origin))
+        expected = "one channel" + (guess(likely.name) if likely else "")
+        gaps.append(LogError(role, f"{len(channels)} candidates: {names}{why}", expected, example, origin))
         if role in needed and likely:
             chosen[role] = AssignedRole(role, likely, "", True)
     for role in [role for role in needed if role not in chosen and role not in proposal.rivals]:
         taken = {name: choice.channel for name, choice in (proposal.chosen | chosen).items()}
         likely, why = _likeliest(role, table, taken)
         example = option("--map", role, likely.name) if likely else ""
-        gaps.append(LogError(role, f"no channel whose name suggests it{why}", listing(table), example, origin))
+        left = listing(table, [choice.channel for choice in proposal.chosen.values()])
+        expected = left + (guess(likely.name) if likely else "")
+        gaps.append(LogError(role, f"no channel whose name suggests it{why}", expected, example, origin))
         if likely:
             chosen[role] = AssignedRole(role, likely, "", True)
     gaps += _of_time(reading, proposal, [chosen[role] for role in needed if role in chosen])

@@ -133,6 +133,11 @@ def _pair(
     return first, second
 
 
+def guess(what: str, reason: str = "") -> str:
+    """What an example assumes that nobody told, and what that makes of the log, to be checked before it is copied."""
+    return f" (guessed: {what}{f', {reason}' if reason else ''}; check it)"
+
+
 def option(name: str, left: str, right: str) -> str:
     """An option LEFT=RIGHT as a shell takes it."""
     return f"{name} {shell_word(f'{left}={right}')}"

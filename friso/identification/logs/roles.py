@@ -257,9 +257,11 @@ def _nearest(table: ChannelTable, name: str, role: str) -> str:
     return written[near[0]] if near else next(iter(written.values()))
 
 
-def listing(table: ChannelTable) -> str:
-    """The channels there are, for a message; and what was left out as objects."""
-    labels = [c.name + (f" [{c.unit}]" if c.unit else "") for c in table.channels]
+def listing(table: ChannelTable, taken: Sequence[Channel] = ()) -> str:
+    """The channels there are, for a message, but for those that are `taken` for other roles; and what was left out as
+    objects."""
+    used = {id(channel) for channel in taken}
+    labels = [c.name + (f" [{c.unit}]" if c.unit else "") for c in table.channels if id(c) not in used]
     text = ", ".join(labels[:40]) + (f" and {len(labels) - 40} more" if len(labels) > 40 else "")
     objects = "".join(f"; {line}" for line in table.read if "structure with time" in line)
     return f"one of the channels {text}{objects}"

@@ -13,7 +13,7 @@ from friso.errors import InputError, LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.checks import rises_evenly, unwrapped
 from friso.identification.logs.log import ROLES
-from friso.identification.logs.mapping import Mapping, option
+from friso.identification.logs.mapping import Mapping, guess, option
 from friso.identification.logs.preamble import RATES, STEPS
 from friso.identification.logs.roles import AssignedRole, find, is_clock, words
 from friso.identification.logs.text import with_times
@@ -151,15 +151,16 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
     """The error for a channel whose unit is none of the role's kind, or that has none."""
     role, name, wanted = choice.role, choice.channel.name, reading.unit(choice.role)
     if not unit:
-        usual = _likely_length(choice.channel) if wanted == LENGTH else wanted
+        usual, travel = _likely_length(choice.channel) if wanted == LENGTH else (wanted, "")
         actual = f"{quoted(name)}, which has no unit{_span(choice.channel.values)}"
         expected = f"a unit convertible to {wanted}"
-        example = option("--unit", name, usual)
+        example, electric = option("--unit", name, usual), _electric_unit(choice)
         if role == "force":
-            electric = _electric_unit(choice)
             scale = f"{wanted}/{electric or 'V'}"
             expected += f", or a scale such as {option('--scale', role, f'35 {scale}')}"
             example = f'--scale {role}="NUMBER {scale}"' if electric else example
+        if not electric:
+            expected += guess(usual, travel)
         return LogError(role, actual, expected, example, reading.origin)
     number = "35.1507" if role in ("force", "disturbance") else "5e-7" if si == "count" else "1.5"
     scale = f"{wanted}/({si})" if "/" in si else f"{wanted}/{si}"
@@ -170,11 +171,13 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
     return LogError(role, f"{quoted(name)} in {unit}", expected, example, reading.origin)
 
 
-def _likely_length(place: Channel) -> str:
-    """The unit of length in which the travel of a position is between 0.5 mm and 0.5 m, or nearest to that."""
+def _likely_length(place: Channel) -> tuple[str, str]:
+    """The unit of length in which the travel of a position is between 0.5 mm and 0.5 m, or nearest to that; and what
+    the travel is then, in words."""
     finite = place.values[np.isfinite(place.values)]
     travel = float(np.ptp(finite)) if finite.size else 0.0
-    return "m" if travel <= 0.5 else "mm" if travel <= 500 else "um"
+    unit, size = ("m", 1.0) if travel <= 0.5 else ("mm", 1e-3) if travel <= 500 else ("um", 1e-6)
+    return unit, f"a travel of {1e3 * size * travel:.3g} mm"
 
 
 def _span(values: np.ndarray) -> str:
@@ -209,15 +212,20 @@ def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
     if value is None:
         actual = f"{quoted(name)} in {unit}" if unit else f"{quoted(name)}, which has no unit"
         expected = "; or ".join(text for text in ("a unit convertible to s", _offers(reading.table)) if text)
-        raise LogError("time", actual, expected, option("--unit", name, _likely_unit(clock.channel)), reading.origin)
+        likely, step = _likely_unit(clock.channel)
+        expected += guess(likely, step)
+        raise LogError("time", actual, expected, option("--unit", name, likely), reading.origin)
     return value
 
 
-def _likely_unit(clock: Channel) -> str:
-    """The unit in which the steps of a time are like those of a log, between 0.1 ms and 100 ms."""
+def _likely_unit(clock: Channel) -> tuple[str, str]:
+    """The unit in which the steps of a time are like those of a log, between 0.1 ms and 100 ms; and what they are then,
+    in words."""
     steps = np.diff(clock.values)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-    return "s" if step <= 0.1 else "ms" if step <= 100 else "us" if step <= 1e5 else "ns"
+    unit, size = ("s", 1e3) if step <= 0.1 else ("ms", 1.0) if step <= 100 else ("us", 1e-3)
+    unit, size = (unit, size) if step <= 1e5 else ("ns", 1e-6)
+    return unit, f"a sample time of {size * step:.3g} ms"
 
 
 def no_time(channel: Channel, reading: Reading) -> LogError:
@@ -227,6 +235,8 @@ def no_time(channel: Channel, reading: Reading) -> LogError:
     offer = re.match(r'--dt "[^"]*"', offers)
     clocks = [other for other in reading.table.channels if other is not channel and _may_be_a_clock(other)]
     example = offer[0] if offer else option("--map", "time", clocks[0].name) if clocks else '--dt "NUMBER ms"'
+    if clocks and not offer:
+        expected += guess(clocks[0].name, "it rises evenly")
     return LogError("time", f"no time stamps for {quoted(channel.name)}", expected, example, reading.origin)
 
 

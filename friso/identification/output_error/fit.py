@@ -15,6 +15,7 @@ from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.refine import bounds_of, refine_fit
 from friso.identification.spread import correlation_length, groups_of, spread_of
 from friso.intervals import COVERAGE
+from friso.progress import Progress, Tally, share_of, silent
 
 STARTS, TRIED, KEPT = 1024, 20, 6
 """Starts that are simulated, how many of them are refined at first, and how many to the end."""
@@ -98,29 +99,37 @@ def first_values(parameters: Sequence[FitParameter]) -> np.ndarray:
     return np.array([parameter.inner(parameter.start) for parameter in parameters])
 
 
-def fit(problem: Problem, free: Sequence[int], starts: np.ndarray) -> OutputErrorFit:
+def fit(problem: Problem, free: Sequence[int], starts: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
     """Fit the free parameters, given by number, of a problem, from some starts, shape (starts, parameters), the best of
     which are refined; the others stay as in the first of them."""
-    return fits([problem], free, starts)[0]
+    return fits([problem], free, starts, progress)[0]
 
 
-def fits(problems: Sequence[Problem], free: Sequence[int], starts: np.ndarray) -> list[OutputErrorFit]:
+def fits(
+    problems: Sequence[Problem], free: Sequence[int], starts: np.ndarray, progress: Progress = silent
+) -> list[OutputErrorFit]:
     """The same of problems that differ in nothing but what counts."""
-    pieces = _parts(problems[0], len(starts))
-    ranked = _ranked(problems, pieces, starts)
-    return [_fit(problem, pieces, free, tried) for problem, tried in zip(problems, ranked, strict=True)]
+    pieces, works = _parts(problems[0], len(starts)), 1 + len(problems)
+    ranked = _ranked(problems, pieces, starts, share_of(progress, 0, works))
+    return [
+        _fit(problem, pieces, free, tried, share_of(progress, number, works))
+        for number, (problem, tried) in enumerate(zip(problems, ranked, strict=True), 1)
+    ]
 
 
-def _fit(problem: Problem, pieces: Sequence[slice], free: Sequence[int], tried: np.ndarray) -> OutputErrorFit:
+def _fit(
+    problem: Problem, pieces: Sequence[slice], free: Sequence[int], tried: np.ndarray, progress: Progress
+) -> OutputErrorFit:
     """Fit from the best starts. What one of them is worth shows after a few iterations, on pieces of a long record: of
     a stage that sticks and slips the best of the starts as they are lead to other optima."""
     mask = np.zeros(tried.shape[1], bool)
     mask[list(free)] = True
     rough = [problem] if problem.closed else [problem.part(piece) for piece in pieces]
-    for parts, most, iterations in ((rough, TRIED, FIRST), ([problem], KEPT, ROUGH)):
-        refined = refine_fit(parts, tried[:most], np.tile(mask, (len(tried[:most]), 1)), iterations)
+    for number, (parts, most, iterations) in enumerate(((rough, TRIED, FIRST), ([problem], KEPT, ROUGH))):
+        part = share_of(progress, number, 3)
+        refined = refine_fit(parts, tried[:most], np.tile(mask, (len(tried[:most]), 1)), iterations, progress=part)
         tried = refined.inner[np.argsort(refined.cost)]
-    return polished(problem, tuple(free), tried[0])
+    return polished(problem, tuple(free), tried[0], share_of(progress, 2, 3))
 
 
 def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.ndarray:
@@ -157,15 +166,19 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
     return starts
 
 
-def _ranked(problems: Sequence[Problem], pieces: Sequence[slice], starts: np.ndarray) -> list[np.ndarray]:
+def _ranked(
+    problems: Sequence[Problem], pieces: Sequence[slice], starts: np.ndarray, progress: Progress
+) -> list[np.ndarray]:
     """Of each problem the best starts, shape (tried, parameters), the first one always among them."""
     if len(starts) <= TRIED:
         return [starts] * len(problems)
     sums = np.zeros((len(problems), len(starts) - 1))
+    tally = Tally(progress, len(pieces) * (len(starts) - 1))
     for piece in pieces:
         part, counted = problems[0].part(piece), np.stack([problem.counted[piece] for problem in problems])
         for numbers, record in part.simulated(starts[1:]):
             sums[:, numbers] += counted**2 @ ((part.target - record.force) ** 2).T
+            tally.add(len(numbers), "")
     best = np.argsort(np.where(np.isfinite(sums), sums, np.inf), axis=1)[:, : TRIED - 1]
     return [np.vstack([starts[0], starts[1:][chosen]]) for chosen in best]
 
@@ -180,10 +193,10 @@ def _parts(problem: Problem, starts: int) -> list[slice]:
     return [slice(int(first), int(first) + most // STRETCHES) for first in firsts]
 
 
-def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> OutputErrorFit:
+def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
     """The end of the fit, and how well it is known."""
     mask = np.isin(np.arange(len(inner)), free)
-    best = refine_fit([problem], inner[None], mask[None], FINE, LITTLE).inner[0]
+    best = refine_fit([problem], inner[None], mask[None], FINE, LITTLE, progress).inner[0]
     rest, slopes = problem.linearised(best, mask)
     counted = problem.counted > 0
     velocity, acceleration = problem.inputs.segments[0, :-1, 2:4].T

@@ -15,7 +15,7 @@ from friso.identification.output_error.parameters import EXPONENT, MASS, RATIO, 
 from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.profile import WORSE, Profile, profile
 from friso.identification.readings.common import low_pass
-from friso.progress import Progress, silent
+from friso.progress import Progress, between, silent
 
 STRIBECK = (RATIO, "friction.stribeck_velocity")
 CURVE = (*STRIBECK, EXPONENT)
@@ -35,8 +35,13 @@ SURE = 0.99
 AGAIN = 3
 """Times at most that a profile leads to a better fit."""
 
-STEPS = 10
-"""Pieces of about the same work that a fit with its profiles is."""
+PLAIN, LOOP, ALONG, AGAIN_LOOP = 0.1, 0.4, 0.85, 0.95
+"""Shares of the work up to the ends of its parts: mass and sliding friction, all parameters in closed loop, all along
+the log, and the closed loop from there; the last is how well they are known then."""
+
+FITTED, SETTLED, PROFILED = 0.5, 0.65, 0.95
+"""The same of the fit along the log: that of all parameters, what the log does not say between its samples, and how
+well each is known; the last is the fit of those that are shown."""
 
 SWINGS = 0.25
 """Natural frequency of the mass on its bristles, times the sample time, up to which a log follows how these bend."""
@@ -74,29 +79,29 @@ def fit_identifiable(
     would have to explain it."""
     names = [parameter.name for parameter in follows.parameters]
     core = {parameter.name for parameter in follows.parameters if parameter.core}
-    progress(0, STEPS, "moves: mass and sliding friction along the log")
-    plain = fit(follows, _numbers(names, core), first_values(follows.parameters)[None])
+    part = between(progress, 0, PLAIN, "moves: mass and sliding friction along the log")
+    plain = fit(follows, _numbers(names, core), first_values(follows.parameters)[None], part)
     explaining = []
     if loop is not None:
         numbers = tuple(range(len(names)))
-        progress(1, STEPS, "moves: all parameters in closed loop")
-        full = fit(loop, numbers, np.vstack([nearby(plain), everywhere(loop, numbers, plain.inner)]))
+        part = between(progress, PLAIN, LOOP, "moves: all parameters in closed loop")
+        full = fit(loop, numbers, np.vstack([nearby(plain), everywhere(loop, numbers, plain.inner)]), part)
         if full.explains(noise, CLOSELY):
-            return believed(full, core, covered, progress, explained=True)
+            return believed(full, core, covered, between(progress, LOOP, 1), explained=True)
         explaining = [full] if full.explains(noise) else []
-    progress(3, STEPS, "moves: all parameters along the log")
-    along = _identifiable_on_log(follows, plain, core, covered, noise, progress)
+    part = between(progress, *((PLAIN, 1) if loop is None else (LOOP, ALONG)))
+    along = _identifiable_on_log(follows, plain, core, covered, noise, part)
     if loop is None:
         return along
-    progress(STEPS - 1, STEPS, "moves: the closed loop from there")
     starts = nearby(along.fit)
     if set(along.fit.free) - set(_numbers(names, core)):
         starts = np.vstack([starts, everywhere(loop, along.fit.free, plain.inner)])
-    best = min((fit(loop, along.fit.free, starts), *explaining), key=lambda one: one.cost)
+    part = between(progress, ALONG, AGAIN_LOOP, "moves: the closed loop from there")
+    best = min((fit(loop, along.fit.free, starts, part), *explaining), key=lambda one: one.cost)
     if not (_in_step(best, along.fit, bandwidth) and bounds_as_much(best, along.fit)):
         return along
     if best.explains(noise, CLOSELY):
-        return believed(best, core, covered, progress, explained=True)
+        return believed(best, core, covered, between(progress, AGAIN_LOOP, 1), explained=True)
     return replace(along, fit=best)
 
 
@@ -109,9 +114,11 @@ def _identifiable_on_log(
     if not hopeful:
         return IdentifiableFit(plain, {}, frozenset())
     numbers = _numbers(names, core | hopeful)
-    full = fit(follows, numbers, everywhere(follows, numbers, plain.inner))
+    part = between(progress, 0, FITTED, "moves: all parameters along the log")
+    full = fit(follows, numbers, everywhere(follows, numbers, plain.inner), part)
+    between(progress, FITTED, SETTLED)(0, 0, "moves: what happens between the samples")
     full = with_force_settled(with_smoothness_settled(full), noise)
-    answer = believed(full, core, covered, progress)
+    answer = believed(full, core, covered, between(progress, SETTLED, PROFILED))
     if full.problem.inputs is not plain.problem.inputs:
         plain = polished(full.problem, plain.free, plain.inner)
     if _pays(full, plain) or answer.shown == hopeful:
@@ -120,7 +127,8 @@ def _identifiable_on_log(
         return replace(answer, fit=plain)
     free = _numbers(names, core | answer.shown | ({EXPONENT} if RATIO in answer.shown else set()))
     neutral = np.where(np.isin(np.arange(len(names)), free), full.inner, plain.inner)
-    return replace(answer, fit=fit(full.problem, free, neutral[None]))
+    part = between(progress, PROFILED, 1, "moves: the parameters that are shown")
+    return replace(answer, fit=fit(full.problem, free, neutral[None], part))
 
 
 def believed(
@@ -134,7 +142,7 @@ def believed(
     again = AGAIN
     while len(profiles) < len(asked):
         i = asked[len(profiles)]
-        progress(4 + min(len(profiles), STEPS - 6), STEPS, f"moves: how well {names[i]} is known")
+        progress(len(profiles), len(asked), f"moves: how well {names[i]} is known")
         seen, fits = profile(full, i, tuple(other for other in full.free if other != i), full.cost)
         profiles[names[i]] = seen
         if again and fits.cost.min() < full.cost * (1 - WORSE / full.independent):

@@ -8,6 +8,7 @@ import numpy as np
 
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, fits
 from friso.intervals import COVERAGE
+from friso.progress import Progress, silent
 
 LEAST = 0.2
 """Share of the samples that count of which a direction consists at least."""
@@ -29,7 +30,7 @@ class EitherWay:
     less: float | None = None
 
 
-def either_way(both: OutputErrorFit, velocity: np.ndarray, thorough: bool) -> EitherWay:
+def either_way(both: OutputErrorFit, velocity: np.ndarray, thorough: bool, progress: Progress = silent) -> EitherWay:
     """A fit beside those to the forward and to the backward motion of its record.
 
     The model has one static friction, one Stribeck velocity and one set of bristles for both; where these differ, what
@@ -45,7 +46,7 @@ def either_way(both: OutputErrorFit, velocity: np.ndarray, thorough: bool) -> Ei
         return EitherWay(both)
     problems = [replace(both.problem, counted=way, unsettled=()) for way in ways]
     starts = everywhere(both.problem, free, both.inner) if thorough else both.inner[None]
-    alone = fits(problems, free, starts)
+    alone = fits(problems, free, starts, progress)
     deviation = np.sqrt(np.diag(both.covariance))
     off = np.abs([one.inner - both.inner for one in alone]).max(axis=0)[list(both.free)] / COVERAGE
     usable = np.isfinite(deviation) & (deviation > 0)

@@ -54,6 +54,9 @@ SETTLED = 3.0
 PASSES = 5 / 8
 """Noise bandwidth [Hz] of a critically damped second-order loop, in units of its natural frequency [rad/s]."""
 
+AT_ONCE = 16384
+"""Samples of all runs together for which outputs are computed at once: what they are made of stays in the caches."""
+
 SAME = 1e-3
 """Share by which the sample time of the log and that of the drive may differ to count as one."""
 
@@ -212,9 +215,14 @@ class Problem:
         values = [np.asarray(value)[:, None] for value in self.kernel.values(part, len(runs.numbers))]
         reference = self.inputs.segments[0, :count, 1:].T[:, None, :]
         states = np.moveaxis(runs.states, 2, 0)
-        modes = self.kernel.modes(states, 0.0, reference, values)
-        outputs = self.kernel.module.outputs(states, modes, 0.0, reference, values)
-        return np.broadcast_to(outputs[list(self.kernel.outputs).index("force")], runs.states.shape[:2])
+        force = np.empty(runs.states.shape[:2])
+        size = max(1, AT_ONCE // len(runs.numbers))
+        for first in range(0, count, size):
+            part = slice(first, first + size)
+            modes = self.kernel.modes(states[..., part], 0.0, reference[..., part], values)
+            outputs = self.kernel.module.outputs(states[..., part], modes, 0.0, reference[..., part], values)
+            force[:, part] = outputs[list(self.kernel.outputs).index("force")]
+        return force
 
     def _holding_force(self, runs: DrivenRuns) -> np.ndarray:
         """The force [N] of the controller that holds a stage to a log (`tracking`), shape (runs, n)."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.identification.output_error.problem import Problem
+from friso.progress import Progress, silent
 
 FIRST, MOST = 1e-2, 1e3
 """Damping of the first step, as a share of the curvature, and that at which a fit that gets no better is left."""
@@ -48,7 +49,12 @@ def costs(pieces: Sequence[Problem], inner: np.ndarray) -> np.ndarray:
 
 
 def refine_fit(
-    pieces: Sequence[Problem], starts: np.ndarray, free: np.ndarray, iterations: int, enough: float = ENOUGH
+    pieces: Sequence[Problem],
+    starts: np.ndarray,
+    free: np.ndarray,
+    iterations: int,
+    enough: float = ENOUGH,
+    progress: Progress = silent,
 ) -> Refined:
     """Fit all `pieces` of a problem from several starts, shape (starts, parameters); of each only the numbers that are
     `free`, a mask of the same shape. A fit is done when its sum of squares falls by less than the share `enough`.
@@ -64,7 +70,8 @@ def refine_fit(
     busy = np.isfinite(cost)
     squares, gradients = np.zeros((*inner.shape, inner.shape[1])), np.zeros(inner.shape)
     moved = busy.copy()
-    for _ in range(iterations):
+    for iteration in range(iterations):
+        progress(iteration, iterations, "")
         squares[moved], gradients[moved] = _curvature(pieces, inner[moved], free[moved])
         busy &= np.isfinite(gradients).all(axis=1) & (damping < MOST)
         rows = np.flatnonzero(busy)
