@@ -34,6 +34,7 @@ from friso.identification.output_error.one_way import either_way
 from friso.identification.output_error.parameters import EXPONENT, HIGHEST_RATIO, MASS, RATIO, SHORTEST, fit_parameters
 from friso.identification.output_error.problem import loop_problem, tracking
 from friso.identification.output_error.refine import bounds_of, costs
+from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.quality import Quality
 from friso.identification.readings.common import record
 from friso.identification.stage_file import made_up
@@ -60,11 +61,31 @@ def small() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def quick() -> tuple[dict[str, Any], Log, IdentifiedMoves]:
+def reported() -> list[tuple[float, str]]:
+    """What `quick` reports of its progress: the share of the work that is done, and what is being done."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def quick(reported: list[tuple[float, str]]) -> tuple[dict[str, Any], Log, IdentifiedMoves]:
     """A machine at 2 ms, its log, and what is found in it; its controller is known."""
     machine = drawn(3, False)
     log = moves(machine)
-    return machine.flat, log, identify_moves(log, machine.guess.flat(), True)
+
+    def progress(done: int, total: int, label: str, /) -> None:
+        reported.append((done / total, label))
+
+    return machine.flat, log, identify_moves(log, machine.guess.flat(), True, progress=progress)
+
+
+@pytest.mark.usefixtures("quick")
+def test_progress_moves_within_every_part_of_a_fit(reported: list[tuple[float, str]]) -> None:
+    shares = [share for share, _ in reported]
+    assert shares == sorted(shares)
+    assert 0 <= shares[0] < shares[-1] <= 1
+    assert all(label.startswith("moves: ") for _, label in reported)
+    at = {label: [share for share, said in reported if said == label] for _, label in reported}
+    assert all(len({*at[label]}) > 2 for label in at if "parameters" in label or "sliding" in label), at
 
 
 def test_intervals_hold_mass_and_friction(quick: tuple[dict[str, Any], Log, IdentifiedMoves]) -> None:
@@ -144,6 +165,19 @@ def test_a_loop_that_bounds_less_than_the_log_does_not_take_its_place(
     lost = replace(best, covariance=np.full_like(best.covariance, np.inf))
     assert bounds_as_much(best, lost)
     assert not bounds_as_much(lost, best)
+
+
+def test_an_interval_reaches_as_far_up_as_that_of_the_logarithm(
+    quick: tuple[dict[str, Any], Log, IdentifiedMoves],
+) -> None:
+    best, covered = quick[2].fit, quick[2].covered
+    names = frozenset(parameter.name for parameter in best.problem.parameters)
+    for off in (0.02, 0.3):
+        loose = replace(best, covariance=off**2 * np.eye(len(best.free)))
+        estimates = {one.name: one for one in estimates_of(IdentifiableFit(loose, {}, names), covered)[0]}
+        stiffness = estimates["friction.bristle_stiffness"]
+        assert stiffness.high >= stiffness.value * np.exp(1.95 * off)
+        assert stiffness.high < stiffness.value * (1 + 1.1 * np.expm1(2 * off))
 
 
 def test_a_loop_that_leaves_more_than_the_noise_is_fitted_once_more(

@@ -34,15 +34,19 @@ def as_far_off_as_repeated(
 
     Noise of the position blurs where a stage breaks away, and noise of the force breaks it away early or late: what the
     stage that follows makes of that is no error about the fitted values that a Jacobian could tell, but one to one side
-    (parametric bootstrap: Efron, Tibshirani 1993, chapter 6). `noise` [N] is that of the log's force.
+    (parametric bootstrap: Efron, Tibshirani 1993, chapter 6). `noise` [N] is that of the log's force. A fit that leaves
+    more than those to the simulated logs do is off by as much more than they are: noise that has led it away, as that
+    of a force in coarse digits does, moves the machine it made less than it moved the true one.
     """
     free = np.isin(np.arange(len(once.inner)), once.free)
     again = [
-        refine_fit([problem], once.inner[None], free[None], ITERATIONS).inner[0]
+        refine_fit([problem], once.inner[None], free[None], ITERATIONS)
         for problem in _simulated_logs(once, log, part, bandwidth, noise, progress)
     ]
-    off = np.sqrt(np.mean([(inner - once.inner)[free] ** 2 for inner in again], axis=0))
+    off = np.sqrt(np.mean([(fit.inner[0] - once.inner)[free] ** 2 for fit in again], axis=0))
     off = off * float(student.ppf(CONFIDENCE, TIMES)) / COVERAGE
+    usual = float(np.mean([fit.cost[0] for fit in again]))
+    off *= np.sqrt(max(1.0, once.cost / usual)) if 0 < usual < np.inf else 1.0
     deviation = np.sqrt(np.diag(once.covariance))
     finite = np.isfinite(deviation) & (deviation > 0)
     wider = np.divide(np.maximum(off, deviation), deviation, out=np.ones_like(off), where=finite)

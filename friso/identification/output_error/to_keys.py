@@ -39,7 +39,11 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
     values = _keys_at(fit, fit.inner)
     shares = [FOLLOWED if key == "friction.static" and not fit.problem.closed else LINEARITY for key in keys]
     linear = np.array(shares) * np.abs([values[key] for key in keys]) / COVERAGE
-    deviation = np.hypot(np.sqrt(np.diag(covariance)), linear)
+    of_logarithm = {parameter.name for parameter in parameters if parameter.logarithmic}
+    logarithmic = np.isin([_OWNERS.get(key, key) for key in keys], [*of_logarithm])
+    spread_of_keys = np.sqrt(np.diag(covariance))
+    farther = _to_the_farther_end(spread_of_keys, np.array([values[key] for key in keys]))
+    deviation = np.hypot(np.where(logarithmic, farther, spread_of_keys), linear)
     unknown = _reasons(identified, covered)
     estimates = []
     for i, key in enumerate(keys):
@@ -55,6 +59,15 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
     part = covariance[np.ix_(certain, certain)] / np.outer(deviation[certain], deviation[certain])
     np.fill_diagonal(part, 1.0)
     return tuple(estimates), (part + part.T) / 2
+
+
+def _to_the_farther_end(deviation: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Deviations that reach, about `values` fitted as logarithms, as far as the upper end of the interval of the
+    logarithm does: that of half a value is 0.65 of it above, and 0.4 below."""
+    size = np.abs(values)
+    relative = np.divide(deviation, size, out=np.zeros_like(size), where=size > 0)
+    farther = size * np.expm1(COVERAGE * np.minimum(relative, 1.0)) / COVERAGE
+    return np.where(relative > 0, np.maximum(farther, deviation), deviation)
 
 
 _OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}

@@ -142,9 +142,18 @@ def robust(values: np.ndarray) -> float:
 def noise_of(signal: np.ndarray) -> float:
     """Standard deviation of the noise of a force [N] or a position [m], shape (n,): of what neighbouring samples do not
     share, as its third differences show it, or of its digits."""
-    rough = np.diff(signal, 3)
-    white = NORMAL_MAD * float(np.median(np.abs(rough))) / np.sqrt(20) if rough.size else 0.0
-    return max(white, digit_of(signal) / np.sqrt(12))
+    rough, digit = np.abs(np.diff(signal, 3)), digit_of(signal)
+    white = NORMAL_MAD * _median(rough, digit) / np.sqrt(20) if rough.size else 0.0
+    return max(white, digit / np.sqrt(12))
+
+
+def _median(sizes: np.ndarray, digit: float) -> float:
+    """The median of sizes that were rounded to whole digits, as of grouped data: each stands for all within half a
+    digit, none of which is below 0."""
+    middle = float(np.median(sizes))
+    low = max(middle - digit / 2, 0.0)
+    below, within = np.mean(sizes < low), np.mean(np.abs(sizes - middle) < digit / 2)
+    return low + float((0.5 - below) / within) * (middle + digit / 2 - low) if within > 0 else middle
 
 
 def digit_of(signal: np.ndarray) -> float:
