@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
+from warnings import catch_warnings
 
 import numpy as np
 import pytest
@@ -724,6 +725,14 @@ def test_a_margin_is_between_0_and_1(rigid: Stage, margin: str, refused: Refused
 LIMITER = {"limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}
 
 DITHER = {"dither_amplitude": "0.5 N", "dither_frequency": "100 Hz"}
+
+
+def test_a_force_that_is_not_finite_warns_of_nothing() -> None:
+    """With a force limit below 1 N the library warned of an overflow, on the user's screen."""
+    column = np.ones(1)
+    points = TriedPoints(np.zeros((1, 1)), column, column, column, np.array([np.inf]), column, column, column, column)
+    with catch_warnings(action="error"):
+        assert np.isfinite(points.cost(Goal(force_limit=0.2))).all()
 
 
 def test_reasons_say_nothing_of_settings_that_were_left_out_before() -> None:

@@ -138,6 +138,7 @@ def _most(limit: float | None) -> float:
     return np.inf if limit is None else limit
 
 
+@np.errstate(over="ignore")  # a force that is not finite counts otherwise
 def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
     """By what share values are above a limit."""
     return np.maximum(0, values / _most(limit) - 1)
