@@ -15,6 +15,7 @@ from variants import LOCKED, PARASITIC, VARIANTS, free, lugre, release, stage, v
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
+from friso.equations.bandwidth import faster
 from friso.equations.structure import structure
 from friso.hunting.check import check_given
 from friso.hunting.cycle.ensemble import Ensemble
@@ -235,6 +236,13 @@ def test_results_do_not_depend_on_the_tolerance(chosen: Stage) -> None:
         assert rough.amplitude == pytest.approx(fine.amplitude, rel=1e-6)
         assert rough.multiplier == pytest.approx(fine.multiplier, rel=1e-4)
         assert rough.residual < 1e-8
+
+
+@RIGID
+def test_orbits_are_closed_at_a_rough_tolerance_too() -> None:
+    """However rough the runs, Newton's method goes on until the orbit counts as closed."""
+    stages = Ensemble.held(faster(rigid(4).flat(), np.geomspace(0.5, 1.1, 40)), 40)
+    assert symmetric_cycles(stages, 1e-5).closed.all()
 
 
 @FREE_RIG

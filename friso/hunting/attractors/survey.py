@@ -37,7 +37,7 @@ suffice."""
 
 ABREAST = 4
 """Runs that are followed of all that repeat themselves like a cycle that repels, on either side of it: those farthest
-from it, which leave it first, and as many together as take no longer than one."""
+from it, which leave it first. So many together take no longer than one."""
 
 TIMES = 2
 """How many times the time of a cycle that repels a motion takes at most that repeats itself beside it."""

@@ -41,9 +41,10 @@ SMALL_GAP, ROUNDING = 0.002, 1e-9
 """Share of the break-away force by which friction falls with speed: the smallest for which cycles are of a size that is
 looked for; and where it does not fall at all."""
 
-FEEDING = 0.05
-"""The same share of an amplitude below which the fall of friction feeds no cycle, at whatever speed it is: a fortieth
-of the least with which any was found."""
+UNFED = 0.05
+"""Fall of friction up to a speed, as that share, over the amplitude of swings that fast, as a share of the deflection
+by the break-away force: where it is below this at all speeds, no cycle is fed. The least with which one was found was
+forty times as much."""
 
 FASTEST, SPEEDS = 1e7, 300
 """The fastest speed at which friction is evaluated, in units of the largest of small swings, and how many of these."""
@@ -316,7 +317,7 @@ def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
     falls = (np.maximum.accumulate(np.maximum(force, at_rest), axis=2) - force) / breakaway[:, None]
     deepest, fed = falls.max(axis=2), falls[:, :, : sizes.size] / sizes
     last, most = fed[:, :, -1], fed.max(axis=2)
-    feeds = (falls / (speeds / (stages.length * stages.number("rate"))[:, None])[:, None]).max(axis=2) > FEEDING
+    feeds = (falls / (speeds / (stages.length * stages.number("rate"))[:, None])[:, None]).max(axis=2) > UNFED
     little = (deepest > ROUNDING) & (deepest < SMALL_GAP) & feeds
     fades = (last < FED[1]) & (most > np.maximum(FED[0], 1.2 * last))
     return np.any(little | fades, axis=1)

@@ -34,7 +34,7 @@ FINEST, FINEST_CHATTERING = 1e-11, 1e-8
 """Gap that is as good as none, and that for a limiter that may chatter, where gaps below it are rounding's."""
 
 WITHIN = 0.1
-"""Share of the tolerance of its runs to which a gap is as good as none."""
+"""Share of the tolerance of its runs to which a gap is as good as none, if an orbit with it is closed (`CLOSED`)."""
 
 FOLLOWED, STALLED_FOLLOWED = 1e-6, (3, 3, 1)
 """Gap on the way along a branch up to which an orbit counts as closed that gets no closer, as where the stage is stiff
@@ -197,7 +197,7 @@ class _Shooting:
         self.inverses: list[np.ndarray] = [np.empty(0)] * count
         self.active, self.serves = np.ones(count, bool), np.zeros(count, bool)
         self.chatters = family(np.arange(count), self.places).chatters
-        self.finest = FINEST_CHATTERING if self.chatters else max(FINEST, WITHIN * rtol)
+        self.finest = FINEST_CHATTERING if self.chatters else max(FINEST, min(WITHIN * rtol, CLOSED))
         self.limit, self.stalled = CLOSED_CHATTERING if self.chatters else CLOSED, STALLED
 
     def advance(self) -> bool:
