@@ -881,3 +881,14 @@ def test_an_orbit_beside_the_edge_of_a_window_beyond_which_a_controller_pushes_i
     assert motion.cycles is not None
     assert motion.amplitude == pytest.approx(4.57664e-4, rel=1e-5)
     assert motion.period == pytest.approx(2.77911, rel=1e-5)
+
+
+def test_a_motion_that_anti_windup_holds_far_out_is_not_said_to_run_away_for_good() -> None:
+    """Runs of a step of 1 mm are followed for 1 km; with 10 kN the stage swings by 1.4 km to either side in the end."""
+    limit = {"controller.force_limit": "10 kN", "controller.anti_windup": "back_calculation"}
+    chosen = VARIANTS["rigid stage, PI"].replace({"controller.ki": "5e6 N/(m*s)"})
+    case = check_given(chosen.replace({**limit, "controller.anti_windup_time": "50 ms"}))
+    assert case.judgement.hunting.target is not None
+    assert float(case.judgement.hunting.target.amplitude) == pytest.approx(1399, rel=0.01)
+    assert (case.verdict, case.judgement.runs_away, case.runs_away) == ("failed", True, False)
+    assert check_given(chosen).runs_away

@@ -40,6 +40,13 @@ def winds_up_at_a_limit(stages: Ensemble) -> bool:
     return bool(controller and controller.anti_windup == "none")
 
 
+def may_swing_far_out(stages: Ensemble) -> bool:
+    """Whether stages have a force limit with anti-windup, behind which what runs away may come to a swing farther out
+    than runs are followed."""
+    controller = stages.structure.controller
+    return bool(controller and controller.anti_windup) and not winds_up_at_a_limit(stages)
+
+
 def far_beyond_a_limit(stages: Ensemble) -> np.ndarray | None:
     """The loops of stages as swings far beyond a force limit without anti-windup see them, words of shape (count,):
     where they are unstable these grow, where they are stable these shrink. None: there is no such limit."""

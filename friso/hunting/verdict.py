@@ -108,7 +108,8 @@ class Judgement:
     longer than its own end, as the longer run was not needed or not completed). `observed`: what attracts was observed
     in long simulations, no orbit that attracts could be closed. `lasting` [m], peak to peak, is where this motion alone
     was seen to swing on, at the end of the time for which it was followed; it `runs_away` if it leaves its reference
-    for good. `given_up`: what of `PARTS`, or `LOWER`, or `FEEDING`, would have taken more work than was allowed.
+    farther than runs are followed. `given_up`: what of `PARTS`, or `LOWER`, or `FEEDING`, would have taken more work
+    than was allowed.
     """
 
     verdict: Verdict
@@ -273,7 +274,8 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
 
 
 def _runs_away(stage: Stage, target: Target) -> bool:
-    """Whether the stage's own motion leaves its reference for good, before it has come to what attracts it."""
+    """Whether the stage's own motion leaves its reference farther than runs are followed, before it has come to what
+    attracts it."""
     flat = stage.flat()
     longer = {**flat, "motion.duration": float(np.max(last_corner(flat)) + target.lasting)}
     return bool(run_motions(longer, 1, measuring_options(RTOL)).away[0])
