@@ -371,7 +371,7 @@ class Survey:
 
     def _exact(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Which runs repeat themselves as exactly as they do on what attracts alone, or approach that where nothing
-        has to be proved, and unlike any closed cycle that repels."""
+        has to be proved, and unlike any closed cycle that repels, or beside one to stay."""
         repeats, unlike = ends.repeats, (ends.repeats.swings > 0) & ~_like(self._closed, owners, ends)
         if self.prove:
             return (unlike & (repeats.deviation < EXACT)) | self._stay(owners, ends)
