@@ -910,10 +910,11 @@ def test_a_browser_that_has_not_opened_the_address_is_told_to(browsed: Browsed) 
 
 def test_a_narrow_page_draws_what_is_there_otherwise_and_asks_nothing(browsed: Browsed) -> None:
     page, asked = browsed.page, []
+    page.wait_for_selector("#answer .rest .note")  # the whole verdict, which else is asked for behind the pictures
     page.click("#tab-map")
     page.wait_for_selector(".plot .heatmaplayer image")
     page.wait_for_function("() => document.querySelector('.plot').data.some((one) => one.z?.length === 41)")
-    page.wait_for_load_state("networkidle")  # the verdict is asked for behind the pictures
+    page.wait_for_load_state("networkidle")
     page.on("request", lambda request: asked.append(request.url))
     height = page.evaluate("document.querySelector('.plot').layout.height")
     page.set_viewport_size({"width": 400, "height": 900})

@@ -35,9 +35,10 @@ MOST_KINDS, DEARER = 32, 30.0
 the next ones may take: of a stage that nothing attracts so far all kinds are followed for which the steps left
 suffice."""
 
-ABREAST = 4
-"""Runs that are followed of all that repeat themselves like a cycle that repels, on either side of it: those farthest
-from it, which leave it first. So many together take no longer than one."""
+ABREAST, OUTER = 4, 0.25
+"""Runs that are followed of all that repeat themselves like a cycle that repels, on either side of it, and the share of
+the distance of the farthest one over which they are spread: those leave it first. So many together take no longer than
+one."""
 
 TIMES = 2
 """How many times the time of a cycle that repels a motion takes at most that repeats itself beside it."""
@@ -122,6 +123,17 @@ class _Beside:
     def take(self, numbers: np.ndarray) -> _Beside:
         """Those of the runs with these numbers."""
         return _Beside(self.cycles[numbers], self.offsets[numbers])
+
+    @property
+    def leave_first(self) -> np.ndarray:
+        """The runs that are followed for all on the same side of the same cycle, (runs,)."""
+        chosen, far, sides = np.zeros(len(self.cycles), bool), np.abs(self.offsets), np.sign(self.offsets)
+        for cycle, side in {*zip(self.cycles.tolist(), sides.tolist(), strict=True)} - {(-1, 0.0)}:
+            group = np.flatnonzero((self.cycles == cycle) & (sides == side))
+            group = group[np.argsort(-far[group], kind="stable")]
+            group = group[far[group] >= OUTER * far[group[0]]]
+            chosen[group[np.linspace(0, len(group) - 1, ABREAST).round().astype(int)]] = True
+        return chosen
 
 
 def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
@@ -236,7 +248,7 @@ class Survey:
             if not swinging.size:
                 return
             beside = self._beside(owners, ends)
-            apart = ~ends.swing if number > 0 else beside.cycles < 0  # each of them somewhere else
+            apart = ~ends.swing if number > 0 else (beside.cycles < 0) | runs.stages.remember  # each somewhere else
             still = swinging[apart[swinging]]
             moving = np.setdiff1d(swinging, still)
             most = self._affordable(owners, ends)[moving]
@@ -419,18 +431,17 @@ def _kinds(
     repeats = ends.repeats.swings > 0
     sizes, times = ends.repeats.size, np.nan_to_num(ends.repeats.time)
     near = np.where(repeats, ALIKE, CLOSE)
-    cycles, sides = beside.cycles, np.sign(beside.offsets)
+    cycles, leaves_first = beside.cycles, beside.leave_first
 
     def same_kind(k: int, j: int) -> bool:
-        if cycles[k] >= 0 or cycles[j] >= 0:
-            return bool(cycles[k] == cycles[j] and sides[k] == sides[j])
         same = abs(sizes[k] - sizes[j]) <= near[k] * sizes[j] and abs(times[k] - times[j]) <= ALIKE * times[j]
-        return bool(same and repeats[k] == repeats[j])
+        return bool(same and repeats[k] == repeats[j] and cycles[j] < 0)
 
-    for k in np.lexsort((ends.repeats.swings, -np.abs(beside.offsets))).tolist():
+    for k in np.argsort(ends.repeats.swings, kind="stable").tolist():
         same_stage = chosen.setdefault(int(owners[k]), [])
-        alike = sum(same_kind(k, j) for j in same_stage)
-        if alike < (ABREAST if cycles[k] >= 0 else 1):
-            (same_stage if alike or len(same_stage) < limits[k] else surplus).append(k)
+        if cycles[k] < 0 and any(same_kind(k, j) for j in same_stage):
+            continue
+        if cycles[k] < 0 or leaves_first[k]:
+            (same_stage if len(same_stage) < limits[k] else surplus).append(k)
     stand = [k for numbers in chosen.values() for k in numbers]
     return np.array(stand, dtype=np.int64), np.array(surplus, dtype=np.int64)
