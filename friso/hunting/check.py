@@ -21,7 +21,7 @@ from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import cannot_hunt
 from friso.hunting.feeding import Feeding, feeding
-from friso.hunting.loop import LoopState, may_swing_far_out, unstable
+from friso.hunting.loop import LoopState, unstable
 from friso.hunting.measures import BANDS, measure_runs, measuring_options
 from friso.hunting.verdict import ATTRACTION, FEEDING, PARTS, ROOM, WORK, Judgement, judge
 from friso.progress import Progress, Tally, silent
@@ -87,8 +87,7 @@ class Case:
     @property
     def runs_away(self) -> bool:
         """Whether the motion leaves its reference for good because the loop is unstable: there is no other verdict."""
-        away = self.verdict == "failed" and self.judgement.runs_away and bool(self.unstable)
-        return away and not may_swing_far_out(Ensemble.held(self.stage.flat(), 1))
+        return self.verdict == "failed" and self.judgement.runs_away
 
     @property
     def unmoved(self) -> bool:

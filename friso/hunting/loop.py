@@ -40,13 +40,6 @@ def winds_up_at_a_limit(stages: Ensemble) -> bool:
     return bool(controller and controller.anti_windup == "none")
 
 
-def may_swing_far_out(stages: Ensemble) -> bool:
-    """Whether stages have a force limit with anti-windup, behind which what runs away may come to a swing farther out
-    than runs are followed."""
-    controller = stages.structure.controller
-    return bool(controller and controller.anti_windup) and not winds_up_at_a_limit(stages)
-
-
 def far_beyond_a_limit(stages: Ensemble) -> np.ndarray | None:
     """The loops of stages as swings far beyond a force limit without anti-windup see them, words of shape (count,):
     where they are unstable these grow, where they are stable these shrink. None: there is no such limit."""
@@ -101,6 +94,15 @@ def unstable(stage: Stage) -> tuple[LoopState, ...]:
     """In which of its states the loop is not stable, the limiter not touched: while the stage sticks, held by its
     bristles, and while it slides, with no friction but its viscous share."""
     return tuple(state for state, where in unstable_among(Ensemble.held(stage.flat(), 1)).items() if where[0])
+
+
+def leaves_for_good(stage: Stage) -> bool:
+    """Whether a motion that has gone farther from its reference than runs are followed goes on for good: the loop is
+    unstable, and there is no force limit with anti-windup, behind which it may come to a swing farther out."""
+    stages = Ensemble.held(stage.flat(), 1)
+    controller = stages.structure.controller
+    limited = bool(controller and controller.anti_windup) and not winds_up_at_a_limit(stages)
+    return not limited and bool(unstable(stage))
 
 
 @np.errstate(all="ignore")  # absurd gains leave infinities behind

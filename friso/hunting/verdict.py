@@ -41,7 +41,7 @@ from friso.hunting.cycle.hunting import (
     surely_surveyed,
     why_not,
 )
-from friso.hunting.loop import may_run_away, unstable, winds_up_at_a_limit
+from friso.hunting.loop import leaves_for_good, may_run_away, winds_up_at_a_limit
 from friso.hunting.margin import DISTANCE, NOT_SOUGHT, Margin, SearchedBandwidths, followed_on, search_bandwidths
 from friso.hunting.measures import Measures, measuring_options
 from friso.hunting.motions import FollowedMotions, Motions, followed_motions, resting, run_motions, some_of
@@ -108,8 +108,7 @@ class Judgement:
     longer than its own end, as the longer run was not needed or not completed). `observed`: what attracts was observed
     in long simulations, no orbit that attracts could be closed. `lasting` [m], peak to peak, is where this motion alone
     was seen to swing on, at the end of the time for which it was followed; it `runs_away` if it leaves its reference
-    farther than runs are followed. `given_up`: what of `PARTS`, or `LOWER`, or `FEEDING`, would have taken more work
-    than was allowed.
+    for good. `given_up`: what of `PARTS`, or `LOWER`, or `FEEDING`, would have taken more work than was allowed.
     """
 
     verdict: Verdict
@@ -164,7 +163,7 @@ def judge(
         moves_on = _keeps_moving(stage.flat()) and not cannot_hunt(stage)
         attraction = Hunting((), MOVING, True, None) if moves_on else hunting(stage, work=SURVEY * work)
     if not motions.completed[0]:
-        return Judgement("failed", attraction, runs_away=bool(motions.away[0]))
+        return Judgement("failed", attraction, runs_away=bool(motions.away[0]) and leaves_for_good(stage))
     if attraction.target:
         return _with_a_target(stage, motions, attraction, attraction.target, begin, work - spent.used)
     begin(BANDWIDTHS)
@@ -176,7 +175,7 @@ def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: H
         rest = followed_motions(
             stage.flat(), motions, 1, replace(measuring_options(rtol), room=ROOM), possible=attraction.possible
         )
-    if rest.away[0] and unstable(stage):
+    if rest.away[0] and leaves_for_good(stage):
         return Judgement("failed", attraction, runs_away=True)
     leaves = attraction.surveyed is not None and bool(attraction.surveyed.runs_away[0])
     runs_away, doubtful = leaves and bool(rest.away[0]), attraction.possible and attraction.certain
@@ -219,7 +218,7 @@ def _with_a_target(
     with allowance() as spent:
         own = own_motion(stage, target, REST * work)
         if not own.completed:
-            return Judgement("failed", attraction, runs_away=_runs_away(stage, target))
+            return Judgement("failed", attraction, runs_away=_runs_away(stage, target) and leaves_for_good(stage))
         within = float(motions.settling[0])
         doubt = "" if own.ends else _restless(stage, attraction, own.swing, within)
         doubt = own.doubt or doubt
