@@ -509,7 +509,7 @@ def test_a_map_is_laid_out_once_for_its_page_and_its_files(
     drawn: list[Figure] = []
     render = matplotlib_renderer.render
     monkeypatch.setattr(matplotlib_renderer, "render", lambda figure: drawn.append(figure) or render(figure))
-    files = map_files(plain(), "peaks", RERUN, None)
+    files = map_files(plain(), "peaks", RERUN, lambda: None)
     for form in matplotlib_renderer.FORMATS:
         files[form](tmp_path / f"map.{form}")
     assert len(drawn) == 1

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -126,7 +127,7 @@ class SweepAnswer(Answer):
         again = 'friso.simulate(runs.cell("{indices}"))'
         if self.store is not None:
             again = f"friso simulate --cell {shell_word(str(self.store))} {{indices}}"
-        return map_files(self.result, self.metric, again, drawn_runs(self.study, self.result, progress))
+        return map_files(self.result, self.metric, again, partial(drawn_runs, self.study, self.result, progress))
 
 
 @question

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from friso.engine.batch import run_chunks
-from friso.engine.kernel import Kernel, kernel
+from friso.engine.kernel import kernel
 from friso.equations import motion
 from friso.hunting.measures import measuring_options
 from friso.progress import Progress, Tally, silent
@@ -25,7 +25,7 @@ IN_BIN = 20
 DRAWING = "drawing runs"
 """What a progress is told."""
 
-CHUNK = 128
+CHUNK = 256
 """Runs whose samples are held at once."""
 
 
@@ -55,22 +55,30 @@ def traces(study: Study, skipped: np.ndarray | None = None, progress: Progress =
     time = np.arange(BINS * IN_BIN) * interval
     drawn = Traces(np.full((study.cells, 2 * BINS), np.nan), np.zeros(study.cells), duration)
     for flat, cells, shape in by_equations(parts, allowed):
-        form = kernel(shape)
+        form, references = kernel(shape), _references(flat, time)
+        end, corner = flat["motion.duration"], motion.last_corner(flat)
+        drawn.late[cells] = (end + np.where(corner < 0.9 * end, corner, 0.0)) / 2
         for runs in run_chunks(form, flat, len(cells), options):
             for number, states in zip(runs.numbers, runs.results.samples, strict=True):
-                one = {key: value[number] if np.ndim(value) else value for key, value in flat.items()}
-                drawn.deviations[cells[number]] = _extremes(_deviation(form, one, states, time))
-                end, corner = float(one["motion.duration"]), float(motion.last_corner(one))
-                drawn.late[cells[number]] = (end + (corner if corner < 0.9 * end else 0.0)) / 2
+                drawn.deviations[cells[number]] = _extremes(_deviation(states[:, form.position], references(number)))
             tally.add(len(runs.numbers), DRAWING)
     return drawn
 
 
-def _deviation(form: Kernel, flat: Mapping[str, Any], states: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Position minus reference [m] at the times; NaN beyond what was sampled."""
-    deviation = np.full(time.shape, np.nan)
-    sampled = states[: len(time), form.position]
-    deviation[: len(sampled)] = sampled - motion.reference(flat, time[: len(sampled)])
+def _references(flat: Mapping[str, Any], time: np.ndarray) -> Callable[[int], np.ndarray]:
+    """The reference [m] at the times of the run with a number: the same for all, as a rule."""
+    moved = {key: value for key, value in flat.items() if key.startswith("motion.")}
+    if not any(np.ndim(value) for value in moved.values()):
+        reference = motion.reference(moved, time)
+        return lambda number: reference
+    return lambda number: motion.reference({k: v[number] if np.ndim(v) else v for k, v in moved.items()}, time)
+
+
+def _deviation(position: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Position minus reference [m]; NaN beyond what was sampled."""
+    deviation = np.full(reference.shape, np.nan)
+    sampled = position[: len(reference)]
+    deviation[: len(sampled)] = sampled - reference[: len(sampled)]
     return deviation
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -29,13 +30,13 @@ PRINTED = ON_PAGE._replace(noted=False)
 """What the page shows where it is printed."""
 
 
-def map_files(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None) -> dict[str, Content]:
-    """The figure in all formats and the page of a map, by their suffixes in the order of `FORMS`; `rerun` and `drawn`
-    as in `map_html`."""
+def map_files(runs: xr.Dataset, metric: str, rerun: str, draw: Callable[[], Traces | None]) -> dict[str, Content]:
+    """The figure in all formats and the page of a map, by their suffixes in the order of `FORMS`; `rerun` as in
+    `map_html`, and `draw` makes the runs that are `drawn` there, beside which the figure is."""
     figure = map_figure(runs, metric)
     draw_beforehand([figure], [*map(Image, FORMATS), PRINTED])
     files: dict[str, Content] = {form: partial(save, figure) for form in FORMS[:-1]}
-    return {**files, FORMS[-1]: map_html(runs, metric, rerun, drawn, figure)}
+    return {**files, FORMS[-1]: map_html(runs, metric, rerun, draw(), figure)}
 
 
 def map_html(
