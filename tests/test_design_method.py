@@ -176,7 +176,7 @@ def test_relaxed_alone_a_requirement_lets_leaves_do(base: Stage, monkeypatch: py
 def test_no_leaves_no_design(base: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(relax_module, "GENERATIONS", 5)
     with pytest.raises(NoDesign, match="no leaf springs"):
-        leaves(loaded(force_x="500 N"), base.flat(), 1.0, lambda *labels: None)
+        leaves(loaded(force_x="500 N"), base.flat(), 1.0)
 
 
 # --- hunting and the controller ---------------------------------------------------------------------------------------

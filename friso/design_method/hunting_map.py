@@ -10,7 +10,6 @@ from friso.design_method.population import Population, typical_move
 from friso.design_method.spec import Spec
 from friso.design_method.verification import move_machines
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.progress import Progress
 from friso.stage import Stage
 
 CROSSOVERS, STROKES = 24, 16
@@ -30,7 +29,7 @@ class HuntingMap:
     share: np.ndarray
 
 
-def hunting_map(stage: Stage, spec: Spec, population: Population, progress: Progress) -> HuntingMap:
+def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
     """The map about a design, at its own drive stiffness."""
     flat = stage.flat()
     crossovers, strokes = (
@@ -43,6 +42,6 @@ def hunting_map(stage: Stage, spec: Spec, population: Population, progress: Prog
     )
     machines = {key: value[number] for key, value in population.keys.items()}
     runs = {**flat, **machines, **typical_move(spec), CROSSOVER: crossover, "joint.stroke": stroke}
-    outcome = move_machines(runs, len(number), float(spec.position.window), progress, "hunting map", patient=False)
+    outcome = move_machines(runs, len(number), float(spec.position.window), patient=False)
     share = np.where(outcome.completed, outcome.restless, np.nan).reshape(shape).mean(axis=2)
     return HuntingMap(crossovers, strokes, share)

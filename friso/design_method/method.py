@@ -27,6 +27,7 @@ from friso.design_method.relax import Relaxation, relaxed_requirements
 from friso.design_method.requirements import LeafTask
 from friso.design_method.spec import Spec
 from friso.design_method.verification import Verification, verification
+from friso.engine.side_by_side import both
 from friso.equations.breakaway import least_breakaway
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.ranges import Range
@@ -140,31 +141,38 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
     InputError for input that cannot be used, NoDesign if nothing meets the specification."""
     base = prepared(stage, spec)
     flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit
+    friction = float(np.min(least_breakaway(population.over(flat))))
+    if friction <= 0:
+        raise NoDesign("the bias force on the cart exceeds the least static friction: no joint is soft enough")
     others = laws([base.with_numbers(_friction_of(population, n)) for n in range(population.count)])
     over = partial(
         _by_law, laws={flat["friction.model"]: {}, **others.frictions}, population=population, progress=progress
     )
-    without = over(rigid(flat), FIRST * limit, BEYOND * limit, "hunting without isolator")
-    friction = float(np.min(least_breakaway(population.over(flat))))
-    if friction <= 0:
-        raise NoDesign("the bias force on the cart exceeds the least static friction: no joint is soft enough")
-    task, candidates = leaves(spec, flat, friction, progress)
-    progress(0, 1, "leaves and crossover")
-    fit = fit_leaves(base, task, candidates, population)
+
+    def fitted() -> tuple[LeavesAndCrossover, list[Candidate]]:
+        task, candidates = leaves(spec, flat, friction)
+        return fit_leaves(base, task, candidates, population), candidates
+
+    label = "hunting without isolator"
+    without, (fit, candidates) = both(partial(over, rigid(flat), FIRST * limit, BEYOND * limit, label), fitted)
     crossover = fit.stage.flat()[CROSSOVER]
-    progress(0, 1, "hunting with isolator")
     stiffest = fit.stage.flat()["joint.stiffness"] * (1 + spec.safety.stiffness_tolerance)
     worst = {**fit.stage.flat(), "joint.stiffness": stiffest}
-    isolated = over(worst, FIRST * crossover, ABOVE * crossover, "hunting with isolator")
+
+    def examined() -> tuple[tuple[Confirmed, ...], DesignedController, HuntingMap]:
+        control = choose_controller(fit.stage, fit.choice.beams, population)
+        return tuple(confirmed(fit.task, candidates)), control, hunting_map(fit.stage, spec, population)
+
+    label = "hunting with isolator"
+    isolated, (by_beams, control, edges_map) = both(
+        partial(over, worst, FIRST * crossover, ABOVE * crossover, label), examined
+    )
     edges = worst_edges(isolated)
     _does_not_hunt(fit, edges)
-    progress(0, 1, "margins")
-    control = choose_controller(fit.stage, fit.choice.beams, population)
-    progress(0, 1, "hunting map")
-    edges_map = hunting_map(fit.stage, spec, population, progress)
-    by_beams = tuple(confirmed(fit.task, candidates))
-    tried = verification(fit.stage, spec, fit.task.load / fit.choice.beams.buckling, progress)
-    damped, faster = with_damping(fit)
+    softening = fit.task.load / fit.choice.beams.buckling
+    tried, (damped, faster) = both(
+        partial(verification, fit.stage, spec, softening, progress), partial(with_damping, fit)
+    )
     results = (worst_edges(without), tuple(candidates), by_beams, fit, edges, control, edges_map, tried, damped, faster)
     return Design(spec, stage, *results, {law: (without[law], isolated[law]) for law in without}, others.lost)
 
@@ -207,16 +215,13 @@ def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
     return None, target
 
 
-def leaves(
-    spec: Spec, flat: Mapping[str, Any], friction: float, progress: Progress
-) -> tuple[LeafTask, list[Candidate]]:
+def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTask, list[Candidate]]:
     """The front for the largest stroke that allows the machine's limit; else that which allows the highest crossover.
     Raises NoDesign where no leaf springs meet the requirements."""
     stroke, choices = spec.leaves.stroke, []
     several = stroke.high > stroke.low
     strokes = np.geomspace(stroke.high, stroke.low, STROKES).tolist() if several else [stroke.high]
-    for k, size in enumerate(strokes):
-        progress(k, len(strokes), "leaf springs")
+    for size in strokes:
         task = LeafTask(spec, size, spec.limit, friction, flat)
         if candidates := front(task):
             choices.append((task, candidates))

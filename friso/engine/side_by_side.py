@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from contextvars import ContextVar, copy_context
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from friso.engine.overtaken import ended_by, go_on
 from friso.system import usable_cores
 
 _T = TypeVar("_T")
+_Other = TypeVar("_Other")
 
 _PATIENCE = 0.1
 """How long [s] is waited before it is looked again whether anybody waits for all of it still."""
@@ -77,3 +78,10 @@ def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
             flag[0] = 1
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def both(first: Callable[[], _T], second: Callable[[], _Other]) -> tuple[_T, _Other]:
+    """What two tasks return, one beside the other as `side_by_side`."""
+    tasks: list[Callable[[], Any]] = [first, second]
+    one, other = side_by_side(tasks)
+    return one, other
