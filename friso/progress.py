@@ -52,3 +52,21 @@ class Tally:
         with self._turn:
             self.done += steps
             self.progress(self.done, self.total, label)
+
+
+def together(progress: Progress, count: int) -> list[Progress]:
+    """The progresses of `count` equal pieces of work that are done side by side, within that of all."""
+    tally = Tally(progress, PERCENT * count)
+
+    def piece() -> Progress:
+        before = 0
+
+        def report(done: int, total: int, label: str, /) -> None:
+            nonlocal before
+            now = PERCENT * done // total if total else 0
+            tally.add(now - before, label)
+            before = now
+
+        return report
+
+    return [piece() for _ in range(count)]

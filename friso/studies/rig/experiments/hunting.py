@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import numpy as np
 
-from friso.progress import Progress
+from friso.engine.side_by_side import side_by_side
+from friso.progress import Progress, together
 from friso.shares import Share
 from friso.stage import Stage
 from friso.studies.rig.moves_on_rails import (
@@ -31,6 +33,7 @@ from friso.studies.rig.moves_on_rails import (
 from friso.studies.rig.outcome import Outcome, rig_log
 from friso.studies.rig.sizes import pace
 from friso.virtual_rig.run import RecordedRuns
+from friso.virtual_rig.task import MoveTask
 
 CROSSOVERS = np.array([6.0, 7.0, 8.0, 9.5, 11.0, 12.5, 14.3, 16.0, 20.0]) / 8
 """Over that of the stage: 8, 9.5 and 14.3 Hz are the thesis's (Sec. 4.3.2), the others ours."""
@@ -108,13 +111,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     a motion that moves the stage."""
     stages = {case: with_joint(stage, locked) for case, locked in CASES.items()}
     frequencies, seeds = pace(stage) * CROSSOVERS, rails(stage)
-    changes = on_rails(stage, at_crossovers(stage, frequencies), seeds)
-    moves = {}
-    for case, variant in stages.items():
-        numbers = numbers_of(seed, len(frequencies), len(seeds))
-        runs = run_moves(variant, move(stage), numbers, changes, progress, f"moves, joint {case}")
-        moves[case] = runs.shaped(len(frequencies), len(seeds))
-    started = _releases(stages["locked"], seed, frequencies, seeds, progress)
+    moves, started = _moves_and_releases(stages, move(stage), seed, frequencies, seeds, progress)
     rail = int(np.argmax(moves["locked"].counted[SHOWN[0]]))
     machine = on_rails(stage, at_crossovers(stage, frequencies), seeds[[rail]])
     again = {
@@ -140,13 +137,30 @@ def machine_file(stage: Stage, rail: float) -> Stage:
     return stage if stage.rail is None else stage.replace({"rail.seed": rail})
 
 
-def _releases(stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarray, progress: Progress) -> RailRuns:
-    """Releases at crossovers [Hz] on all rails, shape (displacements, crossovers, rails)."""
+def _moves_and_releases(
+    stages: Mapping[str, Stage],
+    there: MoveTask,
+    seed: int,
+    frequencies: np.ndarray,
+    seeds: np.ndarray,
+    progress: Progress,
+) -> tuple[dict[str, RailRuns], RailRuns]:
+    """The move `there` of each case at crossovers [Hz] on all rails, shape (crossovers, rails), and releases with the
+    joint locked, shape (displacements, crossovers, rails)."""
+    stage, shape = stages["locked"], (len(frequencies), len(seeds))
     changes = on_rails(stage, at_crossovers(stage, frequencies), seeds)
-    numbers = numbers_of(seed, len(frequencies), len(seeds))
-    tasks = [released(stage, share * distance(stage)) for share in DISPLACEMENTS]
-    parts = [run_moves(stage, task, numbers, changes, progress, "releases, joint locked") for task in tasks]
-    return concatenate_runs(parts).shaped(len(DISPLACEMENTS), len(frequencies), len(seeds))
+    numbers = numbers_of(seed, *shape)
+    moved = [(variant, there, f"moves, joint {case}") for case, variant in stages.items()]
+    let_go = [(stage, released(stage, share * distance(stage)), "releases, joint locked") for share in DISPLACEMENTS]
+    lots = [*moved, *let_go]
+    runs = side_by_side(
+        [
+            partial(run_moves, variant, task, numbers, changes, part, label)
+            for (variant, task, label), part in zip(lots, together(progress, len(lots)), strict=True)
+        ]
+    )
+    moves = {case: part.shaped(*shape) for case, part in zip(stages, runs, strict=False)}
+    return moves, concatenate_runs(runs[len(moved) :]).shaped(len(DISPLACEMENTS), *shape)
 
 
 def _startable(
