@@ -177,7 +177,7 @@ def test_margins_of_many_are_those_of_each(every: CompareOptions, machines: Mach
         own = {key: float(values[number]) for key, values in machines.keys.items()}
         flat = linear_flat(option.stage, option.stage.flat(own | {"controller.tuned_mass": 1.7}))
         exact = min(margins(flat, one).modulus_margin for one in limit_cases(flat).values())
-        assert loops.margin[number] == pytest.approx(exact, abs=0.01)
+        assert loops.margin[number] == pytest.approx(exact, abs=1e-3)
 
 
 GAINS = {"kind": "pid", "kp": "3000 N/m", "ki": "10000 N/(m*s)", "kd": "80 N*s/m", "tau": "2 ms"}

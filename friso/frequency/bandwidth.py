@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.equations.bandwidth import sped_up
 from friso.frequency.drive import DriveTiming
-from friso.frequency.loops import open_loop, poles
+from friso.frequency.loops import poles
 from friso.frequency.margins import margins, with_resonances
 from friso.frequency.members import Members, limit_cases
 from friso.stage import Stage
@@ -48,7 +48,7 @@ def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.
     loops are looked at on a grid of frequencies and their gain is taken to be a power of it in between."""
     flat, sliding = stage.flat(), _sliding(stage.flat())
     omega = with_resonances(2 * np.pi * GRID, [poles(flat, sliding, DriveTiming(0.0, 0.0)).cut])
-    loops = open_loop({**flat, **changes}, sliding.repeated(count)).at(1j * omega)[:, :, 0, 0]
+    loops = poles({**flat, **changes}, sliding.repeated(count), DriveTiming(0.0, 0.0)).loop(omega)
     gain, frequency = np.log(np.abs(loops)), np.log(omega / (2 * np.pi))
     falls = (gain[:, :-1] >= 0) & (gain[:, 1:] < 0)
     last = falls.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)

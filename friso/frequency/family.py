@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from friso.frequency.operating_point import operating_point
 from friso.frequency.parts import FORCE, RATED, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
 from friso.frequency.rates import controller_over_period, samples_controller
 from friso.frequency.system import Complex, System
+
+_T = TypeVar("_T")
 
 CHUNK = 256
 """Members that are computed together: their arrays then stay in the cache."""
@@ -101,16 +103,30 @@ class PoleStability(NamedTuple):
 
 def stability_by_poles(flat: Mapping[str, Any], members: Members) -> PoleStability:
     """Every member by its own poles; `flat` may hold arrays of shape (members,), except in the drive's keys."""
-    drive, by_poles = DriveTiming.of(flat), PoleStability(np.empty(len(members)), np.empty(len(members)))
+    by_poles = PoleStability(np.empty(len(members)), np.empty(len(members)))
 
-    def look(which: np.ndarray) -> None:
+    def look(part: Poles) -> PoleStability:
+        distance = part.distance(np.nan_to_num(omega := about_resonances(part), nan=1.0))
+        return PoleStability(part.abscissa, np.where(np.isnan(omega), np.inf, distance).min(axis=1))
+
+    for which, looked in for_poles(flat, members, look):
+        by_poles.abscissa[which], by_poles.resonant[which] = looked
+    return by_poles
+
+
+def for_poles(
+    flat: Mapping[str, Any], members: Members, function: Callable[[Poles], _T]
+) -> list[tuple[np.ndarray, _T]]:
+    """A function of the poles of every member, a few at a time, side by side: their numbers, and what it returns;
+    `flat` may hold arrays of shape (members,), except in the drive's keys."""
+    drive = DriveTiming.of(flat)
+
+    def of_part(which: np.ndarray) -> tuple[np.ndarray, _T]:
         keys = {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
-        part_poles = poles(keys, members[which], drive)
-        by_poles.abscissa[which], by_poles.resonant[which] = part_poles.abscissa, _about_resonances(part_poles)
+        return which, function(poles(keys, members[which], drive))
 
     numbers = (np.flatnonzero(mask) for mask in (members.stuck, ~members.stuck))
-    side_by_side([partial(look, part) for numbers_of_kind in numbers for part in _split(numbers_of_kind)])
-    return by_poles
+    return side_by_side([partial(of_part, part) for numbers_of_kind in numbers for part in _split(numbers_of_kind)])
 
 
 def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
@@ -118,15 +134,15 @@ def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
     return stability_by_poles(flat, members).abscissa
 
 
-def _about_resonances(system: Poles) -> np.ndarray:
-    """The least abs(1 + L) about the lightly damped closed-loop poles of each member, shape (members,)."""
+def about_resonances(system: Poles) -> np.ndarray:
+    """Angular frequencies [rad/s] about the lightly damped closed-loop poles of each member, shape (members, k), NaN
+    where there are fewer."""
     if system.drive.period > 1:  # its poles do not tell which alias resonates
-        return np.full(len(system.closed), np.inf)
+        return np.full((len(system.closed), 1), np.nan)
     closed = system.in_s
     light = (closed.imag > 0) & (np.abs(closed.real) < LIGHT * closed.imag)
     omega = np.where(light, closed.imag, np.nan)[:, :, None] + NEAR * np.where(light, closed.real, np.nan)[:, :, None]
-    omega = np.clip(omega, 0, system.drive.highest).reshape(len(closed), -1)
-    return np.nanmin(np.where(np.isnan(omega), np.inf, system.distance(np.nan_to_num(omega, nan=1.0))), axis=1)
+    return np.clip(omega, 0, system.drive.highest).reshape(len(closed), -1)
 
 
 def distance_to_lines(loop: Complex) -> np.ndarray:

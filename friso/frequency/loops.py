@@ -103,12 +103,24 @@ class Poles:
     def distance(self, omega: np.ndarray) -> np.ndarray:
         """abs(1 + L) at angular frequencies [rad/s], shape (members, k): the distances from all closed-loop poles over
         those from all poles of the cut loop."""
+        at = self._at(omega)
+        squared = np.ones(omega.shape)
+        for closed, cut in zip(self.closed.T[..., None], self.cut.T[..., None], strict=True):
+            squared *= _squared(at, closed) / _squared(at, cut)
+        return np.sqrt(squared)
+
+    def loop(self, omega: np.ndarray) -> Complex:
+        """L at angular frequencies (k,) [rad/s], shape (members, k), to a share of its size and of 1."""
+        at = self._at(omega)
+        ratio = np.ones((len(self.closed), len(omega)), complex)
+        for closed, cut in zip(self.closed.T[..., None], self.cut.T[..., None], strict=True):
+            ratio *= (at - closed) / (at - cut)
+        return ratio - 1
+
+    def _at(self, omega: np.ndarray) -> Complex:
+        """Angular frequencies [rad/s] in the plane of the poles."""
         time = self.drive.sample_time * self.drive.period
-        at = np.exp(1j * omega * time) if time else 1j * omega
-        distance = np.ones(omega.shape)
-        for k in range(self.closed.shape[1]):
-            distance = distance * (np.abs(at - self.closed[:, [k]]) / np.abs(at - self.cut[:, [k]]))
-        return distance
+        return np.asarray(np.exp(1j * omega * time) if time else 1j * omega)
 
 
 def poles(flat: Mapping[str, Any], members: Members, drive: DriveTiming, cut: str = "") -> Poles:
@@ -181,6 +193,11 @@ def _cut(machine: System, control: System) -> System:
     b = np.concatenate([machine.b, control.b @ machine.d], axis=1)
     c = -np.concatenate([control.d @ machine.c, control.c], axis=2)
     return System(a, b, c, -control.d @ machine.d, machine.states + control.states, (FORCE,), (FORCE,))
+
+
+def _squared(at: Complex, pole: Complex) -> np.ndarray:
+    """Squares of distances from a pole of each member, (members, 1): much sooner than with `np.abs`."""
+    return np.asarray((at.real - pole.real) ** 2 + (at.imag - pole.imag) ** 2)
 
 
 def _shut(loop: System) -> Complex:

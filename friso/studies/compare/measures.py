@@ -10,9 +10,8 @@ import numpy as np
 
 from friso.engine.arrays import Status
 from friso.equations.motion import Stand
-from friso.frequency.drive import DriveTiming
-from friso.frequency.family import stability_by_poles
-from friso.frequency.loops import poles
+from friso.frequency.family import about_resonances, for_poles
+from friso.frequency.loops import Poles
 from friso.frequency.members import limit_cases
 from friso.hunting.criteria import end_of_traces, outcomes, peaks_in_traces, settling_of_traces
 from friso.hunting.criteria.run_outcome import FAILED, RESTS, SWINGS
@@ -20,9 +19,12 @@ from friso.hunting.turning import WINDOW
 from friso.stage import Stage
 from friso.virtual_rig.run import RecordedRuns
 
-DENSITY, SLOWEST, FASTEST = 100, 0.1, 10.0
+DENSITY, SLOWEST, FASTEST = 25, 0.1, 10.0
 """Frequencies per decade at which loops are looked at, besides those about resonances, and the lowest, as a share of
 the slowest pole; the highest is half that of sampling, or so many times the fastest pole."""
+
+CLOSER, WITHIN = 2, 9
+"""How often a loop is looked at more closely about the frequency where it comes closest to -1, and at how many."""
 
 
 @dataclass(frozen=True)
@@ -116,15 +118,26 @@ class LoopRobustness:
 
 def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> LoopRobustness:
     """The loops of machines, given as flat keys to SI numbers or arrays; the limit cases are those of the stage."""
-    drive, stable, margin = DriveTiming.of(flat), np.ones(count, bool), np.full(count, np.inf)
+    stable, margin = np.ones(count, bool), np.full(count, np.inf)
     for limit_case in limit_cases(stage.flat()).values():
-        machines = limit_case.repeated(count)
-        loop_poles, looked = poles(flat, machines, drive), stability_by_poles(flat, machines)
-        size = np.abs(loop_poles.continuous)
-        low = SLOWEST * float(np.median(size.min(axis=1)))
-        high = min(drive.highest, FASTEST * float(size.max()))
-        omega = np.geomspace(low, high, int(DENSITY * np.log10(high / low)) + 2)
-        shared = loop_poles.distance(np.broadcast_to(omega, (count, len(omega)))).min(axis=1)
-        stable &= looked.abscissa < 0
-        margin = np.minimum(margin, np.minimum(shared, looked.resonant))
+        for which, (settles, distance) in for_poles(flat, limit_case.repeated(count), _robustness):
+            stable[which] &= settles
+            margin[which] = np.minimum(margin[which], distance)
     return LoopRobustness(stable, np.where(stable, margin, 0.0))
+
+
+def _robustness(loops: Poles) -> tuple[np.ndarray, np.ndarray]:
+    """Which loops are stable, and the least distance of each from -1, both of shape (members,)."""
+    size, rows = np.abs(loops.continuous), np.arange(len(loops.closed))
+    low = SLOWEST * float(np.median(size.min(axis=1)))
+    high = min(loops.drive.highest, FASTEST * float(size.max()))
+    even = np.geomspace(low, high, int(DENSITY * np.log10(high / low)) + 2)
+    resonant = np.nan_to_num(about_resonances(loops), nan=high)
+    omega = np.sort(np.concatenate([np.broadcast_to(even, (len(rows), len(even))), resonant], axis=1), axis=1)
+    distance = loops.distance(omega)
+    for _ in range(CLOSER):
+        closest = distance.argmin(axis=1)
+        before, after = (omega[rows, np.clip(closest + step, 0, omega.shape[1] - 1)] for step in (-1, 1))
+        omega = np.linspace(before, after, WITHIN, axis=1)
+        distance = loops.distance(omega)
+    return loops.abscissa < 0, distance.min(axis=1)
