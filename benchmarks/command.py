@@ -27,10 +27,16 @@ PATIENCE = 60.0
 LOCKED = "--set joint.locked=true"
 CROSSOVER = '--x controller.crossover="1 Hz..40 Hz"'
 THESIS_MAP = '--x controller.crossover="1 Hz..16 Hz:{n}" --y joint.stroke="1 um..1 mm:{n}"'
+MAKES_LOG = 'simulate {servo} --sample-time "1 ms" --out response'
+"""The command that makes `{log}`, a log to identify."""
+
+DRAWN = '--set friction.static="3 N +/- 0.3 N" --set masses.cart="1.2 kg +/- 0.1 kg"'
 COMMANDS: dict[str, float | None] = {
     "--help": 0.2,
     "check {rig}": 1.2,
     "check {rig} --out report": None,
+    f"check {{rig}} {DRAWN} --draws 1000": 20.0,
+    MAKES_LOG: None,
     f"boundary {{rig}} {LOCKED} {CROSSOVER} --out boundary": None,
     f'boundary {{rig}} {LOCKED} {CROSSOVER} --y masses.cart="0.6 kg..2.4 kg" --out boundary': 15.0,
     'bode {rig} --set drive.sample_time="50 us" --set drive.delay="100 us" --out bode': 3.0,
@@ -39,7 +45,10 @@ COMMANDS: dict[str, float | None] = {
     "design {rig} {specification} --out design": 20.0,
     f'tune {{rig}} {LOCKED} --bandwidth-limit "25 Hz" --out tuned': None,
     "compare {drive} --machines 200 --out compare": 60.0,
+    "flexure {leaves} --out leaves": None,
     "rig hunting {drive} --out hunting": 20.0,
+    "logs {log}": None,
+    "identify {log} --stage {servo} --out identified": None,
 }
 """The README's commands, and others with a goal: the wall time wanted of each, warm [s] (None: no goal)."""
 
@@ -47,6 +56,8 @@ PLACES = {
     "rig": "examples/thesis_rig.toml",
     "drive": "examples/thesis_drive.toml",
     "specification": "examples/specs/thesis.toml",
+    "servo": "examples/emps_axis.toml",
+    "leaves": "examples/thesis_leaves.toml",
 }
 SWEPT = 100_000
 
@@ -101,20 +112,32 @@ HEAD = ("command", "cold", "warm, least", "median", "CPU, median", "runs", "want
 def time_command(command: str, wanted: float | None, repetitions: int) -> Timed:
     """Run a command with an empty cache, and then again and again, in a folder of its own."""
     with tempfile.TemporaryDirectory(prefix="friso-bench-") as folder:
-        environment = {**os.environ, "FRISO_CACHE_DIR": str(Path(folder, "cache")), "PYTHONPATH": str(ROOT)}
         places = {name: str(ROOT / place) for name, place in PLACES.items()}
-        arguments = [sys.executable, "-c", START, *shlex.split(command.format(**places))]
+        if "{log}" in command:
+            _timed(MAKES_LOG.format(**places), Path(folder, "cache"), Path(folder))
+            (log,) = Path(folder, "response").glob("*.csv")
+            places["log"] = str(log)
         walls: list[float] = []
         cpus: list[float] = []
         while len(walls) < 2 or (len(walls) <= repetitions and sum(walls) < PATIENCE):
-            before, start = os.times(), time.perf_counter()
-            done = subprocess.run(arguments, env=environment, capture_output=True, text=True, cwd=folder)
-            walls.append(time.perf_counter() - start)
-            after = os.times()
-            cpus.append(after[2] + after[3] - before[2] - before[3])
-            if done.returncode:
-                raise RuntimeError(f"friso {command} ended with status {done.returncode}: {done.stderr[-500:]}")
-    return Timed(command.format(**PLACES), wanted, walls[0], walls[1:], cpus[1:])
+            run_in = Path(folder, str(len(walls)))  # what an earlier run has written would be gone on with
+            run_in.mkdir()
+            wall, cpu = _timed(command.format(**places), Path(folder, "cache"), run_in)
+            walls.append(wall)
+            cpus.append(cpu)
+    return Timed(command.format(**PLACES, log="log.csv"), wanted, walls[0], walls[1:], cpus[1:])
+
+
+def _timed(command: str, cache: Path, folder: Path) -> tuple[float, float]:
+    """Wall and CPU time [s] of a command that is run in a folder."""
+    environment = {**os.environ, "FRISO_CACHE_DIR": str(cache), "PYTHONPATH": str(ROOT)}
+    arguments = [sys.executable, "-c", START, *shlex.split(command)]
+    before, start = os.times(), time.perf_counter()
+    done = subprocess.run(arguments, env=environment, capture_output=True, text=True, cwd=folder)
+    wall, after = time.perf_counter() - start, os.times()
+    if done.returncode:
+        raise RuntimeError(f"friso {command} ended with status {done.returncode}: {done.stderr[-500:]}")
+    return wall, after[2] + after[3] - before[2] - before[3]
 
 
 def page(timed: list[Timed], machine: str) -> str:
