@@ -6,8 +6,10 @@ import codecs
 import csv
 import re
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from friso.errors import LogError
@@ -15,6 +17,8 @@ from friso.identification.logs.units import is_unit, split_heading
 
 HEAD_BYTES = 1 << 18
 """How much of a file is looked at to find how it is written."""
+REMEMBERED = 4
+"""Heads of files of which it is remembered how they are written: each is asked for several times."""
 HEAD_LINES = 1000
 """How many lines of it are tried with each delimiter."""
 MOST_COLUMNS = 10_000
@@ -63,12 +67,24 @@ class TextLayout:
 def decoded_head(path: Path) -> tuple[str, list[str]]:
     """Encoding and the first lines of a text file. Raises LogError for what is no text."""
     with path.open("rb") as file:
-        head = file.read(HEAD_BYTES)
+        decoded = _decoded(file.read(HEAD_BYTES))
+    if decoded is None:
+        raise LogError(
+            "log", f"{path.stat().st_size} bytes that are neither text nor a known format",
+            "a text", "", str(path),
+        )  # fmt: skip
+    encoding, lines = decoded
+    return encoding, [*lines]
+
+
+@lru_cache(REMEMBERED)
+def _decoded(head: bytes) -> tuple[str, tuple[str, ...]] | None:
+    """Encoding and lines of what a file begins with; None for what is no text."""
     encoding = next((name for mark, name in _BYTE_ORDER_MARKS if head.startswith(mark)), "")
     if not encoding and b"\0" in head:
         even, odd = head[0:4000:2].count(0), head[1:4000:2].count(0)
         if max(even, odd) < len(head[:4000]) // 4 or min(even, odd) > 0:  # Latin text in UTF-16 has a 0 in each pair
-            raise _no_text(path)
+            return None
         encoding = "utf-16-le" if odd > even else "utf-16-be"
     if not encoding:
         encoding = "utf-8"
@@ -77,19 +93,16 @@ def decoded_head(path: Path) -> tuple[str, list[str]]:
         except UnicodeDecodeError:
             encoding = "cp1252"
     text = codecs.getincrementaldecoder(encoding)("replace").decode(head).replace(DOS_END, "")
-    odd = sum(not (character.isprintable() or character in "\t\r\n\f") for character in text)
+    odd = sum(times for character, times in Counter(text).items() if not _may_stand_in_text(character))
     if odd > 0.02 * len(text):
-        raise _no_text(path)
+        return None
     lines = re.split(r"\r\n|\n|\r", text)
     is_cut = len(head) == HEAD_BYTES and len(lines) > 1
-    return encoding, lines[:-1] if is_cut or not lines[-1] else lines
+    return encoding, tuple(lines[:-1] if is_cut or not lines[-1] else lines)
 
 
-def _no_text(path: Path) -> LogError:
-    return LogError(
-        "log", f"{path.stat().st_size} bytes that are neither text nor a known format",
-        "a text", "", str(path),
-    )  # fmt: skip
+def _may_stand_in_text(character: str) -> bool:
+    return character.isprintable() or character in "\t\r\n\f"
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
@@ -133,14 +146,8 @@ def layout(path: Path) -> TextLayout:
     Raises LogError where there is none."""
     encoding, lines = decoded_head(path)
     lines = lines[:HEAD_LINES]
-    split = {delimiter: [split_line(line, delimiter) for line in lines] for delimiter, _ in _CANDIDATES}
-    fits = [_fits(lines, encoding, delimiter, decimal, split[delimiter]) for delimiter, decimal in _CANDIDATES]
-    plain, worded = (
-        max((fit for fit in by if fit), key=lambda fit: fit[0], default=None) for by in zip(*fits, strict=True)
-    )
-    chosen = worded if plain is None or (worded is not None and worded[0][0] > 2 * plain[0][0]) else plain
-    if chosen is not None:
-        best = chosen[1]
+    best = _best_fit(encoding, tuple(lines))
+    if best is not None:
         if best.columns > MOST_COLUMNS:
             expected = f"at most {MOST_COLUMNS}: one a channel, one row a sample"
             raise LogError("log", f"{best.columns} columns", expected, "", str(path))
@@ -149,6 +156,18 @@ def layout(path: Path) -> TextLayout:
     actual = "no row of numbers" + (f" after the heading {lines[0][:60]!r}" if lines else "")
     expected = "a heading and rows of numbers" + ("; a stage file is for friso check" if path.suffix == ".toml" else "")
     raise LogError("log", actual, expected, "time [s];position [mm];force [N]", str(path))
+
+
+@lru_cache(REMEMBERED)
+def _best_fit(encoding: str, lines: Sequence[str]) -> TextLayout | None:
+    """The layout that fits lines best; None if none fits."""
+    split = {delimiter: [split_line(line, delimiter) for line in lines] for delimiter, _ in _CANDIDATES}
+    fits = [_fits(lines, encoding, delimiter, decimal, split[delimiter]) for delimiter, decimal in _CANDIDATES]
+    plain, worded = (
+        max((fit for fit in by if fit), key=lambda fit: fit[0], default=None) for by in zip(*fits, strict=True)
+    )
+    chosen = worded if plain is None or (worded is not None and worded[0][0] > 2 * plain[0][0]) else plain
+    return chosen and chosen[1]
 
 
 def _no_open_quote(above: list[str], delimiter: str, path: Path) -> None:
@@ -165,7 +184,9 @@ _Fit = tuple[tuple[int, bool, int], TextLayout] | None
 """A layout, and how well it fits: rows of numbers, a heading as long as they are, columns. None for no fit."""
 
 
-def _fits(lines: list[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]]) -> tuple[_Fit, _Fit]:
+def _fits(
+    lines: Sequence[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]]
+) -> tuple[_Fit, _Fit]:
     """How well this delimiter, which gives these rows, and decimal sign fit without words in rows of numbers, and with
     them."""
     numeric = [[is_number(cell, decimal) for cell in cells] for cells in rows]
@@ -178,7 +199,7 @@ def _fits(lines: list[str], encoding: str, delimiter: str, decimal: str, rows: l
 
 
 def _fit(
-    lines: list[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]], is_row: list[bool]
+    lines: Sequence[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]], is_row: list[bool]
 ) -> _Fit:
     """How well this delimiter and decimal sign fit, with which these are rows of numbers."""
     if not any(is_row):
@@ -199,7 +220,9 @@ def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:
     return is_row[following] and len(_filled(rows[following])) == len(_filled(rows[i]))
 
 
-def _headings(lines: list[str], first: int, columns: int, delimiter: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _headings(
+    lines: Sequence[str], first: int, columns: int, delimiter: str
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names and units per column, from the one or two lines above the numbers that are as long; () for none."""
     above = [lines[i].lstrip("#% ") for i in range(first) if lines[i].strip()]
     heads = [_heading_cells(line, columns, delimiter) for line in above[-2:]]
