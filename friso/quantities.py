@@ -273,6 +273,10 @@ def _checked_unit(text: str) -> str:
     return text
 
 
+TORQUES = ("newton_meter = newton * meter = Nm", "newton_centimeter = newton * centimeter = Ncm")
+"""Units of torque as they are written on motors."""
+
+
 @cache
 def common_units() -> dict[str, tuple[float, dict[str, float], list[str]]]:
     """What pint says of the units that are met every day (`_root`): with pint itself, reading a stage takes 0.8 s."""
@@ -284,7 +288,10 @@ def _registry() -> Any:
     """pint's registry: slow to import and to build, so not before a unit is met that is no common one."""
     import pint
 
-    return pint.UnitRegistry()
+    registry = pint.UnitRegistry(on_redefinition="ignore")
+    for definition in TORQUES:  # of which pint takes Nm for a measure of yarn, or does not know it, by its version
+        registry.define(definition)
+    return registry
 
 
 @lru_cache(maxsize=1024)
