@@ -1,6 +1,7 @@
 """What starts hunting, and how far off its edge is: against runs of single stages, and against one another."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,10 @@ from scipy.stats import binom, qmc
 from variants import VARIANTS, lugre, stage, there_and_back, van_dijk
 
 import friso
+from friso.engine.arrays import Status
+from friso.engine.batch import RunOptions, run_chunks
 from friso.equations.bandwidth import faster
+from friso.equations.motion import last_corner, standing
 from friso.hunting.attractors import Target
 from friso.hunting.basin import (
     EDGE,
@@ -168,6 +172,24 @@ def test_share_of_moves_is_reproducible() -> None:
     assert first.times == pytest.approx([0.003, 0.06])
     low, high = first.interval
     assert 0 < low < first.fraction < high < 1
+
+
+@RIGID
+@pytest.mark.parametrize("kind", ["release", "there and back"])
+def test_a_run_that_goes_on_where_its_reference_stands_is_the_whole_run(kind: str) -> None:
+    """It is followed on from its state after the last corner; so far within the tolerance of both."""
+    flat = (released(2e-3) if kind == "release" else MOVING).flat()
+    form = Ensemble.held(flat, 1).kernel
+    first, rest = float(last_corner(flat)) + 0.7, 2.3
+
+    def ends(keys: dict[str, Any], duration: float, starts: np.ndarray | None = None) -> np.ndarray:
+        (runs,) = run_chunks(form, {**keys, "motion.duration": duration}, 1, RunOptions(rtol=1e-9), starts)
+        assert runs.results.statuses == Status.DONE
+        return runs.results.ends
+
+    on = ends(standing(flat), rest, ends(flat, first))
+    scales = Ensemble.held(flat, 1).scales
+    assert np.max(np.abs(on - ends(flat, first + rest))[:, : scales.shape[1]] / scales) < 1e-5
 
 
 @RIGID

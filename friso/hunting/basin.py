@@ -11,7 +11,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
-from friso.equations.motion import CRUISE, last_corner
+from friso.equations.motion import CRUISE, last_corner, standing
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Target
 from friso.hunting.attractors.rounds import RTOL, TIGHT, typical_period
@@ -112,17 +112,23 @@ def ends_in(
 def _ends_closed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    corner, size = np.max(last_corner(flat)), np.broadcast_to(2 * target.amplitude, (count,))
-    early, after = (np.broadcast_to(corner + time, (count,)) for time in (target.early, target.lasting))
-    swing, completed = _last_swing(flat, early, LAST * target.period, starts, RTOL, **options)
-    ends = completed & np.where(early < after, np.abs(swing / size - 1) <= CAUGHT, lasts(swing, 0.0, size / 4))
-    if (unfinished := np.flatnonzero(completed & ~ends & (early < after))).size:
-        aims = target.of(unfinished) if np.ndim(target.amplitude) else target
-        begin = None if starts is None else starts[unfinished]
-        swing[unfinished], completed[unfinished] = _last_swing(
-            some_of(flat, unfinished), after[unfinished], LAST * aims.period, begin, RTOL, **options
-        )
-        ends[unfinished] = lasts(swing[unfinished], 0.0, size[unfinished] / 4) & completed[unfinished]
+    """Runs are looked at early, and those that are not caught by then are followed on, for twice as long each time."""
+    size, lasting, early, last = (
+        np.broadcast_to(part, (count,))
+        for part in (2 * target.amplitude, target.lasting, target.early, LAST * target.period)
+    )
+    ends, completed, swing, since = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count), np.zeros(count)
+    left, until, leg = np.arange(count), np.minimum(early, lasting), np.max(last_corner(flat)) + early
+    while left.size:
+        part = some_of(flat, left), leg[left], last[left], starts
+        swing[left], completed[left], starts = _last_swing(*part, RTOL, **options)
+        final = until[left] >= lasting[left]
+        close = np.abs(swing[left] / size[left] - 1) <= CAUGHT
+        ends[left] = completed[left] & np.where(final, lasts(swing[left], 0.0, size[left] / 4), close)
+        on = completed[left] & ~ends[left] & ~final
+        left, starts, flat = left[on], starts[on], standing(flat)
+        since, until = until, np.minimum(2 * until, lasting)
+        leg = np.maximum(until - since, last)
     return ends, completed, swing
 
 
@@ -130,12 +136,12 @@ def _ends_observed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     after = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
-    swing, completed = _last_swing(flat, after, LAST * target.period, starts, TIGHT, **options)
+    swing, completed, _ = _last_swing(flat, after, LAST * target.period, starts, TIGHT, **options)
     ends = completed & lasts(swing, 0.0, np.broadcast_to(target.amplitude, (count,)) / 2)
     if (others := np.flatnonzero(completed & ~ends)).size:
         begin = None if starts is None else starts[others]
         part = some_of(flat, others), after[others], OBSERVED * after[others]
-        swing[others], completed[others] = _last_swing(*part, begin, TIGHT, **options)
+        swing[others], completed[others], _ = _last_swing(*part, begin, TIGHT, **options)
     return ends, completed, swing
 
 
@@ -152,16 +158,18 @@ def _last_swing(
     starts: np.ndarray | None,
     rtol: float,
     **run_options: Any,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Peak to peak in the last time [s] before the ends of runs [s], (count,), and which runs were completed."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Peak to peak in the last time [s] before the ends of runs [s], (count,), which runs were completed, and their
+    states at the end, (count, kept)."""
     long, count = {**flat, "motion.duration": end}, len(end)
     window = float(np.min(1 - last / end))
     options = RunOptions(rtol=rtol, window=window, record_from=np.inf, least_swing=np.inf, **run_options)
-    swing, completed = np.zeros(count), np.zeros(count, bool)
-    for runs in run_chunks(kernel(shared_structure(flat)), long, count, options, starts):
+    form = kernel(shared_structure(flat))
+    swing, completed, ends = np.zeros(count), np.zeros(count, bool), np.zeros((count, len(form.full_state)))
+    for runs in run_chunks(form, long, count, options, starts):
         completed[runs.numbers] = runs.results.statuses == Status.DONE
-        swing[runs.numbers] = swing_of(runs)
-    return swing, completed
+        swing[runs.numbers], ends[runs.numbers] = swing_of(runs), runs.results.ends
+    return swing, completed, ends
 
 
 def _caught(
