@@ -33,6 +33,7 @@ from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.hunting import Cycle, hunting
 from friso.hunting.cycle.rest import pushed
 from friso.hunting.margin import FARTHEST, margin
+from friso.hunting.outward import AttractionEnd, Outward
 from friso.hunting.verdict import BY_CHANCE, own_motion
 from friso.stage import Stage
 
@@ -284,6 +285,15 @@ def at(chosen: Stage, factor: float) -> Stage:
     scaled = faster(chosen.flat(), np.array(factor))
     texts = {f"controller.{name}": unit for name, unit in units.items() if f"controller.{name}" in scaled}
     return chosen.replace({key: f"{float(scaled[key])!r} {unit}" for key, unit in texts.items()})
+
+
+@RIGID
+def test_an_edge_just_before_the_lowest_bandwidth_that_attracts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Within what it is known to: it was searched for among the bandwidths up to it, of which there are none then."""
+    monkeypatch.setattr(Outward, "end", lambda _, at, *others: AttractionEnd(0.9999 * at, 1.01 * at, True, 5e-4))
+    edge = margin(rigid(95), attracting=False)
+    assert edge is not None
+    assert edge.factor == pytest.approx(0.9999 / FARTHEST)
 
 
 @RIGID

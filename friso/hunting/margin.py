@@ -202,7 +202,8 @@ class _Grid:
                 self.attracts |= beyond > 0
                 return None
             end = replace(end, outside=float(self.factors[settled[0]]), certain=False)
-        last = int(np.flatnonzero(beyond <= 0)[-1 if ahead > 0 else 0])
+        attracted = np.flatnonzero((ahead * (np.arange(len(self.factors)) - at) > 0) & (beyond <= 0))
+        last = int(attracted[-1 if ahead > 0 else 0]) if attracted.size else at  # within its reserve it may lie before
         self.ends[at, ahead] = self.ends[last, ahead] = end
         return end
 
