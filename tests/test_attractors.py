@@ -491,6 +491,7 @@ def with_little_gap(static: str) -> Stage:
     )
 
 
+@pytest.mark.usefixtures("own_bandwidth")
 def test_a_swing_of_ten_minutes_is_seen() -> None:
     """With static friction 0.5 % above the Coulomb friction the stage waits for five minutes at 2 mm, and swings on for
     ever."""
@@ -562,7 +563,7 @@ def test_a_small_swing_about_home_is_not_rest() -> None:
     stage = VARIANTS["rigid, GMS"].replace(
         {f"friction.{name}": value for name, value in friction.items()}
         | {f"controller.{name}": value for name, value in controller.items()}
-        | {"masses": {"stage": "76.8398 g"}}
+        | {"masses": {"cart": "38.4199 g", "stage": "38.4199 g"}}
     )
     attracted = attractors(held(stage))
     assert [1e9 * motion.amplitude for motion in attracted.motions] == pytest.approx([253.5], rel=0.01)
@@ -764,7 +765,7 @@ def test_a_swing_that_grows_without_bound_has_no_size() -> None:
     """Without anti-windup, where b k_p < m k_i: in a run from 500 mm each swing is larger than the one before."""
     stage = VARIANTS["rigid"].replace(
         {
-            "masses": {"stage": "2.8 kg"},
+            "masses": {"cart": "1.4 kg", "stage": "1.4 kg"},
             "friction.static": "6.5 N",
             "friction.coulomb": "3.1 N",
             "friction.viscous": "16 N*s/m",

@@ -395,7 +395,7 @@ def test_identify_in_its_own_loop(whole: Stage) -> None:
     """A log that its own sampled loop wrote gives mass and friction back."""
     plain_axis = {"joint": None, "parasitic": None, "rail": None, "cable": None, "drive": {"sample_time": "1 ms"}}
     one = whole.replace(plain_axis)
-    flat, time = one.flat(), np.arange(4000) * 1e-3
+    flat, time = one.flat(), np.arange(2000) * 1e-3
     reference = 0.02 * (1 - np.cos(2 * np.pi * time))
     blank = record("given", 1e-3, reference=reference, position=0 * reference, force=0 * reference)
     truth = loop_problem(flat, blank, blank.segments[0], ()).record(np.zeros(0))

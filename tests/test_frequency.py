@@ -198,7 +198,7 @@ LIGHT = {
 @pytest.mark.parametrize("stage", [{}, LIGHT])
 def test_scan_finds_what_exact_margins_find(rig: Stage, stage: dict, drive: dict) -> None:
     flat = rig.replace({**stage, **drive}).flat()
-    members = family(flat, 21, 9)
+    members = family(flat, 11, 5)
     scanned = scan_stability(flat, members)
     exact = [margins(flat, members[k]) for k in range(len(members))]
     assert scanned.stable.tolist() == [item.stable for item in exact]

@@ -47,7 +47,7 @@ def test_estimates_far_beyond_their_intervals_disagree() -> None:
 
 
 @given(st.integers(0, 2**31), st.integers(3, 8))
-@settings(max_examples=20)
+@settings(max_examples=8)
 def test_places_that_differ_show_the_mean_of_all_places(seed: int, count: int) -> None:
     """Places that scatter by far more than their own errors, one known much less: the mean of all is held as often as
     95 % intervals should, and the one that is not known does not widen it."""

@@ -175,7 +175,7 @@ def test_export(locked: Stage, tmp_path: Path) -> None:
 def test_identify_in_its_own_loop(locked: Stage, tmp_path: Path) -> None:
     """A log that its own sampled loop wrote gives mass and friction back."""
     rigid = locked.replace({"joint": None, "rail": None, "cable": None, "drive": {"sample_time": "1 ms"}})
-    time = np.arange(4000) * 1e-3
+    time = np.arange(2000) * 1e-3
     reference = 0.02 * (1 - np.cos(2 * np.pi * time))
     blank = record("blank", 1e-3, reference=reference, position=0 * reference, force=0 * reference)
     problem = loop_problem(rigid.flat(), blank, blank.segments[0], ())
