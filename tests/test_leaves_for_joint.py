@@ -112,7 +112,7 @@ def test_a_load_under_which_no_leaves_stand_has_none() -> None:
 @pytest.fixture(scope="module")
 def tuning() -> Advice:
     rigid = RIG.replace({"joint": None, "parasitic": None})
-    budget = Budget(points=6, generations=3, refined=1, machines=6, surveyed=4, fresh=20)
+    budget = Budget(points=4, generations=2, refined=1, machines=4, surveyed=3, fresh=20)
     return tune(rigid, Goal(controller=False), budget=budget, chosen=["isolator"])
 
 
