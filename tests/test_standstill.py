@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from variants import gains, limit, lugre, release, stage
+from variants import gains, limit, lugre, release, stage, there_and_back, van_dijk
 
 import friso
+from friso.equations import motion
 from friso.equations.blocks import Loop
 from friso.equations.sampled import sampled_controller
 from friso.equations.structure import controller_form
@@ -21,6 +22,8 @@ from friso.hunting.cycle.hunting import DITHERS
 from friso.hunting.cycle.hunting import hunting as hunting_of
 from friso.hunting.cycle.rest import stuck, wait
 from friso.stage import Stage
+from friso.virtual_rig.run import run
+from friso.virtual_rig.task import MoveTask
 
 KP, KI, KD, MASS = 2000.0, 20000.0, 50.0, 1.7
 
@@ -157,6 +160,18 @@ def test_a_drive_carries_them_out_alike() -> None:
         forces.append(min(max(demand(x), -3.5), 3.5))
     assert np.abs(np.array(ours) - np.array(forces)).max() < 1e-9
     assert len({*np.round(forces, 3)}) > 500
+
+
+def test_a_dead_zone_before_a_filter_runs_on_a_machine_as_built() -> None:
+    """As in continuous time, if the drive samples fast: the filter passes what the dead zone leaves of the error."""
+    move = there_and_back("0.4 s", "0.3 s").replace("100 m/s^2", "1 m/s^2").replace("30 ms", "50 ms")
+    chosen = stage(move, friction=lugre(2), controller=van_dijk("8 Hz", 'error_deadband = "80 um"'))
+    ideal = friso.simulate(chosen, 1e-8, 1e-3)["position"].values[:-1]
+    task = MoveTask(motion.pieces(chosen.flat(), 1)[0], 0.4)
+    (recorded,) = run(chosen.replace({"drive.sample_time": "20 us"}), task, [1], 1e-3)
+    assert np.abs(recorded.true["position"][0][: len(ideal)] - ideal).max() < 1e-5
+    without = friso.simulate(chosen.replace({"controller.error_deadband": "0.01 um"}), 1e-8, 1e-3)["position"].values
+    assert np.abs(without[:-1] - ideal).max() > 5e-5
 
 
 @pytest.mark.parametrize(

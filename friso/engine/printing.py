@@ -88,6 +88,10 @@ class _Renamed(NumPyPrinter):
     def _print_sine(self, expr: sp.Expr) -> str:
         return f"sine({self._print(expr.args[0])})"
 
+    def _print_clipped(self, expr: sp.Expr) -> str:
+        value, limit = map(self._print, expr.args)
+        return f"np.clip({value}, -({limit}), {limit})"
+
     def _print_Piecewise(self, expr: sp.Piecewise) -> str:
         """As `where` in `where`: quicker than the `select` of SymPy's own."""
         text = "np.nan"
