@@ -43,6 +43,12 @@ def percent(share: float, digits: int = 2, signed: bool = False) -> str:
     return f"{number:{plus}.0f} %" if abs(number) >= 10**digits else f"{number:{plus}g} %"
 
 
+def plain_factor(factor: float) -> str:
+    """A factor to three significant digits, without an exponent."""
+    rounded = float(f"{factor:.3g}")
+    return f"{rounded:.0f}" if abs(rounded) >= 1000 else f"{rounded:g}"
+
+
 def outwards(value: float, larger: bool) -> float:
     """Three digits of a value, so that it is not met more tightly than it has to be."""
     if value <= 0:

@@ -11,7 +11,7 @@ from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.quality import Quality, halves, whole_error
-from friso.quantities import percent
+from friso.quantities import percent, plain_factor
 
 CLEARLY = 0.5
 """Times what an inverse model without a cause leaves, below which a whole model is better without that cause."""
@@ -68,8 +68,8 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
         doubts.append(f"A mass with friction leaves {percent(inverse.error, 3)} of the force unexplained: {why}")
     elif not rejected and plain.lacks_something:
         doubts.append(
-            f"The fit leaves {left:.3g} {unit} unexplained, {plain.ratio:.3g} times what the noise of the record would "
-            f"leave: the model lacks something, for which the intervals allow"
+            f"The fit leaves {left:.3g} {unit} unexplained, {plain_factor(plain.ratio)} times what the noise of the "
+            f"record would leave: the model lacks something, for which the intervals allow"
             f"{''.join(f'; {cause.sentence}' for cause in reasons)}"
         )
     doubts += [sentence for sentence in (little_friction(inverse, unit),) if sentence]

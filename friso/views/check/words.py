@@ -10,7 +10,7 @@ from friso.hunting.basin import SHARES
 from friso.hunting.criteria import ATTRACTED
 from friso.hunting.margin import COARSE, DISTANCE, FARTHEST, STEPS
 from friso.hunting.verdict import BANDWIDTHS, FEEDING, LOWER, STARTS
-from friso.quantities import percent
+from friso.quantities import percent, plain_factor
 from friso.stage.controllers import FORCE_LIMIT
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.check.feeding_words import feeding_sentences
@@ -380,7 +380,7 @@ def _faster(case: Case, edge: Margin) -> str:
     factor = rounded_up(edge.quiet * apart)
     powers = controller.speeds_up.items()
     gains = [f"{name} × {factor**power:.3g}" for name, power in powers if getattr(controller, name)]
-    return f"make the controller {factor:.3g} times faster{kept} ({', '.join(gains)}){doubt}"
+    return f"make the controller {plain_factor(factor)} times faster{kept} ({', '.join(gains)}){doubt}"
 
 
 def _distance(case: Case, edge: Margin) -> float:

@@ -12,7 +12,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.equations.settings import SETTINGS, Setting
 from friso.evidence import value
 from friso.frequency.crossover import WANTED
-from friso.quantities import percent
+from friso.quantities import percent, plain_factor
 from friso.stage import ControllerSection
 from friso.stage.section import numeric_fields
 from friso.stage.standstill import AgainstFriction
@@ -121,7 +121,7 @@ def _setting(setting: Setting, flat: Mapping[str, Any]) -> str:
 
 def _bandwidth(option: Option, comparison: Comparison) -> str:
     present = bandwidth(comparison.stage.flat())
-    faster = f"a controller {option.factor:.3g} times as fast"
+    faster = f"a controller {plain_factor(option.factor)} times as fast"
     if present is not None:
         raised, before = with_unit(present * option.factor, "Hz"), with_unit(present, "Hz")
         faster = f"a {comparison.stage.controller.bandwidth_name} of {raised} instead of {before}"
@@ -256,7 +256,7 @@ def _cost(result: OptionResult, comparison: Comparison) -> str:
     loops = f"modulus margin {result.margin.value:.2f}, least {result.loops.margin.min():.2f}"
     if result.unstable:
         loops = f"the linear loop is unstable on {result.unstable} of {comparison.machines.count}"
-    return f" ({comparison.paired(result).force.value:.3g} times the force RMS of a; {loops})"
+    return f" ({plain_factor(comparison.paired(result).force.value)} times the force RMS of a; {loops})"
 
 
 def _as_is(comparison: Comparison) -> str:

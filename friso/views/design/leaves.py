@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.design_method.method import Design
 from friso.design_method.requirements import RelaxableKey, Requirement
-from friso.quantities import percent
+from friso.quantities import percent, plain_factor
 from friso.views.design.words import DesignStep, hertz, leaves, size, trimmed
 from friso.views.drawing.prefixes import listed
 from friso.views.flexure.table import megapascals, newtons_per
@@ -62,7 +62,7 @@ def _numbers(design: Design) -> tuple[tuple[str, str], ...]:
         ("Drive stiffness, by beams", newtons_per(beams.drive[0], "mm")),
         ("First interfering frequency, by beams", hertz(choice.frequency)),
         ("Stress at the clamps at full stroke", megapascals(beams.clamp_stress)),
-        ("Margin to yield, to fatigue", f"{beams.yield_margin:.3g} times, {_factor(beams.fatigue_margin)}"),
+        ("Margin to yield, to fatigue", f"{plain_factor(beams.yield_margin)} times, {_factor(beams.fatigue_margin)}"),
         ("Buckling load", trimmed(beams.buckling, "N")),
         ("Load along the leaves, weight included", f"{design.fitted.task.load:.3g} N"),
         (
@@ -80,7 +80,7 @@ def _interfering(design: Design) -> str:
         return f"None of the modes considered interferes with control ({multiple:g} times the crossover is required)."
     return (
         f"The first mode that interferes with control is {mode.name}, at {hertz(mode.frequency)}: "
-        f"{mode.frequency / design.controller.crossover:.3g} times the crossover ({multiple:g} required)."
+        f"{plain_factor(mode.frequency / design.controller.crossover)} times the crossover ({multiple:g} required)."
     )
 
 
@@ -94,8 +94,8 @@ def _strength(design: Design) -> str:
         f"With the stroke alone, the stress at the clamps is {megapascals(beams.clamp_stress)}, "
         f"{beams.yield_margin:.3g} "
         f"times below yield{fatigue} ({safety.strength:g}{required} required). The leaves buckle at "
-        f"{trimmed(beams.buckling, 'N')}, {margin:.3g} times the {load:.3g} N that they carry ({safety.buckling:g} "
-        f"required{forms})."
+        f"{trimmed(beams.buckling, 'N')}, {plain_factor(margin)} times the {load:.3g} N that they carry "
+        f"({safety.buckling:g} required{forms})."
     )
 
 
@@ -134,4 +134,4 @@ def _confirmed(design: Design) -> str:
 
 
 def _factor(value: float) -> str:
-    return f"{value:.3g} times" if np.isfinite(value) else "unknown"
+    return f"{plain_factor(value)} times" if np.isfinite(value) else "unknown"
