@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.remedies.catalogue import Remedy
-from friso.remedies.search import Search
+from friso.remedies.search import BATCH, Search
 from friso.remedies.variables import Variable, of_key
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
@@ -24,6 +24,10 @@ BEYOND = 2.0
 STEPS = np.linspace(1.0, 1.5, 26)
 """Powers of the factors of the least change that are looked at, one after the other: the least of all is the one that
 just works on the machines of the search, which is not to say on others."""
+
+ALONE, FINER = 16, 8
+"""Values of each key that are tried with the others as they were, evenly in the logarithm; and steps between the first
+that does and the one before."""
 
 PARTS = (0.15, 0.3, 0.5, 0.7)
 """How far from the least change to the settings that work points are tried that change more keys."""
@@ -58,9 +62,30 @@ def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
     return of_key(key, min(old, further), max(old, further), old)
 
 
-def seek_least(search: Search) -> None:
-    """Search a remedy of `least_remedy` for the least change: fewer keys first, then smaller factors."""
-    search.optimise(partial(change_costs, search.remedy), _beginnings(search.remedy))
+def least_changes(search: Search) -> Iterator[np.ndarray]:
+    """The least changes of a remedy of `least_remedy`, (variables,), as of `candidates`: fewer keys first, then smaller
+    factors. Each key is changed alone at first, as any such change is less than all those of more keys."""
+    wanted = partial(change_costs, search.remedy)
+    home, works = _ends(search.remedy).T
+    ways = np.diag(np.where(works > home, 1.0, 0.0) - home)  # of each key alone, as far as it goes
+    steps = np.linspace(0, 1, ALONE + 1)[1:]
+    alone = np.concatenate([home + step * ways for step in steps])
+    search.tries(alone[np.argsort(wanted(alone), kind="stable")], wanted)
+    if (least := _least(search)) is not None:
+        way = ways[np.abs(least - home).argmax()] / ALONE
+        search.tries(least - way * np.linspace(0, 1, FINER + 1)[1:-1, None], wanted)
+        yield from candidates(search)
+    search.optimise(wanted, _beginnings(search.remedy))
+    yield from candidates(search)
+
+
+def _least(search: Search) -> np.ndarray | None:
+    """The least change of those tried that break nothing, (variables,); None without any."""
+    if not search.tried:
+        return None
+    points = search.points
+    free = points.shares[points.meets(search.goal)]
+    return free[int(change_costs(search.remedy, free).argmin())] if len(free) else None
 
 
 def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
@@ -95,13 +120,8 @@ def candidates(search: Search) -> Iterator[np.ndarray]:
     the way from it to the settings that work, and last others that were tried, the least change first: those with which
     enough of the fresh machines meet the goal by their moves and margins, or else most of them, and nothing attracts
     the machines."""
-    if not search.tried:
+    if (least := _least(search)) is None:
         return
-    points = search.points
-    free = points.shares[points.meets(search.goal)]
-    if not len(free):
-        return
-    least = free[int(change_costs(search.remedy, free).argmin())]
     home, works = _ends(search.remedy).T
     further = [home + step * (least - home) for step in STEPS]
     towards = [least + part * (works - least) for part in PARTS]
@@ -111,5 +131,6 @@ def candidates(search: Search) -> Iterator[np.ndarray]:
         share = search.share(kept)
         most = min(share.max(), search.goal.surely(search.fresh.count))
         kept = kept[share >= most]
-        yield from kept[search.clear(kept)]
+        for few in np.array_split(kept, -(-len(kept) // BATCH)):
+            yield from few[search.clear(few)]
     yield from search.surveyed(partial(change_costs, search.remedy))

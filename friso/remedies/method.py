@@ -22,7 +22,7 @@ from friso.progress import Progress, silent
 from friso.remedies.catalogue import Remedy, remedies, with_bandwidth
 from friso.remedies.change import ChangeSize, change_size
 from friso.remedies.goal import Goal
-from friso.remedies.least import MORE, candidates, least_remedy, seek_least
+from friso.remedies.least import MORE, least_changes, least_remedy
 from friso.remedies.machines import TRAVEL, Fleet, draw_fleet
 from friso.remedies.relax import RelaxedGoal, relaxations
 from friso.remedies.search import NEAR, Budget, Search
@@ -271,8 +271,8 @@ class _Session:
     def tries_less(self) -> None:
         """The least change of the controller as it is, from the remedy of that which works and changes most, and then,
         where that which changes least, however far, changes fewer keys still, from that; where none works, from what
-        changes least of the others. Once. Where some of the keys stay as they are, the others have a search of their
-        own, which takes its place if it changes less."""
+        changes least of the others. Once. Where some of the keys stay as they are, the others, if there are several,
+        have a search of their own, which takes its place if it changes less."""
         working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and outcome.stage]
         own = [outcome for outcome in working if outcome.remedy.stage is self.stage]
         if not working or self.tried_less:
@@ -286,7 +286,7 @@ class _Session:
             self.tried_less |= self._tries_less_than(least)
         for place in range(first, len(self.outcomes)):
             outcome = self.outcomes[place]
-            if outcome.certainty == "works" and self._size(outcome).keys < len(outcome.remedy.variables):
+            if outcome.certainty == "works" and 1 < self._size(outcome).keys < len(outcome.remedy.variables):
                 self._tries_less_than(outcome)
                 fewer = self.outcomes.pop()
                 if fewer.certainty == "works" and self._size(fewer) < self._size(outcome):
@@ -299,8 +299,7 @@ class _Session:
         if less is None:
             return False
         search = self._begun(less, MORE * self.budget.machines)
-        seek_least(search)
-        self._ended(search, candidates(search))
+        self._ended(search, least_changes(search))
         return True
 
     def interrupted(self) -> None:

@@ -7,6 +7,7 @@ Storn, Price 1997 (doi:10.1023/A:1008202821328), as SciPy has it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -34,8 +35,8 @@ BATCH, MOST = 3, 8
 MOST_POINTS = 40
 """Points of a generation at most."""
 
-WORK = 6e8
-"""Work of a search (see `friso.engine.allowance`): about 7 s on one core. Moves that chatter take most of it."""
+WORK = 4e8
+"""Work of a search (see `friso.engine.allowance`): about 5 s on one core. Moves that chatter take most of it."""
 
 OF_SETTING = 1 / 3
 """Share of that for a setting against friction alone: with gains with which a stage hunts, most runs of a setting that
@@ -181,9 +182,25 @@ class Search:
         """Try points until they get no better, or until that takes too much work (`cut`): the settling time, or what is
         `wanted` small, from points (points, variables) to numbers (points,). A search of several variables begins with
         the points `start`, if any."""
+        with self._allowed():
+            self._optimise(wanted, start)
+
+    def tries(self, points: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray]) -> None:
+        """Try points (points, variables), a few at a time, until one of those that came first breaks nothing: of which
+        what is `wanted` small is least, they come first."""
+        with self._allowed():
+            for few in np.array_split(points, -(-len(points) // WIDE)):
+                self.report(f"{self.remedy.name}: settings")
+                self.tried.append(self.measured(few, wanted=wanted(few)))
+                if (self.tried[-1].meets(self.goal) & self.tried[-1].whole).any():
+                    break
+
+    @contextmanager
+    def _allowed(self) -> Iterator[None]:
+        """The work of a search; where it does not suffice, the search is `cut`."""
         try:
             with allowance(WORK * (OF_SETTING if self.remedy.of_setting else 1.0)):
-                self._optimise(wanted, start)
+                yield
         except Exhausted:
             self.cut = True
 

@@ -18,7 +18,16 @@ from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
 from friso.remedies.search import TriedPoints
-from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile, timing
+from friso.remedies.trials import (
+    RTOL,
+    Attraction,
+    Moves,
+    attraction,
+    modulus_margins,
+    moves_of_points,
+    quantile,
+    timing,
+)
 from friso.remedies.window import VariableWindow
 from friso.shares import Share, share
 from friso.stage import Stage
@@ -144,7 +153,7 @@ def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> P
     if flat.get("joint.locked") is False:
         stiffness = in_series(stiffness, flat["joint.stiffness"])
     measured = Performance(
-        moves_of_points(remedy, ONE, machines, goal),
+        moves_of_points(remedy, ONE, machines, goal, rtol=RTOL),
         modulus_margins(remedy, ONE, machines, drive),
         Attraction.none(machines.count),
         settled_margin(linear_flat(drive, {**flat, **timing(drive)})),

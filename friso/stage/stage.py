@@ -55,6 +55,7 @@ _TRANSMISSION = Table(lambda _: Transmission, '[transmission] inertia = "1.2e-4 
 _MOTOR_FRICTION = Table(FRICTION.pick, '[motor_friction] model = "stribeck" ...')
 _ENCODER = Table(lambda _: Encoder, '[encoder] position = "load", velocity = "motor"')
 _JOINT = Table(lambda _: Joint, '[joint] stiffness = "2.4 N/mm" ...')
+_LOCKED = '[joint] locked = true, limiter_stiffness = "2e7 N/m", limiter_damping = "100 N*s/m"'
 _FLEXURE = Table(lambda _: Flexure, '[flexure] leaves = 2, length = "70 mm", width = "45 mm" ...')
 _PARASITIC = Table(lambda _: Parasitic, '[parasitic] frequency = "300 Hz" ...')
 _BIAS = Table(lambda _: Bias, '[bias] cart = "0.2 N"')
@@ -148,7 +149,11 @@ class Stage(Section):
             raise StageError("masses", text, "both masses", 'cart = "1.2 kg", stage = "0.5 kg"')
         for table, words in (("parasitic", "a parasitic mode"), ("flexure", "leaf springs")):
             if getattr(self, table) and not self.joint:
-                raise StageError(table, f"{words}, but no [joint]", "both or neither", _JOINT.example)
+                expected, example = "both or neither", _JOINT.example
+                if table == "parasitic":
+                    expected += "; a machine in one piece has the joint locked and its mass as cart and stage"
+                    example = _LOCKED
+                raise StageError(table, f"{words}, but no [joint]", expected, example)
         if self.flexure and self.axis_kind != LINEAR:
             text = f"leaf springs on an axis with {self.axis_kind.described}"
             raise StageError("flexure", text, "[joint] with its stiffness", 'stiffness = "2.4 N*m/mrad"')

@@ -38,7 +38,11 @@ _AFTERWARDS = {
 }
 """What becomes of a swing that was observed beyond a force limit without anti-windup, by the loop at lower gains."""
 
-_UNFINISHED = "this run was completed, but not the longer one that shows whether it ends in the hunting that was found"
+_UNFINISHED = (
+    "could not be judged: its own run was completed, but not the longer one that shows whether it ends in the hunting "
+    "that was found."
+)
+"""That what a stage does in the end is not known."""
 
 ONE_PLACE = 1.01
 """Factor between the ends of a window below which it is told by its middle and its width."""
@@ -55,7 +59,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     if case.runs_away:
         return " ".join([*loop, "runs away from its reference for good."])
     if case.verdict not in says and case.solver.done:
-        return " ".join([*loop, f"{case.verdict}: {_UNFINISHED}."])
+        return " ".join([*loop, _UNFINISHED])
     if case.verdict not in says:
         return " ".join([*loop, f"could not be simulated to the end of its motion ({case.solver.status})."])
     feeds = feeding_sentences(case.feeding) if case.feeding else []

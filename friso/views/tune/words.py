@@ -257,9 +257,12 @@ def _brings(measured: Performance, tuning: Advice) -> str:
     before = slowest_time(tuning.present, tuning.goal)
     as_is = "" if measured is tuning.present else f"; as it is: {before}"
     meet = share_with_interval(measured.share(tuning.goal))
+    when = (
+        f"after {slowest_time(measured, tuning.goal)}" if measured.slowest(tuning.goal) else "once the reference stands"
+    )
     return (
         f"Of {measured.count} fresh machines and moves, {meet} meet the goal; "
-        f"the slowest twentieth is in position after {slowest_time(measured, tuning.goal)}{as_is}"
+        f"the slowest twentieth is in position {when}{as_is}"
     )
 
 
@@ -388,14 +391,16 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
     broken, left = points.broken(goal), np.ones(len(points.margin), bool)
     margin = f"a modulus margin of {goal.margin:g}"
     some = bool(broken["margin"].any())  # lack the margin: nothing is said of these
-    tried = f"No setting{f' that keeps {margin}' * some} (of {len(left)} setting{'s' * (len(left) != 1)} tried)"
+    tried = f"No setting{f' that keeps {margin}' * some} (of {len(left)} tried)"
+    brings, still_settles = f"{tried} brings", f"{tried} still settles"
+    if len(left) == 1:  # nothing varies
+        brings, still_settles = "It does not bring", "It does not settle any more"
     settle = f"All settings that {'keep the margin and ' * some}settle"
     sentences = {
         "margin": f"No setting keeps {margin} on {percent(goal.share)} of the machines: the best has "
         f"{points.margin.max(initial=0.0):.2f}.",
-        "settling": f"{tried} brings {percent(goal.share)} of the machines to rest in position in time.",
-        "distance": f"{tried} still settles at {1 / goal.distance:.2f} of its bandwidth: the edge of hunting is too "
-        "close.",
+        "settling": f"{brings} {percent(goal.share)} of the machines to rest in position in time.",
+        "distance": f"{still_settles} at {1 / goal.distance:.2f} of its bandwidth: the edge of hunting is too close.",
         "force": f"{settle} take more force than there is.",
         "settle": f"{settle} do so too late.",
         "bandwidth": f"Only settings above your limit of the bandwidth do all of that{_lowest(points, goal)}.",
@@ -427,7 +432,7 @@ def _edges(tuning: Advice) -> str:
     if edge is not None:
         factors = (edge.quiet, tuning.goal.distance * edge.quiet)
         ends, needed = (with_unit(float(hertz), "Hz") for hertz in bandwidths_at(stage, factors))
-        parts.append(f"hunting ends at {ends}, so that {needed} is needed")
+        parts.append(f"hunting of the machine in the file ends at {ends}, so that it needs {needed}, others more")
     if comfortable is not None and np.isfinite(comfortable) and comfortable < tuning.limits.searched[1]:
         again = [low for low, _ in tuning.limits.comfortable if low > comfortable][:1]
         own = bandwidth(stage.flat()) or 1.0
