@@ -10,13 +10,14 @@ from beyond_flip import CREEPING
 
 import friso
 from friso.design_method import front as front_module
+from friso.design_method import method as method_module
 from friso.design_method import relax as relax_module
 from friso.design_method.choice import chosen, confirmed
 from friso.design_method.controller import choose_controller, comfortable_below, dampings
 from friso.design_method.edges import Corners, edges_over, rigid
 from friso.design_method.front import Candidate, evaluate_geometries, front
 from friso.design_method.geometry import Geometry, Sheet, box, mechanisms, sheets, sizes_of
-from friso.design_method.method import NoDesign, fit_leaves, leaves
+from friso.design_method.method import NoDesign, design, fit_leaves, leaves
 from friso.design_method.modal import Modal
 from friso.design_method.population import Population, corners
 from friso.design_method.prepare import prepared, with_leaves
@@ -36,6 +37,7 @@ from friso.leaf_springs.closed_model import closed_form_model
 from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.mechanism import Mechanism
 from friso.stage import Stage
+from friso.views.design.words import refusal
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SPEC = load_spec(EXAMPLES / "specs" / "thesis.toml")
@@ -177,6 +179,26 @@ def test_no_leaves_no_design(base: Stage, monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(relax_module, "GENERATIONS", 5)
     with pytest.raises(NoDesign, match="no leaf springs"):
         leaves(loaded(force_x="500 N"), base.flat(), 1.0)
+
+
+@pytest.mark.parametrize(("edge", "begins"), [(0.0, "No isolator is needed"), (1e3, "no design")])
+def test_where_there_is_no_design_it_is_said_whether_an_isolator_is_needed(
+    base: Stage, monkeypatch: pytest.MonkeyPatch, edge: float, begins: str
+) -> None:
+    """Of a machine that cannot have leaf springs, by its edge of hunting [Hz] without isolator."""
+
+    def edges(_: object, population: Population, low: float, high: float, *others: object) -> Corners:
+        return Corners(population, np.full(population.count, edge), (low, high))
+
+    def no_leaves(*_: object) -> None:
+        raise NoDesign("no leaf springs")
+
+    monkeypatch.setattr(method_module, "edges_over", edges)
+    monkeypatch.setattr(method_module, "leaves", no_leaves)
+    with pytest.raises(NoDesign) as refused:
+        design(base, SPEC)
+    assert refusal(refused.value).startswith(begins)
+    assert "no leaf springs" in refusal(refused.value)
 
 
 # --- hunting and the controller ---------------------------------------------------------------------------------------

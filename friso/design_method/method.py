@@ -63,12 +63,31 @@ def own_law(stages: Sequence[Stage]) -> OtherLaws:
     return OtherLaws()
 
 
-class NoDesign(Exception):
-    """No design meets the specification: why, and what to relax by how much."""
+@dataclass(frozen=True)
+class Need:
+    """What tells whether a machine needs an isolator: the edges of hunting `without` one over the corners of a
+    specification."""
 
-    def __init__(self, reason: str, relaxed: tuple[Relaxation, ...] = ()) -> None:
+    without: Corners
+    spec: Spec
+
+    @property
+    def isolator(self) -> bool:
+        """Whether the machine hunts without isolator at all crossovers that it allows."""
+        return self.spec.safety.hunting * self.without.highest > self.spec.limit
+
+
+class NoDesign(Exception):
+    """No design meets the specification: why, and what to relax by how much; and what tells whether an isolator is
+    needed at all, `need` (None: that was not looked at)."""
+
+    def __init__(self, reason: str, relaxed: tuple[Relaxation, ...] = (), need: Need | None = None) -> None:
         super().__init__(reason)
-        self.reason, self.relaxed = reason, relaxed
+        self.reason, self.relaxed, self.need = reason, relaxed, need
+
+    def of(self, need: Need) -> NoDesign:
+        """The same, once it is known whether an isolator is needed."""
+        return NoDesign(self.reason, self.relaxed, need)
 
 
 @dataclass(frozen=True)
@@ -131,9 +150,14 @@ class Design:
         return not free.missed and (limit is None or free.slower_than(SLOW) <= limit)
 
     @property
+    def need(self) -> Need:
+        """What tells whether an isolator is needed."""
+        return Need(self.without, self.spec)
+
+    @property
     def needed(self) -> bool:
         """Whether the machine hunts without isolator at all crossovers that it allows."""
-        return self.spec.safety.hunting * self.without.highest > self.spec.limit
+        return self.need.isolator
 
 
 def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Frictions = own_law) -> Design:
@@ -149,12 +173,19 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
         _by_law, laws={flat["friction.model"]: {}, **others.frictions}, population=population, progress=progress
     )
 
-    def fitted() -> tuple[LeavesAndCrossover, list[Candidate]]:
-        task, candidates = leaves(spec, flat, friction)
-        return fit_leaves(base, task, candidates, population), candidates
+    def fitted() -> tuple[LeavesAndCrossover, list[Candidate]] | NoDesign:
+        try:
+            task, candidates = leaves(spec, flat, friction)
+            return fit_leaves(base, task, candidates, population), candidates
+        except NoDesign as failure:
+            return failure
 
     label = "hunting without isolator"
-    without, (fit, candidates) = both(partial(over, rigid(flat), FIRST * limit, BEYOND * limit, label), fitted)
+    without, outcome = both(partial(over, rigid(flat), FIRST * limit, BEYOND * limit, label), fitted)
+    need = Need(worst_edges(without), spec)
+    if isinstance(outcome, NoDesign):
+        raise outcome.of(need)
+    fit, candidates = outcome
     crossover = fit.stage.flat()[CROSSOVER]
     stiffest = fit.stage.flat()["joint.stiffness"] * (1 + spec.safety.stiffness_tolerance)
     worst = {**fit.stage.flat(), "joint.stiffness": stiffest}
@@ -168,12 +199,12 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
         partial(over, worst, FIRST * crossover, ABOVE * crossover, label), examined
     )
     edges = worst_edges(isolated)
-    _does_not_hunt(fit, edges)
+    _does_not_hunt(fit, edges, need)
     softening = fit.task.load / fit.choice.beams.buckling
     tried, (damped, faster) = both(
         partial(verification, fit.stage, spec, softening, progress), partial(with_damping, fit)
     )
-    results = (worst_edges(without), tuple(candidates), by_beams, fit, edges, control, edges_map, tried, damped, faster)
+    results = (need.without, tuple(candidates), by_beams, fit, edges, control, edges_map, tried, damped, faster)
     return Design(spec, stage, *results, {law: (without[law], isolated[law]) for law in without}, others.lost)
 
 
@@ -269,7 +300,7 @@ def _down(crossover: float) -> float:
     return float(np.floor(crossover / step * (1 + 1e-9)) * step)
 
 
-def _does_not_hunt(fit: LeavesAndCrossover, edges: Corners) -> None:
+def _does_not_hunt(fit: LeavesAndCrossover, edges: Corners, need: Need) -> None:
     """Raises NoDesign where the crossover does not keep its distance from the edge of hunting."""
     spec, crossover = fit.task.spec, fit.stage.flat()[CROSSOVER]
     needed = spec.safety.hunting * edges.highest
@@ -282,7 +313,7 @@ def _does_not_hunt(fit: LeavesAndCrossover, edges: Corners) -> None:
         f"stage hunts up to {until}; a crossover above that by the safety factor of {spec.safety.hunting:g} is not "
         f"possible, the highest is {crossover:.3g} Hz"
     )
-    raise NoDesign(reason, tuple(_ways_out(fit, edges.highest, needed, crossover)))
+    raise NoDesign(reason, tuple(_ways_out(fit, edges.highest, needed, crossover)), need)
 
 
 def _ways_out(fit: LeavesAndCrossover, edge: float, needed: float, crossover: float) -> Iterator[Relaxation]:

@@ -62,6 +62,15 @@ class Setting:
         return {ControllerSection.key(name): ends for name, ends in self.tuned_in(flat, within).items()}
 
 
+def at_standstill(flat: FlatMachine) -> dict[str, Any] | None:
+    """The flat keys of a stage with the gains of its loop as they are within its window of standstill; None without
+    one."""
+    factor, controller = flat.get(ControllerSection.key("standstill_factor")), controller_of(flat)
+    if factor is None:
+        return None
+    return {**flat, **{key: factor * flat[key] for key in map(controller.key, controller.loop_gain)}}
+
+
 def _scaled(scale: float, ends: tuple[float, float]) -> tuple[float, float]:
     low, high = ends
     return scale * low, scale * high

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import sped_up
+from friso.equations.settings import at_standstill
 from friso.frequency.drive import DriveTiming
 from friso.frequency.loops import poles
 from friso.frequency.margins import margins, with_resonances
@@ -21,8 +22,11 @@ of the stage."""
 
 def loop_bandwidth(stage: Stage) -> float:
     """The bandwidth [Hz] of a stage: the last frequency at which the gain of its open loop is 1 (0 dB) while the stage
-    slides (NaN: there is none): stuck, its bearing holds it, and the loop hardly moves it."""
-    return _last_crossing(stage.flat())
+    slides (NaN: there is none): stuck, its bearing holds it, and the loop hardly moves it. With other gains at
+    standstill it is the larger one of both."""
+    flat = stage.flat()
+    within = at_standstill(flat)
+    return float(np.fmax(_last_crossing(flat), _last_crossing(within) if within else np.nan))
 
 
 def rigid_bandwidth(stage: Stage) -> float:
@@ -45,14 +49,24 @@ def bandwidths_at(stage: Stage, factors: Sequence[float] | np.ndarray) -> np.nda
 @np.errstate(all="ignore")
 def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.ndarray:
     """The bandwidths [Hz] of a stage with changes, arrays of shape (count,), in continuous time: to a share of 1e-3, as
-    loops are looked at on a grid of frequencies and their gain is taken to be a power of it in between."""
+    loops are looked at on a grid of frequencies and their gain is taken to be a power of it in between. With other
+    gains at standstill they are the larger ones of both."""
     flat, sliding = stage.flat(), _sliding(stage.flat())
     omega = with_resonances(2 * np.pi * GRID, [poles(flat, sliding, DriveTiming(0.0, 0.0)).cut])
-    loops = poles({**flat, **changes}, sliding.repeated(count), DriveTiming(0.0, 0.0)).loop(omega)
+    changed = {**flat, **changes}
+    within, machines = at_standstill(changed), sliding.repeated(count)
+    bandwidths = _last_falls(changed, machines, omega)
+    return np.fmax(bandwidths, _last_falls(within, machines, omega)) if within else bandwidths
+
+
+def _last_falls(flat: Mapping[str, Any], machines: Members, omega: np.ndarray) -> np.ndarray:
+    """Where the gains of open loops fall through 1 for the last time on a grid of angular frequencies [rad/s]: at these
+    frequencies [Hz], shape (members,) (NaN: nowhere)."""
+    loops = poles(flat, machines, DriveTiming(0.0, 0.0)).loop(omega)
     gain, frequency = np.log(np.abs(loops)), np.log(omega / (2 * np.pi))
     falls = (gain[:, :-1] >= 0) & (gain[:, 1:] < 0)
     last = falls.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)
-    rows = np.arange(count)
+    rows = np.arange(len(machines))
     before, after = gain[rows, last], gain[rows, last + 1]
     at = frequency[last] + (frequency[last + 1] - frequency[last]) * before / (before - after)
     return np.where(falls.any(axis=1), np.exp(at), np.nan)

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.remedies.catalogue import Remedy
-from friso.remedies.search import BATCH, Search
+from friso.remedies.search import BATCH, WIDE, Search
 from friso.remedies.variables import Variable, of_key
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
@@ -21,9 +21,12 @@ LEAST = ": the least change"
 BEYOND = 2.0
 """Factor by which keys may go further than in the settings that the search begins with."""
 
-STEPS = np.linspace(1.0, 1.5, 26)
+STEPS = np.append(np.linspace(1.0, 1.5, 26), np.geomspace(1.6, 8.0, 14))
 """Powers of the factors of the least change that are looked at, one after the other: the least of all is the one that
 just works on the machines of the search, which is not to say on others."""
+
+OTHERS = 24
+"""Other settings tried that break nothing which are looked at among these, those of the least changes."""
 
 ALONE, FINER = 16, 8
 """Values of each key that are tried with the others as they were, evenly in the logarithm; and steps between the first
@@ -53,26 +56,33 @@ def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
 
 
 def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
-    """A key between two values, and beyond the one that works where a stage may have that."""
-    further = new * BEYOND if new > old else new / BEYOND
+    """A key between two values, beyond the one that works, and a little the other way, as far as a stage may have
+    that."""
+    towards, away = (new * BEYOND, old / BEYOND) if new > old else (new / BEYOND, old * BEYOND)
+    ends = _possible(tuned, key, towards, new), _possible(tuned, key, away, old)
+    return of_key(key, min(ends), max(ends), old)
+
+
+def _possible(tuned: Stage, key: str, value: float, otherwise: float) -> float:
+    """A value of a key, or another one where a stage may not have that."""
     try:
-        tuned.with_numbers({key: further})
+        tuned.with_numbers({key: value})
     except InputError:
-        further = new
-    return of_key(key, min(old, further), max(old, further), old)
+        return otherwise
+    return value
 
 
 def least_changes(search: Search) -> Iterator[np.ndarray]:
     """The least changes of a remedy of `least_remedy`, (variables,), as of `candidates`: fewer keys first, then smaller
     factors. Each key is changed alone at first, as any such change is less than all those of more keys."""
     wanted = partial(change_costs, search.remedy)
-    home, works = _ends(search.remedy).T
-    ways = np.diag(np.where(works > home, 1.0, 0.0) - home)  # of each key alone, as far as it goes
+    home, _ = _ends(search.remedy).T
+    ways = np.concatenate([np.diag(end - home) for end in (1.0, 0.0)])  # of each key alone, as far as it goes
     steps = np.linspace(0, 1, ALONE + 1)[1:]
     alone = np.concatenate([home + step * ways for step in steps])
     search.tries(alone[np.argsort(wanted(alone), kind="stable")], wanted)
     if (least := _least(search)) is not None:
-        way = ways[np.abs(least - home).argmax()] / ALONE
+        way = ways[(ways @ (least - home)).argmax()] / ALONE
         search.tries(least - way * np.linspace(0, 1, FINER + 1)[1:-1, None], wanted)
         yield from candidates(search)
     search.optimise(wanted, _beginnings(search.remedy))
@@ -116,21 +126,29 @@ def _ends(remedy: Remedy) -> np.ndarray:
 
 
 def candidates(search: Search) -> Iterator[np.ndarray]:
-    """The least change of those tried that break nothing, (variables,), the same change taken further, then points on
-    the way from it to the settings that work, and last others that were tried, the least change first: those with which
-    enough of the fresh machines meet the goal by their moves and margins, or else most of them, and nothing attracts
-    the machines."""
+    """The least change of those tried that break nothing, (variables,), the same change taken further, points on the
+    way from it to the settings that work, and others that were tried, all of them the least change first: those with
+    which enough of the fresh machines meet the goal by their moves and margins, or else most of them, and nothing
+    attracts the machines; last all others that were tried."""
     if (least := _least(search)) is None:
         return
+    wanted = partial(change_costs, search.remedy)
     home, works = _ends(search.remedy).T
     further = [home + step * (least - home) for step in STEPS]
     towards = [least + part * (works - least) for part in PARTS]
-    tried = np.clip([*further, *towards], 0, 1)
+    free = search.points.shares[search.points.meets(search.goal)]
+    others = free[np.argsort(wanted(free), kind="stable")][:OTHERS]
+    tried = np.unique(np.clip([*further, *towards, *others], 0, 1), axis=0)
     kept = tried[search.measured(tried).meets(search.goal)]
-    if len(kept):
-        share = search.share(kept)
-        most = min(share.max(), search.goal.surely(search.fresh.count))
-        kept = kept[share >= most]
-        for few in np.array_split(kept, -(-len(kept) // BATCH)):
-            yield from few[search.clear(few)]
-    yield from search.surveyed(partial(change_costs, search.remedy))
+    kept = kept[np.argsort(wanted(kept), kind="stable")]
+    enough, best, most = search.goal.surely(search.fresh.count), kept[:0], 0.0
+    for few in np.array_split(kept, -(-len(kept) // WIDE)) if len(kept) else []:
+        share = search.share(few)
+        if share.max() > most:
+            best, most = few[[share.argmax()]], float(share.max())
+        robust = few[share >= enough]
+        for some in np.array_split(robust, -(-len(robust) // BATCH)) if len(robust) else []:
+            yield from some[search.clear(some)]
+    if len(best) and most < enough:
+        yield from best[search.clear(best)]
+    yield from search.surveyed(wanted)

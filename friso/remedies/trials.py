@@ -10,6 +10,7 @@ from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.bandwidth import faster
+from friso.equations.settings import at_standstill
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import attractors
 from friso.hunting.criteria import settling_of_runs
@@ -84,11 +85,14 @@ def modulus_margins(
     remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage, slower: float = 1.0
 ) -> np.ndarray:
     """The least modulus margin of the limit cases (0: not stable), shape (points, machines), with the sampling and
-    delay of the stage `drive`, and a bandwidth lower by a factor `slower`."""
+    delay of the stage `drive`, and a bandwidth lower by a factor `slower`; with other gains at standstill that with
+    either."""
     flat = {**machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), **timing(drive)}
     flat = faster(flat, 1 / slower)
     count = len(shares) * machines.count
-    return linear_loops(remedy.stage, linear_flat(drive, flat), count).margin.reshape(len(shares), machines.count)
+    states = [keys for keys in (flat, at_standstill(flat)) if keys]
+    margins = [linear_loops(remedy.stage, linear_flat(drive, keys), count).margin for keys in states]
+    return np.min(margins, axis=0).reshape(len(shares), machines.count)
 
 
 @dataclass(frozen=True)

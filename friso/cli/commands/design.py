@@ -56,7 +56,7 @@ def _refuse(failure: NoDesign, stage_file: Path, spec_file: Path | None, as_json
     if as_json:
         stage = load(stage_file)
         print_document(refused_document(stage.name, specification_of(stage, spec_file).name, failure))
-    say(f"no design: {refusal(failure)}")
+    say(refusal(failure))
     raise typer.Exit(2)
 
 

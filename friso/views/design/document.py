@@ -15,14 +15,14 @@ from friso.design_method.method import SLOW, Design, NoDesign
 from friso.design_method.relax import Relaxation
 from friso.design_method.verification import MachineOutcomes
 from friso.views.design.window import lower, upper
-from friso.views.design.words import need, refusal
+from friso.views.design.words import need_words, refusal
 from friso.views.documents import plain_json, unit_suffix
 
 
 def design_document(design: Design) -> dict[str, Any]:
     """All but the files."""
     document = {
-        "conclusion": need(design),
+        "conclusion": need_words(design.need),
         "stage": design.original.name,
         "spec": design.spec.name,
         "feasible": design.meets,

@@ -11,7 +11,7 @@ import numpy as np
 
 from friso.design_method.edges import Corners
 from friso.design_method.geometry import Geometry
-from friso.design_method.method import Design, NoDesign
+from friso.design_method.method import Design, Need, NoDesign
 from friso.design_method.relax import Relaxation
 from friso.design_method.verification import MachineOutcomes
 from friso.quantities import outwards, percent
@@ -37,7 +37,7 @@ class DesignStep:
 def headline(design: Design) -> list[tuple[str, str]]:
     """The verdicts, each with its colour: isolator or not, what it is, whether it holds."""
     return [
-        (ORANGE if design.needed else GREEN, need(design)),
+        (ORANGE if design.needed else GREEN, need_words(design.need)),
         (
             GREEN,
             f"The isolator{'' if design.needed else ', designed nevertheless'}: {leaves(design)}; stroke "
@@ -70,9 +70,9 @@ def lost_laws(design: Design) -> str:
     return f"Not tried, since they keep what is measured in some corners only: {laws}. Edges may be worse under them."
 
 
-def need(design: Design) -> str:
+def need_words(need: Need) -> str:
     """Whether the machine needs an isolator, and why."""
-    limit, factor, without = hertz(design.spec.limit), design.spec.safety.hunting, design.without
+    limit, factor, without = hertz(need.spec.limit), need.spec.safety.hunting, need.without
     if not without.hunts:
         return f"No isolator is needed: without one the machine {edge(without)}."
     corners = without.population.count > 1
@@ -84,7 +84,7 @@ def need(design: Design) -> str:
         )
     where = " in the worst corner of friction and masses" if corners else ""
     above = f"{hertz(factor * without.highest)} or more, {factor:g} times the edge of hunting{where}"
-    if design.needed:
+    if need.isolator:
         return f"An isolator is needed: without one the crossover must be {above}; the machine allows {limit}."
     return f"No isolator is needed: without one the crossover must be {above}, and the machine allows {limit}."
 
@@ -184,7 +184,13 @@ def gaps(corners: Corners, flat: Mapping[str, Any]) -> np.ndarray | None:
 
 
 def refusal(failure: NoDesign) -> str:
-    """Why no design meets a specification, and what to relax."""
+    """That no isolator is needed, where that is so; why no design meets a specification, and what to relax."""
+    if failure.need and not failure.need.isolator:
+        return f"{need_words(failure.need)}\nNor is there a design of one that meets the specification: {_why(failure)}"
+    return f"no design: {_why(failure)}"
+
+
+def _why(failure: NoDesign) -> str:
     if not failure.relaxed:
         tail = "no single requirement was found whose relaxation alone is enough: relax several"
         return f"{failure.reason}\n  {tail}"
