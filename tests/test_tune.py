@@ -244,6 +244,34 @@ CONTROLLERS = {
 }
 
 
+@pytest.mark.parametrize("factor", [0.5, 3.978])
+def test_bandwidth_and_margin_are_those_of_the_gains_at_standstill_too(
+    rigid: Stage, machines: Fleet, factor: float
+) -> None:
+    """Within its window the loop has other gains: the larger bandwidth and the smaller margin of both count."""
+    gains = {"kind": "pid", "kp": 2e4, "ki": 1e5, "kd": 500.0, "tau": 5e-4, "derivative_on": "error"}
+
+    def made(times: float, **more: Any) -> Stage:
+        scaled = {
+            key: value * (times if key in ("kp", "ki", "kd") else 1) for key, value in gains.items() if key != "kind"
+        }
+        text = {"kp": "N/m", "ki": "N/(m*s)", "kd": "N*s/m", "tau": "s"}
+        table = {key: f"{value!r} {text[key]}" if key in text else value for key, value in scaled.items()}
+        return rigid.replace({"controller": {"kind": "pid", **table, **more}})
+
+    switched = made(1, standstill_window="100 um", standstill_factor=factor)
+    plain, inside = made(1), made(factor)
+    larger = max(loop_bandwidth(plain), loop_bandwidth(inside))
+    assert loop_bandwidth(switched) == pytest.approx(larger, rel=1e-6)
+    assert loop_bandwidths(switched, {}, 1)[0] == pytest.approx(larger, rel=2e-3)
+    own, *both = (
+        modulus_margins(Remedy.settled_on("", one), np.zeros((1, 0)), machines, one)
+        for one in (switched, plain, inside)
+    )
+    assert own == pytest.approx(np.minimum(*both))
+    assert np.abs(both[0] - both[1]).min() > 1e-3
+
+
 def crossing(loop: Callable[[complex], complex], low: float, high: float) -> float:
     """Where the gain of a loop is 1 between two frequencies [Hz]."""
     root: Any = brentq(lambda hertz: np.log(abs(loop(2j * np.pi * hertz))), low, high, xtol=1e-9)
@@ -833,6 +861,31 @@ def test_the_least_change_is_sought_off_the_line_where_something_attracts_all_al
     search.clear = lambda batch: batch[:, 0] > 0.6  # pyright: ignore[reportAttributeAccessIssue]
     search._closer = lambda point, wanted: []  # pyright: ignore[reportAttributeAccessIssue]
     assert 0.6 < next(candidates(search))[0] < 0.7
+
+
+def test_the_least_change_that_meets_the_goal_on_fresh_machines_is_taken(rigid: Stage) -> None:
+    """Its machines let one through far from all others that work, and fresh ones ask for twice as much: then for the
+    least of those that were tried, not for one on the way to the tuned settings. Something smaller the other way is."""
+    tuned = rigid.replace({"controller.crossover": "40 Hz"})
+    remedy = least_remedy(rigid, tuned, Remedy.settled_on("gains", tuned))
+    assert remedy is not None
+    (variable,) = remedy.variables
+    assert variable.low == pytest.approx(4.0)  # half of the present one
+    assert variable.high == pytest.approx(160.0)
+
+    def taken(tried: list[float], enough: Callable[[np.ndarray], np.ndarray]) -> float:
+        shares = np.array([[variable.share(crossover)] for crossover in tried])
+        points = SimpleNamespace(shares=shares, meets=lambda _: np.ones(len(shares), bool))
+        every = SimpleNamespace(meets=lambda _: slice(None))
+        search: Any = SimpleNamespace(
+            remedy=remedy, tried=True, points=points, goal=SimpleNamespace(surely=lambda _: 0.98),
+            fresh=SimpleNamespace(count=100), measured=lambda _: every, clear=lambda some: np.ones(len(some), bool),
+            share=lambda some: enough(variable.at(some[:, 0])).astype(float), surveyed=lambda _: iter(()),
+        )  # fmt: skip
+        return float(variable.at(next(candidates(search)))[0])
+
+    assert 16.0 <= taken([9.0, 16.5, 25.0], lambda crossover: crossover > 16.0) <= 16.5
+    assert taken([6.5, 25.0], lambda crossover: np.abs(np.log(crossover / 8)) > 0.2) == pytest.approx(6.5)
 
 
 def test_a_change_of_one_key_is_less_than_any_of_two(machines: Fleet, rigid: Stage) -> None:

@@ -18,8 +18,8 @@ from friso.stage.controllers import CONTROLLER
 LEAST = ": the least change"
 """What is added to the name of a remedy."""
 
-BEYOND = 2.0
-"""Factor by which keys may go further than in the settings that the search begins with."""
+BEYOND, AWAY = 4.0, 2.0
+"""Factors by which keys may go further than in the settings that the search begins with, and the other way."""
 
 STEPS = np.append(np.linspace(1.0, 1.5, 26), np.geomspace(1.6, 8.0, 14))
 """Powers of the factors of the least change that are looked at, one after the other: the least of all is the one that
@@ -28,7 +28,7 @@ just works on the machines of the search, which is not to say on others."""
 OTHERS = 24
 """Other settings tried that break nothing which are looked at among these, those of the least changes."""
 
-ALONE, FINER = 16, 8
+ALONE, FINER = 24, 8
 """Values of each key that are tried with the others as they were, evenly in the logarithm; and steps between the first
 that does and the one before."""
 
@@ -58,7 +58,7 @@ def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
 def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
     """A key between two values, beyond the one that works, and a little the other way, as far as a stage may have
     that."""
-    towards, away = (new * BEYOND, old / BEYOND) if new > old else (new / BEYOND, old * BEYOND)
+    towards, away = (new * BEYOND, old / AWAY) if new > old else (new / BEYOND, old * AWAY)
     ends = _possible(tuned, key, towards, new), _possible(tuned, key, away, old)
     return of_key(key, min(ends), max(ends), old)
 
