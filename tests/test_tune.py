@@ -856,7 +856,7 @@ def test_the_least_change_is_sought_off_the_line_where_something_attracts_all_al
     shares = np.linspace(0.02, 1, 50)
     points = TriedPoints(shares[:, None], *np.ones((8, 50)))
     search = Search(remedy, Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
-    search.measured = lambda batch: replace(points, shares=batch).take(np.arange(len(batch)))  # pyright: ignore[reportAttributeAccessIssue]
+    search.measured = lambda batch: TriedPoints(batch, *np.ones((8, len(batch))))  # pyright: ignore[reportAttributeAccessIssue]
     search.share = lambda batch: np.ones(len(batch))  # pyright: ignore[reportAttributeAccessIssue]
     search.clear = lambda batch: batch[:, 0] > 0.6  # pyright: ignore[reportAttributeAccessIssue]
     search._closer = lambda point, wanted: []  # pyright: ignore[reportAttributeAccessIssue]
@@ -878,7 +878,7 @@ def test_the_least_change_that_meets_the_goal_on_fresh_machines_is_taken(rigid: 
         points = SimpleNamespace(shares=shares, meets=lambda _: np.ones(len(shares), bool))
         every = SimpleNamespace(meets=lambda _: slice(None))
         search: Any = SimpleNamespace(
-            remedy=remedy, tried=True, points=points, goal=SimpleNamespace(surely=lambda _: 0.98),
+            remedy=remedy, points=points, goal=SimpleNamespace(surely=lambda _: 0.98),
             fresh=SimpleNamespace(count=100), measured=lambda _: every, clear=lambda some: np.ones(len(some), bool),
             share=lambda some: enough(variable.at(some[:, 0])).astype(float), surveyed=lambda _: iter(()),
         )  # fmt: skip

@@ -29,8 +29,8 @@ OTHERS = 24
 """Other settings tried that break nothing which are looked at among these, those of the least changes."""
 
 ALONE, FINER = 24, 8
-"""Values of each key that are tried with the others as they were, evenly in the logarithm; and steps between the first
-that does and the one before."""
+"""Values of each key either way that are tried with the others as they were, evenly in the logarithm; and steps between
+one that does and the one before."""
 
 PARTS = (0.15, 0.3, 0.5, 0.7)
 """How far from the least change to the settings that work points are tried that change more keys."""
@@ -73,29 +73,40 @@ def _possible(tuned: Stage, key: str, value: float, otherwise: float) -> float:
 
 
 def least_changes(search: Search) -> Iterator[np.ndarray]:
-    """The least changes of a remedy of `least_remedy`, (variables,), as of `candidates`: fewer keys first, then smaller
-    factors. Each key is changed alone at first, as any such change is less than all those of more keys."""
-    wanted = partial(change_costs, search.remedy)
-    home, _ = _ends(search.remedy).T
-    ways = np.concatenate([np.diag(end - home) for end in (1.0, 0.0)])  # of each key alone, as far as it goes
-    steps = np.linspace(0, 1, ALONE + 1)[1:]
-    alone = np.concatenate([home + step * ways for step in steps])
-    search.tries(alone[np.argsort(wanted(alone), kind="stable")], wanted)
-    if (least := _least(search)) is not None:
-        way = ways[(ways @ (least - home)).argmax()] / ALONE
-        search.tries(least - way * np.linspace(0, 1, FINER + 1)[1:-1, None], wanted)
-        yield from candidates(search)
-    search.optimise(wanted, _beginnings(search.remedy))
+    """The least changes of a remedy of `least_remedy`, (variables,): fewer keys first, then smaller factors. Each key
+    is changed alone at first, as any such change is less than all those of more keys."""
+    yield from _of_one_key(search)
+    search.optimise(partial(change_costs, search.remedy), _beginnings(search.remedy))
     yield from candidates(search)
 
 
-def _least(search: Search) -> np.ndarray | None:
-    """The least change of those tried that break nothing, (variables,); None without any."""
-    if not search.tried:
-        return None
-    points = search.points
-    free = points.shares[points.meets(search.goal)]
-    return free[int(change_costs(search.remedy, free).argmin())] if len(free) else None
+def _of_one_key(search: Search) -> Iterator[np.ndarray]:
+    """Changes of one key, the least first, as far as it goes either way: those that break nothing, with which enough of
+    the fresh machines meet the goal by their moves and margins, and nothing attracts the machines."""
+    wanted = partial(change_costs, search.remedy)
+    home, _ = _ends(search.remedy).T
+    ways = np.concatenate([np.diag(end - home) for end in (1.0, 0.0)]) / ALONE
+
+    def changed(points: np.ndarray) -> np.ndarray:
+        points = points[wanted(points) >= 1]
+        return points[np.argsort(wanted(points), kind="stable")]
+
+    alone = changed(np.concatenate([home + step * ways for step in range(1, ALONE + 1)]))
+    for few in search.tries(alone):
+        for one in _robust(search, few):
+            way = ways[(ways @ (one - home)).argmax()]
+            finer = changed(one - way * np.linspace(0, 1, FINER + 1)[1:-1, None])
+            for some in search.tries(finer) if len(finer) else ():
+                yield from _robust(search, some)
+            yield one
+
+
+def _robust(search: Search, points: np.ndarray) -> Iterator[np.ndarray]:
+    """Those of points (points, variables) with which enough of the fresh machines meet the goal by their moves and
+    margins, and nothing attracts the machines."""
+    robust = points[search.share(points) >= search.goal.surely(search.fresh.count)] if len(points) else points
+    for few in np.array_split(robust, -(-len(robust) // BATCH)) if len(robust) else ():
+        yield from few[search.clear(few)]
 
 
 def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
@@ -126,29 +137,22 @@ def _ends(remedy: Remedy) -> np.ndarray:
 
 
 def candidates(search: Search) -> Iterator[np.ndarray]:
-    """The least change of those tried that break nothing, (variables,), the same change taken further, points on the
-    way from it to the settings that work, and others that were tried, all of them the least change first: those with
-    which enough of the fresh machines meet the goal by their moves and margins, or else most of them, and nothing
-    attracts the machines; last all others that were tried."""
-    if (least := _least(search)) is None:
+    """The least change of those of several keys tried that break nothing, (variables,), the same change taken further,
+    points on the way from it to the settings that work, and others that were tried, all of them the least change first:
+    those with which enough of the fresh machines meet the goal by their moves and margins, and nothing attracts the
+    machines; last all that were tried."""
+    wanted, points = partial(change_costs, search.remedy), search.points
+    free = points.shares[points.meets(search.goal)]
+    free = free[wanted(free) >= min(2, len(search.remedy.variables))]
+    if not len(free):
         return
-    wanted = partial(change_costs, search.remedy)
-    home, works = _ends(search.remedy).T
+    others = free[np.argsort(wanted(free), kind="stable")][:OTHERS]
+    least, (home, works) = others[0], _ends(search.remedy).T
     further = [home + step * (least - home) for step in STEPS]
     towards = [least + part * (works - least) for part in PARTS]
-    free = search.points.shares[search.points.meets(search.goal)]
-    others = free[np.argsort(wanted(free), kind="stable")][:OTHERS]
     tried = np.unique(np.clip([*further, *towards, *others], 0, 1), axis=0)
     kept = tried[search.measured(tried).meets(search.goal)]
     kept = kept[np.argsort(wanted(kept), kind="stable")]
-    enough, best, most = search.goal.surely(search.fresh.count), kept[:0], 0.0
-    for few in np.array_split(kept, -(-len(kept) // WIDE)) if len(kept) else []:
-        share = search.share(few)
-        if share.max() > most:
-            best, most = few[[share.argmax()]], float(share.max())
-        robust = few[share >= enough]
-        for some in np.array_split(robust, -(-len(robust) // BATCH)) if len(robust) else []:
-            yield from some[search.clear(some)]
-    if len(best) and most < enough:
-        yield from best[search.clear(best)]
+    for few in np.array_split(kept, -(-len(kept) // WIDE)) if len(kept) else ():
+        yield from _robust(search, few)
     yield from search.surveyed(wanted)

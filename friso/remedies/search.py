@@ -185,15 +185,15 @@ class Search:
         with self._allowed():
             self._optimise(wanted, start)
 
-    def tries(self, points: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray]) -> None:
-        """Try points (points, variables), a few at a time, until one of those that came first breaks nothing: of which
-        what is `wanted` small is least, they come first."""
-        with self._allowed():
-            for few in np.array_split(points, -(-len(points) // WIDE)):
-                self.report(f"{self.remedy.name}: settings")
-                self.tried.append(self.measured(few, wanted=wanted(few)))
-                if (self.tried[-1].meets(self.goal) & self.tried[-1].whole).any():
-                    break
+    def tries(self, points: np.ndarray) -> Iterator[np.ndarray]:
+        """Try points (points, variables), a few at a time: those of them that break nothing."""
+        for few in np.array_split(points, -(-len(points) // WIDE)):
+            self.report(f"{self.remedy.name}: settings")
+            with self._allowed():
+                self.tried.append(self.measured(few))
+            if self.cut:
+                return
+            yield few[self.tried[-1].meets(self.goal)]
 
     @contextmanager
     def _allowed(self) -> Iterator[None]:
