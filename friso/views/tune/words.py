@@ -71,6 +71,9 @@ OPTIONS = {
 
 ABSENT = "never"
 
+NONE_FOUND = "none was found that surely works"
+"""What is said of a remedy some of whose settings meet the goal on the machines of the search, and were not taken."""
+
 LOCKED = "joint.locked"
 
 
@@ -255,7 +258,9 @@ def size_words(size: ChangeSize) -> str:
 
 def _brings(measured: Performance, tuning: Advice) -> str:
     before = slowest_time(tuning.present, tuning.goal)
-    as_is = "" if measured is tuning.present else f"; as it is: {before}"
+    present = percent(tuning.present.share(tuning.goal).probability)
+    met = f" ({present} of the machines meet the goal)" * (before == ABSENT)
+    as_is = "" if measured is tuning.present else f"; as it is: {before}{met}"
     meet = share_with_interval(measured.share(tuning.goal))
     when = (
         f"after {slowest_time(measured, tuning.goal)}" if measured.slowest(tuning.goal) else "once the reference stands"
@@ -365,8 +370,11 @@ def _met_by_another(outcome: RemedyOutcome, tuning: Advice) -> bool:
 
 
 def _verdict(outcome: RemedyOutcome, tuning: Advice) -> str:
-    """Whether a remedy works, in a word or two."""
-    return "see the others" if _met_by_another(outcome, tuning) else outcome.certainty
+    """Whether a remedy works, in a few words."""
+    if _met_by_another(outcome, tuning):
+        return "see the others"
+    some = outcome.points is not None and bool(outcome.points.meets(tuning.goal).any())
+    return NONE_FOUND if some and outcome.certainty == "does not work" else outcome.certainty
 
 
 def _differing(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
@@ -398,7 +406,7 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
     settle = f"All settings that {'keep the margin and ' * some}settle"
     sentences = {
         "margin": f"No setting keeps {margin} on {percent(goal.share)} of the machines: the best has "
-        f"{points.margin.max(initial=0.0):.2f}.",
+        f"{_below(points.margin.max(initial=0.0), goal.margin)}.",
         "settling": f"{brings} {percent(goal.share)} of the machines to rest in position in time.",
         "distance": f"{still_settles} at {1 / goal.distance:.2f} of its bandwidth: the edge of hunting is too close.",
         "force": f"{settle} take more force than there is.",
@@ -414,6 +422,12 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
         f"looked at further ({outcome.attracted} surveyed) none surely meets it on fresh machines"
         f"{'' if outcome.cut else ', others may'}."
     )
+
+
+def _below(value: float, limit: float) -> str:
+    """A value below a limit in two digits, or in as many as show that."""
+    digits = next((digits for digits in range(2, 6) if round(value, digits) < limit), 6)
+    return f"{value:.{digits}f}"
 
 
 def _lowest(points: TriedPoints, goal: Goal) -> str:
@@ -448,7 +462,7 @@ def _edges(tuning: Advice) -> str:
 def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
     """The remedies side by side, the stage as it is first."""
     shown = [("as it is", tuning.present, "no" if tuning.needed else "yes")]
-    words = {"works": "yes", "unsure": "not sure", "does not work": "no"}
+    words = {"works": "yes", "unsure": "not sure", NONE_FOUND: "none found", "does not work": "no"}
     table = [(name, _row(measured, tuning, works)) for name, measured, works in shown]
     for outcome in tuning.outcomes:
         works = words.get(verdict := _verdict(outcome, tuning), verdict)
