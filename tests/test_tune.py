@@ -270,6 +270,8 @@ def test_bandwidth_and_margin_are_those_of_the_gains_at_standstill_too(
     )
     assert own == pytest.approx(np.minimum(*both))
     assert np.abs(both[0] - both[1]).min() > 1e-3
+    measured, *others = (performance_of(one, machines, Goal(settle=1e-9), one) for one in (switched, plain, inside))
+    assert measured.own_margin == pytest.approx(min(other.own_margin for other in others))
 
 
 def crossing(loop: Callable[[complex], complex], low: float, high: float) -> float:

@@ -62,13 +62,13 @@ class Setting:
         return {ControllerSection.key(name): ends for name, ends in self.tuned_in(flat, within).items()}
 
 
-def at_standstill(flat: FlatMachine) -> dict[str, Any] | None:
-    """The flat keys of a stage with the gains of its loop as they are within its window of standstill; None without
-    one."""
+def gain_states(flat: FlatMachine) -> list[FlatMachine]:
+    """The flat keys of a stage with the gains that its loop may have: its own, and where there is a window of
+    standstill those within it."""
     factor, controller = flat.get(ControllerSection.key("standstill_factor")), controller_of(flat)
     if factor is None:
-        return None
-    return {**flat, **{key: factor * flat[key] for key in map(controller.key, controller.loop_gain)}}
+        return [flat]
+    return [flat, {**flat, **{key: factor * flat[key] for key in map(controller.key, controller.loop_gain)}}]
 
 
 def _scaled(scale: float, ends: tuple[float, float]) -> tuple[float, float]:

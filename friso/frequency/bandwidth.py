@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import sped_up
-from friso.equations.settings import at_standstill
+from friso.equations.settings import gain_states
 from friso.frequency.drive import DriveTiming
 from friso.frequency.loops import poles
 from friso.frequency.margins import margins, with_resonances
@@ -24,9 +24,7 @@ def loop_bandwidth(stage: Stage) -> float:
     """The bandwidth [Hz] of a stage: the last frequency at which the gain of its open loop is 1 (0 dB) while the stage
     slides (NaN: there is none): stuck, its bearing holds it, and the loop hardly moves it. With other gains at
     standstill it is the larger one of both."""
-    flat = stage.flat()
-    within = at_standstill(flat)
-    return float(np.fmax(_last_crossing(flat), _last_crossing(within) if within else np.nan))
+    return float(np.fmax.reduce([_last_crossing(flat) for flat in gain_states(stage.flat())]))
 
 
 def rigid_bandwidth(stage: Stage) -> float:
@@ -53,10 +51,8 @@ def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.
     gains at standstill they are the larger ones of both."""
     flat, sliding = stage.flat(), _sliding(stage.flat())
     omega = with_resonances(2 * np.pi * GRID, [poles(flat, sliding, DriveTiming(0.0, 0.0)).cut])
-    changed = {**flat, **changes}
-    within, machines = at_standstill(changed), sliding.repeated(count)
-    bandwidths = _last_falls(changed, machines, omega)
-    return np.fmax(bandwidths, _last_falls(within, machines, omega)) if within else bandwidths
+    machines = sliding.repeated(count)
+    return np.fmax.reduce([_last_falls(state, machines, omega) for state in gain_states({**flat, **changes})])
 
 
 def _last_falls(flat: Mapping[str, Any], machines: Members, omega: np.ndarray) -> np.ndarray:

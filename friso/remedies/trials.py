@@ -10,7 +10,7 @@ from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.bandwidth import faster
-from friso.equations.settings import at_standstill
+from friso.equations.settings import gain_states
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import attractors
 from friso.hunting.criteria import settling_of_runs
@@ -90,8 +90,7 @@ def modulus_margins(
     flat = {**machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), **timing(drive)}
     flat = faster(flat, 1 / slower)
     count = len(shares) * machines.count
-    states = [keys for keys in (flat, at_standstill(flat)) if keys]
-    margins = [linear_loops(remedy.stage, linear_flat(drive, keys), count).margin for keys in states]
+    margins = [linear_loops(remedy.stage, linear_flat(drive, state), count).margin for state in gain_states(flat)]
     return np.min(margins, axis=0).reshape(len(shares), machines.count)
 
 

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from friso.equations.bandwidth import proportional_stiffness
+from friso.equations.settings import gain_states
 from friso.frequency.bandwidth import loop_bandwidth
 from friso.frequency.crossover import settled_margin
 from friso.frequency.stiffness import in_series
@@ -156,7 +157,7 @@ def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> P
         moves_of_points(remedy, ONE, machines, goal, rtol=RTOL),
         modulus_margins(remedy, ONE, machines, drive),
         Attraction.none(machines.count),
-        settled_margin(linear_flat(drive, {**flat, **timing(drive)})),
+        min(settled_margin(linear_flat(drive, state)) for state in gain_states({**flat, **timing(drive)})),
         float(stiffness),
     )
     some = np.flatnonzero(measured._meets_all(goal))
