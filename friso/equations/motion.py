@@ -117,10 +117,14 @@ def last_corner(flat: Mapping[str, Any]) -> Any:
     return _PIECES[flat["motion.kind"]](flat)[-1][0]
 
 
+def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """The flat keys without those of the motion."""
+    return {key: value for key, value in flat.items() if not key.startswith("motion.")}
+
+
 def standing(flat: Mapping[str, Any]) -> dict[str, Any]:
     """The flat keys of a stage with a motion whose reference stands from the start where that of its own motion, which
     comes to stand, does from its last corner on; magnitudes remain those of its own."""
     if flat["motion.kind"] != "there_and_back":
         return dict(flat)
-    others = {key: value for key, value in flat.items() if not key.startswith("motion.")}
-    return {**others, "motion.kind": "release", "motion.displacement": size(flat)}
+    return {**without_motion(flat), "motion.kind": "release", "motion.displacement": size(flat)}

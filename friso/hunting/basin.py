@@ -11,12 +11,12 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
-from friso.equations.motion import CRUISE, last_corner, standing
+from friso.equations.motion import CRUISE, last_corner, standing, without_motion
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Target
 from friso.hunting.attractors.rounds import RTOL, TIGHT, typical_period
 from friso.hunting.criteria.run_outcome import lasts
-from friso.hunting.cycle.ensemble import Ensemble, without_motion
+from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import pushed
 from friso.hunting.measures import swing_of
 from friso.hunting.motions import run_motions, some_of

@@ -12,6 +12,7 @@ import numpy as np
 from friso.engine.arrays import Results, Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, columns, kernel
+from friso.equations.motion import without_motion
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, shared_structure
 from friso.stage.transmission import BACKLASH
@@ -215,11 +216,6 @@ class Ensemble:
         begun, ended = (self.kernel.modes(state.T, 0.0, np.zeros(3), self.values) for state in (states, ends))
         switches = list(self.kernel.switches)
         return np.all(begun[switches] == ended[switches], axis=0)
-
-
-def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """The flat keys without those of the motion."""
-    return {key: value for key, value in flat.items() if not key.startswith("motion.")}
 
 
 def _with_room(results: Results, room: int) -> Results:
