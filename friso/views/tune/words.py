@@ -30,7 +30,14 @@ from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
 from friso.stage.transmission import leading_friction
 from friso.views.design.words import leaf_words
-from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, share_with_interval, with_unit
+from friso.views.drawing.prefixes import (
+    NOTHING,
+    digits_that_differ,
+    listed,
+    range_with_unit,
+    share_with_interval,
+    with_unit,
+)
 from friso.views.loop_words import unstable_loop
 from friso.views.machine_words import spread_sentences
 
@@ -173,10 +180,12 @@ def goal_words(goal: Goal) -> str:
     """The goal in words."""
     late = "" if goal.settle is None else f", in {with_unit(goal.settle, 's')}"
     force = "" if goal.force_limit is None else f" with at most {with_unit(goal.force_limit, 'N')}"
+    most = goal.bandwidth_limit
+    limit = "" if most is None else f" and a bandwidth of at most {with_unit(most, 'Hz')}"
     return (
         f"{percent(goal.share)} of the machines in position within {with_unit(goal.within, 'm')}{late}{force}, with a "
-        f"modulus margin of {goal.margin:g}, and nothing that attracts them down to {1 / goal.distance:.2f} of their "
-        "bandwidth"
+        f"modulus margin of {goal.margin:g}{limit}, and nothing that attracts them down to {1 / goal.distance:.2f} of "
+        "their bandwidth"
     )
 
 
@@ -397,7 +406,7 @@ def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
 def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterator[str]:
     """The first constraint that leaves nothing of the settings that meet those before."""
     broken, left = points.broken(goal), np.ones(len(points.margin), bool)
-    margin = f"a modulus margin of {goal.margin:g}"
+    margin, best = f"a modulus margin of {goal.margin:g}", float(points.margin.max(initial=0.0))
     some = bool(broken["margin"].any())  # lack the margin: nothing is said of these
     tried = f"No setting{f' that keeps {margin}' * some} (of {len(left)} tried)"
     brings, still_settles = f"{tried} brings", f"{tried} still settles"
@@ -406,7 +415,7 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
     settle = f"All settings that {'keep the margin and ' * some}settle"
     sentences = {
         "margin": f"No setting keeps {margin} on {percent(goal.share)} of the machines: the best has "
-        f"{_below(points.margin.max(initial=0.0), goal.margin)}.",
+        f"{best:.{digits_that_differ((best, goal.margin))}g}.",
         "settling": f"{brings} {percent(goal.share)} of the machines to rest in position in time.",
         "distance": f"{still_settles} at {1 / goal.distance:.2f} of its bandwidth: the edge of hunting is too close.",
         "force": f"{settle} take more force than there is.",
@@ -422,12 +431,6 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
         f"looked at further ({outcome.attracted} surveyed) none surely meets it on fresh machines"
         f"{'' if outcome.cut else ', others may'}."
     )
-
-
-def _below(value: float, limit: float) -> str:
-    """A value below a limit in two digits, or in as many as show that."""
-    digits = next((digits for digits in range(2, 6) if round(value, digits) < limit), 6)
-    return f"{value:.{digits}f}"
 
 
 def _lowest(points: TriedPoints, goal: Goal) -> str:
