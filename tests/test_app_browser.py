@@ -910,9 +910,8 @@ def test_a_browser_that_has_not_opened_the_address_is_told_to(browsed: Browsed) 
 
 def test_a_narrow_page_draws_what_is_there_otherwise_and_asks_nothing(browsed: Browsed) -> None:
     page, asked = browsed.page, []
-    whole = page.expect_event("requestfinished", lambda request: request.url.endswith("/ask/check"))
-    with whole:  # the verdict that is asked for behind the pictures
-        page.reload()
+    page.reload()
+    page.wait_for_selector("#answer .rest .note")  # the whole verdict, which else is asked for behind the pictures
     page.click("#tab-map")
     page.wait_for_selector(".plot .heatmaplayer image")
     page.wait_for_function("() => document.querySelector('.plot').data.some((one) => one.z?.length === 41)")
