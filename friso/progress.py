@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from threading import Lock
 from typing import Protocol
 
@@ -70,3 +73,37 @@ def together(progress: Progress, count: int) -> list[Progress]:
         return report
 
     return [piece() for _ in range(count)]
+
+
+class WorkClock:
+    """Seconds of work: it stands still during what is done once, such as compiling, which does not tell how long the
+    rest takes."""
+
+    def __init__(self) -> None:
+        self._stood = self._since = 0.0
+        self._reasons = 0
+        self._turn = Lock()
+
+    def now(self) -> float:
+        """The time [s] since any time before."""
+        with self._turn:
+            return (self._since if self._reasons else time.monotonic()) - self._stood
+
+    @contextmanager
+    def stands(self) -> Iterator[None]:
+        """Within, the clock stands still. Several threads may have it do so at once."""
+        with self._turn:
+            if not self._reasons:
+                self._since = time.monotonic()
+            self._reasons += 1
+        try:
+            yield
+        finally:
+            with self._turn:
+                self._reasons -= 1
+                if not self._reasons:
+                    self._stood += time.monotonic() - self._since
+
+
+WORK_CLOCK = WorkClock()
+"""That of this process."""

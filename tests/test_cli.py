@@ -18,6 +18,7 @@ import friso
 from friso.cli.app import _failed
 from friso.cli.progress import ProgressBar
 from friso.hunting.cycle.find import NO_RETURN
+from friso.progress import WORK_CLOCK
 from friso.system import LIBRARIES
 
 ROOT = Path(__file__).parent.parent
@@ -36,14 +37,52 @@ def checked() -> dict[str, Any]:
     return json.loads(run("check", RIG, "--json").stdout)
 
 
-def test_the_time_to_go_of_other_work_counts_from_its_beginning(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = [0.0]
-    monkeypatch.setattr("friso.cli.progress.time", SimpleNamespace(monotonic=lambda: clock[0]))
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The seconds that the clock of work takes for the time."""
+    seconds = [0.0]
+    monkeypatch.setattr("friso.progress.time", SimpleNamespace(monotonic=lambda: seconds[0]))
+    return seconds
+
+
+def test_the_time_to_go_of_other_work_counts_from_its_beginning(clock: list[float]) -> None:
     bar, times = ProgressBar(), []
-    for clock[0], done in ((100.0, 10), (190.0, 95), (200.0, 0), (210.0, 50), (220.0, 20), (230.0, 30)):
+    reports = ((100, 10), (190, 40), (220, 91), (230, 0), (240, 50), (250, 20), (260, 30))
+    for clock[0], done in reports:
         bar(done, 100, "work")
         times.append(bar.line().rpartition(", ")[2])
-    assert times == ["15 min to go", "10 s to go", "work", "10 s to go", "work", "70 s to go"]
+    assert times == ["work", "3 min to go", "13 s to go", "work", "10 s to go", "work", "70 s to go"]
+
+
+def test_no_time_to_go_is_told_without_a_basis_for_it(clock: list[float]) -> None:
+    """Before a twentieth of the work is done, or a hundred steps of it, the rest may take any time."""
+    bar, times = ProgressBar("first"), []
+    reports = (
+        (60, 0, 0),
+        (120, 1, 800),
+        (240, 30, 800),
+        (246, 41, 800),
+        (300, 41, 9000),
+        (310, 99, 9000),
+        (320, 200, 9000),
+    )
+    for clock[0], done, total in reports:
+        bar(done, total, "work")
+        times.append(bar.line().rpartition(", ")[2])
+    assert times == ["work", "work", "work", "40 min to go", "work", "work", "18 min to go"]
+
+
+def test_the_time_to_go_leaves_out_compiling(clock: list[float]) -> None:
+    bar = ProgressBar()
+    bar(0, 100, "work")
+    clock[0] = 10.0
+    with WORK_CLOCK.stands(), WORK_CLOCK.stands():  # of two threads
+        clock[0] = 70.0
+        bar(10, 100, "work")
+        assert bar.line() == "10 %, work, 90 s to go"
+    clock[0] = 80.0
+    bar(20, 100, "work")
+    assert bar.line() == "20 %, work, 80 s to go"
 
 
 def test_a_wait_is_told_where_no_terminal_shows_it(
@@ -53,6 +92,7 @@ def test_a_wait_is_told_where_no_terminal_shows_it(
     monkeypatch.setattr("friso.cli.progress.LINES", 0.01)
     with ProgressBar("first") as bar:
         _until_told(capsys, "friso: first")
+        bar(0, 12, "cells")
         bar(3, 12, "cells")
         _until_told(capsys, "friso: 25 %, cells, 0 s to go")
 

@@ -1,6 +1,6 @@
 """`friso tune`: machines, remedies, searches and outcomes, with tiny budgets."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -21,6 +21,7 @@ from friso.answers.tune import TuneAnswer
 from friso.app import questions
 from friso.cli.asking import show
 from friso.design_method.isolator import isolated
+from friso.engine.allowance import allowance
 from friso.engine.arrays import STATISTICS, Results
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
@@ -68,6 +69,7 @@ from friso.stage.controllers import as_tuned, controller_of
 from friso.stage.correlations import Correlations
 from friso.views.check.isolator_words import isolator_sentence
 from friso.views.drawing import matplotlib_renderer
+from friso.views.drawing.prefixes import NOTHING, with_unit
 from friso.views.tune.document import tune_document
 from friso.views.tune.figures import _sensitivity, drawn_stages, figures
 from friso.views.tune.gain_words import gain_lines
@@ -428,13 +430,17 @@ def test_the_least_change_is_sought_among_the_fewest_keys(
 
 
 def test_more_work_than_was_counted_is_no_more_than_all_of_it() -> None:
+    """Of a remedy, too: the next one goes on from where it should have ended."""
     steps: list[tuple[int, int]] = []
     report = method._Report(lambda done, total, label: steps.append((done, total)), 10)
-    report.after(50)
-    report("one more")
-    report.after(50)
+    for share in (2, 3, 50):
+        report.begins(share)
+        for _ in range(3):
+            report("one more")
+    assert [done for done, _ in steps] == [1, 2, 2, 3, 4, 5, 6, 7, 8]
+    report.begins(50)
     report("another")
-    assert steps == [(10, 10), (10, 10)]
+    assert steps[-1] == (10, 10)
 
 
 def working(remedy: Remedy, tuned: Stage) -> RemedyOutcome:
@@ -466,9 +472,57 @@ def test_the_stage_as_it_is_does_not_meet_the_goal(tuning: Advice) -> None:
     assert tuning.case.verdict == "hunts"
 
 
-def test_a_margin_that_does_not_change_is_as_before(tuning: Advice) -> None:
-    margin = tuning.present.least_margin(tuning.goal)
-    assert f"a modulus margin of {margin:.2f} as before" in price(tuning.present, tuning, buys_joint=False)
+def test_what_does_not_change_is_as_before(tuning: Advice) -> None:
+    present, goal = tuning.present, tuning.goal
+    same = price(present, tuning, buys_joint=False)
+    assert f"a modulus margin of {present.least_margin(goal):.2f} as before" in same
+    assert f"the same force ({with_unit(present.force(goal), 'N')})" in same
+    assert "the same stiffness against a load" in same
+    assert "1 times" not in same
+    of_none = replace(tuning, present=replace(present, stiffness=0.0))
+    assert f"a stiffness against a load before the integral acts of {with_unit(present.stiffness, 'N/m')}" in price(
+        present, of_none, buys_joint=False
+    )
+
+
+def test_it_is_said_for_what_the_drive_of_the_file_counts(tuning: Advice) -> None:
+    drive = "The [drive] of the file counts for the margin alone"
+    assert not any(drive in line for line in answer(replace(tuning, as_built={"drive": {"encoder_noise": "1 nm"}})))
+    assert any(drive in line for line in answer(replace(tuning, as_built={"drive": {"delay": "50 us"}})))
+
+
+def test_of_a_dither_it_is_said_that_no_cycle_can_verify_it(rigid: Stage, tuning: Advice) -> None:
+    """Of no machine it is known that nothing attracts it: not that it is attracted."""
+    dithered = rigid.replace({"controller": {**rigid.as_written()["controller"], **DITHER}})
+    outcome = RemedyOutcome(Remedy.settled_on("dither", dithered), dithered, tuning.present, None, ("hunting",))
+    advice = replace(tuning, outcomes=(*tuning.outcomes, outcome))
+    assert failing(advice)[-1] == (
+        "dither: not sure to work: its dither keeps the stage moving, so that no cycle can verify it."
+    )
+    name, (works, share, *_) = rows(advice)[-1]
+    assert (name, works, share) == ("dither", "not sure", NOTHING)
+
+
+def test_looking_further_ends_where_it_takes_too_much_work(
+    rigid: Stage, machines: Fleet, goal: Goal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What attracts a ball screw took minutes with each batch of points. Those looked at so far are taken."""
+    search = Search(AS_IS(rigid), goal, machines, machines, rigid, TINY, lambda label: None)
+
+    def points() -> Iterator[np.ndarray]:
+        while True:
+            moves_of_points(AS_IS(rigid), ONE, machines, goal)
+            yield np.zeros(0)
+
+    with allowance() as once:
+        next(points())
+    monkeypatch.setattr(search_module, "WORK", 5 * once.used / search_module.LOOKING)
+    assert len([*search.looked_at(points())]) == 5
+    assert search.cut  # and where it is already, as its settings took too much work, they are looked at all the same
+    assert len([*search.looked_at(points())]) == 5
+    search.cut = False
+    (_,) = search.looked_at(iter([np.zeros(0)]))
+    assert not search.cut
 
 
 def test_the_answer_names_what_to_change(tuning: Advice) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
-import time
+from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
 from threading import Event, Lock, Thread
 from typing import TYPE_CHECKING, Self, TextIO
 
 from friso.cli.terminal import console
 from friso.escapes import one_line
+from friso.progress import WORK_CLOCK
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Display
@@ -18,18 +19,21 @@ if TYPE_CHECKING:
 LINES = 10.0
 """Seconds between lines of progress where no terminal shows a bar."""
 
+SHARE, STEPS = 0.05, 100
+"""The share of work, or its steps where these are fewer, that tells how long the rest takes."""
+
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):
     """A bar on standard error for as long as the `with` block lasts; where that is no terminal, a line every `LINES`
     seconds.
 
     It is a `friso.progress.Progress`; before its first call, and without a total, it shows `what` and only moves.
-    Where fewer steps are done than before, other work has begun, and its time counts from there.
+    Where fewer steps are done than before, or the total is another, other work has begun: its time counts from there.
     """
 
     def __init__(self, label: str = "") -> None:
         self.label = label
-        self.begun = time.monotonic()
+        self.begun = WORK_CLOCK.now()
         self.done = self.total = self.before = 0
         self.display: Display | None = None
         self.task: TaskID | None = None
@@ -38,7 +42,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
 
     def __enter__(self) -> Self:
         if sys.stderr.isatty():
-            self.display = _display()
+            self.display = _display(self._to_go)
             self.task = self.display.add_task(one_line(self.label), total=None)
             self.display.start()
         else:
@@ -56,8 +60,8 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
 
     def __call__(self, done: int, total: int, label: str, /) -> None:
         with self._turn:
-            if done < self.done:
-                self.begun, self.before = time.monotonic(), done
+            if done < self.done or total != self.total:
+                self.begun, self.before = WORK_CLOCK.now(), done
             self.done, self.total, self.label = done, total, label
         if self.display is not None and self.task is not None:
             self.display.update(self.task, completed=done, total=total or None, description=one_line(label))
@@ -69,9 +73,10 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             return ", ".join(part for part in (share, one_line(self.label) or "working", self._to_go()) if part)
 
     def _to_go(self) -> str:
-        if not self.total or self.done == self.before:
+        done = self.done - self.before
+        if not self.total or done < min(SHARE * (self.total - self.before), STEPS) or not done:
             return ""
-        seconds = (time.monotonic() - self.begun) * (self.total - self.done) / (self.done - self.before)
+        seconds = (WORK_CLOCK.now() - self.begun) * (self.total - self.done) / done
         return f"{seconds / 60:.0f} min to go" if seconds >= 100 else f"{seconds:.0f} s to go"
 
     def _tell(self, stream: TextIO) -> None:
@@ -81,7 +86,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
                 print(f"friso: {self.line()}", file=stream, flush=True)
 
 
-def _display() -> Display:
+def _display(to_go: Callable[[], str]) -> Display:
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -89,7 +94,6 @@ def _display() -> Display:
         ProgressColumn,
         Task,
         TextColumn,
-        TimeRemainingColumn,
     )
     from rich.text import Text
 
@@ -99,11 +103,17 @@ def _display() -> Display:
         def render(self, task: Task) -> Text:
             return Text(f"{task.speed:,.0f}/s" if task.speed and task.speed >= 1 else "")
 
+    class ToGo(ProgressColumn):
+        """How long the rest takes."""
+
+        def render(self, task: Task) -> Text:
+            return Text(to_go())
+
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         Rate(),
-        TimeRemainingColumn(),
+        ToGo(),
     )
     return Progress(*columns, console=console(sys.stderr), transient=True)

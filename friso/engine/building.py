@@ -22,6 +22,7 @@ from friso.engine.cache import CodeRequest, Compiled, cache_folder, logger
 from friso.engine.overtaken import Overtaken, go_on
 from friso.engine.prune import prune
 from friso.helper_process import HelperProcess
+from friso.progress import WORK_CLOCK
 from friso.system import usable_cores
 
 _PATIENCE = 0.1
@@ -38,7 +39,8 @@ def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
     requests = list(requests)
     compiled = {request: request.entry() for request in requests}
     if missing := [request for request, entry in compiled.items() if entry is None]:
-        _work().finish(missing)
+        with WORK_CLOCK.stands():
+            _work().finish(missing)
         prune(cache_folder())
         compiled |= {request: request.entry() for request in missing}
     if dropped := [request.title for request, entry in compiled.items() if entry is None]:

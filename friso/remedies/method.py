@@ -157,14 +157,14 @@ def tune(
     ideal = stage.replace({table: None for table in AS_BUILT if getattr(stage, table)})
     listed = [remedy for remedy in remedies(ideal, goal) if chosen is None or remedy.name in chosen]
     later = (PAIRS + 2) * (_generations(budget) + 4)  # pairs and the least change, about
-    report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later + 2)
-    report("compiling")
+    report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later)
+    progress(0, 0, "compiling")
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
     of_ideal = correlations.among(ideal.uncertain())
     fresh, unseen = (_not_seen(ideal, of_ideal, budget.fresh, seed + added) for added in (FRESH, UNSEEN))
     further = _not_seen(ideal, of_ideal, budget.further, seed + FURTHER)
     machines = machines_of_search(ideal, of_ideal, budget, seed, goal, stage)
-    report("the stage as it is")
+    progress(0, 0, "the stage as it is")
     case, present = verified(ideal), performance_of(ideal, unseen, goal, stage)
     if not unmet_goals(case, present, goal):
         listed = []  # nothing has to change
@@ -313,6 +313,7 @@ class _Session:
 
     def _begun(self, remedy: Remedy, machines: int) -> Search:
         """The search for a remedy, on so many of the machines."""
+        self.report.begins(_steps(remedy, self.budget))
         several = self.machines.take(np.arange(machines))
         search = Search(remedy, self.goal, several, self.fresh, self.drive, self.budget, self.report)
         self.outcomes.append(RemedyOutcome(remedy, None, None, None, (), interrupted=True))  # until it has ended
@@ -323,7 +324,8 @@ class _Session:
         """The first of a few points that is verified, or else the first that is not sure to work."""
         unsure: RemedyOutcome | None = None
         tries = 0
-        for shares in islice(points, LOOKS):
+        looks = LOOKS if search.remedy.verifiable else 1
+        for shares in islice(search.looked_at(points), looks):
             outcome = self._verified(search, shares)
             tries += outcome.case is not None
             if outcome.certainty == "works":
@@ -336,7 +338,6 @@ class _Session:
         tried = search.points if search.tried else None
         none = RemedyOutcome(search.remedy, None, None, None, (), (), tried, search.attracted, cut=search.cut)
         self.outcomes[-1] = unsure or none
-        self.report.after(_steps(search.remedy, self.budget))
         last = self.outcomes[-1]
         if last.remedy.buys_joint and not last.remedy.makes and last.certainty == "works":
             self._made_of_leaves(last)
@@ -409,16 +410,15 @@ def _generations(budget: Budget) -> int:
 
 
 class _Report:
-    """Counts the steps of all remedies."""
+    """Counts the steps of all remedies; one that makes more than its own waits at the last of them."""
 
     def __init__(self, progress: Progress, total: int) -> None:
-        self.progress, self.total, self.done, self.base = progress, total, 0, 2
+        self.progress, self.total, self.done, self.end = progress, total, 0, 0
+
+    def begins(self, steps: int) -> None:
+        """A remedy of so many steps begins."""
+        self.done, self.end = self.end, min(self.end + steps, self.total)
 
     def __call__(self, label: str) -> None:
-        self.done = min(self.done + 1, self.total)
+        self.done = min(self.done + 1, self.end)
         self.progress(self.done, self.total, label)
-
-    def after(self, steps: int) -> None:
-        """A remedy of so many steps has ended."""
-        self.base += steps
-        self.done = min(self.base, self.total)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import brentq, differential_evolution
 from scipy.stats import qmc
 
-from friso.engine.allowance import Exhausted, allowance
+from friso.engine.allowance import Allowance, Exhausted, allowance
 from friso.frequency.bandwidth import loop_bandwidths
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
@@ -37,6 +37,9 @@ MOST_POINTS = 40
 
 WORK = 4e8
 """Work of a search (see `friso.engine.allowance`): about 5 s on one core. Moves that chatter take most of it."""
+
+LOOKING = 2.0
+"""What looking at its points further may take, in units of that: on fresh machines, and at what attracts these."""
 
 OF_SETTING = 1 / 3
 """Share of that for a setting against friction alone: with gains with which a stage hunts, most runs of a setting that
@@ -182,27 +185,44 @@ class Search:
         """Try points until they get no better, or until that takes too much work (`cut`): the settling time, or what is
         `wanted` small, from points (points, variables) to numbers (points,). A search of several variables begins with
         the points `start`, if any."""
-        with self._allowed():
+        with self._allowed(self._work):
             self._optimise(wanted, start)
 
     def tries(self, points: np.ndarray) -> Iterator[np.ndarray]:
         """Try points (points, variables), a few at a time: those of them that break nothing."""
         for few in np.array_split(points, -(-len(points) // WIDE)):
             self.report(f"{self.remedy.name}: settings")
-            with self._allowed():
+            with self._allowed(self._work):
                 self.tried.append(self.measured(few))
             if self.cut:
                 return
             yield few[self.tried[-1].meets(self.goal)]
 
+    def looked_at(self, points: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
+        """Points (variables,) that are looked at further, until finding the next one takes too much work (`cut`)."""
+        left = LOOKING * self._work
+        while True:
+            point = None
+            with self._allowed(left) as spent:
+                point = next(points, None)
+            if point is None:
+                return
+            yield point
+            left -= spent.used
+
+    @property
+    def _work(self) -> float:
+        """What a search may take."""
+        return WORK * (OF_SETTING if self.remedy.of_setting else 1.0)
+
     @contextmanager
-    def _allowed(self) -> Iterator[None]:
-        """The work of a search; where it does not suffice, the search is `cut`."""
-        try:
-            with allowance(WORK * (OF_SETTING if self.remedy.of_setting else 1.0)):
-                yield
-        except Exhausted:
-            self.cut = True
+    def _allowed(self, work: float) -> Iterator[Allowance]:
+        """So much work; where it does not suffice, the search is `cut`."""
+        with allowance(work) as spent:
+            try:
+                yield spent
+            except Exhausted:
+                self.cut = True
 
     def _optimise(self, wanted: Callable[[np.ndarray], np.ndarray] | None, start: np.ndarray | None) -> None:
         variables = len(self.remedy.variables)

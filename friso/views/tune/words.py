@@ -146,7 +146,7 @@ def answer(tuning: Advice) -> list[str]:
         lines += _works(fastest, tuning, "What settles soonest")
     elif len(tuning.working) > 1:
         lines += _works(tuning.working[1], tuning, "The next best")
-    return [*lines, f"The goal: {goal_words(tuning.goal)}.", *unknown(tuning)]
+    return [*lines, f"The goal: {goal_words(tuning.goal)}.{_of_the_drive(tuning)}", *unknown(tuning)]
 
 
 def _least_words(tuning: Advice) -> str:
@@ -157,6 +157,12 @@ def _least_words(tuning: Advice) -> str:
     if any(outcome.remedy.name.endswith(LEAST) and not outcome.interrupted for outcome in tuning.outcomes):
         return "The least change so far that works"
     return "This works, but was tuned to settle soonest and is not the least change, which was not sought yet"
+
+
+def _of_the_drive(tuning: Advice) -> str:
+    """For what the drive of the file counts."""
+    has = {"sample_time", "delay", "current_bandwidth"} & {*tuning.as_built.get("drive", ())}
+    return " The [drive] of the file counts for the margin alone, not for moves and hunting." if has else ""
 
 
 def unknown(tuning: Advice) -> list[str]:
@@ -283,8 +289,9 @@ def _brings(measured: Performance, tuning: Advice) -> str:
 def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
     """What a remedy costs against the stage as it is."""
     goal, before = tuning.goal, tuning.present
-    force = _ratio(measured.force(goal), before.force(goal))
-    stiffness = _ratio(measured.stiffness, before.stiffness)
+    force = _against(measured.force(goal), before.force(goal), "force", "N")
+    resists = "stiffness against a load before the integral acts"
+    stiffness = _against(measured.stiffness, before.stiffness, resists, "N/m")
     margin, margin_before = (f"{performance.least_margin(goal):.2f}" for performance in (measured, before))
     before_it = " as before" if margin == margin_before else f" instead of {margin_before}"
     still = (
@@ -292,15 +299,17 @@ def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
         if buys_joint
         else ""
     )
+    return f"Its price: {force}, a modulus margin of {margin}{before_it}, {stiffness}.{still}"
+
+
+def _against(now: float, before: float, what: str, unit: str) -> str:
+    """What there is now of something, against what there was before."""
+    if not before > 0 or not math.isfinite(now / before):
+        return f"a {what} of {with_unit(now, unit)}"
+    factor = factor_text(now / before)
     return (
-        f"Its price: {force} times the force ({with_unit(measured.force(goal), 'N')}), a modulus margin of "
-        f"{margin}{before_it}, {stiffness} times the "
-        f"stiffness against a load before the integral acts ({with_unit(measured.stiffness, 'N/m')}).{still}"
+        f"{'' if factor == '1' else f'{factor} times '}the {'same ' * (factor == '1')}{what} ({with_unit(now, unit)})"
     )
-
-
-def _ratio(now: float, before: float) -> str:
-    return factor_text(now / before) if before > 0 and math.isfinite(now / before) else NOTHING
 
 
 def factor_text(factor: float) -> str:
@@ -354,6 +363,8 @@ def unsure_why(outcome: RemedyOutcome) -> str:
     """Why a remedy is not sure to work."""
     if outcome.interrupted and not outcome.doubts:
         return "it was not verified: the search was interrupted"
+    if not outcome.remedy.verifiable:
+        return "its dither keeps the stage moving, so that no cycle can verify it"
     return listed([DOUBTS[doubt] for doubt in outcome.doubts], "and")
 
 
@@ -472,6 +483,7 @@ def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
         cells = [works, *[NOTHING] * (len(COLUMNS) - 1)]
         if outcome.measured is not None:
             cells = _row(outcome.measured, tuning, works)
+            cells[1] = cells[1] if outcome.remedy.verifiable else NOTHING
         table.append((outcome.remedy.name, cells))
     return table
 
