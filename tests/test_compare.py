@@ -38,6 +38,7 @@ from friso.views.compare.document import compare_document
 from friso.views.compare.figures import figures
 from friso.views.compare.page import page
 from friso.views.compare.words import _setting, conclusion, paired_rows, sentences, table_rows
+from friso.views.drawing.matplotlib_renderer import image
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 COARSE = {"drive.sample_time": "250 us", "drive.delay": "250 us"}
@@ -480,6 +481,16 @@ def test_standstill_is_compared_on_a_floor_only(made_up: Comparison, wording: Wo
         assert any("no [floor]" in note for note in expected["notes"]) is not compared
         assert ("no [floor]" in text) is not compared
         wording(figures(item)[0].caption)
+
+
+def test_machines_that_rest_where_they_begin_are_drawn(made_up: Comparison) -> None:
+    """Their RMS error in position is 0, which a logarithmic axis has no place for: matplotlib warned."""
+    still = [
+        replace(result, measures=replace(result.measures, in_position=np.zeros(COUNT))) for result in made_up.results
+    ]
+    drawn = figures(replace(made_up, results=tuple(still)))[0]
+    assert image(drawn, "png")  # warnings are errors here
+    assert [figure.panels[-1].y.log for figure in (drawn, *figures(made_up))] == [False, True]
 
 
 def test_the_cable_is_said_to_be_left_out(built: Stage) -> None:

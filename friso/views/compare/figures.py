@@ -128,11 +128,13 @@ def _standstill(comparison: Comparison) -> Panel:
         [result.in_position for result in comparison.results],
     )
     middle = np.array([median.value for median in medians])
+    most = [_most(result) for result in comparison.results]
     series = (
-        _bars(x, [_most(result) for result in comparison.results], GREY),
+        _bars(x, most, GREY),
         _bars(x, [(median.low, median.high) for median in medians], BLUE, width=4.0),
     )
-    y = Axis("In-position RMS", "m", log=True)
+    moves = max((high for _, high in most if high > 0), default=0.0) > 0  # none does that rests where it begins
+    y = Axis("In-position RMS", "m", log=moves)
     title = "Standstill" if comparison.shaken else "At rest or not (no floor vibration)"
     return Panel(title, _names(comparison), y, series, (Markers(x, middle, "median", BLUE),))
 
