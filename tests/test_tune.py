@@ -32,6 +32,7 @@ from friso.equations.structure import shared_structure
 from friso.errors import InputError
 from friso.frequency.bandwidth import bandwidths_at, loop_bandwidth, loop_bandwidths, rigid_bandwidth
 from friso.frequency.crossover import settled_margin
+from friso.frequency.family import controller_response
 from friso.hunting.check import check_given
 from friso.hunting.criteria import settling_of_runs
 from friso.hunting.cycle.ensemble import Ensemble
@@ -63,7 +64,7 @@ from friso.remedies.trials import (
     quantile,
 )
 from friso.remedies.variables import BANDWIDTH, of_key
-from friso.remedies.verified import ONE, Performance, RemedyOutcome, performance_of, unmet_goals
+from friso.remedies.verified import ONE, Performance, RemedyOutcome, _stiffness, performance_of, unmet_goals
 from friso.remedies.window import HALVINGS, POINTS, windows
 from friso.stage.controllers import as_tuned, controller_of
 from friso.stage.correlations import Correlations
@@ -483,6 +484,23 @@ def test_what_does_not_change_is_as_before(tuning: Advice) -> None:
     assert f"a stiffness against a load before the integral acts of {with_unit(present.stiffness, 'N/m')}" in price(
         present, of_none, buys_joint=False
     )
+
+
+def test_the_stiffness_under_load_is_that_of_the_loop(rigid: Stage) -> None:
+    """Before the integral acts a controller is nowhere softer; that of van Dijk's rules was told to be, by 1/beta. What
+    carries the load is the stage, with actuator and sensor: of a free joint nothing was to be lost. At standstill the
+    gains are those of standstill, and behind a motor's encoder there is its transmission."""
+    cascade, screw = load(EXAMPLES / "twincat_cascade.toml"), load(EXAMPLES / "ball_screw_axis.toml")
+    for stage in (rigid, cascade):
+        flat = stage.flat()
+        softest = np.abs(controller_response(flat, np.geomspace(0.1, 1e3, 500))).min()
+        assert _stiffness(flat) == pytest.approx(softest, rel=0.05)
+    own = _stiffness(rigid.flat())
+    assert _stiffness(isolated(rigid).flat()) == pytest.approx(own)
+    at_rest = rigid.replace({"controller.standstill_window": "1 um", "controller.standstill_factor": 3.0})
+    assert _stiffness(at_rest.flat()) == pytest.approx(3 * own)
+    behind = screw.replace({"encoder.position": "motor"})
+    assert 1 / _stiffness(behind.flat()) == pytest.approx(1 / 220e3 + 1 / 35e6)
 
 
 def test_it_is_said_for_what_the_drive_of_the_file_counts(tuning: Advice) -> None:

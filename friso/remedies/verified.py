@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from friso.equations.bandwidth import proportional_stiffness
+from friso.equations.continuous import slow_gains
 from friso.equations.settings import gain_states
 from friso.frequency.bandwidth import loop_bandwidth
 from friso.frequency.crossover import settled_margin
@@ -44,8 +44,8 @@ Certainty = Literal["works", "unsure", "given up", "does not work"]
 @dataclass(frozen=True)
 class Performance:
     """A stage on machines: its `moves`, modulus margins and what attracts, in rows of one; and of the stage itself the
-    least modulus margin in all settled states, `own_margin`, and the stiffness [N/m] against a load before the integral
-    acts: that of loop and joint in series. `further` machines are only known to meet all of the goal, or not, (n,)."""
+    least modulus margin in all settled states, `own_margin`, and the `stiffness` [N/m] against a load. `further`
+    machines are only known to meet all of the goal, or not, (n,)."""
 
     moves: Moves
     margin: np.ndarray
@@ -150,21 +150,28 @@ def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> P
     surveyed only of those that meet the rest of the goal: of others nothing is said to."""
     remedy = Remedy.settled_on("", stage)
     flat = stage.flat()
-    stiffness = proportional_stiffness(flat)
-    if flat.get("joint.locked") is False:
-        stiffness = in_series(stiffness, flat["joint.stiffness"])
     measured = Performance(
         moves_of_points(remedy, ONE, machines, goal, rtol=RTOL),
         modulus_margins(remedy, ONE, machines, drive),
         Attraction.none(machines.count),
         min(settled_margin(linear_flat(drive, state)) for state in gain_states({**flat, **timing(drive)})),
-        float(stiffness),
+        _stiffness(flat),
     )
     some = np.flatnonzero(measured._meets_all(goal))
     if not some.size:
         return measured
     surveyed = attraction(remedy, ONE, machines.take(some), goal)
     return replace(measured, attraction=measured.attraction.of_some(surveyed, some))
+
+
+def _stiffness(flat: Mapping[str, Any]) -> float:
+    """The stiffness [N/m] of the loop against a load on the stage, before the integral acts, with the gains that it has
+    at standstill. A joint takes nothing of it, as actuator and sensor are on the stage; the transmission does, where
+    the position is that of the motor."""
+    proportional, _ = slow_gains(gain_states(flat)[-1])
+    if flat.get("encoder.position") == "motor":
+        return float(in_series(proportional, flat["transmission.stiffness"]))
+    return proportional
 
 
 def verified(stage: Stage) -> Case:
