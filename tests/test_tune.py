@@ -773,6 +773,22 @@ def test_the_least_change_of_few_keys_is_sought_among_these_alone(
     assert session.outcomes[1] is (alone if taken else of_three)
 
 
+@pytest.mark.parametrize(("doubt", "verified"), [("given up", 1), ("distance", method.TRIES)])
+def test_no_other_point_is_verified_once_friso_check_gave_one_up(
+    rigid: Stage, tuning: Advice, doubt: str, verified: int
+) -> None:
+    """With the heavy loop of a cascade three points took three times as long as what a check may take."""
+    made: Any = [rigid, rigid, tuning.goal, *[None] * 4, TINY, lambda label: None]
+    session = _Session(*made, outcomes=[tuning.outcomes[0]])
+    unsure = RemedyOutcome(AS_IS(rigid), rigid, tuning.present, tuning.case, (doubt,))
+    looked_at: list[np.ndarray] = []
+    session._verified = lambda search, shares: looked_at.append(shares) or unsure  # pyright: ignore[reportAttributeAccessIssue]
+    search = Search(AS_IS(rigid), tuning.goal, *made[3:5], rigid, TINY, lambda label: None)
+    session._ended(search, iter([np.zeros(0)] * 9))
+    assert len(looked_at) == verified
+    assert session.outcomes == [unsure]
+
+
 def test_machines_not_seen_are_drawn_alone(rigid: Stage) -> None:
     assert (_not_seen(rigid, Correlations(), 6, 1).travel < 1).all()
 
@@ -872,6 +888,8 @@ def test_reasons_say_nothing_of_settings_that_were_left_out_before() -> None:
     assert "0.5" not in one
     outcome.attracted, kept = 24, TriedPoints(np.zeros((2, 1)), *np.ones((8, 2)))
     assert "2 settings tried 2 meet the rest" in next(_reasons(kept, outcome, Goal()))
+    outcome.cut, outcome.attracted = True, 0  # none was surveyed: nothing is said of these
+    assert "none surely meets it" not in next(_reasons(kept, outcome, Goal()))
 
 
 @pytest.mark.parametrize("first", np.arange(0, 0.95, 0.08))

@@ -47,6 +47,9 @@ TRIES, LOOKS = 3, 12
 """Points of a remedy whose cycles are verified at most, and that are measured on fresh machines: the next best ones
 where the best are not sure to work."""
 
+CYCLES = 20
+"""For how many steps of progress the cycles of a point count, of which a generation of points is one."""
+
 PAIRS = 2
 """Settings against friction that are tried together with the bandwidth."""
 
@@ -156,7 +159,7 @@ def tune(
     begins()
     ideal = stage.replace({table: None for table in AS_BUILT if getattr(stage, table)})
     listed = [remedy for remedy in remedies(ideal, goal) if chosen is None or remedy.name in chosen]
-    later = (PAIRS + 2) * (_generations(budget) + 4)  # pairs and the least change, about
+    later = (PAIRS + 2) * (_generations(budget) + 4 + CYCLES)  # pairs and the least change, about
     report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later)
     progress(0, 0, "compiling")
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
@@ -333,7 +336,7 @@ class _Session:
                 break
             unsure = unsure or outcome
             self.outcomes[-1] = unsure
-            if tries == TRIES:
+            if tries == TRIES or "given up" in outcome.doubts:  # by friso check: others would take it as long
                 break
         tried = search.points if search.tried else None
         none = RemedyOutcome(search.remedy, None, None, None, (), (), tried, search.attracted, cut=search.cut)
@@ -356,7 +359,7 @@ class _Session:
             case = verified(tuned)
             doubted = unsettled_parts(case, measured, goal)
         if not doubted:
-            self.report(f"{remedy.name}: further machines")
+            self.report(f"{remedy.name}: further machines", CYCLES)
             for part in np.split(np.arange(self.further.count), [self.further.count // 3]):
                 if measured.decides(goal) is None:
                     measured = measured.with_further(tuned, self.further.take(part), goal, self.drive)
@@ -400,8 +403,8 @@ def _moves(stage: Stage) -> None:
 
 
 def _steps(remedy: Remedy, budget: Budget) -> int:
-    """How many reports a remedy makes, about."""
-    return (2 if len(remedy.variables) < 2 else _generations(budget)) + 4
+    """How many steps a remedy takes, about."""
+    return (2 if len(remedy.variables) < 2 else _generations(budget)) + 4 + CYCLES
 
 
 def _generations(budget: Budget) -> int:
@@ -419,6 +422,6 @@ class _Report:
         """A remedy of so many steps begins."""
         self.done, self.end = self.end, min(self.end + steps, self.total)
 
-    def __call__(self, label: str) -> None:
-        self.done = min(self.done + 1, self.end)
+    def __call__(self, label: str, steps: int = 1) -> None:
+        self.done = min(self.done + steps, self.end)
         self.progress(self.done, self.total, label)

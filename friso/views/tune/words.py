@@ -235,7 +235,11 @@ def _made_of_leaves(outcome: RemedyOutcome, tuning: Advice) -> Iterator[str]:
     if made is not None:
         flat = made.remedy.stage.flat()
         disturbs = float(first_interfering(Mechanism.of(flat)))
-        mode = f"first interfering frequency {with_unit(disturbs, 'Hz')}" if math.isfinite(disturbs) else "no mode"
+        mode = (
+            f"first interfering frequency {with_unit(disturbs, 'Hz')}"
+            if math.isfinite(disturbs)
+            else "no interfering mode"
+        )
         yield (
             f"Leaf springs for its joint: {leaf_words(Geometry.of_stage(flat))}; "
             f"{with_unit(flat['joint.stiffness'], 'N/m')}, {mode}{_replaced(tuning.stage)}. {_verified(made, tuning)}"
@@ -437,11 +441,14 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
         left = left & ~broken[name]
         if not left.any():
             yield sentence
-    yield (
-        f"Of {len(left)} settings tried {left.sum()} meet the rest of the goal on the machines of the search; of those "
-        f"looked at further ({outcome.attracted} surveyed) none surely meets it on fresh machines"
-        f"{'' if outcome.cut else ', others may'}."
-    )
+    meet = f"Of {len(left)} settings tried {left.sum()} meet the rest of the goal on the machines of the search"
+    if outcome.cut and not outcome.attracted:
+        yield f"{meet}; of none it is known whether something attracts these."
+    else:
+        yield (
+            f"{meet}; of those looked at further ({outcome.attracted} surveyed) none surely meets it on fresh machines"
+            f"{'' if outcome.cut else ', others may'}."
+        )
 
 
 def _lowest(points: TriedPoints, goal: Goal) -> str:
@@ -460,7 +467,7 @@ def _edges(tuning: Advice) -> str:
     if edge is not None:
         factors = (edge.quiet, tuning.goal.distance * edge.quiet)
         ends, needed = (with_unit(float(hertz), "Hz") for hertz in bandwidths_at(stage, factors))
-        parts.append(f"hunting of the machine in the file ends at {ends}, so that it needs {needed}, others more")
+        parts.append(f"hunting of the machine in the file ends at {ends} (it needs {needed}, others more)")
     if comfortable is not None and np.isfinite(comfortable) and comfortable < tuning.limits.searched[1]:
         again = [low for low, _ in tuning.limits.comfortable if low > comfortable][:1]
         own = bandwidth(stage.flat()) or 1.0
