@@ -773,19 +773,34 @@ def test_the_least_change_of_few_keys_is_sought_among_these_alone(
     assert session.outcomes[1] is (alone if taken else of_three)
 
 
-@pytest.mark.parametrize(("doubt", "verified"), [("given up", 1), ("distance", method.TRIES)])
-def test_no_other_point_is_verified_once_friso_check_gave_one_up(
-    rigid: Stage, tuning: Advice, doubt: str, verified: int
+@pytest.mark.parametrize(
+    ("doubt", "work", "verified"), [("given up", 1e9, 1), ("distance", 1e9, method.TRIES), ("distance", 1.0, 1)]
+)
+def test_no_other_point_is_verified_once_one_took_too_long(
+    rigid: Stage,
+    machines: Fleet,
+    tuning: Advice,
+    monkeypatch: pytest.MonkeyPatch,
+    doubt: str,
+    work: float,
+    verified: int,
 ) -> None:
-    """With the heavy loop of a cascade three points took three times as long as what a check may take."""
+    """With the heavy loop of a cascade three points took three times as long as what a check may take before it gives
+    up; machines with elements of friction took as long without a check."""
     made: Any = [rigid, rigid, tuning.goal, *[None] * 4, TINY, lambda label: None]
     session = _Session(*made, outcomes=[tuning.outcomes[0]])
     unsure = RemedyOutcome(AS_IS(rigid), rigid, tuning.present, tuning.case, (doubt,))
-    looked_at: list[np.ndarray] = []
-    session._verified = lambda search, shares: looked_at.append(shares) or unsure  # pyright: ignore[reportAttributeAccessIssue]
-    search = Search(AS_IS(rigid), tuning.goal, *made[3:5], rigid, TINY, lambda label: None)
+    measured: list[Moves] = []
+
+    def verify(search: Search, shares: np.ndarray) -> RemedyOutcome:
+        measured.append(moves_of_points(AS_IS(rigid), ONE, machines, tuning.goal))
+        return unsure
+
+    monkeypatch.setattr(session, "_verified", verify)
+    monkeypatch.setattr(method, "VERIFYING", work)
+    search = Search(AS_IS(rigid), tuning.goal, machines, machines, rigid, TINY, lambda label: None)
     session._ended(search, iter([np.zeros(0)] * 9))
-    assert len(looked_at) == verified
+    assert len(measured) == verified
     assert session.outcomes == [unsure]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from friso.axis import LINEAR
 from friso.design_method.leaves_for_joint import leaves_for_joint
+from friso.engine.allowance import allowance
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import last_corner
@@ -46,6 +47,9 @@ from friso.studies.compare.options import linear_flat
 TRIES, LOOKS = 3, 12
 """Points of a remedy whose cycles are verified at most, and that are measured on fresh machines: the next best ones
 where the best are not sure to work."""
+
+VERIFYING = 1.2e9
+"""Work on the points of a remedy (see `friso.engine.allowance`) after which no other one is measured and verified."""
 
 CYCLES = 20
 """For how many steps of progress the cycles of a point count, of which a generation of points is one."""
@@ -326,17 +330,19 @@ class _Session:
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
         """The first of a few points that is verified, or else the first that is not sure to work."""
         unsure: RemedyOutcome | None = None
-        tries = 0
+        tries, worked = 0, 0.0
         looks = LOOKS if search.remedy.verifiable else 1
         for shares in islice(search.looked_at(points), looks):
-            outcome = self._verified(search, shares)
-            tries += outcome.case is not None
+            with allowance() as spent:
+                outcome = self._verified(search, shares)
+            tries, worked = tries + (outcome.case is not None), worked + spent.used
             if outcome.certainty == "works":
                 unsure = outcome
                 break
             unsure = unsure or outcome
             self.outcomes[-1] = unsure
-            if tries == TRIES or "given up" in outcome.doubts:  # by friso check: others would take it as long
+            # what friso check gave up takes it as long with others
+            if tries == TRIES or worked > VERIFYING or "given up" in outcome.doubts:
                 break
         tried = search.points if search.tried else None
         none = RemedyOutcome(search.remedy, None, None, None, (), (), tried, search.attracted, cut=search.cut)
