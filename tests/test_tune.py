@@ -1038,22 +1038,39 @@ def test_a_stage_that_never_leaves_does_not_settle(rigid: Stage, machines: Fleet
     assert not np.isfinite(moves.looser).any()
 
 
-def test_windows_end_where_settings_no_longer_meet_the_goal() -> None:
-    """One between two values of the grid, one that goes on to an end of the range."""
+def test_windows_end_where_settings_no_longer_meet_the_goal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One between two values of the grid, one that goes on to an end of the range, but for what attracts machines:
+    moves alone told a window of ADRC at the end of which something attracted a third of the machines."""
     variables = of_key("first", 1.0, np.e), of_key("second", 1.0, np.e)
 
     def measured(shares: np.ndarray) -> Any:
         good = (np.abs(shares[:, 0] - 0.5) < 0.01) & (shares[:, 1] > 0.21)
         return SimpleNamespace(meets=lambda goal: good)
 
-    search: Any = SimpleNamespace(remedy=SimpleNamespace(variables=variables), measured=measured, goal=None)
+    def attracted_above(share: float) -> None:
+        def survey(remedy: Any, shares: np.ndarray, machines: Any, goal: Goal) -> Any:
+            return SimpleNamespace(clear=shares[:, [1]] < [share, 2.0, 2.0])  # the first of three machines
+
+        monkeypatch.setattr("friso.remedies.window.attraction", survey)
+
+    search: Any = SimpleNamespace(
+        remedy=SimpleNamespace(variables=variables), measured=measured, machines=None, goal=Goal()
+    )
+    attracted_above(2.0)
     first, second = windows(search, np.array([0.5, 0.4]))
     ends = np.log([first.low, first.high, second.low, second.high])
-    assert ends == pytest.approx([0.49, 0.51, 0.21, 1.0], abs=1 / (POINTS - 1) / 2**HALVINGS)
+    near = 1 / (POINTS - 1) / 2**HALVINGS
+    assert ends == pytest.approx([0.49, 0.51, 0.21, 1.0], abs=near)
     assert 0.49 < ends[0] < ends[1] < 0.51
     assert ends[2] > 0.21
     assert (second.open_below, second.open_above, first.open_above) == (False, True, False)
     assert windows(search, np.array([0.52, 0.4])) == ()  # not met there itself
+    attracted_above(0.7)
+    again, closer = windows(search, np.array([0.5, 0.4]))
+    assert again == first
+    assert closer.low == second.low
+    assert not closer.open_above
+    assert 0.7 - 1.01 * 0.6 / 2**HALVINGS < np.log(closer.high) < 0.7
 
 
 def test_that_there_is_no_window_is_said() -> None:

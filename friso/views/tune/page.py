@@ -70,7 +70,9 @@ def page(tuning: Advice, figures: Sequence[Figure]) -> str:
     behind = [
         Behind("What does not work, and why", failing(tuning), open=True),
         Behind("The numbers to type in, in the terms of drives (friso export gains)", (), gain_facts(tuning)),
-        Behind("Where each number may lie, all else being as tuned", (), window_facts(tuning)),
+        Behind(
+            "Where each number may lie on the machines of the search, the others as tuned", (), window_facts(tuning)
+        ),
         Behind("What matters for the edge of hunting", sensitivity_sentences(tuning)),
         Behind("What is assumed, and how machines were drawn", assumptions(tuning)),
     ]

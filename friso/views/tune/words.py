@@ -533,8 +533,14 @@ def window_lines(tuning: Advice) -> list[str]:
     if least is None or not least.remedy.variables:
         return []
     if not least.windows:
-        return [f"No window is given for {least.remedy.name}: on the machines of the search it misses the goal itself."]
-    return [f"{least.remedy.name} meets the goal with each number varied separately, for {'; '.join(_windows(least))}."]
+        return [
+            f"No window is given for {least.remedy.name}: on the machines of the search it misses the goal itself, or "
+            "what attracts these takes too much computing."
+        ]
+    return [
+        f"{least.remedy.name} meets the goal on the few machines of the search with each number varied separately, for "
+        f"{'; '.join(_windows(least))}. Near the ends, more of other machines may miss it."
+    ]
 
 
 def window_facts(tuning: Advice) -> list[tuple[str, str]]:
