@@ -509,6 +509,16 @@ def test_it_is_said_for_what_the_drive_of_the_file_counts(tuning: Advice) -> Non
     assert any(drive in line for line in answer(replace(tuning, as_built={"drive": {"delay": "50 us"}})))
 
 
+def test_it_is_said_where_the_search_for_a_smaller_change_was_given_up(tuning: Advice) -> None:
+    """With elements of friction, three keys were told as the least change."""
+    ended = replace(tuning, interrupted=False, outcomes=tuning.working)
+    assert answer(ended)[0].startswith("The least change that works: set")
+    less = replace(tuning.working[0].remedy, name=f"gains{LEAST}")
+    given_up = RemedyOutcome(less, None, None, None, (), points=tuning.working[0].points, cut=True)
+    first = answer(replace(ended, outcomes=(*tuning.working, given_up)))[0]
+    assert first.startswith("The least change that works (the search for a smaller one was given up")
+
+
 def test_of_a_dither_it_is_said_that_no_cycle_can_verify_it(rigid: Stage, tuning: Advice) -> None:
     """Of no machine it is known that nothing attracts it: not that it is attracted."""
     dithered = rigid.replace({"controller": {**rigid.as_written()["controller"], **DITHER}})

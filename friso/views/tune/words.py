@@ -152,9 +152,12 @@ def answer(tuning: Advice) -> list[str]:
 def _least_words(tuning: Advice) -> str:
     """What the least change of those that work is: where the search for it was not reached, or did not end, settings
     that were tuned to settle soonest."""
+    sought = [outcome for outcome in tuning.outcomes if outcome.remedy.name.endswith(LEAST)]
     if not tuning.interrupted:
-        return "The least change that works"
-    if any(outcome.remedy.name.endswith(LEAST) and not outcome.interrupted for outcome in tuning.outcomes):
+        given_up = any(outcome.certainty == "given up" for outcome in sought)
+        smaller = " (the search for a smaller one was given up, as it takes too much computing)" * given_up
+        return f"The least change that works{smaller}"
+    if any(not outcome.interrupted for outcome in sought):
         return "The least change so far that works"
     return "This works, but was tuned to settle soonest and is not the least change, which was not sought yet"
 
