@@ -10,6 +10,7 @@ import numpy as np
 
 from friso.hunting.boundary.branch import Branch, Point, Tracer
 from friso.hunting.boundary.crossing import SPREAD, Crossing, FoldBack, crossing, turn
+from friso.roots import NotConverged, bracketed_root
 
 Bifurcation = Literal["flip", "fold", "torus"]
 
@@ -98,8 +99,6 @@ def _enclosed(
 ) -> dict[float, Point] | None:
     """The points between two neighbours that the search for where it happens has met, by their places along the branch;
     None if one of them cannot be reached."""
-    from scipy.optimize import brentq  # 0.4 s to import
-
     direction, length = towards(first, second), float(np.linalg.norm(second.vector - first.vector))
     points: dict[float, Point] = {0.0: first, length: second}
 
@@ -113,9 +112,8 @@ def _enclosed(
         return distance_to(kind, points[place_along])
 
     try:
-        root = float(brentq(distance, 0.0, length, xtol=precise, maxiter=TRIES))  # type: ignore[arg-type]
-        distance(root)
-    except (Unreached, RuntimeError):
+        bracketed_root(distance, 0.0, length, precise, TRIES)
+    except (Unreached, NotConverged):
         return None
     return points
 
