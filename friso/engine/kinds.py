@@ -49,6 +49,10 @@ class ArrayKind:
         return [value.__array_interface__["data"][0], *value.shape]
 
 
+class Words(list[Any]):
+    """The words of a record, in place of it. Its arrays must outlive them."""
+
+
 @dataclass(frozen=True)
 class RecordKind:
     """Named tuples with these fields."""
@@ -60,7 +64,9 @@ class RecordKind:
         return "".join(kind.form for _, kind in self.fields)
 
     def words(self, value: Any) -> list[Any]:
-        """Those of one field after another."""
+        """Those of one field after another; of a record that is handed over often they may be known."""
+        if isinstance(value, Words):
+            return value
         return [word for (_, kind), part in zip(self.fields, value, strict=True) for word in kind.words(part)]
 
 
@@ -88,5 +94,7 @@ class Packing:
 
     def packed(self, arguments: Sequence[Any]) -> bytes:
         """The words of the arguments. Arrays must outlive them. Raises TypeError for arguments of other kinds."""
-        words = (word for kind, argument in zip(self._kinds, arguments, strict=True) for word in kind.words(argument))
+        words: list[Any] = []
+        for kind, argument in zip(self._kinds, arguments, strict=True):
+            words += kind.words(argument)
         return self._struct.pack(*words)
