@@ -13,13 +13,13 @@ def bracketed_root(
     function: Callable[[float], float], low: float, high: float, precise: float, most: int = 100
 ) -> float:
     """Where a function is zero between two places at which it has opposite signs: the better end of an interval not
-    wider than `precise` in which it changes sign. By inverse quadratic interpolation where that is safe, else by
-    bisection (Chandrupatla 1997, doi:10.1016/S0965-9978(96)00051-8). Raises NotConverged after so many evaluations, and
-    ValueError where both signs are the same."""
+    wider than `precise` in which it changes sign. By a secant first, then by inverse quadratic interpolation where
+    that is safe, else by bisection (Chandrupatla 1997, doi:10.1016/S0965-9978(96)00051-8). Raises NotConverged after so
+    many evaluations, and ValueError where both signs are the same."""
     a, b, f_a, f_b = low, high, function(low), function(high)
     if f_a * f_b > 0:
         raise ValueError("the function has the same sign at both ends")
-    share = 0.5
+    share = f_a / (f_a - f_b) if f_a != f_b else 0.5
     for _ in range(most):
         if f_a == 0 or abs(b - a) <= precise:
             return a if abs(f_a) < abs(f_b) else b
