@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from friso.roots import bracketed_root
-
 DOUBT = 0.05
 """Probability that lies outside an interval."""
-
-ODDS, PRECISE = 60.0, 1e-12
-"""Range of the logarithm of the odds in which the ends of intervals are looked for, and how closely."""
 
 
 @dataclass(frozen=True)
@@ -39,22 +33,9 @@ def share(flags: np.ndarray, decided: np.ndarray) -> Share:
 
 def share_interval(hits: int, count: int) -> tuple[float, float]:
     """The 95 % interval of a probability: `hits` of `count` independent trials came true (Clopper and Pearson 1934,
-    doi:10.1093/biomet/26.4.404). From the binomial distribution itself: SciPy's functions take 0.3 s to import."""
-    low = _probability(hits, count) if hits else 0.0
-    high = 1 - _probability(count - hits, count) if hits < count else 1.0
-    return low, high
+    doi:10.1093/biomet/26.4.404). By SciPy's functions rather than its statistics, which take 0.7 s to import."""
+    from scipy.special import betaincinv
 
-
-def _probability(hits: int, count: int) -> float:
-    """The probability with which as many hits or more of so many trials are as rare as half of `DOUBT`."""
-    k = np.arange(1, count + 1)
-    factorials = np.concatenate([[0.0], np.cumsum(np.log(k))])
-    k = k[hits - 1 :]
-    ways = factorials[count] - factorials[k] - factorials[count - k]
-
-    def too_many(odds: float) -> float:
-        log_no = -np.logaddexp(0.0, odds)
-        return float(np.exp(ways + k * odds + count * log_no).sum()) - DOUBT / 2
-
-    odds = bracketed_root(too_many, -ODDS, ODDS, PRECISE)
-    return 1 / (1 + math.exp(-odds))
+    low = betaincinv(hits, count - hits + 1, DOUBT / 2) if hits else 0.0
+    high = betaincinv(hits + 1, count - hits, 1 - DOUBT / 2) if hits < count else 1.0
+    return float(low), float(high)
