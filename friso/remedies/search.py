@@ -38,7 +38,7 @@ MOST_POINTS = 40
 WORK = 4e8
 """Work of a search (see `friso.engine.allowance`): about 5 s on one core. Moves that chatter take most of it."""
 
-LOOKING = 2.0
+LOOKING = 4.0
 """What looking at its points further may take, in units of that: on fresh machines, and at what attracts these."""
 
 OF_SETTING = 1 / 3
