@@ -173,7 +173,7 @@ def test_the_least_change_has_leaves_of_its_own(tuning: Advice, monkeypatch: pyt
     (isolator, _), tried = tuning.outcomes, []
     monkeypatch.setattr(_Session, "_verified", lambda self, search, shares: isolator)
     monkeypatch.setattr(_Session, "tries", lambda self, remedy: tried.append(remedy.makes))
-    rest = SimpleNamespace(after=lambda steps: None)
-    session = _Session(tuning.stage, tuning.stage, tuning.goal, *[None] * 4, Budget(), rest, outcomes=[isolator])
-    session._ended(SimpleNamespace(remedy=isolator.remedy, tried=[], attracted=0, cut=False), iter([np.zeros(0)]))
+    session = _Session(tuning.stage, tuning.stage, tuning.goal, *[None] * 4, Budget(), None, outcomes=[isolator])
+    search = SimpleNamespace(remedy=isolator.remedy, tried=[], attracted=0, cut=False, looked_at=iter)
+    session._ended(search, iter([np.zeros(0)]))
     assert tried == [isolator.remedy.name]

@@ -108,23 +108,18 @@ class Tracer:
         self.shortest, self.hundredth, self.steepest = shortest, hundredth, steepest
 
     def solve(
-        self,
-        near: Point,
-        target: np.ndarray,
-        normal: np.ndarray,
-        states: np.ndarray | None = None,
-        closely: bool = True,
+        self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
     ) -> Point | None:
         """The cycle on the plane through a target (place, log distance, log time) with this normal, found from a cycle
         near it, or from about its own states (1, states); None if none is found, with the Jacobian of the one near it
         or with one of its own."""
-        point = self._solved(near, target, normal, states, closely)
+        point = self._solved(near, target, normal, states)
         if point is None and near.jacobians is not None:
-            return self._solved(replace(near, jacobians=None), target, normal, states, closely)
+            return self._solved(replace(near, jacobians=None), target, normal, states)
         return point
 
     def _solved(
-        self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None, closely: bool
+        self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
     ) -> Point | None:
         """The same, with the Jacobian of the cycle near it alone, if there is one."""
         border = Border(normal[None, :], np.array([normal @ target]))
@@ -133,7 +128,7 @@ class Tracer:
             begin = begin * np.exp(target[1] - near.distance) if states is None else states
             times, place = times * np.exp(target[2] - near.time), target[:1]
         orbits, places, jacobians = close_along(
-            self.family, begin, times, place, border, self.sign, self.rtol, self.swings, near.jacobians, closely
+            self.family, begin, times, place, border, self.sign, self.rtol, self.swings, near.jacobians
         )
         if not orbits.closed[0]:
             return None
@@ -153,7 +148,7 @@ class Tracer:
         while len(points) <= MOST:
             last = points[-1]
             target, states = continued(points[-3:], step, direction)
-            point = self.solve(last, target, direction, states, closely=False)
+            point = self.solve(last, target, direction, states)
             moved = np.zeros(3) if point is None else point.vector - last.vector
             length = float(np.linalg.norm(moved))
             near = point is not None and 0 < length < (2 * step if len(points) > 1 else self.longest)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -31,12 +30,8 @@ STRIDE = 0.3
 CLOSED, CLOSED_CHATTERING = 1e-8, 1e-4
 """Gap up to which an orbit counts as closed, and that for a limiter that may chatter."""
 
-FINEST, FINEST_CHATTERING = 1e-11, 1e-9
+FINEST, FINEST_CHATTERING = 1e-11, 1e-8
 """Gap that is as good as none, and that for a limiter that may chatter, where gaps below it are rounding's."""
-
-FAR, ROUGH = 1e-3, 1e-6
-"""Gap above which, where a limiter may chatter, runs at this relative tolerance do for a step: they are off by a
-hundredth of it, and take a quarter of the steps of those at the tolerance to which an orbit is closed."""
 
 WITHIN = 0.1
 """Share of the tolerance of its runs to which a gap is as good as none, if an orbit with it is closed (`CLOSED`)."""
@@ -164,18 +159,14 @@ def close_along(
     rtol: float,
     swings: int | None = None,
     jacobians: np.ndarray | None = None,
-    closely: bool = True,
 ) -> Followed:
     """Close orbits as `close` does, from states and times [s], their stages being free to change their places so that
     each comes to lie on its border. Goes round folds, at which there is no orbit at a place beyond. With `jacobians`
     of closed orbits at these states, times and places, or near them, the step to the border is made before anything is
-    run; they may come from another line through the keys: steps tell what changes by the place along this one. Unless
-    `closely`, gaps down to `FOLLOWED` do.
+    run; they may come from another line through the keys: steps tell what changes by the place along this one.
     """
     following = _Following(family, states, times, sign, rtol, places)
     following.border = border
-    if not closely:
-        following.finest = FOLLOWED
     if jacobians is not None:
         following.begin_with(jacobians)
     orbits = _iterated(following).orbits
@@ -208,28 +199,25 @@ class _Shooting:
         self.chatters = family(np.arange(count), self.places).chatters
         self.finest = FINEST_CHATTERING if self.chatters else max(FINEST, min(WITHIN * rtol, CLOSED))
         self.limit, self.stalled = CLOSED_CHATTERING if self.chatters else CLOSED, STALLED
-        self.far = FAR if self.chatters else np.inf
 
     def advance(self) -> bool:
         """One step of the orbits still on their way; whether any is on its way still."""
-        renewed, far = self.gaps > RENEWED if self.chatters else ~self.serves, self.gaps > self.far
-        for renew, rough in product((True, False), (True, False)):
-            which = np.flatnonzero(self.active & (renewed == renew) & (far == rough))
+        renewed = self.gaps > RENEWED if self.chatters else ~self.serves
+        for which in (np.flatnonzero(self.active & renewed), np.flatnonzero(self.active & ~renewed)):
             if which.size:
-                self._advance(which, renew, max(self.rtol, ROUGH) if rough else self.rtol)
+                self._advance(which, renew=bool(renewed[which[0]]))
         return bool(self.active.any())
 
-    def _advance(self, which: np.ndarray, renew: bool, rtol: float) -> None:
-        """One step of some orbits, with a Jacobian of their own or with the last one, by runs at a relative
-        tolerance."""
+    def _advance(self, which: np.ndarray, renew: bool) -> None:
+        """One step of some orbits, with a Jacobian of their own or with the last one."""
         stages, states, times = self.family(which, self.places[which]), self.states[which], self.times[which]
         if renew:
-            shot = shoot(stages, states, times, self.sign, rtol)
+            shot = shoot(stages, states, times, self.sign, self.rtol)
             ends, fine = shot.ends, shot.done
-            for k, jacobian in zip(which, self._jacobians(which, stages, shot, rtol), strict=True):
+            for k, jacobian in zip(which, self._jacobians(which, stages, shot), strict=True):
                 self.inverses[k] = _inverse(jacobian)
         else:
-            results = stages.run(states, times, rtol)
+            results = stages.run(states, times, self.rtol)
             ends, fine = self.sign * results.ends, done(results)
         misses = ends - states
         gaps = np.where(fine, np.max(np.abs(misses) / stages.scales, axis=1), np.inf)
@@ -241,8 +229,8 @@ class _Shooting:
         for k, miss, other, scale in zip(which[kept], misses[kept], residual[kept], scales[kept], strict=True):
             self._step(k, np.concatenate([miss, other]), stages.sticking, scale)
 
-    def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot, rtol: float) -> np.ndarray:
-        """Derivatives of the misses and of the phase by the states and the time, from runs at a relative tolerance."""
+    def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
+        """Derivatives of the misses and of the phase by the states and the time."""
         count, size = shot.ends.shape
         jacobians = np.zeros((count, size + 1, size + 1))
         jacobians[:, :size, :size] = shot.flows - np.eye(size)
@@ -298,7 +286,7 @@ class _Following(_Shooting):
         size = self.states.shape[1] + 2
         self.jacobians = np.full((len(self.times), size, size), np.nan)
         self.best_jacobians = self.jacobians.copy()
-        self.stalled, self.far = STALLED_FOLLOWED, np.inf
+        self.stalled = STALLED_FOLLOWED
         if self.chatters:
             self.finest = FOLLOWED
         else:
@@ -346,26 +334,26 @@ class _Following(_Shooting):
         self.jacobians[which, -1, -2] = late / self.times[which]
         self.jacobians[which, -1, -1] = along
 
-    def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot, rtol: float) -> np.ndarray:
-        self.jacobians[which, :-1, :-1] = super()._jacobians(which, stages, shot, rtol)
+    def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
+        self.jacobians[which, :-1, :-1] = super()._jacobians(which, stages, shot)
         gaps = np.max(np.abs(shot.ends - self.states[which]) / stages.scales, axis=1)
         serves = self.chatters & np.isfinite(self.gaps[which]) & (gaps < SERVES * self.gaps[which])
         stale = which[~serves]
         if stale.size:
-            behind, ahead = self._beside(stale, rtol)
+            behind, ahead = self._beside(stale)
             self.jacobians[stale, :-1, -1] = (ahead - behind) / (2 * NUDGE)
         self._set_border(which, stages)
         for k in which:
             self.latest[k] = None
         return self.jacobians[which]
 
-    def _beside(self, which: np.ndarray, rtol: float) -> np.ndarray:
+    def _beside(self, which: np.ndarray) -> np.ndarray:
         """Where the orbits end, and how far their phase is off, with the stages a little farther back and ahead along
         their lines, shape (2, orbits, states + 1)."""
         both = np.concatenate([which, which])
         nudge = np.repeat([-NUDGE, NUDGE], len(which))
         stages = self.family(both, self.places[both] + nudge)
-        ends = self.sign * stages.run(self.states[both], self.times[both], rtol).ends
+        ends = self.sign * stages.run(self.states[both], self.times[both], self.rtol).ends
         return np.hstack([ends, super()._residual(both, stages)]).reshape(2, len(which), -1)
 
     def _residual(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
