@@ -74,7 +74,7 @@ class Runs:
 
 def part_of(flat: Mapping[str, Any], numbers: np.ndarray) -> dict[str, Any]:
     """The flat keys of the stages with these numbers alone."""
-    return {key: value[numbers] if getattr(value, "ndim", 0) else value for key, value in flat.items()}
+    return {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
 
 
 def run_chunks(

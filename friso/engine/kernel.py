@@ -16,7 +16,7 @@ import numpy as np
 from friso.engine.arrays import STATISTICS, Batch, Results, Settings, new_queue
 from friso.engine.building import built_entries
 from friso.engine.cache import CodeRequest, Compiled
-from friso.engine.kinds import CompiledKind, Words, argument_kind
+from friso.engine.kinds import CompiledKind, argument_kind
 from friso.engine.layout import FUNCTIONS, LANES, LOOKED_UP, ModelLayout
 from friso.engine.machine_code import Loops, load_object
 from friso.equations.as_built import AsBuilt
@@ -62,11 +62,7 @@ class Kernel:
 
     def run(self, queue: np.ndarray, batch: Batch, settings: Settings, results: Results) -> None:
         """Run the runs of the batch that this thread gets from the queue; write the results."""
-        self.loops(self._buffer(), self._layout_words, queue, batch, settings, results)
-
-    @cached_property
-    def _layout_words(self) -> Words:
-        return Words(argument_kind(self.layout).words(self.layout))
+        self.loops(self._buffer(), self.layout, queue, batch, settings, results)
 
     def _buffer(self) -> np.ndarray:
         """Room for all rows, on a boundary of 64 bytes: a register that straddles two cache lines takes twice as

@@ -49,10 +49,6 @@ class ArrayKind:
         return [value.__array_interface__["data"][0], *value.shape]
 
 
-class Words(list[Any]):
-    """The words of a record, in place of it. Its arrays must outlive them."""
-
-
 @dataclass(frozen=True)
 class RecordKind:
     """Named tuples with these fields."""
@@ -64,9 +60,7 @@ class RecordKind:
         return "".join(kind.form for _, kind in self.fields)
 
     def words(self, value: Any) -> list[Any]:
-        """Those of one field after another; of a record that is handed over often they may be known."""
-        if isinstance(value, Words):
-            return value
+        """Those of one field after another."""
         return [word for (_, kind), part in zip(self.fields, value, strict=True) for word in kind.words(part)]
 
 
@@ -94,7 +88,5 @@ class Packing:
 
     def packed(self, arguments: Sequence[Any]) -> bytes:
         """The words of the arguments. Arrays must outlive them. Raises TypeError for arguments of other kinds."""
-        words: list[Any] = []
-        for kind, argument in zip(self._kinds, arguments, strict=True):
-            words += kind.words(argument)
+        words = (word for kind, argument in zip(self._kinds, arguments, strict=True) for word in kind.words(argument))
         return self._struct.pack(*words)

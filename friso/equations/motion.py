@@ -71,9 +71,8 @@ def pieces(flat: Mapping[str, Any], runs: int) -> np.ndarray:
     """The reference of each run, shape (runs, pieces, 4): start [s], position [m], velocity, acceleration."""
     rows = _PIECES[flat["motion.kind"]](flat)
     full = np.empty((runs, len(rows), 4))
-    for i, row in enumerate(rows):
-        for j, value in enumerate(row):
-            full[:, i, j] = value
+    for i, j in np.ndindex(len(rows), 4):
+        full[:, i, j] = rows[i][j]
     return full
 
 
