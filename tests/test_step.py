@@ -137,13 +137,14 @@ def test_step_against_plain_python(name: str, method: str, tmp_path: Path) -> No
         x = lanes.x[lane].astype(Real)
         try:
             expected = twin.step(lanes, lane, x)
-            nudged = twin.step(lanes, lane, x * (1 + Real(1e-15) * np.cos(np.arange(x.size))))
+            sizes, last = np.abs(expected.k), np.abs(np.array([*twin.tableau.a[-1], 1.0]))
+            magnitude = np.abs(x) + last @ sizes  # of what is added up in a stage
+            nudged = twin.step(lanes, lane, x + 1e-15 * np.cos(np.arange(x.size)) * magnitude)
         except FloatingPointError:
             continue
-        sizes, spread = np.abs(expected.k), 4 * np.abs(nudged.k - expected.k)
+        spread = 4 * np.abs(nudged.k - expected.k)
         end = lanes.row(lanes.layout.end, lanes.layout.states)[:, lane]
-        last = np.abs(np.array([*twin.tableau.a[-1], 1.0]))
-        rounding = last @ spread + 1e-14 * (np.abs(x) + last @ sizes)
+        rounding = last @ spread + 1e-14 * magnitude
         assert np.all(np.abs(end - expected.end) <= rounding)
         dense = lanes.dense()[:, :, lane]
         weights = np.abs(np.array([row + (0.0,) * (len(sizes) - len(row)) for row in twin.tableau.dense]))

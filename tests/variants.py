@@ -283,10 +283,10 @@ VARIANTS: dict[str, Stage] = {
 
 
 def plain_module(chosen: Stage, folder: Path, method: str = "Rodas5P") -> ModuleType:
-    """The generated module of a stage, not compiled: `module.step` runs it line by line, for one lane."""
+    """The generated module of a stage for eight lanes, not compiled: `module.step` runs it line by line, for one."""
     file = folder / "plain_kernel.py"
     form = structure(chosen.flat())
-    file.write_text(write_module(assemble(form), TABLEAUS[method], repr(form)))
+    file.write_text(write_module(assemble(form), TABLEAUS[method], repr(form), lanes=8))
     name = f"plain_kernel_{abs(hash((form, method)))}"
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None

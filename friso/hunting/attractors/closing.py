@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.hunting.attractors.rounds import Pending
-from friso.hunting.cycle.find import Cycles, described
+from friso.hunting.cycle.find import LEANING, Cycles, described
 from friso.hunting.cycle.shooting import close
 
 SAMPLES = 400
@@ -26,15 +26,25 @@ def close_orbits(
     `closed` where no orbit like the run could be closed."""
     states = _where_they_stick(runs, times)
     parts = []
-    for n in np.unique(swings):
-        group = np.flatnonzero(swings == n)
+
+    def close_from(group: np.ndarray, starts: np.ndarray, times: np.ndarray, n: int) -> Cycles:
+        """Close orbits of `n` swings for the runs with the numbers `group`."""
         sign = -1.0 if n % 2 else 1.0
-        stages, starts = runs.stages.take(group), states[group]
+        stages = runs.stages.take(group)
         if sign < 0:
             starts = starts * np.sign(starts[:, stages.sticking])[:, None]
-        cycles = described(stages, close(stages, starts, times[group], sign, rtol, int(n)), rtol)
+        cycles = described(stages, close(stages, starts, times, sign, rtol, n), rtol)
         cycles.closed[~(np.abs(2 * cycles.amplitude / sizes[group] - 1) < NEAR)] = False
         parts.append((group, cycles))
+        return cycles
+
+    for n in np.unique(swings):
+        group = np.flatnonzero(swings == n)
+        cycles = close_from(group, states[group], times[group], int(n))
+        upright = np.abs(cycles.middle) < LEANING * cycles.amplitude
+        if n == 2 and (twice := np.flatnonzero(cycles.closed & upright & runs.mirrored[group])).size:
+            orbits = cycles.orbits.take(twice)  # symmetric cycles, passed through twice
+            cycles.closed[twice] &= ~close_from(group[twice], orbits.states, orbits.times / 2, 1).closed
     return parts
 
 
