@@ -15,11 +15,15 @@ import numpy as np
 import pytest
 from browser import BROWSER, needs_browser
 from log_files import motion, write_text
+from made_up import both_joints
+from test_map_views import plain
 
 import friso
 from friso.app.frames import frame
 from friso.escapes import escaped
+from friso.views.check.page import check_html
 from friso.views.drawing.figure import INK, Axis, Figure, Panel, Series
+from friso.views.map.page import map_html
 from friso.views.pages import Report
 
 pytestmark = needs_browser
@@ -995,6 +999,29 @@ def test_a_page_of_files_is_drawn_for_its_width_and_axe_finds_no_violation(brows
         page.wait_for_function("was => document.querySelector('.main-svg').clientHeight > was", arg=height)
         violations = axe.run(page).response["violations"]
         assert [(item["id"], [node["html"] for node in item["nodes"]]) for item in violations] == []
+    finally:
+        page.close()
+
+
+PAGES = {
+    "check": (lambda: check_html(both_joints()), 7),
+    "map": (lambda: map_html(plain(), "peaks", "friso simulate --cell map.zarr {indices}"), 1),
+}
+"""Pages of commands, and the figures on each."""
+
+
+@pytest.mark.parametrize("command", PAGES)
+def test_the_figures_of_a_page_are_drawn(browsed: Browsed, tmp_path: Path, command: str) -> None:
+    html, figures = PAGES[command]
+    (tmp_path / "page.html").write_text(html(), encoding="utf-8")
+    page, wrong = browsed.page.context.browser.new_page(), []
+    try:
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.set_viewport_size({"width": 1600, "height": 20_000})  # figures are drawn as one scrolls to them
+        page.goto((tmp_path / "page.html").as_uri())
+        page.wait_for_function("n => document.querySelectorAll('.js-plotly-plot').length == n", arg=figures)
+        assert page.locator("select").count() == (command == "map")
+        assert wrong == []
     finally:
         page.close()
 

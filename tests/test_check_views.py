@@ -10,7 +10,6 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
-from browser import browsed, needs_browser
 from hypothesis import given
 from hypothesis import strategies as st
 from made_up import (
@@ -248,13 +247,6 @@ def test_report_opens_offline_and_holds_plotly_once(page):
     own = page.replace(plotly_renderer.script(), "")
     assert {*re.findall(r"https?://[^\"'<> ]*", own)} == NAMESPACES
     assert "sendChartToCloud" not in own
-
-
-@needs_browser
-def test_a_browser_draws_all_figures(page, tmp_path):
-    elements = browsed(page, tmp_path)
-    assert len(re.findall(r'<div id="figure-[^>]*class="js-plotly-plot"', elements)) == 7
-    assert '<html lang="en">' in elements  # else it would stand still
 
 
 def test_report_holds_a_print_of_every_figure(page):

@@ -18,7 +18,6 @@ import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
-from browser import browsed, needs_browser
 from matplotlib.colors import to_hex
 from pages import NAMESPACES, Page, packed_values
 from scipy.stats import binomtest
@@ -492,14 +491,6 @@ def test_the_page_opens_offline_and_says_what_it_shows():
     ):
         assert text in parsed.text
     assert "In this page" not in parsed.text
-
-
-@needs_browser
-def test_a_browser_draws_the_map_and_its_controls(tmp_path: Path):
-    elements = browsed(map_html(plain(), "peaks", RERUN), tmp_path)
-    assert re.search(r'<div id="plot"[^>]*class="js-plotly-plot"', elements)
-    assert "<select>" in elements
-    assert '<html lang="en">' in elements
 
 
 def test_a_map_is_laid_out_once_for_its_page_and_its_files(
