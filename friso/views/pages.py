@@ -64,12 +64,19 @@ class Report:
 
     @classmethod
     def of_stage(
-        cls, command: str, stage: Stage | None, figures: Sequence[Figure], name: str = "Unnamed stage", **values: Any
+        cls,
+        command: str,
+        stage: Stage | None,
+        figures: Sequence[Figure],
+        name: str = "Unnamed stage",
+        templates: str = OWN_TEMPLATES,
+        **values: Any,
     ) -> Report:
         """The page about a stage, or about none; `name` stands at the head where the stage has none."""
         if stage is None:
-            return cls(command, name, figures, values=values)
-        return cls(command, stage.name or name, figures, stage.to_toml(), stage.source, values=values)
+            return cls(command, name, figures, templates=templates, values=values)
+        about = (stage.to_toml(), stage.source)
+        return cls(command, stage.name or name, figures, *about, templates=templates, values=values)
 
     def html(self) -> str:
         """The page: it opens offline, prints, and is the same bytes on every run."""
