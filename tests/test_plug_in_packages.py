@@ -107,11 +107,11 @@ def test_a_taken_name_or_a_missing_module_is_one_message(name: str, module: str,
     done = friso_command(tmp_path, "--help")
     assert done.returncode == 0
     assert "  check " in done.stdout
-    assert f"friso: friso.friction: {module}" in told(done)
-    assert ('"lugre"' if module == "taken" else "cannot be imported") in told(done)
+    assert f"friso: friso.friction: {module}" in left_out(done)
+    assert ('"lugre"' if module == "taken" else "cannot be imported") in left_out(done)
 
 
-def told(done: subprocess.CompletedProcess[str]) -> str:
+def left_out(done: subprocess.CompletedProcess[str]) -> str:
     """The one sentence on standard error."""
     assert done.stderr.count("\n") == 1, done.stderr
     assert "is left out" in done.stderr
@@ -207,8 +207,8 @@ def test_a_command_that_is_of_no_use_is_one_sentence_and_hinders_no_other(
     listed = friso_command(tmp_path, "--help")
     assert listed.returncode == 0
     assert "  check " in listed.stdout
-    assert f"friso: friso.commands: {name} is left out: {module}" in told(listed)
-    assert why in told(listed)
+    assert f"friso: friso.commands: {name} is left out: {module}" in left_out(listed)
+    assert why in left_out(listed)
     done = friso_command(tmp_path, "init", "stage.toml")
     assert (done.returncode, done.stderr) == (0, "")
     assert friso_command(tmp_path, "check", "--help").returncode == 0
