@@ -22,7 +22,8 @@ ANNOTATED = ("annotation", "returns", "type_comment", "type_params", "kind", "ct
 
 
 def code_digest(places: Sequence[str]) -> str:
-    """A digest of what the modules in some folders and files of the package compute; empty without any."""
+    """A digest of what the modules in some folders and files compute, paths from the package friso; empty without
+    any."""
     if not places:
         return ""
     code = hashlib.sha256()

@@ -21,7 +21,7 @@ from friso.hunting.margin import margin
 from friso.stage import Stage
 from friso.studies.boundary import boundary
 from friso.studies.sweep import sweep
-from friso.studies.thesis.studies import thesis_rig
+from friso_thesis.studies.thesis.studies import thesis_rig
 
 LOCKED = {"joint.locked": True}
 CASES = {"locked": LOCKED, "free": {}, "free, 5 Hz": {"controller.crossover": "5 Hz"}}

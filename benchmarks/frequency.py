@@ -17,7 +17,7 @@ from friso.frequency.bode import bode
 from friso.frequency.family import DENSITY, frequency_grid, scan_stability
 from friso.frequency.members import Members, family
 from friso.stage import Stage
-from friso.studies.thesis.studies import thesis_rig
+from friso_thesis.studies.thesis.studies import thesis_rig
 
 MEMBERS = 10_000
 ONE_BY_ONE = 50

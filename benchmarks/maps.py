@@ -28,8 +28,8 @@ from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.study import Study
 from friso.studies.sweep import run_in_memory, run_in_store
-from friso.studies.thesis.studies import STUDIES, thesis_rig
 from friso.system import usable_cores
+from friso_thesis.studies.thesis.studies import STUDIES, thesis_rig
 
 RTOLS = (1e-4, 1e-6)
 WANTED = {1e-4: 1.5, 1e-6: 5.0}

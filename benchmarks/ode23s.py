@@ -150,8 +150,8 @@ def counted_peaks(deviation: np.ndarray) -> int:
 
 def thesis_solver() -> dict[str, float]:
     """Peaks, swing over the last quarter [m] and steps of every run that is judged: `locked_8_hz_peaks`, for one."""
-    from friso.studies.thesis import thesis_rig
-    from friso.studies.thesis.judges.solver import CASES
+    from friso_thesis.studies.thesis import thesis_rig
+    from friso_thesis.studies.thesis.judges.solver import CASES
 
     values: dict[str, float] = {}
     for name, changes in CASES.items():

@@ -4,6 +4,8 @@ import friso.early  # noqa: F401 (notes a signal that comes while the rest is im
 
 # isort: split
 import importlib
+from collections.abc import Mapping
+from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any
 
 from friso.version import VERSION as __version__
@@ -18,10 +20,8 @@ if TYPE_CHECKING:
     from friso.answers.doctor import doctor
     from friso.answers.export import export
     from friso.answers.flexure import flexure
-    from friso.answers.guideline import guideline
     from friso.answers.identify import identify
     from friso.answers.logs import logs
-    from friso.answers.reproduce import reproduce
     from friso.answers.rig import rig
     from friso.answers.simulate import simulate
     from friso.answers.starting import example, init, schema
@@ -50,10 +50,8 @@ _PLACES = {
     "friso.answers.doctor": ("doctor",),
     "friso.answers.export": ("export",),
     "friso.answers.flexure": ("flexure",),
-    "friso.answers.guideline": ("guideline",),
     "friso.answers.identify": ("identify",),
     "friso.answers.logs": ("logs",),
-    "friso.answers.reproduce": ("reproduce",),
     "friso.answers.rig": ("rig",),
     "friso.answers.simulate": ("simulate",),
     "friso.answers.starting": ("example", "init", "schema"),
@@ -99,7 +97,6 @@ __all__ = [
     "example",
     "export",
     "flexure",
-    "guideline",
     "harmonic_balance",
     "identify",
     "init",
@@ -111,7 +108,6 @@ __all__ = [
     "member",
     "plant_response",
     "read_store",
-    "reproduce",
     "rig",
     "save",
     "schema",
@@ -124,12 +120,24 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Everything is imported when it is first used: numbers with units and arrays take half a second."""
-    if name not in _LAZY:
-        raise AttributeError(f"module 'friso' has no attribute {name!r}")
-    return getattr(importlib.import_module(_LAZY[name]), name)
+    """Import what is used for the first time: numbers with units and arrays take half a second. What friso does not
+    have itself is looked for among the functions of installed packages."""
+    if name in _LAZY:
+        return getattr(importlib.import_module(_LAZY[name]), name)
+    if not name.startswith("_") and PathFinder.find_spec(f"friso.{name}", __path__) is None and name in _installed():
+        from friso.installed import FUNCTIONS, load_declared
+
+        return load_declared(FUNCTIONS, name, _installed()[name], name)
+    raise AttributeError(f"module 'friso' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    """What is public, for completion."""
-    return __all__
+    """What is public, for completion, with the functions of installed packages."""
+    return [*__all__, *_installed()]
+
+
+def _installed() -> Mapping[str, str]:
+    """The modules of functions that installed packages name, by name."""
+    from friso.installed import FUNCTIONS, installed_modules
+
+    return installed_modules(FUNCTIONS, frozenset(_LAZY))

@@ -1,58 +1,84 @@
-"""What the modules of a package declare, one each, by name: the one way in which friso is extended by a file."""
+"""What modules declare, one each, by name: those of a folder of friso, and those that installed packages name."""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
+from functools import cached_property
 from importlib import import_module
+from importlib.util import find_spec
 from pkgutil import iter_modules
 from typing import Any, Generic, TypeVar
 
 from friso.errors import InputError
+from friso.installed import installed_modules, leave_out, load_declared
 
 Item = TypeVar("Item")
 
 
 class Registry(Generic[Item]):
-    """What the modules of a `package` declare under the name `attribute`, by the name of the module with dashes:
-    `break_away.py` declares "break-away".
+    """What modules declare under the name `attribute`, by the name of the module with dashes: `break_away.py` declares
+    "break-away".
 
-    The names, and what each is in one line, the first one of the module's docstring, are read without importing any of
-    them; a module is imported when what it declares is first asked for. `added` takes what is declared elsewhere, as
-    (declared, one line), by name.
+    The modules are those of a `package`, and, where there is a `group` of entry points, those that installed packages
+    name in it, whose entry is of a `kind`. The names, and what each is in one line, the first one of the module's
+    docstring, are read without importing any of them; a module is imported when what it declares is first asked for.
+    `added` takes what is declared elsewhere, as (declared, one line), by name.
     """
 
-    def __init__(self, package: str, attribute: str) -> None:
-        self.package, self.attribute = package, attribute
+    def __init__(self, package: str, attribute: str, group: str = "", kind: type = object) -> None:
+        self.package, self.attribute, self.group, self.kind = package, attribute, group, kind
         self.added: dict[str, tuple[Item, str]] = {}
+
+    @cached_property
+    def _own(self) -> dict[str, str]:
+        """The modules of the package, by name."""
+        modules = iter_modules(import_module(self.package).__path__)
+        return {module.name.replace("_", "-"): f"{self.package}.{module.name}" for module in modules}
+
+    @property
+    def _installed(self) -> Mapping[str, str]:
+        """The modules that installed packages name, by name."""
+        return installed_modules(self.group, frozenset(self._own)) if self.group else {}
 
     def __iter__(self) -> Iterator[str]:
         """The names, in alphabetical order."""
-        paths = import_module(self.package).__path__
-        return iter(sorted({module.name.replace("_", "-") for module in iter_modules(paths)} | self.added.keys()))
+        return iter(sorted({*self._own, *self._installed, *self.added}))
 
     def __contains__(self, name: object) -> bool:
-        return name in tuple(self)
+        return name in self.added or name in self._own or name in self._installed
 
     def __getitem__(self, name: str) -> Item:
-        """What is declared under a name. Raises KeyError for an unknown one."""
+        """What is declared under a name. Raises KeyError for an unknown one, InputError where another package's module
+        declares nothing."""
         if name in self.added:
             return self.added[name][0]
-        if name not in self:
+        if name in self._own:
+            return getattr(import_module(self._own[name]), self.attribute)
+        if name not in self._installed:
             raise KeyError(name)
-        return getattr(import_module(f"{self.package}.{name.replace('-', '_')}"), self.attribute)
+        return load_declared(self.group, name, self._installed[name], self.attribute, self.kind)
+
+    def items(self) -> Iterator[tuple[str, Item]]:
+        """The names with what is declared; what another package's module does not declare is told, and left out."""
+        for name in self:
+            try:
+                yield name, self[name]
+            except InputError as error:
+                leave_out(error)
 
     def one_line(self, name: str) -> str:
         """What is declared under a name, in one line without a full stop. Raises KeyError for an unknown name."""
         if name in self.added:
             return self.added[name][1]
-        for module in iter_modules(import_module(self.package).__path__):
-            if module.name.replace("_", "-") == name:
-                finder: Any = module.module_finder
-                source = finder.find_spec(module.name).loader.get_source(module.name)
-                return (ast.get_docstring(ast.parse(source)) or "").partition("\n")[0].removesuffix(".")
-        raise KeyError(name)
+        module = self._own.get(name) or self._installed[name]
+        try:
+            loader: Any = getattr(find_spec(module), "loader", None)
+            source = loader.get_source(module)
+        except (Exception, SystemExit):  # of another package, told where it is used
+            return f"cannot be imported from {module}"
+        return (ast.get_docstring(ast.parse(source)) or "").partition("\n")[0].removesuffix(".")
 
     def checked(self, name: str, option: str, example: str) -> str:
         """The name, if it is one of these. Raises InputError for the `option` otherwise, whose `example`, with {} for

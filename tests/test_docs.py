@@ -100,7 +100,7 @@ def test_every_command_is_on_its_page() -> None:
 
 def test_every_public_name_is_on_its_page() -> None:
     page = (DOCS / "reference" / "python.md").read_text(encoding="utf-8")
-    names = [name for name in friso.__all__ if callable(getattr(friso, name))]
+    names = [name for name in dir(friso) if callable(getattr(friso, name))]
     assert [name for name in names if not re.search(rf"auto(function|class|exception):: friso\.{name}\n", page)] == []
 
 
@@ -125,7 +125,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if int(version("setuptools").split(".")[0]) < NEEDED:
         pytest.skip(f"setuptools {NEEDED} or later, of the test extra, is not installed")
     tree, out = tmp_path_factory.mktemp("tree"), tmp_path_factory.mktemp("built")
-    for name in ("friso", "examples"):
+    for name in ("friso", "friso_thesis", "examples"):
         shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
     for path in (
         *ROOT.glob("*.md"),
@@ -143,7 +143,8 @@ def test_the_wheel_works_outside_the_repository(built: Path, tmp_path: Path) -> 
     (wheel,) = built.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "installed")
-    data = {path.relative_to(ROOT).as_posix() for path in (ROOT / "friso").rglob("*") if path.is_file()}
+    held = [path for name in ("friso", "friso_thesis") for path in (ROOT / name).rglob("*") if path.is_file()]
+    data = {path.relative_to(ROOT).as_posix() for path in held}
     data = {name for name in data if not name.endswith((".py", ".pyc"))}
     data |= {f"friso/{path.relative_to(ROOT).as_posix()}" for path in (ROOT / "examples").rglob("*.toml")}
     there = {path.relative_to(tmp_path / "installed").as_posix() for path in (tmp_path / "installed").rglob("*")}

@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 import friso
+import friso_thesis
 
-PACKAGE = Path(friso.__file__).parent
+PACKAGES = [Path(str(package.__file__)).parent for package in (friso, friso_thesis)]
 
-SHELL = ("cli", "app", "views")
+SHELL = ("cli", "app", "commands", "views")
 """Floors of commands and sentences, whose functions take what the floors below return."""
 
 ERRORS = ("InputError", "StageError", "LogError", "SpecError", "StoreError")
@@ -68,10 +69,11 @@ class Function:
 
 
 def functions() -> Iterator[Function]:
-    for path in sorted(PACKAGE.rglob("*.py")):
-        name = path.relative_to(PACKAGE)
-        if name.parts[0] not in SHELL:
-            yield from within(ast.parse(path.read_text(encoding="utf-8")).body, str(name))
+    for package in PACKAGES:
+        for path in sorted(package.rglob("*.py")):
+            name = path.relative_to(package.parent)
+            if name.parts[1] not in SHELL:
+                yield from within(ast.parse(path.read_text(encoding="utf-8")).body, str(name))
 
 
 def within(body: list[ast.stmt], place: str) -> Iterator[Function]:
@@ -117,7 +119,7 @@ def test_what_counts_as_a_unit() -> None:
     assert not any(map(UNITS.search, ("[a, b]", "[0]", "[row]", "[friction]", "[masses]")))
 
 
-@pytest.mark.parametrize("name", friso.__all__)
+@pytest.mark.parametrize("name", dir(friso))
 def test_the_public_list(name: str) -> None:
     """Everything has a docstring; that of a function has every argument, the errors raised, and an example."""
     value = getattr(friso, name)

@@ -4,15 +4,12 @@ import copy
 from pathlib import Path
 
 import pytest
-from snapshots import Snapshots
 
 from benchmarks import evidence as command
 from benchmarks.canonical import differ, reference_numbers
 from benchmarks.code import DIGITS, code_digest
 from benchmarks.code import computed as syntax
 from friso.evidence import equations, findings_on_file, value
-from friso.studies.guideline.parasitic import ParasiticLimits
-from friso.views.guideline.words import parasitic_sentences
 
 ROOT = Path(__file__).parent.parent
 
@@ -106,21 +103,3 @@ def test_findings_say_what_their_values_say() -> None:
     assert value("rig.hunting", "locked_at_8_hz") == 12
     assert value("rig.hunting", "locked_none_from_hz") == 12.5
     assert value("compare.thesis-rig", "g_unstable") == 17
-
-
-def test_parasitic_modes_in_words(snapshots: Snapshots) -> None:
-    modes = [
-        ParasiticLimits(100.0, 0.01, (0.1, 69.2), None),
-        ParasiticLimits(300.0, 0.01, (0.1, 69.9), (3.82, 14.2)),
-        ParasiticLimits(100.0, 0.001, None, None),
-    ]
-    texts = parasitic_sentences(modes)
-    facts = (
-        ("0.1 Hz", "69.2 to 69.9 Hz", "1.45 to 4.29"),
-        ("locked", "0.001"),
-        ("3.82 Hz", "14.2 Hz", "21.1", "100 Hz"),
-        ("free", "0.001"),
-        ("1.45 to 21.1",),
-    )
-    assert [fact for row, text in zip(facts, texts, strict=True) for fact in row if fact not in text] == []
-    snapshots.check("guideline", "parasitic modes", "\n".join(texts))

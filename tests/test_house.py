@@ -11,9 +11,10 @@ import typer
 from typer.core import TyperGroup
 
 import friso
+import friso_thesis
 from friso.cli.app import command_line
 
-PACKAGE = Path(friso.__file__).parent
+PACKAGE, THESIS = (Path(str(package.__file__)).parent for package in (friso, friso_thesis))
 ROOT = Path(__file__).parents[1]
 GUIDE = ROOT / "CONTRIBUTING.md"
 
@@ -36,16 +37,13 @@ ABOUT_TUNING = (
     *(
         "design_method/",
         "views/design/",
-        "studies/thesis/",
-        "studies/guideline/",
-        "studies/rig/experiments/measured_cycles.py",
+        "friso_thesis/",
         "studies/compare/disturbance_rejection.py",
     ),
     *("frequency/tuning.py", "identification/stage_file.py", "identification/output_error/problem.py"),
 )
-"""Modules that import a form of the PID controller: the design method, the studies of the thesis and the guideline are
-about van Dijk's rules (Eq. 7, 8); identify makes controllers of its own,
-and compare one with an observer."""
+"""Modules that import a form of the PID controller: the design method, the thesis and the guideline are about van
+Dijk's rules (Eq. 7, 8); identify makes controllers of its own, and compare one with an observer."""
 
 RECIPES = {
     "controller": "equations/controllers",
@@ -66,8 +64,10 @@ LEFT = 38
 
 
 def sources() -> dict[str, str]:
-    """Modules of the package by their path in it."""
-    return {path.relative_to(PACKAGE).as_posix(): path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
+    """Modules by their path in friso; those of the thesis by the name of their package too."""
+    places = {path: path.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py")}
+    places |= {path: path.relative_to(THESIS.parent) for path in THESIS.rglob("*.py")}
+    return {place.as_posix(): path.read_text(encoding="utf-8") for path, place in places.items()}
 
 
 def types() -> dict[str, list[str]]:
@@ -121,7 +121,7 @@ def test_the_name_of_a_type_stands_for_one_thing() -> None:
     assert {name: where for name, where in types().items() if len(where) > 1} == {}
 
 
-@pytest.mark.parametrize("folder", ["friso", "tests", "benchmarks"])
+@pytest.mark.parametrize("folder", ["friso", "friso_thesis", "tests", "benchmarks"])
 def test_names_of_values_say_what_they_hold(folder: str) -> None:
     named = []
     for path in sorted((ROOT / folder).rglob("*.py")):
@@ -155,7 +155,8 @@ def is_percentage(value: ast.expr, behind: ast.expr | None) -> bool:
 
 
 def test_views_stand_in_the_folder_of_their_command() -> None:
-    assert {path.name for path in (PACKAGE / "views").glob("*.py")} - SHARED_VIEWS == set()
+    shared = {path.name for package in (PACKAGE, THESIS) for path in (package / "views").glob("*.py")}
+    assert shared - SHARED_VIEWS == set()
 
 
 def test_files_and_documents_of_commands_are_made_in_the_same_places() -> None:
@@ -166,10 +167,11 @@ def test_files_and_documents_of_commands_are_made_in_the_same_places() -> None:
     for name, command in group.commands.items():
         options = {option for parameter in command.params for option in parameter.opts}
         places = {"--out": ("page", f"{name}_files"), "--json": ("document", f"{name}_document")}
+        package = PACKAGE if (PACKAGE / "views" / name).exists() else THESIS
         for module, function in (place for option, place in places.items() if option in options):
-            path = PACKAGE / "views" / name / f"{module}.py"
+            path = package / "views" / name / f"{module}.py"
             if not path.exists() or f"def {function}(" not in path.read_text(encoding="utf-8"):
-                missing.append(f"{path.relative_to(PACKAGE)}: {function}")
+                missing.append(f"{path.relative_to(package)}: {function}")
     assert missing == []
 
 

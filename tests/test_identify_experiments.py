@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -36,20 +35,6 @@ from friso.identification.readings.ramps import FEW_RAMPS, force_ramps
 from friso.identification.readings.rate_effect import break_away, share_below, static_friction
 from friso.identification.response.fitting import ResponseFit
 from friso.identification.sources import recognised
-from friso.studies.thesis.claims import Evidence, Finding, registered
-from friso.studies.thesis.experiments import (
-    SLOW,
-    Experiments,
-    LockedLine,
-    constant_speed,
-    joint_steps,
-    slow_motion,
-)
-from friso.studies.thesis.judges.identified_in_time import judged_slips, judged_speeds, judged_steps
-from friso.studies.thesis.judges.identified_responses import judged_line
-from friso.studies.thesis.linear import analysed
-from friso.studies.thesis.linear.plants import limit_cases_of
-from friso.studies.thesis.studies import thesis_rig as rig_of_thesis
 
 pytestmark = pytest.mark.xdist_group("identify-experiments")
 
@@ -684,7 +669,7 @@ def test_constant_speeds_name_the_force_as_the_stage_file_does() -> None:
 def test_the_exponent_of_constant_speeds_is_that_which_the_stage_file_states(stated: bool) -> None:
     log, truth = at_speeds(2)
     exponent = round(truth["stribeck_exponent"], 3) if stated else "0.5 .. 2.5"
-    stage = rig_of_thesis().replace({"friction.stribeck_exponent": exponent})
+    stage = friso.load(ROOT / "examples" / "thesis_rig.toml").replace({"friction.stribeck_exponent": exponent})
     kind = KINDS["constant-speed"]
     estimates = kind.estimates(kind.analyse([log], Prior(stage, from_user=True), NOTHING_CHOSEN), stage)
     names = {one.name: one for one in estimates}
@@ -776,68 +761,6 @@ def test_one_pass_shows_no_repeatability_and_a_slow_loop_does_not_follow(wording
     wording(slow.verdict)
     still = record("still", DT, position=np.zeros(500), force=np.ones(500))
     wording(friction_position(still).verdict)
-
-
-# --- the thesis's experiments, and what is judged of them -------------------------------------------------------------
-
-
-def judged(claim: str) -> Finding:
-    """The judge's finding from what it needs of the experiments, and no other."""
-    stage, entry = rig_of_thesis(), registered()[claim]
-    return entry.judge(Evidence({}, {}, analysed(stage), Experiments(stage)))
-
-
-def of_plant(changes: dict[str, str]) -> Finding:
-    """F18 with the limit cases of another rig, which are all that its judge looks at."""
-    plants = limit_cases_of(rig_of_thesis().replace(changes).flat())
-    return registered()["F18"].judge(Evidence({}, {}, replace(analysed(rig_of_thesis()), plants=plants)))
-
-
-@pytest.mark.parametrize(
-    ("claim", "holds"),
-    [
-        ("F17", (True, False, True)),
-        ("F18", (True, False)),
-        ("F19", (False,)),
-        ("F20", (True, False)),
-        ("F21", (False, False, True)),
-    ],
-)
-def test_what_is_found_of_the_identification(claim: str, holds: tuple[bool, ...]) -> None:
-    finding = judged(claim)
-    assert finding.pattern == holds, finding
-    assert all(part.holds or part.why for part in finding.parts)
-    assert not re.search(r"\bnan\b", " ".join(part.number + part.why for part in finding.parts))
-
-
-def test_the_judges_recognise_what_holds() -> None:
-    """Rigs and responses that are as the thesis says."""
-    stiff = rig_of_thesis().replace({"joint.stiffness": "2.9 N/mm"})
-    assert judged_steps(joint_steps(stiff)).judgement == "holds"
-    assert of_plant({"masses.stage": "0.75 kg", "joint.stiffness": "3.6 N/mm"}).judgement == "holds"
-    slippery = rig_of_thesis().replace({"friction.static": "2.4 N"})
-    assert judged_slips(tuple(slow_motion(slippery, speed) for speed in SLOW)).judgement == "holds"
-    slow = constant_speed(rig_of_thesis(), (1e-3, 2.5e-3))
-    assert judged_speeds(slow, slow).pattern == (True, False, True)
-    magnitude = np.full((4, 9), 1.7 / 2.5)
-    magnitude[:, -1] = 0.1
-    scatter = np.array([0.01, 0.1, 0.3, 0.2, 0.1, 0.1, 0.01, 0.01, 0.01])
-    assert judged_line(LockedLine(magnitude, np.zeros((4, 9)), scatter), 1.7).judgement == "holds"
-
-
-def test_the_judges_recognise_what_does_not_hold() -> None:
-    smooth = rig_of_thesis().replace({"friction.static": "1 N"})
-    runs = tuple(slow_motion(smooth, speed) for speed in SLOW)
-    assert judged_slips(runs).pattern[0] is False
-    lively = constant_speed(rig_of_thesis().replace({"joint.locked": True, "friction.static": "1 N"}))
-    assert judged_speeds(lively, lively).pattern[:2] == (False, False)
-    assert (
-        judged_line(LockedLine(np.full((4, 9), 2.0), np.zeros((4, 9)), np.linspace(0.1, 0.5, 9)), 1.7).judgement
-        == "differs"
-    )
-    few = replace(joint_steps(rig_of_thesis()), stiffness=5e3)
-    assert not any(part.holds for part in judged_steps(few).parts)
-    assert of_plant({"joint.stiffness": "24 N/mm", "parasitic.frequency": "600 Hz"}).judgement == "differs"
 
 
 # --- what all share ---------------------------------------------------------------------------------------------------

@@ -1,9 +1,12 @@
-"""Controllers and friction laws from installed packages: found by their entry points, named, and refused."""
+"""What installed packages add to friso: found by their entry points, named, and left out where it is of no use."""
 
 import json
+import math
 import os
+import shutil
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -36,12 +39,18 @@ mass = "1 kg"
 """
 
 
-def package(folder: Path, name: str, **points: str) -> None:
-    """What pip leaves of a package that declares entry points: friso.GROUP = module."""
+Points = Mapping[str, str]
+
+
+def package(folder: Path, name: str, **points: str | Points) -> None:
+    """What pip leaves of a package that declares entry points: by group a module, or modules by name."""
     info = folder / f"{name}-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-    lines = [f"[friso.{group}]\n{module} = {module}\n" for group, module in points.items()]
+    lines = []
+    for group, modules in points.items():
+        named = {modules: modules} if isinstance(modules, str) else modules
+        lines += [f"[friso.{group}]", *(f"{name} = {module}" for name, module in named.items())]
     (info / "entry_points.txt").write_text("\n".join(lines))
 
 
@@ -91,13 +100,136 @@ def test_processes_that_compile_and_that_compute_cells_know_one(installed: Path)
 
 @pytest.mark.parametrize(("name", "module"), [("lugre", "taken"), ("air", "missing"), ("air", "leaves")])
 def test_a_taken_name_or_a_missing_module_is_one_message(name: str, module: str, tmp_path: Path) -> None:
+    """The rest is there all the same."""
     (tmp_path / "taken.py").write_text(LAW.replace("{name}", name))
     (tmp_path / "leaves.py").write_text("raise SystemExit(0)")
     package(tmp_path, "other", friction=module)
     done = friso_command(tmp_path, "--help")
-    assert done.returncode == 2
-    assert "Traceback" not in done.stderr
-    assert ('"lugre"' if module == "taken" else "cannot be imported") in done.stderr
+    assert done.returncode == 0
+    assert "  check " in done.stdout
+    assert f"friso: friso.friction: {module}" in left_out(done)
+    assert ('"lugre"' if module == "taken" else "cannot be imported") in left_out(done)
+
+
+def left_out(done: subprocess.CompletedProcess[str]) -> str:
+    """The one sentence on standard error."""
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert "is left out" in done.stderr
+    return done.stderr
+
+
+def test_a_law_that_cannot_be_imported_is_told_where_a_stage_file_names_it(tmp_path: Path) -> None:
+    package(tmp_path, "other", friction="missing")
+    (tmp_path / "stage.toml").write_text(f'{STAGE}\n[friction]\nmodel = "air"\n')
+    done = friso_command(tmp_path, "check", "stage.toml")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "missing, which cannot be imported" in done.stderr
+    assert "friction.model" in done.stderr
+
+
+@pytest.fixture(scope="module")
+def resting(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the package of tests/friso_resting is installed."""
+    folder = tmp_path_factory.mktemp("resting")
+    shutil.copytree(TESTS / "friso_resting", folder / "friso_resting")
+    (folder / "friso_resting-1.0.dist-info").mkdir()
+    (folder / "friso_resting-1.0.dist-info" / "METADATA").write_text("Name: friso-resting\nVersion: 1.0\n")
+    points = (TESTS / "friso_resting" / "__init__.py").read_text(encoding="utf-8").partition("\n\n")[2]
+    points = points.replace('[project.entry-points."', "[").replace('"]', "]").replace('"', "")
+    (folder / "friso_resting-1.0.dist-info" / "entry_points.txt").write_text(points)
+    return folder
+
+
+def test_a_command_of_a_package_is_listed_and_has_its_help(resting: Path) -> None:
+    listed = friso_command(resting, "--help")
+    assert (listed.returncode, listed.stderr) == (0, "")
+    names = [
+        line.split()[0] for line in listed.stdout.partition("Why does it hunt?")[2].splitlines() if line[2:3].strip()
+    ]
+    assert names.index("convert") < names.index("resting") < names.index("reproduce")
+    done = friso_command(resting, "resting", "--help")
+    assert done.returncode == 0, done.stderr
+    assert "Example: friso resting rig.toml" in done.stdout
+
+
+def test_a_command_of_a_package_answers_with_its_page_and_document(resting: Path) -> None:
+    rig = str(TESTS.parent / "examples" / "thesis_rig.toml")
+    done = friso_command(resting, "resting", rig, "--set", "friction.static=6 N", "--json", "--out", "out")
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    assert document["distance_m"] == pytest.approx(6 / (1.7 * (2 * math.pi * 8) ** 2 / 10**0.5))
+    page = (resting / "out" / "resting.html").read_text(encoding="utf-8")
+    assert "From another package: Friction may hold" in page
+
+
+def test_a_function_of_a_package_stands_beside_those_of_friso(resting: Path) -> None:
+    code = "import friso; answer = friso.resting(friso.example('thesis_rig')); print(answer, 'resting' in dir(friso))"
+    done = python(resting, code)
+    assert done.stdout.startswith("Friction may hold the stage up to"), done.stderr
+    assert done.stdout.endswith("True\n")
+
+
+def test_an_experiment_of_a_package_is_listed_and_runs_with_its_view(resting: Path) -> None:
+    listed = friso_command(resting, "rig", "--help")
+    assert "at-rest Nothing moves, and the force is the seed" in " ".join(listed.stdout.split())
+    drive = str(TESTS.parent / "examples" / "thesis_drive.toml")
+    done = friso_command(resting, "rig", "at-rest", drive, "--out", "rig")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("It rests.")
+    assert (resting / "rig" / "rested.csv").exists()
+
+
+def python(folder: Path, code: str) -> subprocess.CompletedProcess[str]:
+    paths = os.pathsep.join([str(TESTS.parent), str(folder)])
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=folder, capture_output=True, text=True, timeout=600, env={**os.environ, "PYTHONPATH": paths},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "module", "why"),
+    [
+        ("check", "friso_resting.command", "friso has it"),
+        ("reproduce", "friso_resting.command", "several packages give it"),
+        ("missing", "missing", "cannot be imported: No module named"),
+        ("empty", "empty", "whose COMMAND is missing"),
+        ("wrong", "wrong", "whose COMMAND is int"),
+        ("leaves", "leaves", "cannot be imported"),
+    ],
+)
+def test_a_command_that_is_of_no_use_is_one_sentence_and_hinders_no_other(
+    name: str, module: str, why: str, tmp_path: Path
+) -> None:
+    for file, text in {"empty": "", "wrong": "COMMAND = 1", "leaves": "raise SystemExit(0)"}.items():
+        (tmp_path / f"{file}.py").write_text(text)
+    package(tmp_path, "other", commands={name: module}, functions={name: module}, rig_experiments={name: module})
+    listed = friso_command(tmp_path, "--help")
+    assert listed.returncode == 0
+    assert "  check " in listed.stdout
+    assert f"friso: friso.commands: {name} is left out: {module}" in left_out(listed)
+    assert why in left_out(listed)
+    done = friso_command(tmp_path, "init", "stage.toml")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert friso_command(tmp_path, "check", "--help").returncode == 0
+    rig = friso_command(tmp_path, "rig", "--help")
+    assert rig.returncode == 0
+    assert "stiffness" in rig.stdout
+    if name not in ("check", "reproduce"):
+        asked = friso_command(tmp_path, name)
+        assert (asked.returncode, asked.stdout) == (2, "")
+        assert why in asked.stderr
+        assert "Traceback" not in asked.stderr
+
+
+def test_a_function_that_is_of_no_use_is_refused_and_leaves_the_others(tmp_path: Path) -> None:
+    package(tmp_path, "other", functions={"check": "taken", "missing": "missing", "stage": "taken"})
+    code = "import friso\nprint(friso.check.__module__, friso.stage.__name__)\nfriso.missing"
+    done = python(tmp_path, code)
+    assert done.stdout == "friso.answers.check friso.stage\n"
+    assert "friso.functions: check is left out: taken; expected: a name that is not taken: friso has it" in done.stderr
+    assert "InputError: friso.functions: missing" in done.stderr
+    assert "which cannot be imported: No module named 'missing'" in done.stderr
 
 
 def test_a_registered_name_is_refused_in_python() -> None:

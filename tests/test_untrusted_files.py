@@ -100,7 +100,7 @@ def test_where_nothing_can_be_printed_there_is_no_traceback(
 
 
 def test_every_public_function_checks_its_arguments() -> None:
-    functions = [getattr(friso, name) for name in friso.__all__ if inspect.isfunction(getattr(friso, name))]
+    functions = [getattr(friso, name) for name in dir(friso) if inspect.isfunction(getattr(friso, name))]
     assert [function.__name__ for function in functions if not hasattr(function, "__wrapped__")] == []
 
 

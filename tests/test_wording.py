@@ -14,7 +14,8 @@ from snapshots import FOLDER, Snapshots, alike, masked, read
 
 from friso.cli.command import COMMANDS
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
+TESTS = Path(__file__).parent
+EXAMPLES = TESTS.parent / "examples"
 RIG, DRIVE, LEAVES = (EXAMPLES / f"thesis_{name}.toml" for name in ("rig", "drive", "leaves"))
 STICK_SLIP = EXAMPLES / "lugre_stick_slip.toml"
 
@@ -115,8 +116,8 @@ def test_messages_are_those_of_tests_that_there_are() -> None:
     """None is kept of a test that is gone, and none is missing."""
     kept = {name.partition("[")[0].partition(" ")[0] for name in read(FOLDER / "messages.txt")}
     result = set()
-    for path in Path(__file__).parent.glob("test_*.py"):
+    for path in TESTS.rglob("test_*.py"):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef) and _keeps(ast.unparse(node.args)):
-                result.add(f"{path.name}::{node.name}")
+                result.add(f"{path.relative_to(TESTS).as_posix()}::{node.name}")
     assert kept == result

@@ -22,6 +22,7 @@ from friso.cli.command import COMMANDS, QUESTIONS
 from friso.cli.common import INTERRUPTED, say
 from friso.cli.terminal import SPELLED, escaping
 from friso.errors import InputError, shortened
+from friso.installed import installed_modules
 from friso.system import LIBRARIES, cause_of, path_of
 from friso.version import VERSION
 
@@ -69,7 +70,7 @@ class ByQuestion(TyperGroup):
 
 
 def command_line(*names: str) -> typer.Typer:
-    """The commands of these names, by default all of friso, in the order of their places."""
+    """The commands of these names, by default all that there are, in the order of their places."""
     app = typer.Typer(
         cls=ByQuestion,
         rich_markup_mode=None,
@@ -77,7 +78,8 @@ def command_line(*names: str) -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback()(friso)
-    for name, command in sorted(((name, COMMANDS[name]) for name in names or COMMANDS), key=lambda item: item[1].place):
+    commands = ((name, COMMANDS[name]) for name in names) if names else COMMANDS.items()
+    for name, command in sorted(commands, key=lambda item: item[1].place):
         app.command(name, cls=command.help_class)(with_checked_paths(command.function))
     return app
 
@@ -136,7 +138,7 @@ def _run() -> int:
             print(TOUR)
             return 0
         refuse_empty(sys.argv[1:])
-        app = command_line(*{*sys.argv[1:2]}.intersection(COMMANDS))  # others take longer to be put together
+        app = command_line(*(name for name in sys.argv[1:2] if name in COMMANDS))  # others take longer to put together
         if {"-h", "--help"} & {*sys.argv[1:2]}:
             app.info.epilog = _plug_ins()
         return copy_context().run(app, standalone_mode=False) or 0
@@ -180,10 +182,8 @@ def _is_of_loading(error: BaseException) -> bool:
 
 
 def _plug_ins() -> str:
-    """What installed packages add, for the help. Raises InputError for a name that is taken."""
-    from importlib.metadata import entry_points
-
-    if not any(entry_points(group=group) for group in ("friso.controllers", "friso.friction")):
+    """Controllers and friction laws of installed packages, for the help."""
+    if not any(map(installed_modules, ("friso.controllers", "friso.friction"))):
         return ""
     from friso.stage.foreign import installed
 

@@ -4,9 +4,9 @@ first, small tables, what to do next, and details if they are wanted."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Protocol
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,7 +15,6 @@ from friso.cli.common import print_table, print_wrapped, say
 from friso.cli.output import print_document, print_written
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
-from friso.interrupts import hold_interrupts
 from friso.system import cause_of, path_of
 
 if TYPE_CHECKING:
@@ -122,43 +121,6 @@ def named_as_options(names: Mapping[str, Any]) -> Iterator[None]:
             example = example.replace(f"{key}=", f"{option} ", 1).removesuffix(" True")  # a flag takes no value
         place = option_of(origin) if origin in names else origin
         raise type(error)(option, error.actual, error.expected, example, place, error.also) from None
-
-
-class UnfinishedWork(Protocol):
-    """What is kept of long work until all of it is done, in a folder."""
-
-    @property
-    def folder(self) -> Path | None: ...
-
-    @property
-    def count(self) -> int:
-        """How many pieces are kept."""
-        ...
-
-    def clear(self) -> None:
-        """Forget them."""
-
-
-@contextmanager
-def kept_until_done(work: UnfinishedWork, piece: str, pieces: str) -> Iterator[None]:
-    """Within, finished `pieces` are kept, from which the same command resumes; where none is finished, no folder is
-    left."""
-    assert work.folder is not None
-    missing = [folder for folder in (work.folder, *work.folder.parents) if not folder.exists()]
-    try:
-        yield
-    except BaseException as error:
-        if work.count and isinstance(error, KeyboardInterrupt):
-            kept = f"1 {piece} is" if work.count == 1 else f"{work.count} {pieces} are"
-            say(f"{kept} kept in {work.folder}; the same command resumes from there")
-        elif not work.count and missing:
-            with hold_interrupts():
-                work.clear()
-                for folder in missing:
-                    with suppress(OSError):  # what others put there stays
-                        folder.rmdir()
-        raise
-    work.clear()
 
 
 def option_of(keyword: str) -> str:

@@ -1,4 +1,4 @@
-"""What a module of friso/cli/commands declares: a command, its place in `friso --help`, and a list below its help."""
+"""What the module of a command declares: the command, its place in `friso --help`, and a list below its help."""
 
 from __future__ import annotations
 
@@ -70,4 +70,5 @@ class Command:
         return ListingCommand
 
 
-COMMANDS = Registry[Command]("friso.cli.commands", "COMMAND")
+COMMANDS = Registry[Command]("friso.cli.commands", "COMMAND", "friso.commands", Command)
+"""Every module of `friso/cli/commands/` declares one, and every module that an installed package names."""

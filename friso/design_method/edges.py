@@ -1,7 +1,7 @@
 """The edge of hunting over the corners of a specification: the highest crossover at which anything attracts.
 
-Coarser than `friso.hunting.edges`, which tells how hunting ends and closes orbits to find out: a design asks for 1 or
-2 % in seconds, and simulates all its moves afterwards.
+Coarser than the edges of the guideline, which tell how hunting ends and close orbits to find out: a design asks for 1
+or 2 % in seconds, and simulates all its moves afterwards.
 """
 
 from __future__ import annotations

@@ -98,7 +98,7 @@ def remove_if_passing(folder: Path) -> None:
 
 @cache
 def code_digest(*parts: str) -> str:
-    """A digest of the sources in these folders (and files) of the package."""
+    """A digest of the sources in these folders and files, paths from the package friso."""
     code = hashlib.sha256()
     for part in parts:
         place = Path(__file__).parent.parent / part

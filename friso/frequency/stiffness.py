@@ -12,13 +12,6 @@ def in_series(first: Any, second: Any) -> Any:
     return first * second / (first + second)
 
 
-def series_sensitivity(friction_stiffness: Any, joint_stiffness: Any) -> Any:
-    """How the stiffness of both in series changes with that of the friction (Eq. 2): (eta/(1 + eta))^2 with the ratio
-    eta = k_j/k_f."""
-    eta = joint_stiffness / friction_stiffness
-    return (eta / (1 + eta)) ** 2
-
-
 def limiter_in_series(flat: Mapping[str, Any]) -> dict[str, Any]:
     """The stage with joint and limiter in series, as Table 1 of the thesis prints it for a touched limiter;
     to be used as one whose limiter is not touched."""

@@ -20,8 +20,7 @@ def foreign() -> list[str]:
 
 
 def installed() -> list[str]:
-    """The same with all that installed packages name in their entry points. Raises InputError for one that cannot be
-    imported or takes a name."""
+    """Controllers and friction laws from outside friso that are loaded or that installed packages name."""
     for registry in (CONTROLLERS, FRICTION):
         load_installed(registry.group)
     return foreign()

@@ -14,12 +14,12 @@ import importlib
 import importlib.util
 import sys
 from collections.abc import Iterable
-from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from friso.errors import InputError
+from friso.installed import installed_modules, leave_out, load_module
 
 OWN = "friso"
 SCRIPT = "__main__"
@@ -88,16 +88,10 @@ def load_own(group: str) -> None:
 
 @cache
 def load_installed(group: str) -> None:
-    """Import what installed packages name in the entry points of a group: each registers its sections. Raises
-    InputError for one that cannot be imported or registers a name that is taken."""
-    from importlib.metadata import entry_points  # costs as much as all of friso's stage file
-
-    for point in sorted(entry_points(group=group), key=lambda point: point.name):
+    """Import what installed packages name in the entry points of a group: each registers its sections. One that cannot
+    be imported, or registers a name that is taken, is told and left out."""
+    for name, module in installed_modules(group).items():
         try:
-            with redirect_stdout(sys.stderr):  # what a plug-in prints is no answer
-                point.load()
+            load_module(group, name, module)
         except InputError as error:
-            raise error.under(f"{group}: {point.name}") from None
-        except (Exception, SystemExit) as error:
-            actual = f"{point.value}, which cannot be imported: {error}"
-            raise InputError(f"{group}: {point.name}", actual, "a module that registers its class") from error
+            leave_out(error)

@@ -23,7 +23,7 @@ from friso.errors import InputError
 from friso.intervals import Interval, UncertainValue, is_range, uncertain_value
 from friso.quantities import Number, Quantity, as_toml, quoted
 from friso.stage.lists import Rows, Several, Values, row_keys
-from friso.stage.plug_ins import load_installed, load_own
+from friso.stage.plug_ins import load_installed, load_own, plug_in_of
 
 
 @dataclass(frozen=True)
@@ -180,6 +180,8 @@ class Variants:
     def register(self, cls: SectionClass) -> SectionClass:
         """Class decorator: add a variant. Raises InputError where its name is taken."""
         name = self.name_of(cls)
+        if plug_in_of(cls):
+            load_own(self.group)  # whose names come first
         holder = self._classes.get(name, cls)
         if (holder.__module__, holder.__qualname__) != (cls.__module__, cls.__qualname__):
             actual = f"{as_toml(name)}, which {cls.__module__}.{cls.__qualname__} registers"

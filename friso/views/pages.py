@@ -10,7 +10,7 @@ from importlib import resources
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from friso.escapes import escaped
@@ -31,6 +31,9 @@ def made_with() -> str:
     return " with ".join([VERSION, *filter(None, [listed(foreign(), "and")])])
 
 
+OWN_TEMPLATES = "friso.views"
+"""The package with friso's own templates, which those of others extend."""
+
 CONTENTS: Mapping[str, Any] = MappingProxyType(
     {"verdicts": (), "sentences": (), "notes": (), "columns": (), "rows": (), "computed": ""}
 )
@@ -45,7 +48,8 @@ class Report:
     name, `values`: those of `CONTENTS`, and what else its template names.
 
     A template of the command's name, if there is one, extends `page.html`, and changes its blocks: answer, table,
-    figures, footer. `scripted` pages load plotly without figures of their own kind.
+    figures, footer. It stands in the folder templates of a package, `templates`. `scripted` pages load plotly without
+    figures of their own kind.
     """
 
     command: str
@@ -55,16 +59,24 @@ class Report:
     source: str = ""
     version: str = field(default_factory=made_with)
     scripted: bool = False
+    templates: str = OWN_TEMPLATES
     values: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of_stage(
-        cls, command: str, stage: Stage | None, figures: Sequence[Figure], name: str = "Unnamed stage", **values: Any
+        cls,
+        command: str,
+        stage: Stage | None,
+        figures: Sequence[Figure],
+        name: str = "Unnamed stage",
+        templates: str = OWN_TEMPLATES,
+        **values: Any,
     ) -> Report:
         """The page about a stage, or about none; `name` stands at the head where the stage has none."""
         if stage is None:
-            return cls(command, name, figures, values=values)
-        return cls(command, stage.name or name, figures, stage.to_toml(), stage.source, values=values)
+            return cls(command, name, figures, templates=templates, values=values)
+        about = (stage.to_toml(), stage.source)
+        return cls(command, stage.name or name, figures, *about, templates=templates, values=values)
 
     def html(self) -> str:
         """The page: it opens offline, prints, and is the same bytes on every run."""
@@ -74,7 +86,7 @@ class Report:
         values: dict[str, Any] = {"figures": figures, "plotly": scripts, "page_script": script("page")}
         values |= {name: getattr(self, name) for name in ("command", "name", "stage_file", "source", "version")}
         assert not values.keys() & self.values.keys()  # a value of a command's page may not stand in for these
-        template = environment().select_template([f"{self.command}.html", "page.html"])
+        template = environment(self.templates).select_template([f"{self.command}.html", "page.html"])
         return template.render(**{**values, **CONTENTS, **self.values})
 
 
@@ -83,11 +95,11 @@ def script(name: str) -> Markup:
     return Markup((resources.files("friso.views") / "templates" / f"{name}.js").read_text(encoding="utf-8"))
 
 
-def environment() -> Environment:
-    """The templates of friso/views/templates, for one page: texts are escaped, a name without a value is an error,
-    and words of `explained` texts are linked to what the `glossary` says of them."""
+def environment(package: str = OWN_TEMPLATES) -> Environment:
+    """The templates of a package, and those of friso/views/templates, for one page: texts are escaped, a name without a
+    value is an error, and words of `explained` texts are linked to what the `glossary` says of them."""
     templates = Environment(
-        loader=PackageLoader("friso.views"),
+        loader=ChoiceLoader([PackageLoader(name) for name in dict.fromkeys((package, OWN_TEMPLATES))]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

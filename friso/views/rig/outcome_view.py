@@ -23,8 +23,9 @@ class OutcomeView:
     numbers: Callable[[Outcome], dict[str, Any]]
 
 
-OUTCOME_VIEWS: Registry[OutcomeView] = Registry("friso.views.rig.experiments", "VIEW")
-"""Every module of `friso/views/rig/experiments/` declares one, under the name of its experiment."""
+OUTCOME_VIEWS = Registry[OutcomeView]("friso.views.rig.experiments", "VIEW", "friso.rig_views", OutcomeView)
+"""Every module of `friso/views/rig/experiments/` declares one, and every module that an installed package names, under
+the name of its experiment."""
 
 
 def view_of(experiment: str) -> OutcomeView:

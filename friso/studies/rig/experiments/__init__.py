@@ -13,6 +13,7 @@ if TYPE_CHECKING:  # the names are asked for by --help
     from friso.studies.rig.outcome import Outcome
 
 RIG_EXPERIMENTS: Registry[Callable[[Stage, int, Progress], Outcome]] = Registry(
-    "friso.studies.rig.experiments", "run_experiment"
+    "friso.studies.rig.experiments", "run_experiment", "friso.rig_experiments"
 )
-"""Every module of this folder declares one: the function that runs it on a stage, with a seed."""
+"""Every module of this folder declares one, and every module that an installed package names: the function that runs it
+on a stage, with a seed."""

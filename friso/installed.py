@@ -1,0 +1,74 @@
+"""What installed packages add to friso: modules that they name in entry points, by group.
+
+Names are read from the metadata of packages, without importing any; a module is imported when it is asked for. A name
+that is taken, or a module that cannot be used, is told in one sentence and left out: the rest of friso goes on.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Mapping
+from contextlib import redirect_stdout
+from functools import cache
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+from friso.errors import InputError
+
+LOGGER = logging.getLogger("friso")
+
+FUNCTIONS = "friso.functions"
+"""The group of functions that stand beside `friso.check`: each in a module, under the name of the entry point."""
+
+
+@cache
+def installed_modules(group: str, taken: frozenset[str] = frozenset()) -> Mapping[str, str]:
+    """The modules that packages name in the entry points of a group, by name. Names that friso has `taken`, or that
+    several packages give, are told and left out."""
+    modules: dict[str, list[str]] = {}
+    for name, module in _entry_points().get(group, ()):
+        modules.setdefault(name, []).append(module)
+    for name in [name for name, named in modules.items() if name in taken or len(named) > 1]:
+        has = "friso has it" if name in taken else "several packages give it"
+        leave_out(InputError(f"{group}: {name}", " and ".join(modules.pop(name)), f"a name that is not taken: {has}"))
+    return {name: module for name, (module,) in modules.items()}
+
+
+@cache
+def _entry_points() -> Mapping[str, list[tuple[str, str]]]:
+    """Names and modules of all entry points that are about friso, by group."""
+    from importlib.metadata import entry_points  # costs as much as all of friso's stage file
+
+    points = entry_points()
+    groups = (group for group in points.groups if group.startswith("friso."))
+    return {group: sorted((point.name, point.module) for point in points.select(group=group)) for group in groups}
+
+
+def load_module(group: str, name: str, module: str) -> ModuleType:
+    """Import the module that a package names in a group. Raises InputError where it cannot be imported."""
+    try:
+        with redirect_stdout(sys.stderr):  # what a plug-in prints is no answer
+            return import_module(module)
+    except InputError as error:
+        raise error.under(f"{group}: {name}") from None
+    except (Exception, SystemExit) as error:
+        actual = f"{module}, which cannot be imported: {error}"
+        raise InputError(f"{group}: {name}", actual, "a module that can be imported") from error
+
+
+def load_declared(group: str, name: str, module: str, attribute: str, kind: type = object) -> Any:
+    """What the module that a package names declares as an `attribute`. Raises InputError where the module cannot be
+    imported, or declares nothing of this `kind`."""
+    declared = getattr(load_module(group, name, module), attribute, None)
+    if declared is None or not isinstance(declared, kind):
+        actual = f"{module}, whose {attribute} is {'missing' if declared is None else type(declared).__name__}"
+        expected = f"a module that declares {attribute}{f', {kind.__name__}' if kind is not object else ''}"
+        raise InputError(f"{group}: {name}", actual, expected)
+    return declared
+
+
+def leave_out(error: InputError) -> None:
+    """Say in one sentence why something of another package is left out."""
+    LOGGER.warning(f"{error.key} is left out: {error.actual}; expected: {error.expected}")

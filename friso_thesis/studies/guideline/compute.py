@@ -1,0 +1,238 @@
+"""The guideline as data: sweeps, laws fitted to one half of them, their errors on the other, and the worked steps."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from friso.engine.kernel import KernelRequest, kernels
+from friso.errors import InputError
+from friso.hunting.cycle.ensemble import shared_structure
+from friso.progress import Progress, Tally, silent
+from friso.quantities import quoted
+from friso.system import usable_cores
+from friso_thesis.studies.guideline.checks import SimulationCheck, simulate_samples
+from friso_thesis.studies.guideline.groups import Count, group_count, values_of
+from friso_thesis.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, FittedLaw, fit_law
+from friso_thesis.studies.guideline.parasitic import ParasiticLimits, parasitic_limits
+from friso_thesis.studies.guideline.sweeps import (
+    FREE_FIT,
+    FREE_TEST,
+    LOCKED,
+    LOCKED_FIT,
+    LOCKED_TEST,
+    STEPS,
+    Keep,
+    Sweep,
+    concatenate_sweeps,
+    free_sweep,
+    locked_sweep,
+)
+from friso_thesis.studies.guideline.thesis_rig import Laws, plain_rig
+from friso_thesis.studies.guideline.worked import Worked, friction_range, worked
+from friso_thesis.studies.thesis.studies import thesis_rig
+
+SAMPLES = 512
+"""Default number of samples for the fit of the locked law; the other sweeps are shares of it."""
+
+FEWEST, MOST = 64, 65536
+"""Fewer samples do not determine the exponents of a law; more exceed what Sobol points gain here."""
+
+FREE_SHARE, TEST_SHARE = 3 / 8, 1 / 2
+"""Samples with a free joint per one of a rigid mass, whose edge costs a tenth; and of their test per one of their
+fit."""
+
+CHECKED = 1 / 8
+"""Samples that are simulated, per one of the locked fit."""
+
+RATIOS = (0.0, 0.05, 0.3, 3.0, 20.0, np.inf)
+"""Ratios of slip to drop that separate the bins for errors of the locked law."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A law and what it rests on: the samples it was fitted to, those it was tested on, and its errors on both. With a
+    free joint the locked edge is that computed in `on_fit`, that of the locked law in `on_test`, where
+    `on_computed_edge` has the errors with the computed one. `checked` holds simulations of samples of the test."""
+
+    law: FittedLaw
+    fit: Sweep
+    test: Sweep
+    on_fit: Errors
+    on_test: Errors
+    on_computed_edge: Errors
+    checked: SimulationCheck
+
+    @property
+    def sweep(self) -> Sweep:
+        """Samples of fit and test."""
+        return concatenate_sweeps(self.fit, self.test)
+
+    @property
+    def kinds(self) -> Mapping[str, int]:
+        """How many samples of fit and test have an edge of which kind, or none for which reason."""
+        return Counter(self.sweep.edges.kind.astype(str))
+
+    @property
+    def again(self) -> int:
+        """Samples of fit and test in which a cycle attracts again above a crossover at which none does."""
+        return int(np.count_nonzero(self.sweep.edges.windows > 1))
+
+
+@dataclass(frozen=True)
+class Guideline:
+    """Everything in `docs/guideline.md`: how many groups there are by part of the stage, both laws, the worked steps,
+    what a parasitic mode allows; how long it took [s] on how many cores, and how many parts of the sweeps an earlier,
+    interrupted run had left."""
+
+    samples: int
+    counts: Mapping[str, Count]
+    locked: Fit
+    free: Fit
+    worked: Worked
+    parasitic: list[ParasiticLimits]
+    seconds: float
+    cores: int
+    resumed: int
+
+    def held_out(self, free: bool, which: Callable[[Sweep], np.ndarray]) -> Errors | None:
+        """Errors of the laws on those held-out samples for which `which` is true, shape (count,); None of none."""
+        held = (self.free if free else self.locked).test.usable
+        subset = held.take(which(held))
+        locked = self.locked.law.edge(subset.values)
+        law = self.free.law.edge(subset.values, locked) if free else locked
+        return Errors.between(law, subset.edge) if len(law) else None
+
+    def held_out_by_rates(self) -> list[ByRates]:
+        """Errors of the locked law by the ratio of its two rates."""
+        return by_rates(self.locked)
+
+
+@dataclass(frozen=True)
+class ByRates:
+    """Errors of the locked law on the held-out samples whose ratio of slip to drop is from `low` to below `high`; None
+    without such samples."""
+
+    low: float
+    high: float
+    errors: Errors | None
+
+
+def by_rates(locked: Fit) -> list[ByRates]:
+    """Errors of the locked law by the ratio of its two rates."""
+    held = locked.test.usable
+    ratio = _ratio(locked.law, held.values)
+    decades = []
+    for low, high in pairwise(RATIOS):
+        subset = held.take((ratio >= low) & (ratio < high))
+        errors = Errors.between(locked.law.edge(subset.values), subset.edge) if len(subset.edge) else None
+        decades.append(ByRates(low, high, errors))
+    return decades
+
+
+def safe_over_friction(locked: Fit) -> float:
+    """The largest of the safe factors of those bins of slip over drop that the rig visits over its friction range."""
+    flats = [plain_rig() | forces for forces in friction_range()]
+    groups = [values_of(flat) for flat in flats]
+    visited = _ratio(locked.law, {name: np.array([group[name] for group in groups], float) for name in groups[0]})
+    bins = [decade for decade in by_rates(locked) if np.any((visited >= decade.low) & (visited < decade.high))]
+    return max(decade.errors.safe if decade.errors else locked.on_test.safe for decade in bins)
+
+
+def _ratio(law: FittedLaw, values: Mapping[str, np.ndarray]) -> np.ndarray:
+    slip, drop = np.exp(law.log_rates(values))
+    return slip / drop
+
+
+def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progress = silent) -> Guideline:
+    """Compute the guideline. `keep` is a folder for what is done, from which an interrupted run goes on;
+    `progress` gets what is done.
+
+    Raises InputError for a number of samples that does not do.
+    """
+    checked_samples(samples)
+    begin = time.perf_counter()
+    sizes = _sizes(samples)
+    tally = Tally(progress, _steps(sizes))
+    parts = Keep(keep)
+    resumed = parts.count
+    tally.add(0, "compiling")
+    _compile()
+
+    rigid = locked_sweep(sizes["locked fit"], LOCKED_FIT, parts, tally)
+    rigid_test = locked_sweep(sizes["locked test"], LOCKED_TEST, parts, tally)
+    free, beside = free_sweep(sizes["free fit"], FREE_FIT, parts, tally)
+    free_test, beside_test = free_sweep(sizes["free test"], FREE_TEST, parts, tally)
+    tally.add(0, "laws and simulations")
+    few = max(8, int(samples * CHECKED))
+    locked_fit = _locked_fit(rigid, concatenate_sweeps(rigid_test, beside, beside_test), few)
+    free_fit = _free(free, free_test, locked_fit.law, few)
+    tally.add(0, "worked steps")
+    laws = Laws(locked_fit.law, free_fit.law)
+    steps = worked(laws, safe_over_friction(locked_fit), free_fit.on_test.safe)
+    modes = parasitic_limits(thesis_rig())
+    seconds, cores = time.perf_counter() - begin, usable_cores()
+    return Guideline(samples, group_counts(), locked_fit, free_fit, steps, modes, seconds, cores, resumed)
+
+
+def checked_samples(samples: int) -> None:
+    """Raises InputError for a number of samples that does not do."""
+    if not FEWEST <= samples <= MOST:
+        raise InputError(
+            "--samples", quoted(samples), f"a whole number from {FEWEST} to {MOST}", f"--samples {SAMPLES}"
+        )
+
+
+def group_counts() -> dict[str, Count]:
+    """Parameters and groups of the rig rigid, with its joint, and with its parasitic mode as well."""
+    return {
+        "rigid": group_count(plain_rig()),
+        "joint": group_count(plain_rig("joint")),
+        "parasitic": group_count(thesis_rig().flat()),
+    }
+
+
+def _sizes(samples: int) -> dict[str, int]:
+    free = int(samples * FREE_SHARE)
+    return {
+        "locked fit": samples,
+        "locked test": samples // 4,  # the samples with a free joint, locked, are more of them
+        "free fit": free,
+        "free test": int(free * TEST_SHARE),
+    }
+
+
+def _steps(sizes: Mapping[str, int]) -> int:
+    """The steps of all sweeps; a sample with a free joint is computed with the joint locked, too."""
+    both = sum(STEPS.values())
+    return sum(size * (both if name.startswith("free") else STEPS[LOCKED]) for name, size in sizes.items())
+
+
+def _compile() -> None:
+    """Compile all equations that are needed, side by side."""
+    flats = (plain_rig(), plain_rig("joint"), thesis_rig().flat(), thesis_rig().flat() | {"joint.locked": True})
+    kernels([KernelRequest(shared_structure(flat), variational) for flat in flats for variational in (False, True)])
+
+
+def _locked_fit(fit: Sweep, test: Sweep, few: int) -> Fit:
+    used, held = fit.usable, test.usable
+    law = fit_law(LOCKED_LAW, used.values, used.edge)
+    errors = Errors.between(law.edge(held.values), held.edge)
+    return Fit(
+        law, fit, test, Errors.between(law.edge(used.values), used.edge), errors, errors, simulate_samples(test, few)
+    )
+
+
+def _free(fit: Sweep, test: Sweep, locked: FittedLaw, few: int) -> Fit:
+    used, held = fit.usable, test.usable
+    law = fit_law(FREE_LAW, used.values, used.edge, used.locked)
+    from_simulated = Errors.between(law.edge(held.values, held.locked), held.edge)
+    combined = Errors.between(law.edge(held.values, locked.edge(held.values)), held.edge)
+    on_fit = Errors.between(law.edge(used.values, used.locked), used.edge)
+    return Fit(law, fit, test, on_fit, combined, from_simulated, simulate_samples(test, few))

@@ -1,0 +1,218 @@
+"""The edge of the symmetric cycle of many stages: the lowest crossover at and above which it is not known to attract.
+
+What else may attract beyond, such as an asymmetric cycle, is looked for after a jump and where no orbit could be
+closed, and nowhere else; `friso.hunting.margin` and `friso.design_method.edges` rest on a survey of everything that
+attracts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import hunting_cycles
+from friso_thesis.studies.guideline.persistence import swings_from_any_distance
+
+OF = (
+    "the symmetric cycle (of stages that are not symmetric, that over a whole period); others may attract beyond, and "
+    "friso check looks for them"
+)
+"""What these edges are of."""
+
+ROUNDS = 6
+"""Bisections of the step of the grid that holds the edge."""
+
+MEETS = 0.9, 1.1
+"""Sizes of the multiplier of one and the same cycle just below a flip, at least, and just above it, at most: the
+bracket of an edge is less than 1 % wide in the end."""
+
+STEP, STEPS = 1.02, 16
+"""Where a cycle is replaced by another, the factor by which is gone upward as long as simulations hunt, and how often
+at most: as far as the next crossover of a sweep's grid."""
+
+LONG = 2000.0
+"""Periods of a small cycle for which is simulated there: transients may be long beside a cycle that repels."""
+
+FLIP, JUMP, FOLD, LOST = "flip", "jump", "fold", "lost"
+BELOW, ABOVE, UNKNOWN = "below the range", "above the range", "unknown"
+
+KINDS = {
+    FLIP: "the cycle continues, but repels (its multiplier has passed -1)",
+    JUMP: "the cycle is replaced by another, which repels (the multipliers do not meet at -1), and simulations settle",
+    FOLD: "no cycle exists beyond: from every distance the stage swings back less far than it started",
+    LOST: "no orbit could be closed beyond, near the fixed point of the return map, and simulations settle",
+    BELOW: "no cycle attracts at any crossover tried",
+    ABOVE: "a cycle attracts up to the highest crossover tried",
+    UNKNOWN: "a decisive simulation failed, or after a jump hunting did not end within the steps allowed",
+}
+"""What is known of an edge, and of stages without one in the range."""
+
+Stages = Callable[[np.ndarray, np.ndarray], Ensemble]
+"""Stages from their numbers and crossovers, both of shape (count,)."""
+
+
+@dataclass(frozen=True)
+class Edges:
+    """The edge of each stage, all of shape (count,).
+
+    `crossover`, in the unit of the grid (NaN without an edge); its `kind`, one of `KINDS`; the multiplier `inside`,
+    next below it, where something attracts (NaN: by simulation alone), and `outside`, above it (NaN where no cycle is
+    known); and the number of `windows` of the grid in which something attracts: of several the highest counts.
+    """
+
+    crossover: np.ndarray
+    kind: np.ndarray
+    inside: np.ndarray
+    outside: np.ndarray
+    windows: np.ndarray
+
+    @property
+    def located(self) -> np.ndarray:
+        """Which stages have an edge in the range, shape (count,)."""
+        return np.isfinite(self.crossover)
+
+
+def concatenate_edges(parts: list[Edges]) -> Edges:
+    """The edges of all stages."""
+    return Edges(*(np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(Edges)))
+
+
+@dataclass(frozen=True)
+class _AtCrossovers:
+    """What is known at crossovers: whether something attracts, the multiplier (NaN: no cycle), whether there may be a
+    cycle that could not be closed, and whether simulation, which had to decide then, failed."""
+
+    attracts: np.ndarray
+    multiplier: np.ndarray
+    uncertain: np.ndarray
+    failed: np.ndarray
+
+    def reshaped(self, *shape: int) -> _AtCrossovers:
+        return _AtCrossovers(*(getattr(self, column.name).reshape(shape) for column in fields(_AtCrossovers)))
+
+
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
+def _at_crossovers(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> _AtCrossovers:
+    """Where an orbit may be but could not be closed, a long simulation tells whether anything hunts on."""
+    part = stages(which, crossover)
+    cycles = hunting_cycles(part)
+    attracts, failed, unsure = cycles.attracting, np.zeros(part.count, bool), np.flatnonzero(cycles.uncertain)
+    if unsure.size:
+        attracts[unsure], decided = swings_from_any_distance(part.take(unsure))
+        failed[unsure] = ~decided
+    return _AtCrossovers(attracts, cycles.multiplier, cycles.uncertain, failed)
+
+
+def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
+    """The edges of stages whose crossovers are tried on a grid, shape (count, points), ascending; then the step behind
+    the last one at which a cycle attracts is halved, `rounds` times, and gone on upward where the cycle is replaced by
+    another one beside which something still hunts.
+
+    A flip is interpolated between the multipliers on both sides of it, if it comes to lie in what is left of the step;
+    else the middle of that is taken (of the logarithm).
+    """
+    count, points = grid.shape
+    at_crossovers = _at_crossovers(stages, np.repeat(np.arange(count), points), grid.ravel()).reshaped(count, points)
+    last = points - 1 - at_crossovers.attracts[:, ::-1].argmax(axis=1)
+    attracted = at_crossovers.attracts.any(axis=1)
+    which = np.flatnonzero(attracted & (last < points - 1))
+    nothing = [np.full(count, np.nan) for _ in range(3)]
+    windows = (np.diff(at_crossovers.attracts, axis=1, prepend=False) & at_crossovers.attracts).sum(axis=1)
+    kind = np.where(attracted, ABOVE, np.where(at_crossovers.failed.any(axis=1), UNKNOWN, BELOW)).astype(object)
+    edges = Edges(nothing[0], kind, nothing[1], nothing[2], windows)
+    if which.size:
+        search = _Search(stages, which, grid, at_crossovers, last)
+        for _ in range(rounds):
+            search.halve()
+        search.follow()
+        for name, column in search.columns().items():
+            getattr(edges, name)[which] = column
+    return edges
+
+
+class _Search:
+    """Steps that hold an edge on their way to being halved; all arrays of shape (stages,).
+
+    `low`, the logarithm of a crossover at which a cycle attracts, with its multiplier; `high`, one at which none is
+    known to, and whether that is because no orbit could be closed; `flip`, the lowest known one at which the cycle
+    repels (inf: none), with its multiplier, which tells of the edge where orbits just above it cannot be closed; and
+    whether a simulation above failed.
+    """
+
+    def __init__(
+        self, stages: Stages, which: np.ndarray, grid: np.ndarray, at_crossovers: _AtCrossovers, last: np.ndarray
+    ) -> None:
+        at = which, last[which]
+        above = which, last[which] + 1
+        self.stages, self.which = stages, which
+        self.low, self.inside = np.log(grid[at]), at_crossovers.multiplier[at]
+        self.high, self.outside, self.unsure = (
+            np.log(grid[above]),
+            at_crossovers.multiplier[above],
+            at_crossovers.uncertain[above],
+        )
+        beyond = np.arange(grid.shape[1]) > last[which, None]
+        flips = beyond & np.isfinite(at_crossovers.multiplier[which])
+        first = flips.argmax(axis=1)
+        self.flip = np.where(flips.any(axis=1), np.log(grid[which, first]), np.inf)
+        self.flipped = at_crossovers.multiplier[which, first]
+        self.failed = (beyond & at_crossovers.failed[which]).any(axis=1)
+
+    def halve(self) -> None:
+        middle = (self.low + self.high) / 2
+        at_crossovers = _at_crossovers(self.stages, self.which, np.exp(middle))
+        inside, flips = at_crossovers.attracts, ~at_crossovers.attracts & np.isfinite(at_crossovers.multiplier)
+        self.low, self.inside = (
+            np.where(inside, middle, self.low),
+            np.where(inside, at_crossovers.multiplier, self.inside),
+        )
+        self.high, self.outside = (
+            np.where(inside, self.high, middle),
+            np.where(inside, self.outside, at_crossovers.multiplier),
+        )
+        self.unsure = np.where(inside, self.unsure, at_crossovers.uncertain)
+        self.flip, self.flipped = (
+            np.where(flips, middle, self.flip),
+            np.where(flips, at_crossovers.multiplier, self.flipped),
+        )
+        self.failed |= at_crossovers.failed
+
+    @property
+    def jumps(self) -> np.ndarray:
+        """Where a repelling cycle is known just above, but not that which attracts just below."""
+        meets = (self.inside < -MEETS[0]) & (-MEETS[1] < self.outside) & (self.outside < 0)
+        return np.isfinite(self.outside) & ~meets
+
+    def follow(self) -> None:
+        """Go on upward from jumps as long as simulations hunt."""
+        jumping = np.flatnonzero(self.jumps)
+        for _ in range(STEPS):
+            if not jumping.size:
+                return
+            hunts, decided = swings_from_any_distance(
+                self.stages(self.which[jumping], np.exp(self.high[jumping])), LONG
+            )
+            self.failed[jumping] |= ~decided
+            jumping = jumping[hunts]
+            self.low[jumping] = self.high[jumping]
+            self.high[jumping] += np.log(STEP)
+        self.failed[jumping] = True
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """The edges by the steps, under the names of `Edges`."""
+        excess = np.abs(self.inside) - 1, np.abs(self.flipped) - 1
+        crossed = self.low - excess[0] * (self.flip - self.low) / (excess[1] - excess[0])
+        within = (self.low <= crossed) & (crossed <= self.high)
+        surely = np.isfinite(self.outside) & ~self.jumps
+        flips = within & (surely | (self.unsure & (self.inside < -MEETS[0]) & (self.flipped < 0)))
+        kind = np.where(flips, FLIP, np.where(self.jumps, JUMP, np.where(self.unsure, LOST, FOLD)))
+        edge = np.exp(np.where(flips, crossed, (self.low + self.high) / 2))
+        return {
+            "crossover": np.where(self.failed, np.nan, edge),
+            "kind": np.where(self.failed, UNKNOWN, kind),
+            "inside": self.inside,
+            "outside": np.where(flips, self.flipped, self.outside),
+        }

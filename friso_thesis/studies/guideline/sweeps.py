@@ -1,0 +1,159 @@
+"""Sweeps of the edge of hunting over Sobol samples of the groups, in parts that outlive an interruption."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+from scipy.stats import qmc
+
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.progress import Tally
+from friso_thesis.studies.guideline.edges import Edges, concatenate_edges, find_edges
+from friso_thesis.studies.guideline.groups import flat_of
+from friso_thesis.studies.kept_work import KeptWork
+
+LOCKED, FREE = "edges of rigid masses", "edges with a free joint"
+
+STEPS = {LOCKED: 1, FREE: 8}
+"""Steps of the progress that a sample counts: one with a free joint takes as long as eight rigid masses."""
+
+Box = Mapping[str, tuple[float, float]]
+"""The range of each group from which it is drawn, evenly in the logarithm."""
+
+LOCKED_BOX: Box = {
+    "gap": (0.1, 0.85),
+    "stribeck": (0.1, 10.0),
+    "bristle_damping": (0.1, 1.0),
+    "viscous": (1e-4, 5e-3),
+    "alpha": (0.05, 0.25),
+    "beta": (1.5, 4.0),
+    "tuned_mass": (0.8, 1.25),
+}
+"""Ranges about the thesis rig (gap 0.67, stribeck 0.33, bristle damping 0.38, viscous 6e-4, alpha 0.1, beta 2), as wide
+as masses from 0.5 to 50 kg and bristles from 1e5 to 1e8 N/m make them."""
+
+JOINT_BOX: Box = {
+    "ratio": (0.15, 3.0),
+    "stage_share": (0.15, 0.8),
+    "joint_damping": (1e-3, 0.1),
+    "stroke": (0.02, 20.0),
+    "limiter_damping": (5e-3, 0.3),
+}
+"""Ranges of the joint; `ratio` is its frequency, sqrt(k_j/m), over the locked edge: below the range the joint is far
+softer than any that the thesis tries, above it the isolator changes hardly anything."""
+
+LOCKED_GRID = np.geomspace(0.004, 1.0, 20)
+"""Crossovers tried, in units of sqrt(sigma_0/m)."""
+
+FREE_GRID = np.geomspace(0.03, 1.6, 12)
+"""Crossovers tried with a free joint, in units of the locked edge."""
+
+PART = 32
+"""Samples that are worked on together, and kept when they are done."""
+
+LOCKED_FIT, LOCKED_TEST, FREE_FIT, FREE_TEST = 1, 2, 3, 4
+"""Seeds of the scrambled Sobol sequences: fits and their tests share no sample."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Samples and their edges: `values` by group, shape (count,), the crossover among them at the edge (in units of
+    sqrt(sigma_0/m), NaN without an edge); `locked`, the edge of the same stage with its joint locked (rigid), (count,).
+    """
+
+    values: Mapping[str, np.ndarray]
+    locked: np.ndarray
+    edges: Edges
+
+    def take(self, which: np.ndarray) -> Sweep:
+        """The samples with these numbers, or those for which it is true."""
+        values = {name: value[which] for name, value in self.values.items()}
+        return Sweep(values, self.locked[which], Edges(*(getattr(self.edges, e.name)[which] for e in fields(Edges))))
+
+    @property
+    def edge(self) -> np.ndarray:
+        return self.edges.crossover
+
+    @property
+    def usable(self) -> Sweep:
+        """Those with an edge in the range."""
+        return self.take(self.edges.located)
+
+
+def concatenate_sweeps(*sweeps: Sweep) -> Sweep:
+    """The samples of all sweeps of one kind."""
+    values = {name: np.concatenate([sweep.values[name] for sweep in sweeps]) for name in sweeps[0].values}
+    return Sweep(
+        values, np.concatenate([sweep.locked for sweep in sweeps]), concatenate_edges([sweep.edges for sweep in sweeps])
+    )
+
+
+class Keep(KeptWork):
+    """Where the parts of sweeps are kept until they are all done."""
+
+    sources = ("../friso_thesis/studies/guideline",)
+
+    def part(self, name: str, make: Callable[[], Edges]) -> Edges:
+        """The part with this name: as it was kept, or made now and kept."""
+        columns = self.arrays((name,), lambda: _columns(make()), [field.name for field in fields(Edges)])
+        return Edges(**columns)
+
+
+def _columns(edges: Edges) -> dict[str, np.ndarray]:
+    return vars(edges) | {"kind": edges.kind.astype(str)}
+
+
+def sobol_samples(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
+    """Sobol samples of a box, by group, each of shape (count,)."""
+    points = qmc.Sobol(len(box), rng=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
+    low, high = np.log(np.array(list(box.values()))).T
+    return dict(zip(box, np.exp(low + points * (high - low)).T, strict=True))
+
+
+def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
+    """The edges of samples of rigid masses, which locked joints are apart from the contact of their fixtures."""
+    values = sobol_samples(LOCKED_BOX, count, seed)
+    grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
+    edges = _in_parts(f"locked {seed} {count}", values, grid, keep, tally, LOCKED)
+    return Sweep(values, edges.crossover, edges)
+
+
+def free_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> tuple[Sweep, Sweep]:
+    """The edges of samples with a free joint, of those that have one with the joint locked; and those of all samples
+    with their joints locked, to which the frequency of the joint is drawn relative."""
+    drawn_values = sobol_samples({**LOCKED_BOX, **JOINT_BOX}, count, seed)
+    rigid = {name: drawn_values[name] for name in LOCKED_BOX}
+    grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
+    locked = _in_parts(f"locked beside free {seed} {count}", rigid, grid, keep, tally, LOCKED)
+    has = np.flatnonzero(locked.located)
+    values = {name: value[has] for name, value in drawn_values.items() if name != "ratio"}
+    at = locked.crossover[has]
+    values["joint"] = (drawn_values["ratio"][has] * at) ** 2
+    edges = _in_parts(f"free {seed} {count}", values, at[:, None] * FREE_GRID, keep, tally, FREE)
+    return Sweep(values, at, edges), Sweep(rigid, locked.crossover, locked)
+
+
+def _in_parts(
+    name: str, values: Mapping[str, np.ndarray], grid: np.ndarray, keep: Keep, tally: Tally, label: str
+) -> Edges:
+    parts = []
+    for first in range(0, len(grid), PART):
+        part = slice(first, first + PART)
+        subset = {group: value[part] for group, value in values.items()}
+        parts.append(
+            keep.part(f"{name} {first}", lambda subset=subset, part=part: find_edges(_stages(subset), grid[part]))
+        )
+        tally.add(STEPS[label] * len(grid[part]), label)
+    return concatenate_edges(parts)
+
+
+def _stages(values: Mapping[str, np.ndarray]) -> Callable[[np.ndarray, np.ndarray], Ensemble]:
+    """The stages of samples at crossovers in units of sqrt(sigma_0/m)."""
+
+    def stages(which: np.ndarray, crossover: np.ndarray) -> Ensemble:
+        subset = {name: value[which] for name, value in values.items()}
+        return Ensemble.held(flat_of({**subset, "crossover": crossover}), len(which))
+
+    return stages

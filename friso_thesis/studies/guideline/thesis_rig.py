@@ -1,0 +1,108 @@
+"""The worked example: the thesis rig, by the laws and by direct computation side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.margin import margin
+from friso.stage import Stage
+from friso_thesis.studies.guideline.edges import ABOVE, BELOW, FLIP, find_edges
+from friso_thesis.studies.guideline.groups import values_of
+from friso_thesis.studies.guideline.laws import FittedLaw
+from friso_thesis.studies.thesis.studies import thesis_rig
+
+RIGID_GRID = np.geomspace(2.0, 60.0, 14)
+FREE_GRID = np.geomspace(1.0, 20.0, 28)
+"""Crossovers tried for the rig [Hz]; the more with a free joint, some of whose cycles cannot be closed."""
+
+RigChanges = Mapping[str, Any]
+"""Keys that differ from those of the rig, SI."""
+
+
+@dataclass(frozen=True)
+class ThesisCase:
+    """A stage of the rig's kind: what is changed, and its edge [Hz] by the law and as computed (NaN: none found), with
+    its `kind`, one of `KINDS`, which says why there is none."""
+
+    changes: RigChanges
+    law: float
+    computed: float
+    kind: str = FLIP
+
+    @property
+    def ranked(self) -> float:
+        """The computed edge [Hz] to be compared: 0 if it lies below the crossovers tried, infinite if above, NaN if it
+        is not known."""
+        return {BELOW: 0.0, ABOVE: np.inf}.get(self.kind, self.computed)
+
+
+@dataclass(frozen=True)
+class Laws:
+    """The two laws that give the edge of any stage."""
+
+    locked: FittedLaw
+    free: FittedLaw
+
+    def locked_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
+        """The edge [Hz] with the joint locked of stages given by flat keys to SI numbers or arrays."""
+        values, rate = _shaped(flat)
+        return self.locked.edge(values) * rate
+
+    def free_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
+        """The edge [Hz] with the joint free, likewise."""
+        values, rate = _shaped(flat)
+        return self.free.edge(values, self.locked.edge(values)) * rate
+
+    def rates(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        """All rates of the laws [Hz], by name."""
+        values, rate = _shaped(flat)
+        return {
+            quantity.name: np.exp(log) * rate
+            for law in (self.locked, self.free)
+            for quantity, log in zip(law.law.rates, law.log_rates(values), strict=True)
+        }
+
+
+def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The groups as arrays of one shape, and the frequency [Hz] of the mass on its bristles."""
+    values = values_of(flat)
+    rate = np.sqrt(flat["friction.bristle_stiffness"] / (flat["masses.cart"] + flat["masses.stage"])) / (2 * np.pi)
+    arrays = np.broadcast_arrays(*(np.atleast_1d(value) for value in values.values()))
+    return dict(zip(values, arrays, strict=True)), np.atleast_1d(rate)
+
+
+def plain_rig(part: str = "") -> dict[str, Any]:
+    """The flat keys of the rig without its parasitic mode; without its joint as well unless part is "joint"."""
+    dropped = "parasitic." if part == "joint" else ("parasitic.", "joint.")
+    return {key: value for key, value in thesis_rig().flat().items() if not key.startswith(dropped)}
+
+
+def cases(laws: Laws, changes: Sequence[RigChanges], free: bool) -> list[ThesisCase]:
+    """The rig with each of these changes, rigid or with its joint free."""
+    mode = any("parasitic.frequency" in change for change in changes)
+    base = thesis_rig().flat() if mode else plain_rig("joint" if free else "")
+    keys = {key for change in changes for key in change}
+    flat = base | {key: np.array([change.get(key, base[key]) for change in changes], float) for key in keys}
+
+    def stages(which: np.ndarray, crossover: np.ndarray) -> Ensemble:
+        subset = {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
+        return Ensemble.held(subset | {CROSSOVER: crossover}, len(which))
+
+    grid = FREE_GRID if free else RIGID_GRID
+    edges = find_edges(stages, np.broadcast_to(grid, (len(changes), len(grid))))
+    with_joint = plain_rig("joint") | {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
+    law = np.broadcast_to(laws.free_edge(with_joint) if free else laws.locked_edge(with_joint), edges.kind.shape)
+    columns = law.tolist(), edges.crossover.tolist(), edges.kind.astype(str).tolist()
+    return [ThesisCase(*row) for row in zip(changes, *columns, strict=True)]
+
+
+def direct(stage: Stage) -> float:
+    """The edge [Hz] as `friso check` finds it, from a crossover at which the stage hunts; NaN without one."""
+    edge = margin(stage, attracting=True)
+    return edge.crossover if edge and edge.crossover else np.nan

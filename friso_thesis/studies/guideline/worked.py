@@ -1,0 +1,246 @@
+"""The worked steps: from the friction range and the crossover limit of a machine to its isolator, on the thesis rig."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
+from friso_thesis.studies.guideline.parasitic import margin_with
+from friso_thesis.studies.guideline.sweeps import LOCKED_BOX
+from friso_thesis.studies.guideline.thesis_rig import FREE_GRID, Laws, ThesisCase, cases, direct, plain_rig
+from friso_thesis.studies.thesis.studies import thesis_rig
+
+STATIC = (1.0, 1.5, 2.0, 2.5)
+"""Static friction of the rig [N]: the range that the thesis measured (Fig. 20); Table 2 has 3 N."""
+
+GAPS = (0.15, 0.3, 0.5, 0.7, 0.85)
+"""Friction gaps tried, since dynamic friction could not be measured: the range of the law."""
+
+LIMITS = (8.0, 48.0)
+"""Bandwidth limits [Hz]: the crossover at which the thesis evaluates its isolator (Sec. 3.4.2), and the highest that
+was stable on its rig (Sec. 4.3.1)."""
+
+AMPLE = 1.0
+"""A stroke [m] that no cycle uses up."""
+
+CLAIMED_AT = 8.0
+"""Crossover [Hz] of the thesis's studies (Sec. 3.4.2)."""
+
+
+STUDIED: Mapping[str, Callable[[Mapping[str, Any]], float]] = {
+    "gap": lambda changes: changes["friction.static"] - changes["friction.coulomb"],
+    "mass": lambda changes: changes["masses.cart"] + changes["masses.stage"],
+    "share": lambda changes: changes["masses.stage"] / (changes["masses.cart"] + changes["masses.stage"]),
+    "stiffness": lambda changes: changes["joint.stiffness"],
+    "stroke": lambda changes: changes["joint.stroke"],
+    "parasitic": lambda changes: changes["parasitic.frequency"],
+}
+"""What each study varies, SI, from the changes of a case."""
+
+
+@dataclass(frozen=True)
+class WorkedMachine:
+    """A machine of the rig's kind by its name: its edge [Hz] by the law and as `friso check` finds it."""
+
+    name: str
+    law: float
+    computed: float
+
+
+@dataclass(frozen=True)
+class WorkedDesign:
+    """An isolator for a crossover limit [Hz]: the edge [Hz] for which it is laid out by the law, `aim`; its stiffness
+    [N/m], the stroke that it needs [m] and the `force` at full stroke [N]; its edges over the friction range, and the
+    least modulus `margin` of the settled states at the limit, with the rig's own friction and parasitic mode."""
+
+    limit: float
+    aim: float
+    stiffness: float
+    stroke: float
+    cases: tuple[ThesisCase, ...]
+    margin: float
+
+    @property
+    def force(self) -> float:
+        return self.stiffness * self.stroke
+
+    @property
+    def worst(self) -> float:
+        """The highest edge that is known [Hz], or the least crossover tried if all lie below."""
+        return float(np.nanmax([FREE_GRID[0], *(case.ranked for case in self.cases)]))
+
+    @property
+    def unknown(self) -> int:
+        """Pairs of friction forces whose edge could not be computed."""
+        return int(np.isnan([case.ranked for case in self.cases]).sum())
+
+    @property
+    def does(self) -> bool:
+        """Whether no cycle attracts at the limit over the friction range."""
+        return self.worst <= self.limit and not self.unknown
+
+
+@dataclass(frozen=True)
+class IsolatorNeed:
+    """Whether a machine with a crossover limit [Hz] needs an isolator: if that is below `edge` [Hz], the highest locked
+    edge by the law over the friction range, with its safety factor."""
+
+    limit: float
+    edge: float
+
+    @property
+    def needed(self) -> bool:
+        return self.limit < self.edge
+
+
+@dataclass(frozen=True)
+class Worked:
+    """The rig: its `rates` [Hz] by name; `machines` by law and computation; its edge over the `friction` range, rigid,
+    the `bound` [Hz] that the law has over all friction forces at the rig's bristles and masses and the gaps swept, and
+    the `safe` factor on the locked law; what it `needs`, by crossover limit, and where that
+    is an isolator its `designs`, by the law and then corrected until computation agrees; and the `studies` of claims of
+    the thesis, by name."""
+
+    rates: Mapping[str, float]
+    machines: tuple[WorkedMachine, ...]
+    friction: tuple[ThesisCase, ...]
+    bound: float
+    safe: float
+    needs: tuple[IsolatorNeed, ...]
+    designs: tuple[tuple[WorkedDesign, ...], ...]
+    studies: Mapping[str, tuple[ThesisCase, ...]]
+
+    @property
+    def worst(self) -> ThesisCase:
+        """The case of the friction range with the highest computed edge, or one of which it is not known."""
+        return max(self.friction, key=lambda case: case.ranked if case.ranked == case.ranked else np.inf)
+
+
+def friction_range(gaps: Sequence[float] = GAPS) -> list[dict[str, float]]:
+    """The friction forces [N] that the rig may have."""
+    return [{"friction.static": force, "friction.coulomb": force * (1 - gap)} for force, gap in product(STATIC, gaps)]
+
+
+def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
+    """The worked steps with these laws; crossovers are kept above them by the safety factors."""
+    friction = cases(laws, friction_range(), free=False)
+    highest_law = safe_locked * max(case.law for case in friction)
+    needs = tuple(IsolatorNeed(limit, highest_law) for limit in LIMITS)
+    return Worked(
+        {name: float(rate[0]) for name, rate in laws.rates(plain_rig("joint")).items()},
+        machines(laws),
+        tuple(friction),
+        highest(laws),
+        safe_locked,
+        needs,
+        tuple(designed(laws, need.limit, safe_free) for need in needs if need.needed),
+        {name: tuple(cases(laws, changes, free)) for name, (changes, free) in _studies().items()},
+    )
+
+
+def machines(laws: Laws) -> tuple[WorkedMachine, ...]:
+    """The rig as one rigid mass, locked and free."""
+    flat = plain_rig("joint")
+    locked, free = (float(edge(flat)[0]) for edge in (laws.locked_edge, laws.free_edge))
+    stage = thesis_rig()
+    rigid = stage.model_copy(update={"joint": None, "parasitic": None})
+    mode = f"parasitic mode at {stage.flat()['parasitic.frequency']:g} Hz"
+    return (
+        WorkedMachine(f"one rigid mass of {flat['masses.cart'] + flat['masses.stage']:g} kg", locked, direct(rigid)),
+        WorkedMachine(
+            f"joint locked by its fixtures, {mode}",
+            locked,
+            direct(stage.replace({"joint.locked": True})),
+        ),
+        WorkedMachine(f"joint free, {mode}", free, direct(stage.replace({CROSSOVER: "5 Hz"}))),
+    )
+
+
+def highest(laws: Laws) -> float:
+    """The highest edge [Hz] of the rig by the law, over all friction forces with a gap in the range, its masses and
+    bristles as they are: the edge goes with sqrt(sigma_0/m)."""
+    static, gap = np.meshgrid(np.geomspace(0.05, 500.0, 400), np.linspace(*LOCKED_BOX["gap"], 50))
+    flat = plain_rig() | {"friction.static": static.ravel(), "friction.coulomb": (static * (1 - gap)).ravel()}
+    return float(laws.locked_edge(flat).max())
+
+
+def designed(laws: Laws, limit: float, safe: float) -> tuple[WorkedDesign, ...]:
+    """The isolator by the law, its edge by a safety factor below the limit; then, as long as computed edges are above
+    the limit, again with the aim lowered by as much, and where one is unknown at least by `BLIND`."""
+    designs = [_design(laws, limit, limit / safe)]
+    while not designs[-1].does and len(designs) < CORRECTED:
+        share = min(limit / designs[-1].worst, BLIND if designs[-1].unknown else 1.0)
+        designs.append(_design(laws, limit, CLOSER * designs[-1].aim * share))
+    return tuple(designs)
+
+
+def _design(laws: Laws, limit: float, aim: float) -> WorkedDesign:
+    """Nine tenths of the stiffest joint whose edge by the law stays below the aim over the friction range, with the
+    least stroke with which it still does."""
+    forces = friction_range(DESIGN_GAPS)
+    base: dict[str, Any] = plain_rig("joint")
+    base |= {key: np.array([pair[key] for pair in forces]) for key in forces[0]}
+
+    def over(stiffness: float, stroke: float) -> float:
+        edges = laws.free_edge(base | {"joint.stiffness": stiffness, "joint.stroke": stroke})
+        return float(np.log(edges.max() / aim))
+
+    stiffness = MARGIN * _root(lambda log: over(np.exp(log), AMPLE), np.log(1.0), np.log(1e7))
+    stroke = _root(lambda log: over(stiffness, np.exp(log)), np.log(1e-7), np.log(AMPLE))
+    changes = [pair | {"joint.stiffness": stiffness, "joint.stroke": stroke} for pair in forces]
+    joint = {"joint.stiffness": stiffness, "joint.stroke": stroke}
+    margin = margin_with(thesis_rig(), joint | {CROSSOVER: limit})
+    return WorkedDesign(limit, aim, stiffness, stroke, tuple(cases(laws, changes, free=True)), margin)
+
+
+DESIGN_GAPS = (0.3, 0.6, 0.85)
+"""Friction gaps over which a design is computed."""
+
+CORRECTED, CLOSER = 5, 0.98
+"""Designs at most, that by the law included, and the factor on each new aim, with which fewer are needed."""
+
+BLIND = 0.85
+"""Factor on the new aim where an edge is unknown."""
+
+MARGIN = 0.9
+"""Share of the stiffest joint that is chosen: at all of it only an endless stroke would do."""
+
+
+def _root(function: Any, low: float, high: float) -> float:
+    return float(np.exp(brentq(function, low, high)))  # type: ignore[arg-type]
+
+
+def _studies() -> dict[str, tuple[Sequence[Mapping[str, float]], bool]]:
+    """Changes of the rig by the name of the study, and whether its joint is free."""
+    flat = plain_rig("joint")
+    mass, static = flat["masses.cart"] + flat["masses.stage"], flat["friction.static"]
+    forces = [
+        {"friction.static": force, "friction.coulomb": force * (1 - gap)}
+        for force in (2.0, static, 4.0)
+        for gap in np.linspace(0.1, 0.85, 11)
+    ]
+    shares = [
+        {"masses.cart": mass * (1 - share), "masses.stage": mass * share} for share in (0.15, 0.3, 0.45, 0.6, 0.8)
+    ]
+    heavier = [
+        {
+            "masses.cart": n * flat["masses.cart"],
+            "masses.stage": n * flat["masses.stage"],
+            TUNED_MASS: n * mass,
+        }
+        for n in (0.5, 1.0, 1.5, 2.0, 3.0)
+    ]
+    return {
+        "gap": (forces, False),
+        "mass": (heavier, False),
+        "share": (shares, True),
+        "stiffness": ([{"joint.stiffness": k} for k in (500.0, 1000.0, 2400.0, 5000.0, 10000.0)], True),
+        "stroke": ([{"joint.stroke": s * 1e-3} for s in (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 2.0)], True),
+        "parasitic": ([{"parasitic.frequency": f} for f in (30.0, 60.0, 100.0, 300.0, 1000.0)], True),
+    }

@@ -1,0 +1,69 @@
+"""What is done of long work, kept in a folder until all of it is: an interrupted run goes on from there."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from friso.engine.cache import code_digest, machine
+from friso.studies.store_files import keep_arrays, kept_arrays
+from friso.studies.study import equations_version
+from friso.system import remove_folder
+
+
+@dataclass(frozen=True)
+class KeptWork:
+    """Where pieces of work are kept, a folder; None keeps nothing. What other code made, or is damaged, is made
+    again."""
+
+    folder: Path | None = None
+
+    sources: ClassVar[tuple[str, ...]]
+    """Folders and files that decide on what is kept, beside those of the equations, as paths from the package friso."""
+
+    @property
+    def count(self) -> int:
+        """How many pieces are kept."""
+        if self.folder is None or not self.folder.exists():
+            return 0
+        return sum(1 for file in self.folder.iterdir() if file.suffix in (".npz", ".json"))
+
+    def clear(self) -> None:
+        """Forget them."""
+        if self.folder is not None:
+            remove_folder(self.folder)
+
+    def arrays(
+        self,
+        about: tuple[Any, ...],
+        make: Callable[[], Mapping[str, np.ndarray]],
+        names: Collection[str] | None = None,
+    ) -> Mapping[str, np.ndarray]:
+        """Arrays by name `about` something, as they were kept, with just those `names`, or made now."""
+        file = self._file("npz", *about)
+        columns = None if file is None else kept_arrays(file)
+        if columns is not None and (names is None or columns.keys() == {*names}):
+            return columns
+        arrays = make()
+        if file is not None:
+            keep_arrays(file, arrays)
+        return arrays
+
+    def _file(self, suffix: str, *about: Any) -> Path | None:
+        if self.folder is None:
+            return None
+        settings = repr((equations_version(), code_digest(*self.sources), _built_on(), about))
+        return self.folder / f"{hashlib.sha256(settings.encode()).hexdigest()[:24]}.{suffix}"
+
+
+@cache
+def _built_on() -> str:
+    """What decides on a result besides friso's code."""
+    return f"{machine()}, scipy {version('scipy')}"

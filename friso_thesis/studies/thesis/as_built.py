@@ -1,0 +1,226 @@
+"""The thesis's rig with its drive as built: its loops and plants as they would be measured (Sec. 4.2.1, 4.2.4), and the
+hunting experiments (Sec. 4.3.2), in sizes for a reproduction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.equations.motion import CRUISE
+from friso.progress import silent
+from friso.stage import Stage
+from friso.stage.controllers import ANTI_WINDUP, FORCE_LIMIT
+from friso.studies.rig.excitation import excite
+from friso.studies.rig.experiments.frf import (
+    SETTINGS,
+    MeasuredLoop,
+    Plant,
+    apparent_masses,
+    free_plant,
+    measured_loop,
+    open_loops,
+    stable_settings,
+)
+from friso.studies.rig.moves_on_rails import (
+    RailRuns,
+    concatenate_runs,
+    crossover,
+    distance,
+    move,
+    numbers_of,
+    on_rails,
+    once,
+    released,
+    run_moves,
+    with_joint,
+)
+from friso.studies.rig.outcome import rig_log
+from friso.studies.rig.sizes import freed, locked_stage, pace, travel
+from friso_thesis.studies.rig.in_position import InPosition, in_position
+from friso_thesis.studies.rig.measured_cycles import MOTORS, moves_on_varied_rails, on_rail, started
+from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover, stroke_crossover
+
+AS_BUILT: Mapping[str, Any] = MappingProxyType(
+    {
+        FORCE_LIMIT: "200 N",
+        ANTI_WINDUP: "clamp",
+        "drive.sample_time": "50 us",
+        "drive.delay": "50 us",
+        "drive.current_bandwidth": "2 kHz",
+        "drive.encoder_resolution": "1 nm",
+        "drive.encoder_noise": "0.5 nm",
+        "drive.relative_noise": "30 nm",
+        "rail.seed": 1,
+        "rail.static_deviation": 0.2,
+        "rail.coulomb_deviation": 0.2,
+        "rail.correlation_length": "5 mm",
+        "rail.rolling_pitch": "4 mm",
+        "rail.first_harmonic": 0.05,
+        "rail.second_harmonic": 0.02,
+        "cable.stiffness": "5 N/m",
+        "cable.drag": "0.1 N*s/m",
+    }
+)
+"""The drive by Sec. 3.5.2 (sample time, resolutions, peak force); the rest is our choice. It is that of the example
+thesis_drive.toml, with which `friso rig` runs the same experiments."""
+
+COULOMB_LEVEL = 2.0
+"""Over the Coulomb friction of the rig, with the weaker motor: our choice among the levels of
+`friso rig measured-cycles`."""
+
+SEED = 1
+RAILS = 20
+"""Seed, and number, of the moves and of the rails that vary."""
+
+CROSSOVERS = np.array([8.0, 9.5, 14.3]) / 8
+"""Over 8 Hz (Sec. 4.3.2)."""
+
+DISPLACEMENTS = (-0.05, 0.05)
+"""Displacements of the releases over the distance of the move: 5 mm to either side."""
+
+STROKES, LOOPS = np.array([0.02, 0.1, 0.3, 1.0]), np.array([3.0, 4.0, 5.0, 6.0, 8.0, 12.0]) / 8
+"""Strokes over that of the rig and crossovers over 8 Hz of Fig. 26; each cell has `RAILS`."""
+
+NOISES = (0.1, 0.3, 1.0, 3.0, 10.0)
+"""Noise of the drive's force of Fig. 28, which the thesis does not state, over friso's choice."""
+
+
+@dataclass(frozen=True)
+class MovesOnRails:
+    """Fig. 24, 25: moves with the joint `locked`, shape (crossovers, rails), and `free` at the first crossover, shape
+    (rails,); releases with it locked at the second, shape (displacements, rails). Crossovers [Hz]."""
+
+    crossovers: np.ndarray
+    locked: RailRuns
+    free: RailRuns
+    released: RailRuns
+
+
+@dataclass(frozen=True)
+class CyclesOnRails:
+    """Fig. 27: the cycle on an even rail, one run, and those on rails that vary, shape (rails,), with the asymmetry of
+    their friction about the target; `weak` is the even rail again, one run, with a motor so weak that the mass line
+    shows the mass measured (`MOTORS`) and `COULOMB_LEVEL` times the Coulomb friction."""
+
+    even: RailRuns
+    rails: RailRuns
+    asymmetry: np.ndarray
+    weak: RailRuns
+
+
+def _prescribed(stage: Stage) -> Stage:
+    """The rig with its drive, moved as Sec. 4.3.2 prescribes, by 100 mm at 100 m/s^2, whatever the path of the
+    simulations is; `move` takes the acceleration of this path, and rounds its 90 mm to them."""
+    time = 0.03 / np.sqrt(1 + stage.flat().get(CRUISE, 0.0))
+    own = {"motion.acceleration": "100 m/s^2", "motion.acceleration_time": f"{float(time)!r} s"}
+    return rig_with_drive(stage.replace(own))
+
+
+def rig_with_drive(stage: Stage) -> Stage:
+    """The rig with its drive."""
+    return stage.replace(dict(AS_BUILT))
+
+
+def moves(stage: Stage) -> MovesOnRails:
+    """The moves of Fig. 24 and 25, on several rails."""
+    machine = _prescribed(stage)
+    locked, free = (with_joint(machine, held) for held in (True, False))
+    seeds, frequencies = 1.0 + np.arange(float(RAILS)), crossover(machine) * CROSSOVERS
+    keys = CROSSOVER
+    held = run_moves(
+        locked, move(machine), numbers_of(SEED, len(CROSSOVERS), RAILS), on_rails(machine, {keys: frequencies}, seeds)
+    )
+    first, second = (on_rails(machine, {keys: frequencies[[row]]}, seeds) for row in (0, 1))
+    loose = run_moves(free, move(machine), numbers_of(SEED, 1, RAILS), first)
+    tasks = [released(machine, share * distance(machine)) for share in DISPLACEMENTS]
+    let_go = concatenate_runs([run_moves(locked, task, numbers_of(SEED, 1, RAILS), second) for task in tasks])
+    return MovesOnRails(frequencies, held.shaped(len(CROSSOVERS), RAILS), loose, let_go.shaped(len(tasks), RAILS))
+
+
+def grid(stage: Stage) -> StrokeCrossover:
+    """Fig. 26: strokes and crossovers, on all rails."""
+    seeds = 1.0 + np.arange(float(RAILS))
+    return stroke_crossover(with_joint(_prescribed(stage), locked=False), SEED, STROKES, LOOPS, seeds, silent)
+
+
+def cycles(stage: Stage) -> CyclesOnRails:
+    """Fig. 27: an even rail and rails that vary, the joint locked."""
+    machine = _prescribed(stage)
+    even = on_rail(with_joint(machine, locked=True))
+    run = started(even, SEED, {}, 1, silent, "")
+    swing = float(run.swing[0]) if run.swings[0] else 0.01 * distance(machine)
+    flat = machine.flat()
+    cases = {f"rail.{name}": np.array([flat[f"rail.{name}"]]) for name in _FIELD}
+    rails, asymmetry = moves_on_varied_rails(even, SEED, cases, 1.0 + np.arange(float(RAILS)), swing, silent, "")
+    changes = {
+        "drive.motor_constant_ratio": np.array([MOTORS[1] * flat.get("drive.motor_constant_ratio", 1.0)]),
+        "friction.coulomb": np.array([COULOMB_LEVEL * flat["friction.coulomb"]]),
+    }
+    return CyclesOnRails(run, rails, asymmetry, started(even, SEED, changes, 1, silent, ""))
+
+
+_FIELD = tuple(key.removeprefix("rail.") for key in AS_BUILT if key.startswith("rail.") and key != "rail.seed")
+
+
+def standstill(stage: Stage) -> InPosition:
+    """Fig. 28."""
+    return in_position(rig_with_drive(stage), SEED, silent, NOISES)[0]
+
+
+@dataclass(frozen=True)
+class RailTraces:
+    """What the drive logs of single moves on one rail that varies, and on an even one: time [s], shape (n,), and
+    the position less the end of the move [m], by joint and crossover [Hz] and by rail, each of shape (n,); the
+    `distance` of the move [m]."""
+
+    time: np.ndarray
+    moves: Mapping[tuple[str, float], np.ndarray]
+    rails: Mapping[str, np.ndarray]
+    distance: float
+
+
+def traces(stage: Stage, rail: int) -> RailTraces:
+    """Fig. 24, 25 and 27 in time, on the rail of a number from 0 on."""
+    machine = _prescribed(stage)
+    frequencies, task, length = crossover(machine) * CROSSOVERS, move(machine), distance(machine)
+    held, loose = (with_joint(machine, locked) for locked in (True, False))
+    key = CROSSOVER
+    place = {"rail.seed": 1.0 + rail}
+    locked = once(held, task, [SEED + rail] * len(frequencies), {key: frequencies, **place})
+    free = once(loose, task, [SEED + rail], {key: frequencies[:1], **place})
+    even = once(on_rail(held), task, [SEED])
+    logged = locked.logged["position"] - length
+    moves = {("locked", float(f)): row for f, row in zip(frequencies, logged, strict=True)}
+    moves |= {("free", float(frequencies[0])): free.logged["position"][0] - length}
+    rails = {"even rail": even.logged["position"][0] - length, "rail that varies": logged[0]}
+    return RailTraces(locked.time, moves, rails, length)
+
+
+@dataclass(frozen=True)
+class RigLoops:
+    """Open loops locked at several settings, and free at the lowest of these, with the plant of the free joint;
+    settings [Hz] tried free, shape (n,), and which were stable; apparent masses [kg], shape (2, ratios), locked and
+    free, for the motor constants RATIOS."""
+
+    locked: tuple[MeasuredLoop, ...]
+    free: MeasuredLoop
+    plant: Plant
+    settings: np.ndarray
+    stable: np.ndarray
+    apparent: np.ndarray
+
+
+def rig_loops(stage: Stage) -> RigLoops:
+    """The loops of a rig with its drive as built."""
+    built = rig_with_drive(stage)
+    fixed, free, place = locked_stage(built), freed(built), travel(built)[0]
+    log = rig_log(excite(free, place, SEED), 0, "free", "frequency", free, SEED)
+    settings, stable = stable_settings(free, place, SEED)
+    apparent = np.array([apparent_masses(machine, place, SEED) for machine in (fixed, free)])
+    _, loops = open_loops(fixed, place, SEED, SETTINGS)
+    return RigLoops(loops, measured_loop(log, pace(built)), free_plant([log]), settings, stable, apparent)

@@ -1,0 +1,154 @@
+"""What attracts the stages of the thesis's maps: the curves on which cycles stop attracting, and the agreement of the
+peak count with what attracts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from friso.hunting.boundary import Bifurcation, KeyRange, Space, plane
+from friso.studies.cells import by_words, cell_attractors, flat_cells
+from friso.studies.study import study_of
+from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
+from friso_thesis.studies.thesis.studies import ThesisStudy
+from friso_thesis.studies.thesis.ways import by_attraction, by_peak_count
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SURVEYED = 14
+"""The stage is surveyed at about so many values of each axis: a cell takes a hundred runs."""
+
+NODES = 9
+"""Stages along either axis from which curves are looked for."""
+
+SMALLEST = 1e-3
+"""Share of a linear range at which curves begin that would begin at zero, where there may be no stage."""
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A curve on which a cycle stops attracting: its kind, whether it is of the symmetric cycle, and its points [SI]
+    along the two axes of the map, shape (points,) each."""
+
+    kind: Bifurcation
+    symmetric: bool
+    x: np.ndarray
+    y: np.ndarray
+
+
+@dataclass(frozen=True)
+class PeaksAgainstCycles:
+    """What the peak count and the survey say of the cells compared: peaks counted where something attracts (`both`)
+    or `neither`, peaks counted although nothing attracts (`counted_only`), something that attracts although no peaks
+    are counted (`attracted_only`: another move would start it), and cells of which it is not certain."""
+
+    cells: int
+    both: int
+    neither: int
+    counted_only: int
+    attracted_only: int
+    unknown: int
+
+
+@dataclass(frozen=True)
+class CyclesOnMap:
+    """The curves over a map of the thesis, and the comparison with its peak counts."""
+
+    edges: tuple[Edge, ...]
+    comparison: PeaksAgainstCycles
+
+
+@dataclass(frozen=True)
+class Surveyed:
+    """Some of the cells of a map, evenly spread; whether anything attracts their stages, and whether that is
+    certain, of the shape of the runs."""
+
+    runs: xr.Dataset
+    attracts: np.ndarray
+    decided: np.ndarray
+
+    @property
+    def attracted(self) -> xr.Dataset:
+        """The runs by what attracts their stages."""
+        return by_attraction(by_peak_count(self.runs), self.attracts, self.decided)
+
+
+def map_cycles(study: ThesisStudy, runs: xr.Dataset, surveyed: Surveyed, kept: Kept = NOT_KEPT) -> CyclesOnMap:
+    """The hunting cycles over a map of the thesis, from the study, its runs and what was surveyed of them."""
+    ends = [(name, float(runs[name].values[0]), float(runs[name].values[-1])) for name in runs.dims]
+    about = ("edges", runs.attrs["stage"], runs.attrs["links"], ends)
+    arrays = kept.flags(about, lambda: _as_arrays(_edges(study, runs)))
+    return CyclesOnMap(_from_arrays(arrays), _comparison(surveyed))
+
+
+def _as_arrays(edges: tuple[Edge, ...]) -> dict[str, np.ndarray]:
+    """Edges as arrays by number and name."""
+    return {f"{n}.{key}": np.asarray(value) for n, edge in enumerate(edges) for key, value in vars(edge).items()}
+
+
+def _from_arrays(arrays: Mapping[str, np.ndarray]) -> tuple[Edge, ...]:
+    count = len(arrays) // 4
+    whole = ({key: arrays[f"{n}.{key}"] for key in ("kind", "symmetric", "x", "y")} for n in range(count))
+    return tuple(
+        Edge(cast("Bifurcation", str(edge["kind"])), bool(edge["symmetric"]), edge["x"], edge["y"]) for edge in whole
+    )
+
+
+def survey(runs: xr.Dataset, kept: Kept = NOT_KEPT) -> Surveyed:
+    """What attracts the stages of a map."""
+    coarse = runs.isel({name: slice(None, None, every(size)) for name, size in runs.sizes.items()})
+    axes = [(name, coarse[name].values.tolist()) for name in coarse.dims]
+    flags = kept.flags(("survey", coarse.attrs["stage"], coarse.attrs["links"], axes), lambda: _survey(coarse))
+    shape = coarse["outcome"].shape
+    return Surveyed(coarse, flags["attracts"].reshape(shape), flags["decided"].reshape(shape))
+
+
+def every(values: int) -> int:
+    """Of so many values of an axis each of this many is surveyed."""
+    return max(1, round((values - 1) / (SURVEYED - 1)))
+
+
+def _survey(coarse: xr.Dataset) -> dict[str, np.ndarray]:
+    study = study_of(coarse)
+    valid = (coarse["outcome"].values != "invalid").ravel()
+    attracts, decided = np.zeros(study.cells, bool), np.zeros(study.cells, bool)
+    parts = by_words(study.stage, study.links, study.columns(np.arange(study.cells)))
+    for _, cells, survey, certain in cell_attractors(parts, valid):
+        attracts[cells], decided[cells] = survey is not None and survey.attracts, certain
+    return {"attracts": attracts, "decided": decided & valid}
+
+
+def _comparison(surveyed: Surveyed) -> PeaksAgainstCycles:
+    runs, attracts, decided = by_peak_count(surveyed.runs), surveyed.attracts, surveyed.decided
+    valid = runs["outcome"].values != "invalid"
+    peaks = runs["keeps_moving"].values
+    return PeaksAgainstCycles(
+        cells=int(valid.sum()),
+        both=int((decided & attracts & peaks).sum()),
+        neither=int((decided & ~attracts & ~peaks).sum()),
+        counted_only=int((decided & ~attracts & peaks).sum()),
+        attracted_only=int((decided & attracts & ~peaks).sum()),
+        unknown=int((valid & ~decided).sum()),
+    )
+
+
+def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
+    """The curves over a map; none where the axes belong to the motion, which plays no part."""
+    if study.of_motion:
+        return ()
+    source = study_of(runs)
+    ranges = tuple(_range(runs[span.key].values, span.key, span.log) for span in study.spans)
+    space = Space(ranges, lambda values: flat_cells(source.stage, source.links, values))
+    curves = plane(space, nodes=NODES).curves
+    lines = [space.values(curve.points) for curve in curves]
+    x, y = (swept.key for swept in ranges)
+    return tuple(Edge(curve.kind, curve.sign < 0, line[x], line[y]) for curve, line in zip(curves, lines, strict=True))
+
+
+def _range(values: np.ndarray, key: str, log: bool) -> KeyRange:
+    low, high = float(values[0]), float(values[-1])
+    return KeyRange(key, low if low > 0 else SMALLEST * high, high, log)

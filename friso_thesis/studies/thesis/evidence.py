@@ -1,0 +1,83 @@
+"""What judges look at, computed: maps of the studies, and runs in time, of the rig with or without changes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from friso.engine.simulate import simulate
+from friso.studies.request import Request
+from friso.studies.sweep import sweep
+from friso_thesis.studies.thesis.claims import Evidence, Response
+from friso_thesis.studies.thesis.experiments import Experiments
+from friso_thesis.studies.thesis.judges.arguments import HEAVY, LIGHT
+from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE
+from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
+from friso_thesis.studies.thesis.linear import NEEDS, analysed
+from friso_thesis.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, masses, thesis_rig
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+RESPONSES: Mapping[str, Mapping[str, object]] = {
+    "locked": LOCKED,
+    WIDE: {**LOCKED, "friction.static": "4 N", "friction.coulomb": "0.5 N"},
+    NARROW: {**LOCKED, "friction.static": "4 N", "friction.coulomb": "1.5 N"},
+    LIGHT: {**LOCKED, **masses(1.7)},
+    HEAVY: {**LOCKED, **masses(2.5)},
+}
+"""What runs in time change in the rig: those of Fig. 5 and 13, and two that differ in their masses alone, whatever
+those of the rig are."""
+
+
+def maps_of(
+    studies: Iterable[ThesisStudy],
+    points: int,
+    rtol: float,
+    verify: float = 0.0,
+    changes: Mapping[str, object] = NOTHING,
+) -> dict[str, xr.Dataset]:
+    """The maps of some studies by name, `points` values per axis, `changes` being made to the rig before."""
+    return {study.name: map_of(study, points, rtol, verify, changes) for study in studies}
+
+
+def map_of(
+    study: ThesisStudy,
+    points: int,
+    rtol: float,
+    verify: float = 0.0,
+    changes: Mapping[str, object] = NOTHING,
+    kept: Kept = NOT_KEPT,
+) -> xr.Dataset:
+    """The map of one study, as it was kept or computed now."""
+    stage, axes, links = study.stage(changes), study.axes(points), dict(study.links)
+    request = Request(stage, axes, None, links).study(None, rtol)
+    return kept.runs(request, verify, lambda: sweep(stage, axes, links=links, rtol=rtol, verify=verify))
+
+
+def run_response(own_changes: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
+    """One run in time; other changes of the rig come before the run's own, which distinguish it from the others."""
+    stage = thesis_rig().replace(dict(changes)).replace(dict(own_changes))
+    cell = sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
+    return Response(cell, simulate(stage, rtol))
+
+
+def evidence(
+    needs: Iterable[str],
+    points: int,
+    rtol: float,
+    verify: float = 0.0,
+    changes: Mapping[str, object] = NOTHING,
+    kept: Kept = NOT_KEPT,
+) -> Evidence:
+    """All that is needed, by the names of maps, responses, and parts of the analysis, of the rig with `changes`;
+    experiments are run when they are asked for."""
+    wanted, rig = set(needs), thesis_rig().replace(dict(changes))
+    return Evidence(
+        {name: map_of(study, points, rtol, verify, changes, kept) for name, study in STUDIES.items() if name in wanted},
+        {name: run_response(own, changes, rtol) for name, own in RESPONSES.items() if name in wanted},
+        analysed(rig) if wanted & NEEDS.keys() else None,
+        Experiments(rig, kept),
+        rig,
+    )

@@ -1,0 +1,294 @@
+"""The thesis's identification of its rig (Sec. 4.2, Fig. 17 and 19 to 21), simulated, and read as measured.
+
+The simulated rig has the friction of one place all along its rail, and no noise; for Fig. 17 alone several places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from itertools import pairwise
+from types import MappingProxyType
+from typing import Any, get_type_hints
+
+import numpy as np
+
+from friso.engine.simulate import simulate
+from friso.frequency.describing.mass_line import mass_line
+from friso.identification.experiments.steps import StepStiffness, stiffness_from_steps
+from friso.identification.experiments.stick_slip import StickSlip, static_from_stick_slip
+from friso.identification.logs.log import Log
+from friso.identification.readings.common import record
+from friso.identification.readings.friction_position import FrictionPosition, friction_position
+from friso.stage import Stage, loads
+from friso.stage.controllers import CONTROLLER
+from friso_thesis.studies.rig.in_position import InPosition
+from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
+from friso_thesis.studies.thesis.as_built import (
+    CyclesOnRails,
+    MovesOnRails,
+    RailTraces,
+    RigLoops,
+    cycles,
+    grid,
+    moves,
+    rig_loops,
+    standstill,
+    traces,
+)
+from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
+from friso_thesis.studies.thesis.linear import PartNeeded
+from friso_thesis.studies.thesis.studies import LOCKED
+
+FORCE = 5.0
+"""Amplitude [N] of the identification with the joint locked, which the thesis does not give: some times the friction
+that it finds."""
+
+RANGE, PLACES, COULOMB = (1.0, 2.5), 4, 1 / 3
+"""Static friction by Fig. 20 [N], over which the places of the rail spread evenly, their number, and the share of it
+that is Coulomb friction (as in Table 2): number and share are our choice."""
+
+FREQUENCIES = (5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 120.0, 160.0, 200.0)
+"""[Hz], at which the response with friction is computed."""
+
+SAMPLE_TIME = 1e-3
+"""Sample time of the records [s]: the thesis gives none."""
+
+STEP, STEPS, STANDS = 0.3e-3, (1, 1, -1, -1, 1, -1), 2.0
+"""Size of a step [m] (Sec. 4.2.2), their directions, and the time [s] for which each stands: both our choice."""
+
+FIXED_CART = "1e9 kg"
+"""Mass of a cart that does not move: 1 N displaces it by less than a thousandth of a micrometre in 10 s."""
+
+SLOW, SLOW_TIME = (0.5e-3, 1e-3, 2.5e-3), 20.0
+"""Speeds of slow motion [m/s] and their time [s]: the thesis gives neither; up to the slower one of Fig. 21."""
+
+STROKE = "8 mm"
+"""The limiters in the identification (Sec. 4.2.1)."""
+
+SPEEDS, WAY = (2.5e-3, 10e-3), 0.15
+"""Constant speeds [m/s] and their way [m] (Sec. 4.2.3)."""
+
+
+@dataclass(frozen=True)
+class LockedLine:
+    """Fig. 17: magnitude over the mass line, and phase over that of it [rad], shape (places, frequencies), and the
+    scatter of the phase over the places [rad], shape (frequencies,), at FREQUENCIES."""
+
+    magnitude: np.ndarray
+    phase: np.ndarray
+    scatter: np.ndarray
+
+
+@dataclass(frozen=True)
+class JointSteps:
+    """Fig. 19: the record, the analysis of it, and the joint's stiffness [N/m] that it was simulated with."""
+
+    log: Log
+    result: StepStiffness
+    stiffness: float
+
+
+@dataclass(frozen=True)
+class SlowMotion:
+    """Fig. 20: speed [m/s], the record, the analysis of it, and the static friction [N] it was simulated with."""
+
+    speed: float
+    log: Log
+    result: StickSlip
+    static: float
+
+
+@dataclass(frozen=True)
+class ConstantSpeed:
+    """Fig. 21: the speeds [m/s], a record with one segment for each, and the analysis of it."""
+
+    speeds: tuple[float, ...]
+    log: Log
+    result: FrictionPosition
+
+
+LINE, STEPPED, SLIPS, SPEEDY = "locked_line", "joint_steps", "slow_motion", "constant_speed"
+"""The experiments by name, as a judge needs them."""
+
+BUILT = "rig_loops"
+"""Loops and plants of the rig as built (Sec. 4.2)."""
+
+MOVES, GRID, ON_RAILS, STANDSTILL = "moves", "grid", "cycles", "standstill"
+"""Those of the rig as built (Sec. 4.3.2)."""
+
+TRACES = "traces"
+"""Single moves of the rig as built, which are shown and not judged."""
+
+EXPERIMENTS: Mapping[str, PartNeeded] = MappingProxyType(
+    {
+        LINE: PartNeeded(("motion.", f"{CONTROLLER}.", "friction."), locked=True),
+        STEPPED: PartNeeded(("motion.",)),
+        SLIPS: PartNeeded(("motion.",)),
+        SPEEDY: PartNeeded(("motion.",)),
+        BUILT: PartNeeded(()),
+        MOVES: PartNeeded(("motion.",)),
+        GRID: PartNeeded(("motion.",)),
+        ON_RAILS: PartNeeded(("motion.",), locked=True),
+        STANDSTILL: PartNeeded(("motion.",)),
+    }
+)
+"""What of the stage file plays no part: the first is without its controller, and all have motions of their own."""
+
+
+class Experiments:
+    """The experiments on one rig, each run when it is first asked for, unless it was `kept`; the constant speeds are
+    with the joint free, and locked; the loops with its drive as built."""
+
+    def __init__(self, stage: Stage, kept: Kept = NOT_KEPT) -> None:
+        self._stage_file, self._kept = stage.to_toml(), kept
+        self._results: dict[str, Any] = {}
+
+    @property
+    def locked_line(self) -> LockedLine:
+        """Fig. 17."""
+        return self._result(LINE)
+
+    @property
+    def joint_steps(self) -> JointSteps:
+        """Fig. 19."""
+        return self._result(STEPPED)
+
+    @property
+    def slow_motion(self) -> tuple[SlowMotion, ...]:
+        """Fig. 20."""
+        return self._result(SLIPS)
+
+    @property
+    def constant_speed(self) -> tuple[ConstantSpeed, ConstantSpeed]:
+        """Fig. 21."""
+        return self._result(SPEEDY)
+
+    @property
+    def rig_loops(self) -> RigLoops:
+        """Fig. 17, 18, 22, 23."""
+        return self._result(BUILT)
+
+    @property
+    def moves(self) -> MovesOnRails:
+        """Fig. 24, 25."""
+        return self._result(MOVES)
+
+    @property
+    def grid(self) -> StrokeCrossover:
+        """Fig. 26."""
+        return self._result(GRID)
+
+    @property
+    def cycles(self) -> CyclesOnRails:
+        """Fig. 27."""
+        return self._result(ON_RAILS)
+
+    @property
+    def standstill(self) -> InPosition:
+        """Fig. 28."""
+        return self._result(STANDSTILL)
+
+    @property
+    def traces(self) -> RailTraces:
+        """Fig. 24, 25, 27 in time."""
+        return self._result(TRACES)
+
+    def _result(self, name: str) -> Any:
+        if name not in self._results:
+            kind = get_type_hints(vars(Experiments)[name].fget)["return"]
+            about = ("experiment", name, self._stage_file)
+            self._results[name] = self._kept.result(about, kind, partial(_experiment, name, self._stage_file))
+        return self._results[name]
+
+
+@lru_cache(maxsize=64)
+def _experiment(name: str, stage_file: str) -> Any:
+    """Cached, since judges of several claims ask for the same."""
+    return _RUNS[name](loads(stage_file))
+
+
+def locked_line(stage: Stage) -> LockedLine:
+    """The response of the locked rig to sines of one force at places of other friction."""
+    places = [
+        {"friction.static": f"{f} N", "friction.coulomb": f"{COULOMB * f} N"} for f in np.linspace(*RANGE, PLACES)
+    ]
+    line = mass_line(stage.replace(dict(LOCKED)), places, [FORCE], FREQUENCIES)
+    return LockedLine(line["magnitude"].values[:, 0], line["phase"].values[:, 0], line["spread_phase"].values[0])
+
+
+def joint_steps(stage: Stage) -> JointSteps:
+    """Position steps of 0.3 mm with the cart fixed. The limiter is not touched, so the rig is linear, and the response
+    to all steps is the sum of those to each."""
+    fixed = stage.replace({"masses.cart": FIXED_CART, "joint.stroke": STROKE, "joint.locked": False})
+    duration = STANDS * (len(STEPS) + 1)
+    run = simulate(
+        _with_motion(fixed, kind="step", size=f"{STEP!r} m", duration=f"{duration} s"), sample_time=SAMPLE_TIME
+    )
+    count, signals = round(STANDS / SAMPLE_TIME), {}
+    for name in ("reference", "position", "force"):
+        step, total = run[name].values, np.zeros(count * (len(STEPS) + 1))
+        for number, direction in enumerate(STEPS, start=1):
+            total[number * count :] += direction * step[: len(total) - number * count]
+        signals[name] = total
+    log = record("0.3 mm steps, cart fixed", SAMPLE_TIME, **signals)
+    return JointSteps(log, stiffness_from_steps(log), float(stage.flat()["joint.stiffness"]))
+
+
+def slow_motion(stage: Stage, speed: float) -> SlowMotion:
+    """Slow motion at a `speed` [m/s] with the joint free, which sticks and slips; read with the joint's stiffness."""
+    free = stage.replace({"joint.stroke": STROKE, "joint.locked": False})
+    log = _ramp(free, speed, SLOW_TIME)
+    flat = stage.flat()
+    return SlowMotion(speed, log, static_from_stick_slip(log, flat["joint.stiffness"]), float(flat["friction.static"]))
+
+
+def constant_speed(stage: Stage, speeds: tuple[float, ...] = SPEEDS) -> ConstantSpeed:
+    """Constant speeds over 150 mm, one after the other over the same places."""
+    logs = [_ramp(stage, speed, WAY / speed) for speed in speeds]
+    ends = np.cumsum([0, *(len(log.time) for log in logs)])
+    signals = {role: np.concatenate([log[role] for log in logs]) for role in logs[0].signals}
+    parts = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+    log = replace(record("constant speed", SAMPLE_TIME, **signals), segments=parts)
+    flat = stage.flat()
+    return ConstantSpeed(speeds, log, friction_position(log, flat["masses.cart"] + flat["masses.stage"]))
+
+
+def _ramp(stage: Stage, speed: float, duration: float) -> Log:
+    run = simulate(
+        _with_motion(stage, kind="ramp", velocity=f"{speed!r} m/s", duration=f"{duration!r} s"), sample_time=SAMPLE_TIME
+    )
+    roles = {role: run[role].values for role in ("reference", "position", "cart_position", "force")}
+    return record(f"{speed * 1e3:g} mm/s", SAMPLE_TIME, **roles)
+
+
+def _with_motion(stage: Stage, **motion: Any) -> Stage:
+    """The stage with a motion of another kind, of which other keys are left out."""
+    rows = "\n".join(f'{key} = "{value}"' for key, value in motion.items())
+    text = stage.to_toml()
+    begin = text.index("[motion]")
+    end = text.find("\n[", begin)
+    return loads(f"{text[:begin]}[motion]\n{rows}\n{text[end + 1 :] if end >= 0 else ''}")
+
+
+def _lively_rail(moves: MovesOnRails) -> int:
+    """The first rail on which peaks are counted at the lowest crossover, joint locked; the first where there is
+    none."""
+    return int(np.argmax(moves.locked.counted[0]))
+
+
+_RUNS: Mapping[str, Callable[[Stage], Any]] = MappingProxyType(
+    {
+        LINE: locked_line,
+        STEPPED: joint_steps,
+        SLIPS: lambda stage: tuple(slow_motion(stage, speed) for speed in SLOW),
+        SPEEDY: lambda stage: (constant_speed(stage), constant_speed(stage.replace(dict(LOCKED)))),
+        BUILT: rig_loops,
+        MOVES: moves,
+        GRID: grid,
+        ON_RAILS: cycles,
+        STANDSTILL: standstill,
+        TRACES: lambda stage: traces(stage, _lively_rail(_experiment(MOVES, stage.to_toml()))),
+    }
+)

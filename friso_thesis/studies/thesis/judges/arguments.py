@@ -1,0 +1,224 @@
+"""The arguments that the thesis gives in words: forces at full stroke, the mass to tune for, what a mass or a crossover
+does to the overshoot, what counted peaks mean."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
+from friso.frequency.crossover import settled_margin
+from friso.hunting.criteria.run_outcome import FAILED, SWINGS
+from friso.quantities import percent
+from friso.stage import loads
+from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, Response, judges
+from friso_thesis.studies.thesis.judges.shares import slow_spells
+from friso_thesis.studies.thesis.linear import FREE
+from friso_thesis.studies.thesis.maps import overlap, trend, trend_text, verdict_table
+from friso_thesis.studies.thesis.reading import about, reading
+from friso_thesis.studies.thesis.studies import STUDIES
+
+LIGHT, HEAVY = "1.7 kg", "2.5 kg"
+"""The responses of the locked rig with the mass weighed and with the mass identified (Sec. 4.2.1)."""
+
+_MEASURED = 1.0, 2.5
+"""Static friction by Fig. 20 [N]."""
+
+_PEAK_FORCE, _PRESCRIBED, _GRAVITY, _TENFOLD = 200.0, 100.0, 9.81, 10.0
+"""Peak force of the actuator [N] and accelerations [m/s^2, g] (Sec. 3.5, 4.3.2)."""
+
+_MASSES = 1.7, 2.5
+"""Weighed, and identified [kg]."""
+
+_START = 0.02
+"""Time [s] after break-away in which the acceleration is read."""
+
+
+@judges("S341", figure="Sec. 3.4.1, force at full stroke", needs=("isolator-stiffness",))
+def force_at_full_stroke(evidence: Evidence) -> Finding:
+    """The rule at the thesis's own values, and over the map of stiffness and stroke."""
+    words = reading()
+    flat = evidence.rig.flat()
+    force, static = flat["joint.stiffness"] * flat["joint.stroke"], flat["friction.static"]
+    stiffness, stroke, moving, valid = verdict_table(
+        evidence.maps["isolator-stiffness"], "joint.stiffness", "joint.stroke"
+    )
+    rule = stiffness[:, None] * stroke[None, :] < static
+    some = valid & (stroke > 0)[None, :]
+    kept = overlap(moving, rule & some)
+    return Finding(
+        (
+            Part(
+                "k_j S_j is below the static friction of Table 2",
+                force < static,
+                f"{force:.3g} N of {static:.3g} N",
+            ),
+            Part(
+                f"k_j S_j is below the static friction that was measured ({_MEASURED[0]:g} to {_MEASURED[1]:g} N)",
+                force < _MEASURED[0],
+                f"{force:.3g} N: {force / _MEASURED[0]:.2g} times the least and {force / _MEASURED[1]:.2g} "
+                "times the largest value measured",
+                why="The thesis's own rig breaks its rule where friction is lowest.",
+            ),
+            Part(
+                "over the map of stiffness and stroke, the stage comes to rest where k_j S_j is below the static "
+                f"friction, but for few cells (at most {percent(words.few)})",
+                kept <= words.few,
+                f"{percent(kept)} keep moving where the rule is kept, {percent(overlap(moving, ~rule & some))} where "
+                "it is broken",
+                why="The force at full stroke does not decide alone.",
+            ),
+        )
+    )
+
+
+@lru_cache(maxsize=256)
+def _margins(stage_file: str) -> tuple[float, float]:
+    """Modulus margins of the settled states, tuned for the whole mass and for that of the stage."""
+    flat = {**loads(stage_file).flat(), "joint.locked": False}
+    whole = flat["masses.cart"] + flat["masses.stage"]
+    first, second = (settled_margin({**flat, TUNED_MASS: mass}) for mass in (whole, flat["masses.stage"]))
+    return first, second
+
+
+@judges("S342", figure="Sec. 3.4.2, mass the controller is tuned for", needs=(FREE,))
+def the_mass_to_tune_for(evidence: Evidence) -> Finding:
+    """The margins of all settled states, tuned for the largest and for the smallest mass that moves."""
+    whole, small = _margins(evidence.rig.to_toml())
+    return Finding(
+        (
+            Part(
+                "tuned for the whole mass all settled states are stable",
+                whole > 0,
+                f"modulus margin {whole:.2g}" if whole > 0 else "not stable",
+            ),
+            Part(
+                "their least modulus margin is larger than tuned for the mass of the stage alone",
+                whole > small,
+                f"{whole:.2g} against {small:.2g} (0: not stable)",
+                why="The free joint's loop crosses higher than tuned, and nearer to the parasitic mode.",
+            ),
+        )
+    )
+
+
+@judges("S352", figure="Sec. 3.5, acceleration")
+def close_to_ten_g(evidence: Evidence) -> Finding:
+    """The peak force over the masses weighed and identified."""
+    reached = [_PEAK_FORCE / mass / _GRAVITY for mass in _MASSES]
+    rows = tuple((f"{mass:g} kg", f"{_PRESCRIBED * mass:g} N", f"{_PEAK_FORCE:g} N") for mass in _MASSES)
+    return Finding(
+        (
+            Part(
+                f"{_PEAK_FORCE:g} N reach about {_TENFOLD:g} g (within a factor of 1.5) with the mass weighed and with "
+                "that identified",
+                all(about(g, _TENFOLD) for g in reached),
+                ", ".join(f"{g:.2g} g with {mass:g} kg" for g, mass in zip(reached, _MASSES, strict=True)),
+                printed=_TENFOLD,
+                read=reached[1],
+            ),
+        ),
+        FindingTable(("mass", f"force for the {_PRESCRIBED:g} m/s^2 of Sec. 4.3.2", "peak force"), rows),
+    )
+
+
+@judges("S41", figure="Sec. 4.1, why mass helps", needs=(LIGHT, HEAVY))
+def why_mass_helps(evidence: Evidence) -> Finding:
+    """The first slip across the reference after the return move, with both masses at the same crossover."""
+    light, heavy = (_overshooting_slip(evidence.responses[name]) for name in (LIGHT, HEAVY))
+    names = LIGHT, HEAVY
+    why = "" if np.isfinite([*light, *heavy]).all() else "One of the two has no overshoot: there is nothing to compare."
+    return Finding(
+        (
+            Part(
+                "where it first slips across the reference the heavier cart accelerates less after break-away",
+                heavy[0] < light[0],
+                _compared(names, (light[0], heavy[0]), "m/s^2"),
+                why,
+            ),
+            Part(
+                "it then overshoots the reference less",
+                heavy[1] < light[1],
+                _compared(names, (1e3 * light[1], 1e3 * heavy[1]), "mm"),
+                why,
+            ),
+        )
+    )
+
+
+def _compared(names: tuple[str, str], values: tuple[float, float], unit: str) -> str:
+    texts = (f"{value:.3g} {unit}" if np.isfinite(value) else "no overshoot" for value in values)
+    return " against ".join(f"{text} with {name}" for text, name in zip(texts, names, strict=True))
+
+
+def _overshooting_slip(response: Response) -> tuple[float, float]:
+    """Largest acceleration [m/s^2] of the cart after break-away and largest deviation [m] beyond the reference, of the
+    first slip after the reference has come to its end that begins on one side of it and ends on the other; NaN without
+    one. The cart also slows down where its first swing turns: a slip back from there crosses nothing."""
+    trace = response.trace
+    time, velocity = trace["time"].values, trace["cart_velocity"].values
+    deviation = (trace["position"] - trace["reference"]).values
+    moving = np.flatnonzero(np.abs(np.diff(trace["reference"].values)) > 0)
+    end = time[moving[-1] + 1] if moving.size else 0.0
+    spells = [spell for spell in slow_spells(trace) if time[spell[0]] > end]
+    stops = [*(first for first, _ in spells[1:]), len(time) - 1]
+    for (_, start), stop in zip(spells, stops, strict=False):
+        if deviation[start] * deviation[stop] < 0:
+            early = (time >= time[start]) & (time <= time[start] + _START)
+            acceleration = float(np.abs(np.gradient(velocity[early], time[early])).max())
+            return acceleration, float((np.sign(deviation[stop]) * deviation[start : stop + 1]).max())
+    return np.nan, np.nan
+
+
+@judges("F25O", figure="25", needs=("system",))
+def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
+    """The swing at the end over the crossover, at every mass of the map."""
+    words = reading()
+    runs = evidence.maps["system"]
+    crossover, mass, moving, _ = verdict_table(runs, CROSSOVER, "mass")
+    swing = runs["peak_to_peak"].transpose(CROSSOVER, "mass").values
+    lasting = moving & (runs["outcome"] == SWINGS).transpose(CROSSOVER, "mass").values
+    trends = np.array([trend(crossover[cells], swing[cells, k]) for k, cells in enumerate(lasting.T)])
+    some = np.isfinite(trends)
+    mean = float(trends[some].mean()) if some.any() else np.nan
+    return Finding(
+        (
+            Part(
+                "with the joint locked, over the map of Fig. 11B, the swing of the cycles that last falls as the "
+                f"crossover rises (mean rank correlation over the masses at most {-words.trend:g})",
+                mean <= -words.trend,
+                f"mean rank correlation {trend_text(mean)}, over {some.sum()} of {len(mass)} masses",
+            ),
+        )
+    )
+
+
+@judges("S5", figure="Sec. 5, peaks and cycles", needs=tuple(STUDIES))
+def counted_peaks_mean_cycles(evidence: Evidence) -> Finding:
+    """Of the cells of every map in which peaks are counted, those whose run still swings at its end; by what attracts,
+    of those that are decided those which a cycle attracts."""
+    words = reading()
+    rows, counted, lasting = [], 0, 0
+    for name, runs in evidence.maps.items():
+        peaks = (runs["peaks"].values > 0) & (runs["outcome"].values != FAILED)
+        swings = peaks & runs["lasts"].values
+        counted, lasting = counted + int(peaks.sum()), lasting + int(swings.sum())
+        kept = percent(swings.sum() / peaks.sum()) if peaks.any() else "none"
+        rows.append((f"{STUDIES[name].panel}: {STUDIES[name].title}", percent(peaks.mean()), kept))
+    held = lasting / counted if counted else np.nan
+    return Finding(
+        (
+            Part(
+                f"of the cells in which peaks are counted, all but a few (at most {percent(words.few)}) still "
+                "swing at the "
+                "end of their run (by an attracting cycle: one attracts their stage)",
+                held >= 1 - words.few,
+                f"{percent(held)} over all maps" if counted else "no peaks are counted",
+                why="Peaks after 10 s also count a transient that dies out by 20 s. A cycle that attracts is "
+                "decided by "
+                "what the stage does from any start (see Peak count and hunting cycle).",
+            ),
+        ),
+        FindingTable(("map", "cells with counted peaks", "of these still swinging at the end"), tuple(rows)),
+    )

@@ -1,0 +1,211 @@
+"""Sec. 4.3.3 and 6: the rules of design."""
+
+from __future__ import annotations
+
+from functools import cache, lru_cache
+
+import numpy as np
+
+from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.frequency.crossover import WANTED, settled_margin
+from friso.hunting.margin import margin
+from friso.quantities import percent
+from friso.stage import Stage, loads
+from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges, number_text
+from friso_thesis.studies.thesis.judges.control_and_friction import smallest_gap
+from friso_thesis.studies.thesis.maps import begins, ends, sizes, trend, trend_text, verdict_table
+from friso_thesis.studies.thesis.reading import about, reading
+from friso_thesis.studies.thesis.studies import LOCKED, masses, thesis_rig
+
+_STROKE, _GAP, _RATIO = 0.3e-3, 1.0, 10.0
+"""Least stroke [m], friction gap [N], and parasitic frequency over crossover."""
+
+_WORKS, _LOCKED = 5.25, 15.0
+"""Crossovers [Hz] from which the isolator works, the middle of 5 and 5.5 Hz, and which the locked rig needs."""
+
+_MOVING_MASS, _WEIGHED = 2.5, 1.7
+"""Moving mass [kg] of the rig to which the abstract ties them, and the mass weighed, that of the simulations."""
+
+_EXPERIMENT = 14.3
+"""Crossover [Hz] at which the locked rig did not hunt (Sec. 4.3.2)."""
+
+_HIGHEST = 48.0
+"""Crossover [Hz] up to which the thesis's rig was stable (Sec. 4.3.1, 4.3.3)."""
+
+_RATIOS = np.geomspace(2.0, 80.0, 16)
+"""Parasitic frequencies that are tried, over the crossover."""
+
+
+@judges("D1", figure="14A, 16A, 12A, 11B", needs=("isolator-stiffness", "isolator-crossover", "friction", "system"))
+def rules_of_design(evidence: Evidence) -> Finding:
+    """Each rule by the maps of the parameter study, and that on parasitic modes by linear analysis."""
+    rig = evidence.rig
+    strokes = _stroke(evidence), _softer_needs_less_stroke(evidence)
+    return Finding((_soft(evidence), _far(rig), *strokes, _gap(evidence), *_crossovers(evidence), _up_to(rig)))
+
+
+def _soft(evidence: Evidence) -> Part:
+    """Whether a joint that is softer than one that does, does too."""
+    runs, axes = evidence.maps["isolator-stiffness"], ("joint.stiffness", "joint.stroke")
+    stiffness, stroke, moving, _ = verdict_table(runs, *axes)
+    enough = stroke >= _STROKE
+    softest = ~moving[0, enough]
+    limit = begins(stiffness, moving, sizes(runs, *axes))[enough]
+    return Part(
+        f"at 8 Hz, at every stroke of {_STROKE * 1e3:g} mm and more, the softest joint of the range comes to rest, "
+        f"and at most of these strokes, more than {percent(reading().half)}, the stage keeps moving with a stiffer one",
+        bool(softest.all() and np.mean(limit < stiffness[-1]) > reading().half),
+        f"softest comes to rest at {softest.sum()} of {softest.size} strokes; the stage keeps moving from "
+        f"{limit.min():.0f} to {limit.max():.0f} N/m on",
+    )
+
+
+@lru_cache(maxsize=256)
+def _needed_ratio(stage_file: str) -> float:
+    """The least parasitic frequency over the crossover from which the rig has a modulus margin of 0.5 in all settled
+    states; NaN if it never has."""
+    flat = {**loads(stage_file).flat(), "joint.locked": False}
+    crossover = flat[CROSSOVER]
+    enough = np.nan
+    for ratio in map(float, _RATIOS[::-1]):
+        if settled_margin({**flat, "parasitic.frequency": ratio * crossover}) < WANTED:
+            break
+        enough = ratio
+    return enough
+
+
+@lru_cache(maxsize=256)
+def _margins_at_the_top(stage_file: str) -> dict[str, float]:
+    """The least modulus margin of the settled states at the highest crossover, joint locked and free; 0: unstable."""
+    flat = {**loads(stage_file).flat(), CROSSOVER: _HIGHEST}
+    return {name: settled_margin({**flat, "joint.locked": name == "locked"}) for name in ("locked", "free")}
+
+
+def _up_to(rig: Stage) -> Part:
+    margins = _margins_at_the_top(rig.to_toml())
+    return Part(
+        f"the crossover may be up to {_HIGHEST:g} Hz: there all settled states are stable, locked and free, without "
+        "sampling and delay",
+        all(margin > 0 for margin in margins.values()),
+        ", ".join(f"modulus margin {margin:.2g} {name}" for name, margin in margins.items()),
+    )
+
+
+def _far(rig: Stage) -> Part:
+    words = reading()
+    ratio = _needed_ratio(rig.to_toml())
+    return Part(
+        f"the parasitic mode must be about {_RATIO:g} times the crossover (within a factor of {words.about:g}) for a "
+        f"modulus margin of {WANTED:g} in all settled states, the joint free, 8 Hz",
+        about(ratio, _RATIO),
+        f"{ratio:.3g} times" if np.isfinite(ratio) else f"more than {_RATIOS[-1]:g} times, the highest tried",
+        why="The mass and the damping ratio of the mode, which the thesis leaves open, determine how far away it must "
+        "be.",
+    )
+
+
+def _strokes_needed(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
+    """The stiffnesses of the map [N/m], and the stroke [m] beyond which nothing keeps moving at 8 Hz with each."""
+    runs, axes = evidence.maps["isolator-stiffness"], ("joint.stroke", "joint.stiffness")
+    stroke, stiffness, moving, _ = verdict_table(runs, *axes)
+    return stiffness, ends(stroke, moving, sizes(runs, *axes))
+
+
+def _stroke(evidence: Evidence) -> Part:
+    """The stroke needed with the joint as built."""
+    stiffness, by_stiffness = _strokes_needed(evidence)
+    nearest = int(np.abs(stiffness - 2.4e3).argmin())
+    needed = float(by_stiffness[nearest])
+    return Part(
+        f"with {stiffness[nearest]:.0f} N/m at 8 Hz, nothing keeps moving from a stroke of {_STROKE * 1e3:g} mm on",
+        needed <= _STROKE,
+        f"{needed * 1e3:.3g} mm needed",
+        why="The stroke needed depends on the limiter's damping, which is open.",
+    )
+
+
+def _softer_needs_less_stroke(evidence: Evidence) -> Part:
+    """How the stroke needed goes with the stiffness."""
+    words = reading()
+    stiffness, needed = _strokes_needed(evidence)
+    rises = trend(stiffness, needed)
+    return Part(
+        f"at 8 Hz a softer joint needs less stroke (rank correlation with the stiffness at least {words.trend:g})",
+        rises >= words.trend,
+        f"rank correlation {trend_text(rises)}: {needed[0] * 1e3:.2g} mm needed with {stiffness[0]:.0f} N/m, "
+        f"{needed[-1] * 1e3:.2g} mm with {stiffness[-1]:.0f} N/m",
+    )
+
+
+def _gap(evidence: Evidence) -> Part:
+    words = reading()
+    smallest = smallest_gap(evidence)
+    return Part(
+        f"the smallest gap F_s - F_c at which the stage keeps moving at 8 Hz is about {_GAP:g} N (within a factor of "
+        f"{words.about:g})",
+        about(smallest, _GAP),
+        number_text(smallest, ".2g", "N") if np.isfinite(smallest) else "no cell keeps moving",
+    )
+
+
+@cache
+def _locked_edge() -> str:
+    """Up to where the cycle of the locked rig attracts with the mass of the rule, as `friso check` finds it."""
+    edge = margin(thesis_rig().replace({**masses(_MOVING_MASS), **LOCKED}), attracting=True)
+    rig = f"With the friction of Table 2 and {_MOVING_MASS:g} kg"
+    if edge is None or edge.crossover is None:
+        return f"{rig} no edge of hunting was found."
+    return f"{rig} a cycle attracts up to {edge.crossover:.2g} Hz; peaks counted above that are those of transients."
+
+
+def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
+    """From where on the isolated and the locked rig come to rest."""
+    words = reading()
+    runs = evidence.maps["isolator-crossover"]
+    crossover, stroke, moving, _ = verdict_table(runs, CROSSOVER, "joint.stroke")
+    free = float(np.mean(ends(crossover, moving, sizes(runs, CROSSOVER, "joint.stroke"))[stroke >= _STROKE]))
+    locked, weighed = (locked_limit(evidence, mass) for mass in (_MOVING_MASS, _WEIGHED))
+    return (
+        Part(
+            f"with the isolator, at strokes of {_STROKE * 1e3:g} mm and more, nothing keeps moving from about 5 to "
+            "5.5 Hz on "
+            f"(within a factor of {words.about:g})",
+            about(free, _WORKS),
+            f"{free:.3g} Hz on average",
+            printed=_WORKS,
+            read=free,
+        ),
+        Part(
+            f"locked, with the {_MOVING_MASS:g} kg that the abstract gives, nothing keeps moving from about "
+            f"{_LOCKED:g} Hz on (within a factor of {words.about:g})",
+            about(locked, _LOCKED),
+            f"{locked:.3g} Hz; {weighed:.3g} Hz with the {_WEIGHED:g} kg weighed",
+            why=_locked_edge(),
+            printed=_LOCKED,
+            read=locked,
+        ),
+    )
+
+
+def locked_limit(evidence: Evidence, mass: float) -> float:
+    """The crossover [Hz] above which the locked rig of a mass [kg] comes to rest, between those of the map."""
+    runs = evidence.maps["system"]
+    crossover, masses, moving, _ = verdict_table(runs, CROSSOVER, "mass")
+    return float(np.interp(mass, masses, ends(crossover, moving, sizes(runs, CROSSOVER, "mass"))))
+
+
+@judges("F25P", figure="25", needs=("system",))
+def experiment_needs_more_crossover(evidence: Evidence) -> Finding:
+    """The limit of the parameter study at the mass with which it was made, beside that of the experiment."""
+    weighed, moving = (locked_limit(evidence, mass) for mass in (_WEIGHED, _MOVING_MASS))
+    return Finding(
+        (
+            Part(
+                f"over the map of Fig. 11B, with the {_WEIGHED:g} kg weighed, nothing keeps moving from "
+                f"{_EXPERIMENT:g} Hz on",
+                weighed < _EXPERIMENT,
+                f"limit {weighed:.3g} Hz; {moving:.3g} Hz with the {_MOVING_MASS:g} kg identified",
+                why="Hunting ends no lower in the parameter study: Sec. 4.1 itself says at about 20 Hz.",
+            ),
+        )
+    )

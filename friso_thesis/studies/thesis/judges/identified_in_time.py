@@ -1,0 +1,177 @@
+"""Fig. 19 to 21: stiffness and friction as the thesis identifies them in time, by the same experiments simulated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.identification.readings.rate_effect import static_friction
+from friso.quantities import percent
+from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text
+from friso_thesis.studies.thesis.experiments import (
+    RANGE,
+    SLIPS,
+    SLOW_TIME,
+    SPEEDY,
+    STANDS,
+    STEPPED,
+    ConstantSpeed,
+    JointSteps,
+    SlowMotion,
+)
+from friso_thesis.studies.thesis.judges.identified_responses import CONSTANTS, FIRST, MEASURED
+from friso_thesis.studies.thesis.reading import reading
+
+_STIFFNESS = 2.9e3
+"""By Fig. 19 [N/m] (Sec. 4.2.2)."""
+
+_SPIKE = 0.1
+"""Time [s] within which a spike of the velocity follows a peak of the deflection."""
+
+_UNIFORM = "uniform friction along the rail, no noise"
+"""Assumptions about the simulated rig."""
+
+
+@judges("F19", figure="19", needs=(STEPPED,), undrawn="the joint's stiffness, which is entered")
+def stiffness_from_position_steps(evidence: Evidence) -> Finding:
+    """The steps of the rig with its cart fixed."""
+    return judged_steps(evidence.experiments.joint_steps)
+
+
+def judged_steps(steps: JointSteps) -> Finding:
+    """The finding from the simulated steps."""
+    words = reading()
+    read, apparent = steps.result.stiffness, (2 * np.pi * FIRST) ** 2 * MEASURED[1]
+    larger = steps.stiffness * float(np.mean(CONSTANTS))
+    return Finding(
+        (
+            Part(
+                f"read as in Sec. 4.2.2 the steps give the joint's stiffness: the 95 % interval holds it, and is "
+                f"within {percent(words.close)} of it",
+                bool(read.holds(steps.stiffness) and read.half_width <= words.close * steps.stiffness),
+                f"{number_text(read.value / 1e3, '.4g', 'N/mm')} ({read.low / 1e3:.4g} to {read.high / 1e3:.4g}) of "
+                f"{steps.stiffness / 1e3:.4g}, {len(steps.result.windows)} settled windows. Assumed: steps back and "
+                "forth, "
+                f"{STANDS:g} s each; no noise",
+                why=read.reason or "The interval misses it, or is wide.",
+                self_test=True,
+            ),
+            Part(
+                f"it is {_STIFFNESS / 1e3:g} N/mm (within {percent(words.close)})",
+                bool(abs(read.value / _STIFFNESS - 1) <= words.close),
+                f"{number_text(read.value / 1e3, unit='N/mm')}, as entered by Sec. 3.5",
+                why="Cables, misalignment and the motor constant (Sec. 4.2.2) are not in the model. The last alone, "
+                f"wrong by as much as the masses of Fig. 17 and 18 require, would make it {larger / 1e3:.3g} N/mm, "
+                f"and {FIRST:g} Hz "
+                f"with {MEASURED[1]:g} kg are {apparent / 1e3:.3g} too: the force was scaled differently there, or "
+                "the joint was softer. Simulation alone cannot decide this.",
+            ),
+        )
+    )
+
+
+@judges("F20", figure="20", needs=(SLIPS,), undrawn="the static friction, which is entered")
+def static_friction_from_stick_slip(evidence: Evidence) -> Finding:
+    """Slow motion with the joint free, at several speeds."""
+    return judged_slips(evidence.experiments.slow_motion)
+
+
+def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
+    """The finding from simulated slow motion."""
+    slips = sum(len(run.result.forces) for run in runs)
+    forces, rates = (np.concatenate([getattr(run.result, name) for run in runs]) for name in ("forces", "rates"))
+    read = static_friction("friction.static", forces, rates)
+    truth = runs[0].static
+    counts = ", ".join(f"{len(run.result.forces)} slips at {run.speed * 1e3:g} mm/s" for run in runs)
+    range_read = f"{forces.min():.3g} to {forces.max():.3g} N" if slips else "none"
+    return Finding(
+        (
+            Part(
+                f"at every speed the cart sticks and slips, and a spike of its velocity follows every peak of the "
+                f"relative position within {_SPIKE:g} s",
+                all(len(run.result.forces) > 1 and _spikes(run) for run in runs),
+                f"{counts}. Assumed: these speeds, {SLOW_TIME:g} s each (the thesis states neither); {_UNIFORM}",
+            ),
+            Part(
+                "read from the peaks at all speeds, the 95 % interval holds the static friction of the rig",
+                bool(read.determined and read.holds(truth)),
+                f"{number_text(read.value, unit='N')} ({read.low:.3g} to {read.high:.3g}) of {truth:.3g} N: "
+                f"{read.method}",
+                why=read.reason or "The interval misses it.",
+                self_test=True,
+            ),
+            Part(
+                f"the peaks themselves lie between {RANGE[0]:g} and {RANGE[1]:g} N",
+                bool(slips and forces.min() >= RANGE[0] and forces.max() <= RANGE[1]),
+                f"{range_read}, lower the faster the motion",
+                why=f"Table 2 takes {truth:g} N, more than was measured. Besides, peaks read at a finite speed "
+                f"lie below the static friction, here by up to {percent(1 - forces.min() / truth)}."
+                if slips
+                else "There are no slips.",
+            ),
+        )
+    )
+
+
+def _spikes(run: SlowMotion) -> bool:
+    """Whether the velocity of the cart spikes after every peak, to more than half of the usual."""
+    slips, time = run.result, run.log.time
+    after = [(time >= at) & (time <= at + _SPIKE) for at in slips.times]
+    return all(np.abs(slips.cart_velocity[window]).max() > np.median(slips.speeds) / 2 for window in after)
+
+
+@judges("F21", figure="21", needs=(SPEEDY,))
+def force_at_constant_speed(evidence: Evidence) -> Finding:
+    """Both speeds with the joint free and locked."""
+    return judged_speeds(*evidence.experiments.constant_speed)
+
+
+def force_swings(runs: ConstantSpeed) -> list[float]:
+    """The standard deviation of the force over its mean at each speed, from a tenth of the way on."""
+    forces = [runs.log["force"][part] for part in runs.log.segments]
+    return [float(np.std(late) / abs(np.mean(late))) for late in (force[len(force) // 10 :] for force in forces)]
+
+
+def _swing_text(share: float) -> str:
+    """Such a share, to a hundredth of a percent: below that the force is steady."""
+    return percent(round(share, 4))
+
+
+def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
+    """The finding from the simulated runs."""
+    words = reading()
+    named = {"free": free.result, "locked": locked.result}
+    swings = {"free": force_swings(free), "locked": force_swings(locked)}
+    listed = "; ".join(f"{name} {', '.join(map(_swing_text, shares))}" for name, shares in swings.items())
+    rows = tuple(
+        (name, f"{1e3 * speed:g} mm/s", f"{passage.mean.value:.3g} N", _swing_text(swing))
+        for name, friction in named.items()
+        for speed, passage, swing in zip(free.speeds, friction.passes, swings[name], strict=False)
+    )
+    repeats = ", ".join(f"{name} {friction.repeatability.value:.2f}" for name, friction in named.items())
+    return Finding(
+        (
+            Part(
+                f"the force oscillates at both speeds, joint free or locked (by more than {percent(words.close)} of "
+                "its mean)",
+                all(shares and min(shares) > words.close for shares in swings.values()),
+                f"standard deviation over mean at {' and '.join(f'{v * 1e3:g}' for v in free.speeds)} mm/s: {listed}. "
+                f"Assumed: {_UNIFORM}",
+                why="Locked, the simulated rig slides steadily where it is fast enough.",
+            ),
+            Part(
+                "the oscillation depends on the position: passes over the same places repeat it",
+                all(
+                    friction.repeatability.determined and friction.repeatability.low > 0 for friction in named.values()
+                ),
+                f"correlation of the two speeds: {repeats}",
+                why="The friction of the model is uniform along the rail, and it is the loop that oscillates, by "
+                "sticking and slipping. Simulation alone cannot decide this.",
+            ),
+            Part(
+                "dynamic friction cannot be determined, joint free or locked",
+                not any(friction.separated for friction in named.values()),
+                f"free: {free.result.verdict} Locked: {locked.result.verdict}",
+            ),
+        ),
+        FindingTable(("joint", "speed", "mean force", "standard deviation over mean"), rows),
+    )

@@ -1,0 +1,220 @@
+"""Fig. 8, 22 and 23: the open loops, simulated and measured, and how fast the controller may be."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.frequency.crossover import HIGHEST, WANTED
+from friso.frequency.margins import Margins
+from friso.frequency.ranges import Range
+from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text
+from friso_thesis.studies.thesis.experiments import BUILT
+from friso_thesis.studies.thesis.judges.rig_loops import RAIL, measured_free, measured_locked, on_the_rig
+from friso_thesis.studies.thesis.linear import FREE, FURTHER, LOCKED_LOOP, Contact, CrossoverLoops, Linear, Speeds
+from friso_thesis.studies.thesis.linear.loops import SAMPLED
+from friso_thesis.studies.thesis.linear.trials import IDENTIFIED, LITTLE
+from friso_thesis.studies.thesis.reading import about, reading
+
+_SIMULATED, _MEASURED = 60.0, 48.0
+"""The highest crossovers of the simulation (Sec. 3.4.2) and of the rig (Sec. 4.2.4) [Hz]."""
+
+_CROSSES = 20.0
+"""Where the free rig crossed 0 dB, tuned to 8 Hz [Hz] (Sec. 4.2.4)."""
+
+
+@judges("F8", figure="8", needs=(FREE, LOCKED_LOOP))
+def stable_at_every_speed(evidence: Evidence) -> Finding:
+    """Stability over the speed of the cart, what speed does to the loop, and the crossover by the design method."""
+    words = reading()
+    analysis = evidence.analysis
+    single = analysis.free.single
+    return Finding(
+        (
+            _stable_at_speeds(analysis.speeds),
+            Part(
+                "between the prescribed speeds the loop differs far (by more than a factor of "
+                f"{words.order:.2g}) at a tenth "
+                f"of the crossover, and hardly (at most {words.about:g}) at ten times",
+                analysis.speeds.slow > words.order and analysis.speeds.fast <= words.about,
+                f"factor {analysis.speeds.slow:.3g} at a tenth, {analysis.speeds.fast:.3g} at ten times",
+            ),
+            Part(
+                "by the design method of Sec. 3.4.2 (the loop of the whole mass, sliding, crosses 0 dB once) the "
+                f"crossover may be about {_SIMULATED:g} Hz (from {_SIMULATED / words.about:.3g} to "
+                f"{_SIMULATED * words.about:.3g} "
+                "Hz)",
+                single is not None and about(single, _SIMULATED),
+                f"up to {_hertz(single)}, where {_beyond(analysis.locked)}; all limit cases are stable up to "
+                f"{_hertz(analysis.free.unsampled)} in continuous time; {_edges(analysis, _SIMULATED)}",
+            ),
+        )
+    )
+
+
+def _beyond(locked: CrossoverLoops) -> str:
+    """What crosses 0 dB besides, at the highest setting."""
+    further = _further(locked.margins[_MEASURED]["sliding"], _MEASURED)
+    return f"a mode reaches it too (locked, tuned to {_MEASURED:g} Hz: {_frequencies(further)})"
+
+
+def _stable_at_speeds(speeds: Speeds) -> Part:
+    unstable = {"limiter free": speeds.unstable, "touched": speeds.unstable_touched}
+    where = [f"{name} {_speeds(ranges)}" for name, ranges in unstable.items() if ranges]
+    why = "There friction falls as the speed rises (Stribeck effect)"
+    if speeds.incurable:
+        why += f", and in the middle of that range no faster controller up to {HIGHEST / 1e3:g} kHz is stable"
+    if not speeds.undeflected:
+        why += (
+            ". Linearised about an initial speed with the bristles not yet deflected (z = 0), which leaves this out, "
+            "the loop is stable at every speed: probably what the thesis plotted"
+        )
+    return Part(
+        "the loop is stable at every speed of the cart, its limiter free or touched",
+        not where,
+        f"unstable: {', '.join(where)}" if where else "stable at every speed",
+        why=f"{why}." if where else "",
+    )
+
+
+def _speeds(ranges: tuple[Range, ...]) -> str:
+    return " and ".join(f"from {low * 1e3:.2g} to {high * 1e3:.2g} mm/s" for low, high in ranges)
+
+
+@judges("F22", figure="22", needs=(LOCKED_LOOP, BUILT), undrawn=RAIL)
+def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
+    """The crossings of the locked rig, sliding, at the thesis's settings."""
+    words = reading()
+    settings = {f: cases["sliding"] for f, cases in evidence.analysis.locked.margins.items()}
+    tuned = {f: crossing_nearest(loop, f) for f, loop in settings.items()}
+    lowest, highest = min(settings), max(settings)
+    further = _further(settings[highest], highest)
+    near = min(further, key=lambda f: abs(np.log(f / FURTHER)), default=np.nan)
+    why = _why_elsewhere(evidence.analysis.contact)
+    return Finding(
+        (
+            Part(
+                f"at every setting from {lowest:g} to {highest:g} Hz the sliding rig crosses 0 dB about there (within "
+                f"a factor of {words.about:g})",
+                all(about(crossing, f) for f, crossing in tuned.items()),
+                ", ".join(f"{crossing:.3g} Hz tuned to {f:g}" for f, crossing in tuned.items()),
+            ),
+            Part(
+                "at the highest setting it crosses 0 dB again above, at the lowest it does not",
+                bool(further and not _further(settings[lowest], lowest)),
+                f"tuned to {highest:g} Hz: {_frequencies(further)}",
+                why=why,
+            ),
+            Part(
+                f"one of these crossings is about {FURTHER:g} Hz (from {FURTHER / words.about:.3g} to "
+                f"{FURTHER * words.about:.3g} Hz)",
+                about(near, FURTHER),
+                f"nearest {near:.3g} Hz" if further else "none",
+                why=why,
+            ),
+            _threatened(settings[highest], highest, further),
+            *on_the_rig(evidence, measured_locked),
+        )
+    )
+
+
+def _why_elsewhere(contact: Contact) -> str:
+    """What it would take to cross 0 dB where the thesis measured it."""
+    soft, undamped = (_further(loop_margins, _MEASURED) for loop_margins in (contact.margins, contact.undamped))
+    return (
+        "No mode of the locked model lies there. The contact of cart and stage would with k_l of "
+        f"{contact.stiffness:.2g} N/m (Sec. 3.2.3: 2e7 N/m, for limiters, not for fixtures): further crossings then "
+        f"{_frequencies(soft)} with the limiter damping of the rig, {_frequencies(undamped)} with {LITTLE}. Or it is "
+        "the frame of the encoder's scale, in which Sec. 4.3.1 saw resonances, and which is not in the model."
+    )
+
+
+def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) -> Part:
+    """Whether a further crossing takes the loop close to instability."""
+    close = any(about(margins.closest, f) for f in further)
+    where = (
+        f"distance {margins.modulus_margin:.2g} from -1, at {margins.closest:.3g} Hz" if margins.stable else "unstable"
+    )
+    return Part(
+        "at the highest setting that crossing threatens stability: about there the loop comes closer to -1 than "
+        f"{WANTED:g} (or it is unstable)",
+        bool(further) and (not margins.stable or (close and margins.modulus_margin < WANTED)),
+        where,
+        why=f"Tuned to {setting:g} Hz, the model is far from instability even there: it would take a delay of "
+        f"{_micro(margins.delay_margin)}."
+        if further and margins.stable
+        else "",
+    )
+
+
+@judges("F23", figure="23", needs=(FREE, LOCKED_LOOP, BUILT), undrawn=RAIL)
+def free_loop_crosses_above(evidence: Evidence) -> Finding:
+    """The crossing of the free joint tuned for the whole mass, and its highest stable setting."""
+    words = reading()
+    analysis = evidence.analysis
+    cases = analysis.free.margins[min(analysis.free.margins)]
+    crossing = {name: crossing_nearest(cases[name], _CROSSES) for name in ("stuck", "sliding")}
+    crossed = ", ".join(f"{name} {number_text(f, unit='Hz')}" for name, f in crossing.items())
+    highest = analysis.free.unsampled
+    return Finding(
+        (
+            Part(
+                f"tuned to {min(analysis.free.margins):g} Hz for the whole mass, the free joint's loop crosses 0 dB "
+                f"about {_CROSSES:g} Hz (from {_CROSSES / words.about:.3g} to {_CROSSES * words.about:.3g} Hz), "
+                "stuck and sliding",
+                all(about(f, _CROSSES) for f in crossing.values()),
+                f"{crossed}; with the masses identified ({', tuned for '.join(IDENTIFIED.values())}) "
+                f"{crossing_nearest(analysis.identified, _CROSSES):.3g} Hz",
+            ),
+            Part(
+                f"the setting up to which all limit cases are stable is about {_MEASURED:g} Hz (from "
+                f"{_MEASURED / words.about:.3g} to {_MEASURED * words.about:.3g} Hz)",
+                highest is not None and about(highest, _MEASURED),
+                f"in continuous time {_hertz(highest)}; sampled, see the table; {_edges(analysis, _MEASURED)}",
+                why="The simulated controller neither samples nor delays; the rig's does, but the thesis gives "
+                "no delay. "
+                "Besides, its frame has resonances (Sec. 4.3.1) that the model does not have.",
+            ),
+            *on_the_rig(evidence, measured_free),
+        ),
+        _sampled(analysis),
+    )
+
+
+def crossing_nearest(margins: Margins, frequency: float) -> float:
+    """The crossing of 0 dB closest to a frequency [Hz]; NaN without any."""
+    return min(margins.crossovers, key=lambda f: abs(np.log(f / frequency)), default=np.nan)
+
+
+def _further(margins: Margins, setting: float) -> tuple[float, ...]:
+    """Crossings of 0 dB above that of the crossover tuned for [Hz]."""
+    return tuple(f for f in margins.crossovers if f > crossing_nearest(margins, setting))
+
+
+def _frequencies(frequencies: tuple[float, ...]) -> str:
+    return f"{' and '.join(f'{f:.4g}' for f in frequencies)} Hz" if frequencies else "none"
+
+
+def _hertz(crossover: float | None) -> str:
+    return f"{HIGHEST / 1e3:g} kHz, the end of the search" if crossover is None else f"{crossover:.4g} Hz"
+
+
+def _sampled(analysis: Linear) -> FindingTable:
+    """What sampling and delays leave of the highest stable crossover."""
+    rows = tuple(
+        (_micro(delay), _hertz(free), _hertz(analysis.locked.sampled[delay]))
+        for delay, free in analysis.free.sampled.items()
+    )
+    return FindingTable((f"delay, sampled at {SAMPLED}", "highest stable setting, joint free", "joint locked"), rows)
+
+
+def _edges(analysis: Linear, setting: float) -> str:
+    """The delays at which a setting is at the edge of stability."""
+    edges = {"free": analysis.free.delay_at[setting], "locked": analysis.locked.delay_at[setting]}
+    parts = [
+        f"{name} {f'with a delay of {_micro(at)}' if np.isfinite(at) else 'beyond it'}" for name, at in edges.items()
+    ]
+    return f"sampled at {SAMPLED}, {setting:g} Hz is at the edge of stability: {', '.join(parts)}"
+
+
+def _micro(seconds: float) -> str:
+    return f"{seconds * 1e6:.0f} us"

@@ -1,0 +1,274 @@
+"""Fig. 24 to 28: hunting and standstill of the rig as built: sampled, delayed, on rails whose friction varies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from friso.quantities import percent
+from friso.shares import share_interval
+from friso.studies.rig.moves_on_rails import RailRuns
+from friso_thesis.studies.rig.in_position import BITS, InPosition
+from friso_thesis.studies.rig.measured_cycles import MOTORS
+from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
+from friso_thesis.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, DISPLACEMENTS, CyclesOnRails, MovesOnRails
+from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text
+from friso_thesis.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
+from friso_thesis.studies.thesis.judges.rig_loops import RAIL
+from friso_thesis.studies.thesis.reading import about, reading
+
+_ASSUMED = (
+    f"Assumed: friction that varies by {percent(AS_BUILT['rail.static_deviation'])} over "
+    f"{AS_BUILT['rail.correlation_length']} along the rail, {AS_BUILT['drive.delay']} of delay"
+)
+
+_DEVIATIONS = 0.1e-6, 1e-6
+"""Peaks by Fig. 28 with the joint locked and free [m]."""
+
+
+def _runs_with_peaks(runs: RailRuns, which: Any = ...) -> tuple[int, int]:
+    """On how many runs peaks are counted, of how many."""
+    done = ~runs.failed[which]
+    return int((runs.counted[which] & done).sum()), int(done.sum())
+
+
+def _rails(counted: tuple[int, int]) -> str:
+    """On how many rails, with the interval of their share."""
+    low, high = share_interval(*counted)
+    return f"{counted[0]} of {counted[1]} rails (95 % interval {percent(low)} to {percent(high)})"
+
+
+@judges("F24", figure="24", needs=(MOVES,), undrawn=RAIL)
+def locked_hunts_and_free_settles(evidence: Evidence) -> Finding:
+    """The move at 8 Hz."""
+    return judged_move(evidence.experiments.moves)
+
+
+def judged_move(moves: MovesOnRails) -> Finding:
+    """The finding from the moves on several rails."""
+    words = reading()
+    locked, free = _runs_with_peaks(moves.locked, 0), _runs_with_peaks(moves.free)
+    return Finding(
+        (
+            Part(
+                f"with the joint locked peaks are counted, on at least {percent(words.half)} of the rails",
+                locked[0] >= words.half * locked[1] > 0,
+                f"{_rails(locked)}. {_ASSUMED}",
+                why="Where friction differs between the two places at which the stage sticks, its swings die out.",
+            ),
+            Part("with the joint free on none", free[0] == 0 < free[1], _rails(free)),
+        )
+    )
+
+
+@judges("F25", figure="25", needs=(MOVES,), undrawn=RAIL)
+def locked_needs_crossover(evidence: Evidence) -> Finding:
+    """The move at the crossovers of Fig. 25, and releases at the middle one."""
+    return judged_crossovers(evidence.experiments.moves)
+
+
+def judged_crossovers(moves: MovesOnRails) -> Finding:
+    """The finding from moves and releases with the joint locked."""
+    low, middle, high = (_runs_with_peaks(moves.locked, row) for row in range(3))
+    settle = ~moves.locked.counted[1] & ~moves.locked.failed[1]
+    lasts = moves.released.counted & moves.released.swings
+    started = int((lasts.any(axis=0) & settle).sum())
+    return Finding(
+        (
+            Part(
+                f"peaks are counted on no rail at {moves.crossovers[2]:g} Hz, on some at {moves.crossovers[0]:g} Hz",
+                high[0] == 0 < low[0],
+                f"{_rails(low)} at {moves.crossovers[0]:g} Hz, {_rails(high)} at "
+                f"{moves.crossovers[2]:g} Hz. {_ASSUMED}",
+            ),
+            Part(
+                f"at {moves.crossovers[1]:g} Hz peaks are counted after the same move on some rails, not on all",
+                0 < middle[0] < middle[1],
+                _rails(middle),
+            ),
+            Part(
+                f"at {moves.crossovers[1]:g} Hz a rail without peaks after the move keeps swinging after a release",
+                started > 0,
+                f"{started} of {int(settle.sum())} such rails, released {percent(max(DISPLACEMENTS))} of the "
+                "move to either "
+                "side",
+                why="None of the starts tried on these rails keeps swinging.",
+            ),
+        )
+    )
+
+
+@judges("F26", figure="26", needs=(GRID,), undrawn=RAIL)
+def more_stroke_needs_less_crossover(evidence: Evidence) -> Finding:
+    """The share of rails over stroke and crossover."""
+    return judged_grid(evidence.experiments.grid)
+
+
+def judged_grid(grid: StrokeCrossover) -> Finding:
+    """The finding from the grid."""
+    limits, share = grid.limits, grid.share
+    named = ", ".join(
+        f"{limit:.3g} Hz at {stroke * 1e3:.3g} mm" for limit, stroke in zip(limits, grid.strokes, strict=True)
+    )
+    return Finding(
+        (
+            Part(
+                "at the highest crossover no peaks are counted at any stroke, at the lowest some are at every stroke",
+                bool((share[:, -1] == 0).all() and (share[:, 0] > 0).all()),
+                f"none above {named} ({len(grid.rails)} rails a cell). {_ASSUMED}",
+            ),
+            Part(
+                "the limit of the crossover is lower at the largest stroke than at the smallest, as in Fig. 16A",
+                bool(limits[-1] < limits[0]),
+                f"{limits[-1]:.3g} against {limits[0]:.3g} Hz",
+            ),
+        )
+    )
+
+
+@judges("F27", figure="27", needs=(ON_RAILS,), undrawn=RAIL)
+def simulated_cycles_are_faster(evidence: Evidence) -> Finding:
+    """The cycle of an even rail against those of rails that vary."""
+    return judged_cycles(evidence.experiments.cycles)
+
+
+def judged_cycles(cycles: CyclesOnRails) -> Finding:
+    """The finding from the cycles on an even rail, which is the simulation of the thesis, and on rails that vary."""
+    words = reading()
+    even, rails = cycles.even, cycles.rails
+    swings = rails.swings
+    slower = np.where(swings, rails.period, np.nan) / even.period[0]
+    larger = np.where(swings, rails.swing, np.nan) / even.swing[0]
+    similar = swings & (abs(np.log(larger)) <= np.log(words.similar))
+    sides = np.where(swings, rails.above / rails.below, np.nan)
+    lopsided = abs(np.log(sides[np.isfinite(sides)]))
+    swinging = f"{int(swings.sum())} of {len(swings)} rails still swing at the end"
+    times = f", with {np.nanmin(slower):.3g} to {np.nanmax(slower):.3g} times its period" if similar.any() else ""
+    scatter = float(np.nanmedian(rails.period_scatter)) if np.isfinite(rails.period_scatter).any() else np.nan
+    return Finding(
+        (
+            Part(
+                "on an even rail the cycle is symmetric, of the order of a millimetre from peak to peak",
+                bool(even.swings[0])
+                and about(float(even.swing[0]), 1e-3, words.order)
+                and about(float(even.above[0] / even.below[0]), 1.0),
+                f"{even.swing[0] * 1e3:.3g} mm, period {even.period[0]:.3g} s, one side "
+                f"{even.above[0] / even.below[0]:.3g} times the other",
+                why="There is no lasting swing on an even rail.",
+            ),
+            Part(
+                f"on a rail that varies its period is nearly twice as long (at least {words.twice:g} times) at a "
+                f"similar swing (within a factor of {words.similar:g}), on at least {percent(words.half)} of those "
+                "that keep swinging",
+                bool(swings.any() and (slower[similar] >= words.twice).sum() >= words.half * swings.sum()),
+                f"{swinging}{times}. {_ASSUMED}",
+                why="The rail is not the cause: friction that differs between the two sides slows a cycle down, "
+                "and ends "
+                f"it before it is twice as slow. {_weak_motor(cycles)}",
+            ),
+            Part(
+                f"there its two sides differ (by a factor of more than {words.unequal:g}, on at least "
+                f"{percent(words.half)} of those that keep swinging)",
+                bool(len(lopsided) and np.quantile(lopsided, 1 - words.half) > np.log(words.unequal)),
+                f"larger side over the other, median {np.exp(np.median(lopsided)):.3g}"
+                if len(lopsided)
+                else "nothing swings on",
+                why="Too few keep swinging.",
+            ),
+            Part(
+                f"there it is less regular from cycle to cycle (period scatters by more than {percent(words.uneven)})",
+                scatter > words.uneven,
+                f"median scatter of the period {percent(scatter)}",
+                why="Friction at a given place is the same in each cycle: what changes from cycle to cycle is not in "
+                "the model.",
+            ),
+        )
+    )
+
+
+def _weak_motor(cycles: CyclesOnRails) -> str:
+    """What a weaker motor and more Coulomb friction do to the cycle on an even rail."""
+    cause = (
+        f"On an even rail, with a motor that gives {MOTORS[1]:.2g} of its force, which would explain the mass line, "
+        f"and {COULOMB_LEVEL:g} times the Coulomb friction,"
+    )
+    if not (cycles.weak.swings[0] and cycles.even.swings[0]):
+        return f"{cause} there is no cycle to compare."
+    period, swing = (float(getattr(cycles.weak, name)[0] / getattr(cycles.even, name)[0]) for name in _COMPARED)
+    return (
+        f"{cause} the period is {period:.3g} times as long at {swing:.3g} times the swing (friso rig measured-cycles)."
+    )
+
+
+_COMPARED = ("period", "swing")
+
+
+@judges("F28", figure="28", needs=(STANDSTILL,))
+def free_joint_stands_less_still(evidence: Evidence) -> Finding:
+    """The standstill with the joint locked and free, and with more damping."""
+    return judged_standstill(evidence.experiments.standstill)
+
+
+def judged_standstill(standstill: InPosition) -> Finding:
+    """The finding from the standstills."""
+    words = reading()
+    peaks = [float(standstill.runs[case, "all"].true[0, 1]) for case in ("locked", "free")]
+    ratio = standstill.ratio("all")
+    expected = _DEVIATIONS[1] / _DEVIATIONS[0]
+    tenfold = float(np.interp(np.log(10 * standstill.own_damping), np.log(standstill.damping), standstill.recovered))
+    assumed = (
+        f"Assumed: {standstill.amplifier * 1e3:.2g} mN RMS of noise of the drive's force (rounding to {BITS} bits), a "
+        "quiet laboratory's floor"
+    )
+    return Finding(
+        (
+            Part(
+                f"locked the deviation is of the order of {_DEVIATIONS[0] * 1e6:g} um, free of "
+                f"{_DEVIATIONS[1] * 1e6:g} um",
+                _sized((peaks[0], peaks[1])),
+                f"peaks {peaks[0] * 1e6:.2g} and {peaks[1] * 1e6:.2g} um. {assumed}",
+                why=_over_noise(standstill),
+            ),
+            Part(
+                f"free it is of the order of {expected:g} times as large as locked",
+                about(ratio, expected, words.order),
+                f"ratio of RMS values: {number_text(ratio, '.2g')}",
+            ),
+            Part(
+                f"the joint lacks damping: ten times as much removes at least {percent(words.half)} of the difference",
+                tenfold >= words.half,
+                f"{percent(tenfold)} at {10 * standstill.own_damping:g} N s/m, "
+                f"{percent(standstill.recovered.max())} at the most tried",
+                why="The sticking bearing holds the locked stage with its stiff bristles, the free one is held "
+                "only by the "
+                "joint and the controller.",
+            ),
+        ),
+        _noises(standstill),
+    )
+
+
+def _sized(peaks: tuple[float, float]) -> bool:
+    words = reading()
+    return all(about(peak, size, words.order) for peak, size in zip(peaks, _DEVIATIONS, strict=True))
+
+
+def _over_noise(standstill: InPosition) -> str:
+    """At which noises of the force the deviations are as measured."""
+    met = [f"{factor:g}" for factor, peaks in standstill.louder.items() if _sized(peaks)]
+    tried = ", ".join(f"{factor:g}" for factor in standstill.louder)
+    if not tried:
+        return "The disturbances are assumed."
+    where = f"with {' and '.join(met)} times the noise it is met" if met else "it is met with none"
+    return f"The disturbances are assumed: {where} ({tried} times the assumed noise of the force were tried)."
+
+
+def _noises(standstill: InPosition) -> FindingTable | None:
+    """The deviations over the noise of the force, where it was varied."""
+    rows = tuple(
+        (f"{factor:g}", f"{locked * 1e6:.2g} um", f"{free * 1e6:.2g} um", f"{free / locked:.2g}")
+        for factor, (locked, free) in standstill.louder.items()
+    )
+    columns = "noise of the force over that assumed", "joint locked", "joint free", "ratio"
+    return FindingTable(columns, rows) if rows else None

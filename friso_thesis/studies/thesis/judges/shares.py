@@ -1,0 +1,119 @@
+"""Fig. 13: what the controller's shares do while the stage sticks, at two gaps of the friction forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.hunting import COUNTED_AFTER
+from friso.quantities import percent
+from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, Response, judges
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+WIDE, NARROW = "F_c 0.5 N", "F_c 1.5 N"
+"""The responses at F_s 4 N with the wide and the narrow gap."""
+
+STRIBECK_VELOCITY = 1.6e-3
+"""Stribeck velocity of Table 2 [m/s]."""
+
+
+TURNING = 0.05
+"""Longest time for which a cart that merely turns about is slower than the Stribeck velocity [s]."""
+
+
+@dataclass(frozen=True)
+class Sticking:
+    """The sticks that end in break-away, each of shape (sticks,): their length [s], the share of the integral action in
+    the force at break-away, and its direction (1 or -1)."""
+
+    time: np.ndarray
+    integral: np.ndarray
+    direction: np.ndarray
+
+    def mean(self, values: np.ndarray) -> float:
+        """Mean of the means in the two directions, which weigh the same; NaN if there are not both.
+
+        Sticks may alternate between long and short: a cycle need not be symmetric.
+        """
+        return (
+            float(np.mean([values[self.direction == direction].mean() for direction in (1, -1)]))
+            if self.both
+            else np.nan
+        )
+
+    @property
+    def both(self) -> bool:
+        """Whether there is a break-away in both directions."""
+        return {1, -1} <= set(self.direction)
+
+    def words(self, values: np.ndarray, written: Callable[[float], str]) -> str:
+        """The mean, and the means in the two directions, as numbers are `written`."""
+        if not self.both:
+            return "no cycle"
+        forward, back = (written(float(values[self.direction == direction].mean())) for direction in (1, -1))
+        return f"{written(self.mean(values))} ({forward} and {back} in the two directions)"
+
+
+@judges("F13", figure="13", needs=(WIDE, NARROW))
+def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
+    """Sticking time and integral share at break-away, at both gaps."""
+    wide, narrow = (sticking(evidence.responses[name]) for name in (WIDE, NARROW))
+    why = (
+        ""
+        if wide.both and narrow.both
+        else "One of the two does not stick in both directions: there is nothing to compare."
+    )
+    return Finding(
+        (
+            Part(
+                "the mean time from stick (cart slower than the Stribeck velocity) to break-away (faster again) is "
+                "longer with F_c 1.5 N than with 0.5 N",
+                narrow.mean(narrow.time) > wide.mean(wide.time),
+                f"{narrow.words(narrow.time, _seconds)} against {wide.words(wide.time, _seconds)}",
+                why,
+            ),
+            Part(
+                "the mean share of the integral action in the force at break-away is larger with F_c 1.5 N than with "
+                "0.5 N",
+                narrow.mean(narrow.integral) > wide.mean(wide.integral),
+                f"{narrow.words(narrow.integral, percent)} against {wide.words(wide.integral, percent)}",
+                why,
+            ),
+        )
+    )
+
+
+def sticking(response: Response) -> Sticking:
+    """The sticks of a response that end in a break-away after the time from which peaks count.
+
+    A stick begins where the cart falls below the Stribeck velocity and ends where it exceeds it; the share of the
+    integral action is taken where the friction force is largest within the stick, before it drops.
+    """
+    trace = response.trace
+    time, force, integral, friction = (
+        np.asarray(trace[name].values) for name in ("time", "force", "force_i", "friction_force")
+    )
+    spells = [(i, k) for i, k in slow_spells(trace) if time[k] >= COUNTED_AFTER]
+    peaks = np.array([i + int(np.argmax(np.abs(friction[i : k + 1]))) for i, k in spells], dtype=int)
+    lengths = np.array([time[k] - time[i] for i, k in spells])
+    return Sticking(lengths, integral[peaks] / force[peaks], np.sign(force[peaks]).astype(int))
+
+
+def slow_spells(trace: xr.Dataset) -> list[tuple[int, int]]:
+    """First and last sample of each spell below the Stribeck velocity that is longer than a turning about and over
+    before the run ends."""
+    slow = np.abs(trace["cart_velocity"].values) < STRIBECK_VELOCITY
+    edges = np.flatnonzero(np.diff(slow.astype(int)))
+    spells = [(int(a) + 1, int(b)) for a, b in pairwise(edges) if slow[a + 1]]
+    time = trace["time"].values
+    return [(i, k) for i, k in spells if time[k] - time[i] > TURNING]
+
+
+def _seconds(time: float) -> str:
+    return f"{time:.2f} s"

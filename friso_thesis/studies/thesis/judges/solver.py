@@ -1,0 +1,135 @@
+"""Sec. 3.2.3: the solver of the thesis against friso's, on the same runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.evidence import findings_on_file
+from friso.hunting.criteria.run_outcome import SWINGS
+from friso.quantities import percent
+from friso.studies.sweep import sweep
+from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges
+from friso_thesis.studies.thesis.reading import reading
+from friso_thesis.studies.thesis.studies import thesis_rig
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+EVIDENCE = "thesis.solver"
+"""What ode23s finds (`benchmarks/ode23s.py`), which takes 200 000 steps a run."""
+
+CROSSOVERS = (4.0, 8.0, 12.0, 16.0, 20.0)
+"""Crossovers [Hz] of runs with the joint locked and free: evenly spread up to where Fig. 11 sees no hunting."""
+
+STROKES, DAMPINGS = (30, 100, 300), (1, 100, 10_000)
+"""Strokes [um] and limiter dampings [N s/m] of more with the joint free, where the limiter is hit: over Fig. 14B."""
+
+AT_REST = 1e-9
+"""Swing [m] up to which none is shown."""
+
+RTOL, TIGHT = 1e-4, 1e-8
+"""The thesis's relative tolerance, and a tight one."""
+
+
+def _cases() -> dict[str, dict[str, Any]]:
+    both = {
+        f"{'locked' if locked else 'free'}_{crossover:g}_hz": {"joint.locked": locked, CROSSOVER: f"{crossover:g} Hz"}
+        for locked in (True, False)
+        for crossover in CROSSOVERS
+    }
+    hit = {
+        f"stroke_{stroke}_um_damping_{damping}": {
+            "joint.stroke": f"{stroke} um",
+            "joint.limiter_damping": f"{damping} N*s/m",
+        }
+        for stroke in STROKES
+        for damping in DAMPINGS
+    }
+    return both | hit
+
+
+CASES: Mapping[str, Mapping[str, Any]] = MappingProxyType(_cases())
+"""The runs: what each changes in the rig."""
+
+
+@judges("S323", figure="Sec. 3.2.3, solver")
+def solver_and_largest_step(evidence: Evidence) -> Finding:
+    """The same runs by both: whether they hunt, how often, by how much."""
+    kept = findings_on_file()[EVIDENCE].values
+    return judged_runs({name: _kept(kept, name) for name in CASES}, own_runs(TIGHT), own_runs(RTOL))
+
+
+Counted = tuple[int, float, float]
+"""Peaks counted, swing over the last quarter of the run [m], steps."""
+
+
+def _kept(values: Mapping[str, float], name: str) -> Counted:
+    return int(values[f"{name}_peaks"]), values[f"{name}_swing_m"], values[f"{name}_steps"]
+
+
+@cache
+def own_runs(rtol: float) -> Mapping[str, Counted]:
+    """What friso finds at a relative tolerance; a swing of 0 where the stage does not swing at the end."""
+    return {name: _counted(_run(changes, rtol)) for name, changes in CASES.items()}
+
+
+def _run(changes: Mapping[str, Any], rtol: float) -> xr.Dataset:
+    stage = thesis_rig().replace(dict(changes))
+    return sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
+
+
+def _counted(cell: xr.Dataset) -> Counted:
+    swing = float(cell["peak_to_peak"]) if cell["outcome"].item() == SWINGS else 0.0
+    return int(cell["peaks"]), swing, float(cell["steps"])
+
+
+def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loose: Mapping[str, Counted]) -> Finding:
+    """The finding from runs by name: of ode23s, and of friso at the tight tolerance and at the thesis's."""
+    words = reading()
+    swinging = [name for name, (_, swing, _) in tight.items() if swing > 0]
+    counts = [name for name in tight if theirs[name][0] != tight[name][0]]
+    off = {name: abs(theirs[name][1] / tight[name][1] - 1) for name in swinging}
+    own = [name for name in tight if loose[name][0] != tight[name][0]]
+    steps = [int(count) for _, _, count in theirs.values()], [int(count) for _, _, count in loose.values()]
+    rows = tuple((_title(name), *(_text(runs[name]) for runs in (theirs, tight, loose))) for name in tight)
+    return Finding(
+        (
+            Part(
+                f"ode23s, relative tolerance {RTOL:g}, steps of at most 1e-4 s, counts as many peaks as friso at "
+                f"{TIGHT:g} in each of {len(tight)} runs",
+                not counts,
+                f"in {len(tight) - len(counts)} of {len(tight)}"
+                + (f"; not in {', '.join(map(_title, counts))}" if counts else ""),
+                why="The tolerance decides where a run is near an edge of hunting, or bounces on the limiter.",
+            ),
+            Part(
+                f"the swing at the end is the same (within {percent(words.same)}) in each run that swings at {TIGHT:g}",
+                bool(off) and max(off.values()) <= words.same,
+                f"off by at most {percent(max(off.values()), 2)} in {len(off)} runs" if off else "no run swings",
+                why="The tolerance is too loose for these.",
+            ),
+            Part(
+                f"friso at {RTOL:g}, without a largest step but the two hundredth of the run, counts as many in each",
+                not own,
+                f"in {len(tight) - len(own)} of {len(tight)}; {min(steps[1])} to {max(steps[1])} steps a run, ode23s "
+                f"{min(steps[0])} to {max(steps[0])}",
+                self_test=True,
+            ),
+        ),
+        FindingTable(("run", "ode23s", f"friso, {TIGHT:g}", f"friso, {RTOL:g}"), rows),
+    )
+
+
+def _title(name: str) -> str:
+    """A run's name in words."""
+    return name.replace("_", " ").replace(" hz", " Hz").replace(" um damping", " um, damping")
+
+
+def _text(run: Counted) -> str:
+    peaks, swing, steps = run
+    swings = f", {1e3 * swing:.4g} mm" if swing > AT_REST else ""
+    return f"{peaks} peaks{swings}, {steps:.0f} steps"

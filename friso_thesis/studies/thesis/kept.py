@@ -1,0 +1,114 @@
+"""What is done of a long reproduction, kept in a folder until all is: an interrupted run goes on from there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from friso.studies.cells import WORDS
+from friso.studies.metadata import digest
+from friso.studies.store_files import keep_arrays, kept_arrays, put, stored
+from friso.studies.study import Study
+from friso.studies.sweep import dataset
+from friso_thesis.studies.kept_work import KeptWork
+from friso_thesis.studies.thesis.claims import Finding, Part
+from friso_thesis.studies.thesis.studies import thesis_rig
+from friso_thesis.studies.thesis.taken_apart import put_together, taken_apart
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+T = TypeVar("T")
+
+SOURCES = (
+    *(
+        "../friso_thesis/studies",
+        "studies",
+        "virtual_rig",
+        "frequency",
+        "identification",
+        "leaf_springs",
+        "design_method",
+    ),
+    *("axis.py", "evidence.py", "evidence.toml", "intervals.py", "materials.py", "materials.toml", "shares.py"),
+)
+"""Folders and files that decide on what is kept, beside those of the equations, as paths from the package friso."""
+
+Findings = dict[str, Finding]
+"""Findings by a name, such as that of a claim."""
+
+
+class Kept(KeptWork):
+    """Where maps, experiments and findings of the thesis are kept."""
+
+    sources = SOURCES
+
+    def runs(self, study: Study, verify: float, make: Callable[[], xr.Dataset]) -> xr.Dataset:
+        """The runs of a study, as they were kept or made now."""
+        axes = [(axis.name, axis.values.tolist()) for axis in study.axes]
+        file = self._file("npz", study.stage.to_toml(), axes, dict(study.links), study.rtol, study.metrics, verify)
+        columns = None if file is None else kept_arrays(file)
+        notes = None if columns is None else columns.pop("notes", None)
+        if columns is not None and notes is not None and columns.keys() == set(study.metrics):
+            runs = dataset(study, {name: values.reshape(study.shape) for name, values in columns.items()})
+            runs.attrs |= json.loads(str(notes))
+            return runs
+        runs = make()
+        if file is not None:
+            arrays: dict[str, Any] = {name: runs[name].values.astype(WORDS.get(name, "f8")) for name in study.metrics}
+            verified = {name: value for name, value in runs.attrs.items() if name.startswith("verified")}
+            keep_arrays(file, {"notes": np.array(json.dumps(verified)), **arrays})
+        return runs
+
+    def flags(self, about: tuple[Any, ...], make: Callable[[], Mapping[str, np.ndarray]]) -> Mapping[str, np.ndarray]:
+        """Arrays by name `about` something, as they were kept or made now."""
+        return self.arrays(("flags", *about), make)
+
+    def result(self, about: tuple[Any, ...], kind: type[T], make: Callable[[], T]) -> T:
+        """A result of a kind (see `taken_apart`) `about` something, as it was kept or made now."""
+        file = self._file("npz", "result", *about)
+        columns = None if file is None else kept_arrays(file)
+        if columns is not None:
+            with suppress(ValueError, TypeError, KeyError, RecursionError):
+                return put_together(kind, columns)
+        made = make()
+        if file is not None:
+            keep_arrays(file, taken_apart(made))
+        return made
+
+    def findings(self, about: tuple[Any, ...], make: Callable[[], Findings]) -> Findings:
+        """Findings `about` something, as they were kept or made now."""
+        file = self._file("json", "findings", *about)
+        if file is not None and (kept := kept_findings(file)) is not None:
+            return kept
+        findings = make()
+        if file is not None:
+            document = {name: [asdict(part) for part in item.parts] for name, item in findings.items()}
+            file.parent.mkdir(parents=True, exist_ok=True)
+            put(file, json.dumps({"findings": document, "sha256": digest([file.name, document])}).encode("utf-8"))
+        return findings
+
+    def _file(self, suffix: str, *about: Any) -> Path | None:
+        return super()._file(suffix, thesis_rig().to_toml(), *about)
+
+
+NOT_KEPT = Kept()
+"""Keeps nothing."""
+
+
+def kept_findings(file: Path) -> Findings | None:
+    """Findings from a file; None where there are none, or it is damaged or another's."""
+    try:
+        kept = json.loads(stored(file))
+        document = kept["findings"]
+        if kept["sha256"] != digest([file.name, document]):
+            return None
+        return {name: Finding(tuple(Part(**part) for part in parts)) for name, parts in document.items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None

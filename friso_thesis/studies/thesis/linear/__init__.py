@@ -1,0 +1,91 @@
+"""What linear analysis says of the thesis's rig: the evidence on its limit cases, its loops and its cart speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+
+from friso.frequency.margins import Margins
+from friso.stage import Stage, loads
+from friso.stage.controllers import CONTROLLER
+from friso_thesis.studies.thesis.linear.loops import SETTINGS, CrossoverLoops, loops_of
+from friso_thesis.studies.thesis.linear.plants import PARASITIC, LimitCase, Springs, limit_cases_of, springs_of
+from friso_thesis.studies.thesis.linear.speeds import Speeds, loop_over_speed
+from friso_thesis.studies.thesis.linear.trials import FURTHER, Contact, identified_loop, soft_contact
+from friso_thesis.studies.thesis.studies import LOCKED
+
+__all__ = [
+    "FREE",
+    "FURTHER",
+    "LOCKED_LOOP",
+    "NEEDS",
+    "PARASITIC",
+    "PLANT",
+    "Contact",
+    "CrossoverLoops",
+    "LimitCase",
+    "Linear",
+    "PartNeeded",
+    "Speeds",
+    "Springs",
+    "analysed",
+]
+
+PLANT, FREE, LOCKED_LOOP = "limit cases", "loop, joint free", "loop, joint locked"
+
+
+@dataclass(frozen=True)
+class PartNeeded:
+    """A part of the analysis that a judge may name: the tables of the stage file that play no part in it, and whether
+    its joint is locked, which leaves the joint's own damping out."""
+
+    outside: tuple[str, ...]
+    locked: bool = False
+
+
+NEEDS: Mapping[str, PartNeeded] = MappingProxyType(
+    {
+        PLANT: PartNeeded(("motion.", f"{CONTROLLER}.")),
+        FREE: PartNeeded(("motion.",)),
+        LOCKED_LOOP: PartNeeded(("motion.",), locked=True),
+    }
+)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A rig as a linear system.
+
+    Its plant by limit case ("-series" behind the name with the formula that Table 1 prints for a touched limiter), and
+    its springs in a row; its loops with the joint free and locked; its 8 Hz loop over the speed of the cart, and with
+    the masses that the thesis `identified`, the joint free; its loop at 48 Hz with a softer `contact`, locked.
+    """
+
+    plants: Mapping[str, LimitCase]
+    springs: Springs
+    free: CrossoverLoops
+    locked: CrossoverLoops
+    speeds: Speeds
+    identified: Margins
+    contact: Contact
+
+
+def analysed(stage: Stage) -> Linear:
+    """The linear analysis of a rig with its joint free; kept, since every reproduction asks for the same rigs."""
+    return _analysed(stage.to_toml())
+
+
+@lru_cache(maxsize=8)
+def _analysed(stage_file: str) -> Linear:
+    stage = loads(stage_file)
+    return Linear(
+        plants=limit_cases_of(stage.flat()),
+        springs=springs_of(stage.flat()),
+        free=loops_of(stage, (SETTINGS[0],)),
+        locked=loops_of(stage.replace(dict(LOCKED)), SETTINGS),
+        speeds=loop_over_speed(stage.flat()),
+        identified=identified_loop(stage),
+        contact=soft_contact(stage),
+    )

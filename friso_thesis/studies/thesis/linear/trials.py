@@ -1,0 +1,58 @@
+"""What would make the model do what was measured: the rig with other masses, and with a softer contact."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
+from friso.frequency.margins import Margins, margins
+from friso.frequency.members import limit_cases
+from friso.frequency.stiffness import in_series
+from friso.stage import Stage
+from friso_thesis.studies.thesis.studies import LOCKED
+
+IDENTIFIED: Mapping[str, Any] = {"masses.stage": "0.75 kg", TUNED_MASS: "2.5 kg"}
+"""The masses that the thesis identified (Sec. 4.2.1)."""
+
+FURTHER = 600.0
+"""Where the thesis measured another crossing [Hz] (Sec. 4.2.4)."""
+
+AT_HIGHEST: Mapping[str, Any] = {**LOCKED, CROSSOVER: "48 Hz"}
+"""The setting at which it did."""
+
+LITTLE = "1 N*s/m"
+"""Limiter damping of a contact that hardly loses anything."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A contact of cart and stage so soft, with `stiffness` [N/m], that its mode lies where the further crossing was
+    measured: the loop of the sliding rig, locked at the highest setting, with the rig's limiter damping (`margins`)
+    and with little (`undamped`)."""
+
+    stiffness: float
+    margins: Margins
+    undamped: Margins
+
+
+def identified_loop(stage: Stage) -> Margins:
+    """The loop of the sliding cart, its joint free, with the masses that were identified."""
+    return _sliding(stage.replace(dict(IDENTIFIED)))
+
+
+def soft_contact(stage: Stage) -> Contact:
+    """See `Contact`. The part of the stage that its parasitic mode carries hardly takes part in the mode."""
+    flat = stage.flat()
+    reduced = in_series(flat["masses.cart"], flat["masses.stage"] - flat["parasitic.mass"])
+    stiffness = float((2 * np.pi * FURTHER) ** 2 * reduced)
+    soft = stage.replace({**AT_HIGHEST, "joint.limiter_stiffness": f"{stiffness!r} N/m"})
+    return Contact(stiffness, _sliding(soft), _sliding(soft.replace({"joint.limiter_damping": LITTLE})))
+
+
+def _sliding(stage: Stage) -> Margins:
+    flat = stage.flat()
+    return margins(flat, limit_cases(flat)["sliding"])

@@ -1,0 +1,294 @@
+"""The claims over the plausible space: in how many joint draws of the unstated values each holds, on which of them that
+hangs, and which draw fits the printed numbers best."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from friso.engine.side_by_side import side_by_side
+from friso.escapes import one_line
+from friso.progress import Tally
+from friso.shares import Share, share
+from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, Registered
+from friso_thesis.studies.thesis.evidence import RESPONSES, evidence
+from friso_thesis.studies.thesis.experiments import EXPERIMENTS
+from friso_thesis.studies.thesis.kept import NOT_KEPT, Findings, Kept
+from friso_thesis.studies.thesis.linear import NEEDS
+from friso_thesis.studies.thesis.space import OPEN, SEED, Draw, baseline, draw, enters
+from friso_thesis.studies.thesis.studies import STUDIES
+from friso_thesis.studies.thesis.ways import COUNT, READ, SWING, by_way, weakest
+
+DRAWS, EVERY = 48, 3
+"""Joint draws by default; of every third also linear analysis and experiments are made, which take longer than all the
+maps."""
+
+POINTS = 21
+"""Values per axis of the maps of a draw, whatever those of the baseline have: limits are interpolated."""
+
+DRAW_RTOL = 1e-5
+"""Relative tolerance of the maps of a draw: ten times tighter than the thesis's own."""
+
+MAP_WORK, COSTLY_WORK = POINTS**2 * len(STUDIES), 6 * POINTS**2 * len(STUDIES)
+"""Steps of the progress that the maps of a draw count, and its linear analysis and experiments."""
+
+DOUBT = 0.05
+"""Probability of a separation by chance from which it is not reported, over all values of a claim together."""
+
+PARTS = {**NEEDS, **EXPERIMENTS}
+"""What evidence has besides maps and responses."""
+
+
+@dataclass(frozen=True)
+class Separation:
+    """How well a value separates the draws in which a claim holds from the others: the rank-biserial correlation
+    (Kerby 2014, doi 10.2466/11.IT.3.1), 1 where it holds at all the larger values, and its probability by chance."""
+
+    value: str
+    correlation: float
+    chance: float
+
+
+@dataclass(frozen=True)
+class ClaimInSpace:
+    """A claim over the draws with these `seeds`, (seed, number): the share of them in which it `holds`, in every way
+    and in each (`by_way`), and in which each part does; values on which it hangs, the most decisive first; why it could
+    not be computed, by the number of the draw (`failures`)."""
+
+    seeds: tuple[tuple[int, int], ...]
+    holds: Share
+    count: int
+    by_way: Mapping[str, Share]
+    parts: tuple[Share, ...]
+    hangs_on: tuple[Separation, ...]
+    failures: Mapping[int, str]
+
+    @property
+    def undecided(self) -> int:
+        """In how many draws it could not be computed."""
+        return len(self.failures)
+
+    @property
+    def draws(self) -> int:
+        """Draws tried."""
+        return len(self.seeds)
+
+    @property
+    def misses(self) -> int:
+        """In how many draws it could be computed and does not hold."""
+        return self.draws - self.undecided - self.count
+
+    def met(self, part: int) -> int:
+        """In how many draws a part holds."""
+        share = self.parts[part].probability
+        return round(share * (self.draws - self.undecided)) if self.draws > self.undecided else 0
+
+
+@dataclass(frozen=True)
+class PrintedNumber:
+    """A number that the thesis prints for a claim, the criterion it belongs to, and what a draw has."""
+
+    claim: str
+    criterion: str
+    printed: float
+    read: float
+
+
+@dataclass(frozen=True)
+class BestFit:
+    """The draw whose numbers are nearest to those printed, friso's own choice (numbered -1) being one of them: the root
+    mean square of the logarithms of their ratios (`misfit`; at friso's choice: `at_baseline`), all on maps of `POINTS`
+    values per axis, and these numbers."""
+
+    draw: Draw
+    misfit: float
+    at_baseline: float
+    numbers: tuple[PrintedNumber, ...]
+
+
+@dataclass(frozen=True)
+class Plausible:
+    """All claims over the space, by their name, the best fit (None without draws), and the findings at friso's `own`
+    choice by the runs, on maps of `POINTS` values per axis."""
+
+    draws: tuple[Draw, ...]
+    claims: Mapping[str, ClaimInSpace]
+    fit: BestFit | None
+    own: Mapping[str, Finding]
+
+
+def plausible(
+    entries: Mapping[str, Registered],
+    draws: int,
+    kept: Kept = NOT_KEPT,
+    tally: Tally | None = None,
+) -> Plausible:
+    """The claims over so many joint draws; friso's own choice is computed as one more, for the best fit."""
+    cheap = {name: entry for name, entry in entries.items() if entry.needs and not entry.needs & PARTS.keys()}
+    costly = {name: entry for name, entry in entries.items() if entry.needs & PARTS.keys()}
+    drawn = tuple(draw(number) for number in range(draws))
+    own: dict[str, dict[str, Finding]] = {}
+    by_claim_tried: dict[str, list[tuple[Draw, dict[str, Finding]]]] = {name: [] for name in (*cheap, *costly)}
+    failures: dict[str, dict[int, str]] = {name: {} for name in by_claim_tried}
+    pieces = [(one, cheap, MAP_WORK) for one in (*drawn, baseline()) if drawn and cheap]
+    pieces += [(one, costly, COSTLY_WORK) for one in drawn[EVERY - 1 :: EVERY] if costly]
+
+    def judged(one: Draw, group: Mapping[str, Registered], work: int) -> Findings:
+        about = ("draw", sorted(group), POINTS, DRAW_RTOL, SEED, one.number)
+        findings = kept.findings(about, partial(_judged, group, one))
+        if tally:
+            tally.add(work, f"{one.name} of {draws}" if one in drawn else "friso's own choice")
+        return findings
+
+    by_piece = side_by_side([partial(judged, *piece) for piece in pieces])
+    for (one, group, _), findings in zip(pieces, by_piece, strict=True):
+        for name in group:
+            ways = _by_way(findings, name)
+            if one in drawn:
+                by_claim_tried[name].append((one, ways))
+                failures[name] |= {} if ways else {one.number: findings[f"{name} {FAILED}"].parts[0].number}
+            elif ways:
+                own[name] = ways
+    by_claim = {
+        name: _in_space(entries[name], tried, failures[name]) for name, tried in by_claim_tried.items() if tried
+    }
+    fit = _fit({name: by_claim_tried[name] for name in cheap}, own)
+    return Plausible(drawn, by_claim, fit, {name: weakest(ways) for name, ways in own.items()})
+
+
+def work_of(entries: Mapping[str, Registered], draws: int) -> int:
+    """Steps that the draws take."""
+    cheap = any(entry.needs and not entry.needs & PARTS.keys() for entry in entries.values())
+    costly = any(entry.needs & PARTS.keys() for entry in entries.values())
+    return cheap * (draws + bool(draws)) * MAP_WORK + costly * (draws // EVERY) * COSTLY_WORK
+
+
+def ways_of(entry: Registered, base: Evidence) -> dict[str, Finding]:
+    """The findings of a judge in the two ways that need the runs alone; in one, where no runs are looked at."""
+    if entry.needs & (STUDIES.keys() | RESPONSES.keys()):
+        return {way: entry.judge(by_way(base, read)) for way, read in READ.items()}
+    return {COUNT: entry.judge(base)}
+
+
+def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
+    """The findings in a draw, by claim and way; of what cannot be computed there, why not."""
+    needs = {need for entry in entries.values() for need in entry.needs}
+    try:
+        base = evidence(needs, POINTS, DRAW_RTOL, changes=one.changes)
+    except _SHOWS_NOTHING as error:
+        return {f"{name} {FAILED}": _failure(error) for name in entries}
+    findings: Findings = {}
+    for name, entry in entries.items():
+        try:
+            findings |= {f"{name} {way}": finding for way, finding in ways_of(entry, base).items()}
+        except _SHOWS_NOTHING as error:
+            findings[f"{name} {FAILED}"] = _failure(error)
+    return findings
+
+
+def _failure(error: Exception) -> Finding:
+    """What stands for a claim that is undecided in a draw."""
+    return Finding((Part("can be computed", False, one_line(f"{type(error).__name__}: {error}")),))
+
+
+FAILED = "failed"
+"""Stands after the name of a claim in the place of a way."""
+
+_SHOWS_NOTHING = ValueError, ArithmeticError, RuntimeError
+"""What is raised of a rig of which an experiment shows nothing, such as a loop that stops; errors of the program are
+not taken for it."""
+
+
+def _by_way(findings: Findings, name: str) -> dict[str, Finding]:
+    return {way: findings[key] for way in (COUNT, SWING) if (key := f"{name} {way}") in findings}
+
+
+def _in_space(
+    entry: Registered, tried: Sequence[tuple[Draw, Mapping[str, Finding]]], failures: Mapping[int, str]
+) -> ClaimInSpace:
+    decided = [(one, ways) for one, ways in tried if ways]
+    together = [weakest(ways) for _, ways in decided]
+    holds = np.array([finding.judgement == "holds" for finding in together], bool)
+    by_way_holds = {
+        way: _share(np.array([ways[way].judgement == "holds" for _, ways in decided]), len(tried))
+        for way in (decided[0][1] if decided else ())
+    }
+    parts = np.array([finding.pattern for finding in together], bool)
+    return ClaimInSpace(
+        tuple((SEED, one.number) for one, _ in tried),
+        _share(holds, len(tried)),
+        int(holds.sum()),
+        by_way_holds,
+        tuple(_share(column, len(tried)) for column in parts.T),
+        tuple(_separations(entry, [one for one, _ in decided], holds)),
+        failures,
+    )
+
+
+def _share(flags: np.ndarray, count: int) -> Share:
+    """The share of `count` draws, those beyond the flags being undecided."""
+    missing = count - len(flags)
+    return share(
+        np.append(flags, np.zeros(missing, bool)), np.append(np.ones(len(flags), bool), np.zeros(missing, bool))
+    )
+
+
+def _separations(entry: Registered, drawn: Sequence[Draw], holds: np.ndarray) -> Iterator[Separation]:
+    """The values that separate the draws more than by chance (Mann and Whitney, with Bonferroni's correction)."""
+    from scipy.stats import mannwhitneyu  # 0.7 s to import
+
+    if holds.all() or not holds.any():
+        return
+    values = [value for value in OPEN if enters(value, entry.needs, RESPONSES, PARTS)]
+    every = []
+    for value in values:
+        numbers = np.array([one.values[value.name] for one in drawn])
+        test = mannwhitneyu(numbers[holds], numbers[~holds])
+        correlation = 2 * float(test.statistic) / (holds.sum() * (~holds).sum()) - 1
+        every.append(Separation(value.name, correlation, float(test.pvalue)))
+    chosen = [item for item in every if item.chance < DOUBT / len(values)]
+    yield from sorted(chosen, key=lambda item: -abs(item.correlation))
+
+
+def _fit(
+    by_claim_tried: Mapping[str, Sequence[tuple[Draw, Mapping[str, Finding]]]],
+    own: Mapping[str, Mapping[str, Finding]],
+) -> BestFit | None:
+    """The draw, or friso's `own` choice, that fits the printed numbers best, by the thesis's own count; one of which
+    not all of them are known is none."""
+    first = baseline()
+    at_baseline = [item for name in by_claim_tried if name in own for item in numbers_of(name, own[name][COUNT])]
+    by_draw: dict[int, list[PrintedNumber]] = {first.number: at_baseline}
+    drawn: dict[int, Draw] = {first.number: first}
+    for name, tried in by_claim_tried.items():
+        for one, ways in tried:
+            drawn[one.number] = one
+            if COUNT in ways:
+                by_draw.setdefault(one.number, []).extend(numbers_of(name, ways[COUNT]))
+    most = max(len(numbers) for numbers in by_draw.values())
+    misfits = {number: _misfit(numbers) for number, numbers in by_draw.items() if len(numbers) == most}
+    usable = {number: value for number, value in misfits.items() if np.isfinite(value)}
+    if not usable:
+        return None
+    best = min(usable, key=lambda number: usable[number])
+    return BestFit(drawn[best], usable[best], misfits.get(first.number, np.inf), tuple(by_draw[best]))
+
+
+def numbers_of(claim: str, finding: Finding) -> list[PrintedNumber]:
+    """The printed numbers of a claim with what was found of them."""
+    return [
+        PrintedNumber(claim, part.criterion, part.printed, part.read)
+        for part in finding.parts
+        if np.isfinite(part.printed)
+    ]
+
+
+def _misfit(numbers: Sequence[PrintedNumber]) -> float:
+    """Root mean square of ln(found/printed); infinite where one is not found at all."""
+    ratios = np.array([item.read / item.printed for item in numbers], float)
+    if not ratios.size or not (np.isfinite(ratios) & (ratios > 0)).all():
+        return np.inf
+    return float(np.sqrt(np.mean(np.log(ratios) ** 2)))

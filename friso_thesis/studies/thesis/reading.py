@@ -1,0 +1,160 @@
+"""How the words of the thesis are read in numbers: “about”, “far”, “few”, “the same”, “trend”, “large”; and how they
+might be read as well."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Set
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, fields, replace
+from types import MappingProxyType
+from typing import cast
+
+from friso.quantities import percent
+from friso_thesis.studies.rig.measured_cycles import AS_SLOW, SIMILAR
+
+
+@dataclass(frozen=True)
+class WordReading:
+    """The numbers behind the words: the factor within which a number is `about` another, and that within which it is
+    `of the order` of another and beyond which it is far below it; the share of a map's cells up to which they are
+    `few`, and up to which there are `none`; the rank correlation (Spearman) from which there is a `trend`; the share
+    within which numbers are the `same`, and within which they are `close`, as far as one reads them off a figure; and
+    the damping [N s/m] from which that of the limiter is `large`: the upper two of the six decades studied; the share
+    that is at least `half` or “most” of them; the share of the range of strokes from which they are `long`; and of
+    cycles on the rig, the factor from which one is nearly `twice` as long as another, that within which swings are
+    `similar`, that from which their two sides are `unequal`, and the scatter of the period over its mean from which one
+    is less regular, `uneven`."""
+
+    about: float = 1.5
+    order: float = 10**0.5
+    few: float = 0.05
+    none: float = 0.0
+    trend: float = 0.5
+    same: float = 0.15
+    close: float = 0.1
+    large: float = 1e2
+    half: float = 0.5
+    long: float = 0.5
+    twice: float = AS_SLOW
+    similar: float = SIMILAR
+    unequal: float = 1.1
+    uneven: float = 0.05
+
+
+OWN = WordReading()
+"""Friso's own reading."""
+
+_READ: ContextVar[WordReading] = ContextVar("reading", default=OWN)
+
+
+def reading() -> WordReading:
+    """The reading by which claims are judged now."""
+    return _READ.get()
+
+
+@contextmanager
+def read_as(other: WordReading) -> Iterator[None]:
+    """Judge by another reading within."""
+    before = _READ.set(other)
+    try:
+        yield
+    finally:
+        _READ.reset(before)
+
+
+@contextmanager
+def words_read() -> Iterator[set[str]]:
+    """The words that are read within: what is judged there is the same by any other reading of all others."""
+    noted = _NotedReading(reading())
+    with read_as(cast("WordReading", noted)):
+        yield noted.words
+
+
+class _NotedReading:
+    """A reading that notes which of its words are asked for."""
+
+    def __init__(self, own: WordReading) -> None:
+        self._own, self.words = own, set[str]()
+
+    def __getattr__(self, word: str) -> float:
+        self.words.add(word)
+        return getattr(self._own, word)
+
+
+def _otherwise() -> dict[str, WordReading]:
+    factors = {
+        "about": ("about", (1.25, 2.0)),
+        "order": ("of the order of", (2.0, 10.0)),
+        "similar": ("similar", (1.25, 2.0)),
+    }
+    least = {"twice": ("nearly twice", (1.5, 1.9)), "unequal": ("unequal", (1.05, 1.25))}
+    shares = {
+        "few": ("few", (0.02, 0.1)),
+        "none": ("none", (OWN.few,)),
+        "same": ("the same", (0.1, 0.25)),
+        "close": ("close", (0.05, 0.2)),
+    }
+    others = {
+        f"“{word}” as within a factor of {value:g}": replace(OWN, **{name: value})
+        for name, (word, values) in factors.items()
+        for value in values
+    }
+    others |= {
+        f"“{word}” as {'within' if name in ('same', 'close') else 'at most'} {percent(value)}": replace(
+            OWN, **{name: value}
+        )
+        for name, (word, values) in shares.items()
+        for value in values
+    }
+    others |= {
+        f"“{word}” as at least {value:g} times": replace(OWN, **{name: value})
+        for name, (word, values) in least.items()
+        for value in values
+    }
+    others |= {f"“half” as {percent(value)}": replace(OWN, half=value) for value in (0.3, 0.7)}
+    others |= {f"“long” as the upper {percent(1 - value)}": replace(OWN, long=value) for value in (0.25, 0.75)}
+    others |= {
+        f"“less regular” from a scatter of {percent(value)} on": replace(OWN, uneven=value) for value in (0.02, 0.1)
+    }
+    others |= {f"“trend” as a rank correlation of {value:g}": replace(OWN, trend=value) for value in (0.3, 0.7)}
+    return others | {f"“large” as {value:g} N s/m and more": replace(OWN, large=value) for value in (10.0, 1e3)}
+
+
+OTHERWISE: Mapping[str, WordReading] = MappingProxyType(_otherwise())
+"""Other readings, as reasonable, by what is read otherwise: each in one word, to either side."""
+
+
+def others_of(words: Set[str]) -> dict[str, WordReading]:
+    """Those that read one of these words otherwise."""
+    return {
+        name: other
+        for name, other in OTHERWISE.items()
+        if any(getattr(other, item.name) != getattr(OWN, item.name) for item in fields(OWN) if item.name in words)
+    }
+
+
+def about(value: float, expected: float, factor: float | None = None) -> bool:
+    """Whether a positive number is within a factor (by default that of “about”) of what is expected; NaN is not."""
+    within = reading().about if factor is None else factor
+    return expected / within <= value <= expected * within
+
+
+CONVENTIONS = (
+    f"Words have the same meaning in all claims: “about” is within a factor of {OWN.about:g}, “of the order of” within "
+    f"a factor of {OWN.order:.2g} (half a decade) and “far” beyond it, “few” cells are at most {percent(OWN.few)} of a "
+    f"map, “the same” is within {percent(OWN.same)}, “close” within {percent(OWN.close)}, a “trend” is a rank "
+    f"correlation of at least {OWN.trend:g}, a “large” limiter damping is {OWN.large:g} N s/m and more (the upper two "
+    f"of the six decades studied), “most” and “half” are {percent(OWN.half)}, “long” strokes the upper "
+    f"{percent(1 - OWN.long)} of the range, “similar” swings are within a factor of {OWN.similar:g}, “nearly twice” is "
+    f"at least {OWN.twice:g} times, sides are “unequal” from a factor of {OWN.unequal:g} on, and a period is “less "
+    f"regular” from a scatter of {percent(OWN.uneven)} on. Every claim is judged by other readings too: "
+    f"{', '.join(OTHERWISE)}; where one of them turns a criterion, its dependence says so. Whether a cell of a map "
+    "“keeps moving” or “comes to rest” is judged in three ways: by the thesis's count, where at least one peak is "
+    "counted (Sec. 3.2.2); where the run swings at its end; where a cycle attracts, whatever the move. A claim holds "
+    "as far as it does in all three ways; one on the path alone (F11A) is judged in the first two, since what attracts "
+    "does not depend on the path. A “limit” lies between the last cell that keeps moving and the next, where "
+    "the swing, interpolated in its logarithm, falls below what counts, or halfway where nothing is left of it; none "
+    "beyond it keeps moving."
+)
+"""How the criteria read the words of the claims: one reading for all."""

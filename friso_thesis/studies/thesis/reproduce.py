@@ -1,0 +1,303 @@
+"""The reproduction of the thesis: every study and response, every claim judged, and what each judgement hangs on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Set
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.engine.side_by_side import side_by_side
+from friso.errors import InputError
+from friso.frequency.bode import Bode, bode
+from friso.progress import Progress, Tally, silent
+from friso.quantities import quoted
+from friso_thesis.studies.thesis.claims import Claim, Evidence, Finding, Registered, Response, claims, registered
+from friso_thesis.studies.thesis.cycles import CyclesOnMap, Surveyed, map_cycles, survey
+from friso_thesis.studies.thesis.evidence import RESPONSES, evidence, map_of
+from friso_thesis.studies.thesis.experiments import EXPERIMENTS, Experiments
+from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
+from friso_thesis.studies.thesis.linear import NEEDS, Linear
+from friso_thesis.studies.thesis.plausible import DRAWS, PARTS, Plausible, plausible, ways_of, work_of
+from friso_thesis.studies.thesis.reading import others_of, read_as, words_read
+from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
+from friso_thesis.studies.thesis.verdicts import ClaimVerdict, not_covered, verdict
+from friso_thesis.studies.thesis.ways import CYCLE, by_peak_count, by_way, weakest
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+POINTS, MOST_POINTS = 41, 1001
+"""Values per axis: 0.4 Hz apart in Fig. 16; at most, a million cells in every map."""
+
+JUDGED = 21
+"""Values per axis of the maps on which claims are judged, at least: a region that falls between two values is missed,
+and what is few, or a trend, means nothing on a handful of cells."""
+
+MOST_DRAWS = 10_000
+
+RTOL = 1e-4
+"""The thesis's relative tolerance (Sec. 3.2.3)."""
+
+VERIFIED = 0.05
+"""Share of the cells of a shown map that are run again at a tighter tolerance."""
+
+TIGHT = 1e-8
+"""Second relative tolerance for Fig. 14B, besides the thesis's own."""
+
+SHOWN = (1e-2, 3e3)
+"""Frequencies [Hz] of Fig. 7 and 8."""
+
+PART_WORK, LOCKED_SURVEY_WORK, FREE_SURVEY_WORK = 6000, 5000, 65_000
+"""Steps of the progress, of which a run counts one, by the processor time that they take: a part of the linear analysis
+or an experiment; what attracts the stages of a map, with the joint locked and free."""
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """All results.
+
+    Maps by study name and responses by name, judged by the thesis's count, and the maps on which the claims were judged
+    (`judged`), which are finer where few values per axis were asked for; the linear analysis of the rig, and in
+    `bode` its curves over the frequency, and the experiments, each None where no claim of this run needs it, with the
+    names of those that were made (`experimented`); the map of
+    Fig. 14B by relative tolerance and the shares of its cells in which peaks are counted at one of them only, and whose
+    peak count differs between them (NaN if not computed); a verdict per claim; the claims over the joint draws of what
+    the thesis leaves open; the hunting cycles behind each map by study name; values per axis of the maps (`points`),
+    and of those judged (`judged_points`).
+    """
+
+    maps: Mapping[str, xr.Dataset]
+    judged: Mapping[str, xr.Dataset]
+    responses: Mapping[str, Response]
+    linear: Linear | None
+    bode: Bode | None
+    experiments: Experiments | None
+    experimented: frozenset[str]
+    tolerances: Mapping[float, xr.Dataset]
+    changed: tuple[float, float]
+    verdicts: tuple[ClaimVerdict, ...]
+    plausible: Plausible
+    cycles: Mapping[str, CyclesOnMap]
+    points: int
+    judged_points: int
+    rtol: float
+
+
+def reproduce(
+    names: Iterable[str] | None = None,
+    points: int = POINTS,
+    rtol: float = 1e-6,
+    progress: Progress = silent,
+    with_cycles: bool = True,
+    draws: int = DRAWS,
+    only: Iterable[str] | None = None,
+    kept: Kept = NOT_KEPT,
+) -> Reproduction:
+    """Run the studies `names` (default: all of Table 3), `points` values per axis, and judge the claims, or `only`
+    some of them, with what these need, on maps of at least `JUDGED` values per axis.
+
+    A claim that is left out is "not yet covered". `with_cycles` the hunting cycles behind every map are computed too,
+    the third way in which its claims are judged; with `draws` every claim is judged in as many joint draws of the
+    values that the thesis leaves open. What is `kept` of an earlier run is not computed again. `progress` is called
+    with steps done, steps in all and what comes next. Raises InputError for an unknown study or claim and for numbers
+    that are too low or too high, ValueError for an unusable rtol.
+    """
+    chosen, asked = _studies(names), _claims(only)
+    _check("points", points, 3, MOST_POINTS, "41")
+    _check("draws", draws, 0, MOST_DRAWS, str(DRAWS))
+    entries = {
+        name: entry
+        for name, entry in registered().items()
+        if (asked is None or name in asked) and not {n for n in entry.needs if n in STUDIES} - chosen.keys()
+    }
+    needs = _needs(entries, chosen, asked)
+    studies = {name: study for name, study in chosen.items() if name in needs}
+    parts = sorted(needs & PARTS.keys())
+    judged_points = max(points, JUDGED)
+    half = -(-judged_points // 2)
+    total = len(studies) * (judged_points**2 + half**2) + PART_WORK * len(parts) + work_of(entries, draws)
+    total += with_cycles * sum(map(_survey_work, studies.values())) + 2 * points**2 * ("isolator-damping" in studies)
+    tally = Tally(progress, total)
+    tally.add(0, "responses")
+    base = evidence(needs - STUDIES.keys(), judged_points, rtol, kept=kept)
+    maps: dict[str, xr.Dataset] = {}
+    loose: dict[str, xr.Dataset] = {}
+    for name, study in studies.items():
+        maps[name] = map_of(study, judged_points, rtol, VERIFIED, kept=kept)
+        tally.add(judged_points**2, f"map {study.panel}")
+        loose[name] = map_of(study, half, RTOL, kept=kept)
+        tally.add(half**2, f"map {study.panel} at the thesis's tolerance")
+    base = replace(base, maps=maps)
+    tolerances = _tolerances(studies, points, kept, tally)
+    for part in parts:
+        if part in EXPERIMENTS:
+            getattr(base.experiments, part)
+        tally.add(PART_WORK, part.replace("_", " "))
+
+    def behind(study: ThesisStudy) -> tuple[Surveyed, CyclesOnMap]:
+        surveyed = survey(maps[study.name], kept)
+        tally.add(_survey_work(study) // 2, f"what attracts, map {study.panel}")
+        cycles = map_cycles(study, maps[study.name], surveyed, kept)
+        tally.add(_survey_work(study) // 2, f"edges of hunting, map {study.panel}")
+        return surveyed, cycles
+
+    studied = side_by_side([partial(behind, study) for study in studies.values()] if with_cycles else [])
+    surveyed = {name: of_map for name, (of_map, _) in zip(studies, studied, strict=with_cycles)}
+    cycles = {name: of_map for name, (_, of_map) in zip(studies, studied, strict=with_cycles)}
+    ways, readings = {}, {}
+    for name, entry in entries.items():
+        with words_read() as words:
+            ways[name] = _ways(entry, base, surveyed)
+        readings[name] = _read_otherwise(entry, base, surveyed, words)
+    space = plausible(entries, draws, kept, tally)
+    others = _others(entries, base, loose)
+    verdicts = tuple(_verdict(claim, entries, ways, space, others, readings, chosen) for claim in claims())
+    curves = bode(thesis_rig(), SHOWN, series=True) if base.linear is not None else None
+    judged = by_way(base, by_peak_count)
+    shown = judged.maps
+    if points < judged_points:
+        shown = {name: by_peak_count(map_of(study, points, rtol, VERIFIED)) for name, study in studies.items()}
+    return Reproduction(
+        shown, judged.maps, judged.responses, base.linear, curves, base.identified if parts else None,
+        frozenset(parts) & EXPERIMENTS.keys(), tolerances,
+        _changed(tolerances), verdicts, space, cycles, points, judged_points, rtol,
+    )  # fmt: skip
+
+
+def _survey_work(study: ThesisStudy) -> int:
+    """Steps of the progress that the survey of a map counts."""
+    return LOCKED_SURVEY_WORK if study.changes.get("joint.locked") else FREE_SURVEY_WORK
+
+
+def _verdict(
+    claim: Claim,
+    entries: Mapping[str, Registered],
+    ways: Mapping[str, Mapping[str, Finding]],
+    space: Plausible,
+    others: Mapping[str, Mapping[str, Finding]],
+    readings: Mapping[str, Mapping[str, Finding]],
+    chosen: Mapping[str, ThesisStudy],
+) -> ClaimVerdict:
+    if claim.id not in entries:
+        entry = registered().get(claim.id)
+        missing = sorted({need for need in entry.needs if need in STUDIES} - chosen.keys()) if entry else []
+        reason = ", ".join(missing) or "this claim was not asked for"
+        return not_covered(claim, f"not computed in this run: {reason}" if entry else "no judge decides on it")
+    findings = ways[claim.id]
+    return verdict(
+        claim,
+        entries[claim.id].figure,
+        findings,
+        weakest(findings),
+        space.claims.get(claim.id),
+        {name: by_claim[claim.id] for name, by_claim in others.items() if claim.id in by_claim},
+        entries[claim.id].undrawn,
+        readings[claim.id],
+    )
+
+
+def _ways(entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed]) -> dict[str, Finding]:
+    """The findings of a judge in all the ways in which its evidence can be read; a claim on paths alone is left out of
+    what attracts, which does not depend on the path."""
+    findings, maps = ways_of(entry, base), entry.needs & STUDIES.keys()
+    if maps <= surveyed.keys() and not all(STUDIES[name].of_motion for name in maps):
+        attracted = {name: surveyed[name].attracted for name in maps}
+        lasting = by_way(replace(base, maps={}), by_peak_count)
+        findings[CYCLE] = entry.judge(replace(lasting, maps=attracted))
+    return findings
+
+
+def _read_otherwise(
+    entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed], words: Set[str]
+) -> dict[str, Finding]:
+    """The findings by other readings of the `words` of the thesis by which the claim is judged, by what is read
+    otherwise."""
+    findings = {}
+    for name, other in others_of(words).items():
+        with read_as(other):
+            findings[name] = weakest(_ways(entry, base, surveyed))
+    return findings
+
+
+def _others(
+    entries: Mapping[str, Registered], base: Evidence, loose: Mapping[str, xr.Dataset]
+) -> dict[str, dict[str, Finding]]:
+    """The findings on maps of every second value of each axis, and on those at the thesis's tolerance, by the two ways
+    that need the runs alone."""
+    grids = {
+        "every second value of each axis": {name: _second(runs) for name, runs in base.maps.items()},
+        f"the thesis's relative tolerance, {RTOL:g},": dict(loose),
+    }
+    return {
+        method: {
+            name: weakest(ways_of(entry, replace(base, maps=maps)))
+            for name, entry in entries.items()
+            if entry.needs & STUDIES.keys()
+        }
+        for method, maps in grids.items()
+    }
+
+
+def _second(runs: xr.Dataset) -> xr.Dataset:
+    """Every second value of each axis; of less than five values all."""
+    return runs.isel(dict.fromkeys(runs.dims, slice(None, None, 2))) if min(runs.sizes.values()) >= 5 else runs
+
+
+def _needs(
+    entries: Mapping[str, Registered], chosen: Mapping[str, ThesisStudy], asked: frozenset[str] | None
+) -> set[str]:
+    """What is computed: what the claims need, and all studies and responses where none is asked for by name."""
+    needs = {need for entry in entries.values() for need in entry.needs}
+    return needs if asked is not None else needs | chosen.keys() | RESPONSES.keys() | NEEDS.keys()
+
+
+def _tolerances(studies: Mapping[str, ThesisStudy], points: int, kept: Kept, tally: Tally) -> dict[float, xr.Dataset]:
+    """The map of Fig. 14B at the thesis's tolerance and a tight one."""
+    maps = {}
+    for study in studies.values():
+        for tolerance in (RTOL, TIGHT) if study.panel == "14B" else ():
+            maps[tolerance] = by_peak_count(map_of(study, points, tolerance, kept=kept))
+            tally.add(points**2, f"map 14B at {tolerance:g}")
+    return maps
+
+
+def _studies(names: Iterable[str] | None) -> dict[str, ThesisStudy]:
+    if names is None:
+        return dict(STUDIES)
+    chosen = list(names)
+    for name in chosen:
+        if name not in STUDIES:
+            raise InputError("study", quoted(name), f"one of {', '.join(STUDIES)}", "path")
+    return {name: study for name, study in STUDIES.items() if name in chosen}
+
+
+def _claims(only: Iterable[str] | None) -> frozenset[str] | None:
+    """The claims asked for, whatever their case; all where none is."""
+    if only is None:
+        return None
+    ids = {claim.id.upper(): claim.id for claim in claims()}
+    chosen = set()
+    for name in only:
+        if name.upper() not in ids:
+            raise InputError("only", quoted(name), f"a claim, one of {', '.join(ids.values())}", "only=F15B")
+        chosen.add(ids[name.upper()])
+    return frozenset(chosen)
+
+
+def _check(name: str, value: int, least: int, most: int, example: str) -> None:
+    if not least <= value <= most:
+        raise InputError(name, str(value), f"from {least} to {most}", f"{name}={example}")
+
+
+def _changed(tolerances: Mapping[float, xr.Dataset]) -> tuple[float, float]:
+    """Shares of cells in which peaks are counted at one of the two tolerances only, and whose peak count differs; a
+    count that is unknown in both does not differ."""
+    if not tolerances:
+        return np.nan, np.nan
+    loose, tight = tolerances.values()
+    first, second = loose["count"].values, tight["count"].values
+    other_count = (first != second) & ~(np.isnan(first) & np.isnan(second))
+    return float((loose["keeps_moving"] != tight["keeps_moving"]).mean()), float(other_count.mean())

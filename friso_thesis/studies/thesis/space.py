@@ -1,0 +1,179 @@
+"""The values that the thesis does not state, over the ranges in which they are plausible, and joint draws of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Set
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.equations.controllers.van_dijk import ALPHA, BETA, TUNED_MASS
+from friso.equations.motion import CRUISE
+from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy
+
+if TYPE_CHECKING:
+    from friso_thesis.studies.thesis.linear import PartNeeded
+
+SEED = 1
+"""Seed of the draws; together with its number it gives a draw, however many there are."""
+
+_OPEN_JOINT_KEYS = frozenset({"joint.damping"})
+
+
+@dataclass(frozen=True)
+class OpenValue:
+    """A value that the thesis leaves open: from `low` to `high` [unit], drawn evenly, in its logarithm or as one of the
+    two ends (`scale`); the keys of the stage file on which it decides, why it may be anywhere there, and friso's own
+    choice (`baseline`)."""
+
+    name: str
+    low: float
+    high: float
+    unit: str
+    scale: str
+    keys: frozenset[str]
+    reason: str
+    baseline: float
+
+    def at(self, share: float) -> float:
+        """The value at a share of the way through its range."""
+        if self.scale == "either":
+            return self.low if share < 0.5 else self.high
+        if self.scale == "log":
+            return float(self.low * (self.high / self.low) ** share)
+        return self.low + share * (self.high - self.low)
+
+    def touches(self, study: ThesisStudy) -> bool:
+        """Whether the study's map can be another with another value."""
+        return self.decides(study.sets, bool(study.changes.get("joint.locked")))
+
+    def decides(self, fixed: Set[str], locked: bool) -> bool:
+        """Whether it matters where the keys `fixed` are decided on otherwise; a locked joint has no damping of its
+        own."""
+        return not self.keys <= (fixed | _OPEN_JOINT_KEYS if locked else fixed)
+
+    def touches_part(self, need: PartNeeded) -> bool:
+        """Whether that part of the linear analysis, or that experiment, can be another."""
+        return self.decides({key for key in self.keys if key.startswith(need.outside)}, need.locked)
+
+
+def _value(
+    name: str, low: float, high: float, unit: str, scale: str, keys: tuple[str, ...], baseline: float, reason: str
+) -> OpenValue:
+    return OpenValue(name, low, high, unit, scale, frozenset(keys), reason, baseline)
+
+
+_TIMES = ("motion.acceleration", "motion.acceleration_time")
+_MASSES = ("masses.cart", "masses.stage", "parasitic.mass", TUNED_MASS)
+
+OPEN: tuple[OpenValue, ...] = (
+    _value("alpha", 0.1, 0.3, "", "even", (ALPHA,), 0.1, "Sec. 3.2.4: often chosen between 0.1 and 0.3"),
+    _value("beta", 1.0, 3.0, "", "even", (BETA,), 2.0, "Table 3: studied from 1 to 3"),
+    _value(
+        "joint damping", 0.05, 5.0, "N*s/m", "log", ("joint.damping",), 0.5,
+        "damping ratios of 0.07 % (bare steel leaf springs) to 7 % (cables, air) at 11 Hz",
+    ),
+    _value(
+        "limiter damping", 1.0, 1e4, "N*s/m", "log", ("joint.limiter_damping",), 100.0,
+        "Table 3: studied up to 1e4 N s/m; steel on steel loses at least 0.02 %",
+    ),
+    _value(
+        "parasitic mass over stage mass", 0.1, 0.8, "", "even", ("parasitic.mass",), 0.5,
+        "a third mass is in Fig. 3, its size is not: from a tenth to most of the stage",
+    ),
+    _value(
+        "parasitic damping ratio", 0.001, 0.05, "", "log", ("parasitic.damping_ratio",), 0.01,
+        "bare metal to bolted joints",
+    ),
+    _value(
+        "acceleration", 10.0, 100.0, "m/s^2", "log", _TIMES, 100.0,
+        "Sec. 4.3.2 prescribes 100 m/s^2 to the rig; for the simulations none is printed, and slower starts are usual",
+    ),
+    _value(
+        "distance", 0.05, 0.16, "m", "even", _TIMES, 0.09,
+        "Sec. 3.5: about 160 mm of travel; Sec. 4.3.2 moves 100 mm; for the simulations none is printed",
+    ),
+    _value(
+        "cruise over acceleration time", 0.0, 1.0, "", "either", (*_TIMES, CRUISE), 0.0,
+        "Sec. 3.2.2 says trapezoidal steps, Sec. 4.1 that acceleration and its time give the length: without or with "
+        "a phase at constant speed",
+    ),
+    _value(
+        "stroke", 0.3e-3, 1e-3, "m", "even", ("joint.stroke",), 1e-3,
+        "Sec. 3.4.1 starts from 1 mm, Sec. 6 finds 0.3 mm sufficient; the marker of the figures is not printed",
+    ),
+    _value(
+        "mass", 1.7, 2.5, "kg", "either", _MASSES, 1.7,
+        "Sec. 4.2.1: 1.7 kg weighed, 2.5 kg identified; cart and stage in the same proportion",
+    ),
+)  # fmt: skip
+"""All of them."""
+
+
+def draw_name(number: int) -> str:
+    """What a draw is called; people count from 1, seeds from 0."""
+    return f"draw {number + 1}"
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One joint draw: its number, and the values by name, in the order of `OPEN`."""
+
+    number: int
+    values: Mapping[str, float]
+
+    @property
+    def name(self) -> str:
+        return draw_name(self.number)
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """What it changes in the stage file of the rig."""
+        v = self.values
+        ratio, mass = v["cruise over acceleration time"], v["mass"]
+        time = np.sqrt(v["distance"] / (v["acceleration"] * (1 + ratio)))
+        stage = 0.5 / 1.7 * mass
+        changes: dict[str, Any] = {
+            ALPHA: v["alpha"],
+            BETA: v["beta"],
+            "joint.damping": f"{v['joint damping']!r} N*s/m",
+            "joint.limiter_damping": f"{v['limiter damping']!r} N*s/m",
+            "parasitic.damping_ratio": v["parasitic damping ratio"],
+            "motion.acceleration": f"{v['acceleration']!r} m/s^2",
+            "motion.acceleration_time": f"{float(time)!r} s",
+            "joint.stroke": f"{v['stroke']!r} m",
+            "masses.cart": f"{mass - stage!r} kg",
+            "masses.stage": f"{stage!r} kg",
+            "parasitic.mass": f"{v['parasitic mass over stage mass'] * stage!r} kg",
+            TUNED_MASS: f"{mass!r} kg",
+        }
+        return changes | ({CRUISE: ratio} if ratio else {})
+
+
+def draw(number: int) -> Draw:
+    """The joint draw of this number, from 0 on: values independent of each other, and of other draws."""
+    shares = np.random.default_rng([SEED, number]).random(len(OPEN))
+    return Draw(number, {value.name: value.at(float(share)) for value, share in zip(OPEN, shares, strict=True)})
+
+
+def baseline() -> Draw:
+    """Friso's own choice of all of them."""
+    return Draw(-1, {value.name: value.baseline for value in OPEN})
+
+
+def enters(value: OpenValue, needs: frozenset[str], responses: Mapping[str, Mapping[str, object]],
+           parts: Mapping[str, PartNeeded]) -> bool:  # fmt: skip
+    """Whether a value can change anything of what a judge `needs`: maps, `responses` by what they change in the rig, or
+    `parts` of the analysis."""
+    for name in needs:
+        if name in STUDIES:
+            touched = value.touches(STUDIES[name])
+        elif name in parts:
+            touched = value.touches_part(parts[name])
+        else:
+            own = responses[name]
+            touched = value.decides(own.keys(), bool(own.get("joint.locked")))
+        if touched:
+            return True
+    return False

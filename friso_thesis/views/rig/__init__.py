@@ -1,0 +1,1 @@
+"""How outcomes of the thesis's own experiments are shown, a module each."""

@@ -1,0 +1,51 @@
+"""The thesis's conclusions and a design's edges under several friction laws: what of each counts."""
+
+import numpy as np
+
+from friso.design_method.edges import Corners, under_law, worst_edges
+from friso.design_method.population import Population
+from friso_thesis.studies.thesis.claims import Finding, Part, claims
+from friso_thesis.studies.thesis.laws import CONCLUSIONS, ConclusionByLaw, ConclusionsByLaw
+from friso_thesis.views.reproduce.laws import laws_document, laws_rows
+
+LAWS = ("lugre", "gms", "rolling")
+
+
+def finding(*holds: bool) -> Finding:
+    return Finding(tuple(Part("criterion", held, f"number {place}") for place, held in enumerate(holds)))
+
+
+def by_law_of(*patterns: tuple[bool, ...]) -> dict[str, Finding]:
+    return {law: finding(*pattern) for law, pattern in zip(LAWS, patterns, strict=True)}
+
+
+def test_a_conclusion_survives_the_laws_under_which_the_same_parts_hold() -> None:
+    first, second = (claim for claim in claims() if claim.id in ("F12A", "F12B"))
+    conclusions = (
+        ConclusionByLaw(first, by_law_of((True, True), (True, True), (True, True))),
+        ConclusionByLaw(second, by_law_of((True, False), (False, True), (True, False))),
+    )
+    by_law = ConclusionsByLaw(LAWS, {"dahl": ("static",)}, conclusions)
+    assert [conclusion.claim.id for conclusion in by_law.dependent] == ["F12B"]
+    assert conclusions[1].turned("gms") == ("number 0", "number 1")
+    document = laws_document(by_law)
+    assert [row["turned"] for row in document["conclusions"]] == [{}, {"gms": ["number 0", "number 1"]}]
+    assert len(laws_rows(by_law)) == 2
+
+
+def test_all_conclusions_that_are_asked_are_claims_of_the_thesis() -> None:
+    assert {"E1", "F11A", "F11B", "F12A", "F12B", "F13", "F14A", "F14B", "F15A", "F15B", "F16A", "F16B"} == {
+        claim.id for claim in claims() if claim.id in CONCLUSIONS
+    }
+
+
+def test_the_edge_of_a_corner_is_the_highest_under_any_law() -> None:
+    population = Population({}, 3)
+    corners = [Corners(population, np.array(edges), (1.0, 9.0), 1) for edges in ((0.0, 3.0, 5.0), (2.0, 2.5, np.inf))]
+    worst = worst_edges(dict(zip(("lugre", "gms"), corners, strict=True)))
+    assert worst.edges.tolist() == [2.0, 3.0, np.inf]
+    assert worst.unknown == 2
+    assert under_law({"friction.model": "lugre", "friction.x": 1.0, "masses.cart": 2.0}, {"friction.model": "gms"}) == {
+        "friction.model": "gms",
+        "masses.cart": 2.0,
+    }

@@ -1,0 +1,88 @@
+"""The judges of the claims on the thesis's leaf springs and on its rules of design."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from friso_thesis.studies.thesis.claims import Evidence, Finding, registered
+from friso_thesis.studies.thesis.judges import design_rules
+from friso_thesis.studies.thesis.studies import STUDIES
+
+POINTS = 41
+
+
+def made(name: str, hunts: Callable[[np.ndarray, np.ndarray], Any]) -> xr.Dataset:
+    """A map of the study `name` that hunts where a function of both coordinates is true."""
+    spans = STUDIES[name].spans
+    x, y = (np.linspace(span.low, span.high, POINTS) for span in spans)
+    hunting = np.broadcast_to(hunts(x[:, None], y[None, :]), (POINTS, POINTS))
+    words, dims = np.where(hunting, "swings", "rests"), tuple(span.key for span in spans)
+    return xr.Dataset(
+        {
+            name: (tuple(span.key for span in spans), values)
+            for name, values in (("keeps_moving", hunting), ("outcome", words))
+        },
+        coords=dict(zip(dims, (x, y), strict=True)),
+    )
+
+
+def judged(maps: Mapping[str, Callable[[np.ndarray, np.ndarray], Any]]) -> Finding:
+    return registered()["D1"].judge(Evidence({name: made(name, hunts) for name, hunts in maps.items()}, {}))
+
+
+HOLD = {
+    "isolator-stiffness": lambda k, s: (s < 0.3e-3) | (k > 6e3),
+    "isolator-crossover": lambda f, s: f < 5.3,
+    "friction": lambda s, c: s - c > 0.95,
+    "system": lambda f, m: f < 15,
+}
+DIFFER = {
+    "isolator-stiffness": lambda k, s: (s < 0.6e-3) & (k > 0),
+    "isolator-crossover": lambda f, s: f < 12,
+    "friction": lambda s, c: s - c > 2,
+    "system": lambda f, m: f < 5,
+}
+
+
+def test_rules_of_design_hold_and_differ(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(design_rules, "_needed_ratio", lambda rig: 9.0)
+    assert judged(HOLD).judgement == "holds"
+    monkeypatch.setattr(design_rules, "_needed_ratio", lambda rig: 17.0)
+    monkeypatch.setattr(design_rules, "_margins_at_the_top", lambda rig: {"locked": 0.0, "free": 0.3})
+    assert judged(DIFFER).judgement == "differs"
+
+
+@pytest.mark.parametrize(("below", "holds"), [(14.0, True), (16.0, False)])
+def test_the_parameter_study_against_the_experiment(below: float, holds: bool) -> None:
+    """F25P: 14.3 Hz of the experiment, beside the limit of Fig. 11B at 1.7 kg."""
+    system = made("system", lambda f, m: f < below)
+    assert registered()["F25P"].judge(Evidence({"system": system}, {})).pattern == (holds,)
+
+
+def test_the_ratio_of_the_parasitic_mode_is_computed() -> None:
+    """At a ratio just below the one found, the margin is too small; from it on, never."""
+    from friso.frequency.crossover import settled_margin
+    from friso_thesis.studies.thesis.studies import thesis_rig
+
+    ratio = design_rules._needed_ratio(thesis_rig().to_toml())
+    flat = {**thesis_rig().flat(), "joint.locked": False}
+    tried = design_rules._RATIOS
+    below = tried[tried < ratio * 0.999][-1]
+    crossover = flat["controller.crossover"]
+    assert settled_margin({**flat, "parasitic.frequency": ratio * crossover}) >= 0.5
+    assert settled_margin({**flat, "parasitic.frequency": below * crossover}) < 0.5
+
+
+def test_the_leaf_springs_of_the_thesis() -> None:
+    result = registered()["S35"].judge(Evidence({}, {}))
+    assert result.judgement == "holds", result
+    stiffness, first, parasitic, stress = (part.number for part in result.parts)
+    assert "2238 to 2541 N/m" in stiffness
+    assert first.startswith("10.5")
+    assert first.endswith("11.27 Hz")
+    assert "leaf bending" in parasitic
+    assert "stage along y" in parasitic
+    assert float(stress.split(" to ")[1].split()[0]) == pytest.approx(52.2, abs=0.5)

@@ -1,0 +1,83 @@
+"""The thesis's experiments of identification: what is judged of its rig, and of rigs made to judge otherwise."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from friso_thesis.studies.thesis.claims import Evidence, Finding, registered
+from friso_thesis.studies.thesis.experiments import (
+    SLOW,
+    Experiments,
+    LockedLine,
+    constant_speed,
+    joint_steps,
+    slow_motion,
+)
+from friso_thesis.studies.thesis.judges.identified_in_time import judged_slips, judged_speeds, judged_steps
+from friso_thesis.studies.thesis.judges.identified_responses import judged_line
+from friso_thesis.studies.thesis.linear import analysed
+from friso_thesis.studies.thesis.linear.plants import limit_cases_of
+from friso_thesis.studies.thesis.studies import thesis_rig
+
+pytestmark = pytest.mark.xdist_group("identify-experiments")
+
+
+def judged(claim: str) -> Finding:
+    """The judge's finding from what it needs of the experiments, and no other."""
+    stage, entry = thesis_rig(), registered()[claim]
+    return entry.judge(Evidence({}, {}, analysed(stage), Experiments(stage)))
+
+
+def of_plant(changes: dict[str, str]) -> Finding:
+    """F18 with the limit cases of another rig, which are all that its judge looks at."""
+    plants = limit_cases_of(thesis_rig().replace(changes).flat())
+    return registered()["F18"].judge(Evidence({}, {}, replace(analysed(thesis_rig()), plants=plants)))
+
+
+@pytest.mark.parametrize(
+    ("claim", "holds"),
+    [
+        ("F17", (True, False, True)),
+        ("F18", (True, False)),
+        ("F19", (False,)),
+        ("F20", (True, False)),
+        ("F21", (False, False, True)),
+    ],
+)
+def test_what_is_found_of_the_identification(claim: str, holds: tuple[bool, ...]) -> None:
+    finding = judged(claim)
+    assert finding.pattern == holds, finding
+    assert all(part.holds or part.why for part in finding.parts)
+    assert not re.search(r"\bnan\b", " ".join(part.number + part.why for part in finding.parts))
+
+
+def test_the_judges_recognise_what_holds() -> None:
+    """Rigs and responses that are as the thesis says."""
+    stiff = thesis_rig().replace({"joint.stiffness": "2.9 N/mm"})
+    assert judged_steps(joint_steps(stiff)).judgement == "holds"
+    assert of_plant({"masses.stage": "0.75 kg", "joint.stiffness": "3.6 N/mm"}).judgement == "holds"
+    slippery = thesis_rig().replace({"friction.static": "2.4 N"})
+    assert judged_slips(tuple(slow_motion(slippery, speed) for speed in SLOW)).judgement == "holds"
+    slow = constant_speed(thesis_rig(), (1e-3, 2.5e-3))
+    assert judged_speeds(slow, slow).pattern == (True, False, True)
+    magnitude = np.full((4, 9), 1.7 / 2.5)
+    magnitude[:, -1] = 0.1
+    scatter = np.array([0.01, 0.1, 0.3, 0.2, 0.1, 0.1, 0.01, 0.01, 0.01])
+    assert judged_line(LockedLine(magnitude, np.zeros((4, 9)), scatter), 1.7).judgement == "holds"
+
+
+def test_the_judges_recognise_what_does_not_hold() -> None:
+    smooth = thesis_rig().replace({"friction.static": "1 N"})
+    runs = tuple(slow_motion(smooth, speed) for speed in SLOW)
+    assert judged_slips(runs).pattern[0] is False
+    lively = constant_speed(thesis_rig().replace({"joint.locked": True, "friction.static": "1 N"}))
+    assert judged_speeds(lively, lively).pattern[:2] == (False, False)
+    assert (
+        judged_line(LockedLine(np.full((4, 9), 2.0), np.zeros((4, 9)), np.linspace(0.1, 0.5, 9)), 1.7).judgement
+        == "differs"
+    )
+    few = replace(joint_steps(thesis_rig()), stiffness=5e3)
+    assert not any(part.holds for part in judged_steps(few).parts)
+    assert of_plant({"joint.stiffness": "24 N/mm", "parasitic.frequency": "600 Hz"}).judgement == "differs"
