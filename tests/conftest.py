@@ -49,6 +49,14 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ[FOLDER] = os.environ[MADE] = tempfile.mkdtemp(prefix="friso-tests-")
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests of a whole study, which a fixture named `thorough_...` computes, are thorough."""
+    for item in items:
+        if any(name.startswith("thorough_") for name in getattr(item, "fixturenames", ())):
+            item.add_marker("thorough")
+
+
 def pytest_collection_finish(session: pytest.Session) -> None:
     """What is imported by now stays: looking through it for garbage, again and again, takes a twentieth of the time."""
     gc.freeze()

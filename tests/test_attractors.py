@@ -229,6 +229,7 @@ DOUBLED = Stage(
 SciPy at 17.8762 Hz, +-0.17156 mm (`benchmarks.truth --seed 1301 --number 72`)."""
 
 
+@pytest.mark.thorough
 def test_beyond_the_end_of_a_cycle_others_attract_close_by() -> None:
     edge = margin(DOUBLED, attracting=True)
     assert edge is not None
@@ -304,6 +305,7 @@ def test_an_orbit_that_is_lost_while_it_attracts_well_is_certain_to_a_thousandth
 
 
 @pytest.mark.parametrize(("number", "series", "at"), [(30, "axes", 0.1), (42, "stages", 2.0)])
+@pytest.mark.thorough
 def test_an_end_that_no_orbit_can_be_followed_to_is_certain_between_two_bandwidths(
     number: int, series: str, at: float
 ) -> None:
@@ -413,6 +415,7 @@ UPPER = 39.5987
 """Where that begins [Hz]: a fold, by `friso boundary`."""
 
 
+@pytest.mark.thorough
 def test_every_window_in_which_a_stage_hunts_is_searched() -> None:
     """From both windows, and from the gap between them."""
     for crossover, attracting in ((8.0, True), (20.0, False), (60.0, True)):

@@ -245,6 +245,7 @@ def equal_gains(crossover: float) -> Stage:
 
 
 @GAINS
+@pytest.mark.thorough
 def test_gains_hunt_like_the_tuned_controller_they_equal() -> None:
     """The states of the controller differ, what it does not: the same cycle, the same margin."""
     chosen = equal_gains(8)
@@ -297,6 +298,7 @@ def test_an_edge_just_before_the_lowest_bandwidth_that_attracts(monkeypatch: pyt
 
 
 @RIGID
+@pytest.mark.thorough
 def test_margin_from_above_is_that_from_below() -> None:
     """Whether the stage hunts or not, the edge in between is the same."""
     below, above = margin(rigid(8), attracting=True), margin(rigid(14), attracting=False)

@@ -186,6 +186,7 @@ def test_the_branch_is_what_is_found_at_single_stages(over_crossover: Diagram) -
     assert alone.multiplier == pytest.approx([point.multiplier for point in part], rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_a_branch_does_not_depend_on_where_it_is_begun(over_crossover: Diagram) -> None:
     """The fold is reached from 4 Hz as from 15 Hz."""
     space = over_crossover.space
@@ -248,6 +249,7 @@ def over_friction() -> Plane:
     return plane(Space.of(AT_8_HZ, axes), nodes=5)
 
 
+@pytest.mark.thorough
 def test_every_curve_lies_where_the_multiplier_says(over_friction: Plane) -> None:
     """Flips of the symmetric cycle: 1 % to either side of the curve the cycle attracts on one and repels on the other,
     by cycles that are found from scratch."""
@@ -339,6 +341,7 @@ def test_cycles_at_the_force_limit_are_followed_to_their_fold() -> None:
     assert change.low == change.high == pytest.approx(39.599, abs=0.001)
 
 
+@pytest.mark.thorough
 def test_a_logarithmic_range_finds_the_same_flip() -> None:
     traced = friso.boundary(RIGID, {"controller.crossover": "8 Hz..12 Hz:log"})
     (flip,) = special(traced.result, symmetric=True)["flip"]

@@ -95,6 +95,7 @@ def test_the_files_of_one_key(single: tuple[dict, Path]) -> None:
     assert table["error of controller.crossover [Hz]"].notna().sum() == len(special)
 
 
+@pytest.mark.thorough
 def test_values_are_told_in_the_unit_of_the_command_line(tmp_path: Path) -> None:
     """The rig stops hunting as its cart gets lighter than 661 g; only its files are in kg."""
     done = boundary(tmp_path, *LOCKED, "--x", "masses.cart=640 g..2000 g", "--json")

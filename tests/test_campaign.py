@@ -36,6 +36,7 @@ def test_light_cases_pass(name: str) -> None:
 
 @pytest.mark.parametrize("number", range(2))
 @pytest.mark.parametrize("name", ["interrupted", "short-of-disk"])
+@pytest.mark.thorough
 def test_a_command_leaves_files_whole_or_none(name: str, number: int) -> None:
     assert run_part(name, 3, range(number, number + 1)).failures == []
 

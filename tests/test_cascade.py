@@ -136,6 +136,7 @@ def two() -> Hunting:
     return hunting_of(rigid(BOTH))
 
 
+@pytest.mark.thorough
 def test_two_integrals_against_radau(two: Hunting) -> None:
     """The state that winds up is not one number any more: the cycle is one all the same, or there is none."""
     names = ("position", "velocity", "bristle_deflection", "position_integral", "velocity_integral")
@@ -339,6 +340,7 @@ def test_what_is_wrong_is_told(changes: dict[str, Any], parts: list[str]) -> Non
     assert all(part in str(refused.value) for part in parts), str(refused.value)
 
 
+@pytest.mark.thorough
 def test_boundary_and_map_agree_on_where_hunting_ends() -> None:
     """In the integral time of the velocity loop."""
     machine = rigid(PI)
@@ -384,6 +386,7 @@ def test_rig_hunting(whole: Stage) -> None:
     assert all(sentences(outcome))
 
 
+@pytest.mark.thorough
 def test_compare(whole: Stage) -> None:
     with patched({crossover: {"STEPS": 21, "BIASES": 3}, study: {"FOLLOWED": 6, "LONGER": 3}}):
         comparison = compare(whole, 20, 1)
@@ -391,6 +394,7 @@ def test_compare(whole: Stage) -> None:
     assert all(comparison_sentences(comparison))
 
 
+@pytest.mark.thorough
 def test_identify_in_its_own_loop(whole: Stage) -> None:
     """A log that its own sampled loop wrote gives mass and friction back."""
     plain_axis = {"joint": None, "parasitic": None, "rail": None, "cable": None, "drive": {"sample_time": "1 ms"}}

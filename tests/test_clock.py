@@ -106,6 +106,7 @@ def test_noise_is_that_of_plain_python() -> None:
         assert noise(seed, tick) == pytest.approx(expected, abs=1e-10)
 
 
+@pytest.mark.thorough
 def test_noise_is_normal() -> None:
     """Moments, distribution and tails of 4 million deviates, each within five of its standard errors."""
     z = noise(np.arange(40)[:, None], np.arange(100_000)).ravel()

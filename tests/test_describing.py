@@ -462,6 +462,7 @@ def test_free_joint_against_simulation(size: float, frequency: float, error: flo
     assert abs(abs(against_simulation(size, frequency)) - 1) < error
 
 
+@pytest.mark.thorough
 def test_free_joint_has_its_resonances_and_its_stroke() -> None:
     """Stuck cart: 11.03 Hz; sliding cart: antiresonance 7.12 Hz, resonance 13.12 Hz (references.md, section 5)."""
     joined = stage(HOLD, masses="both", friction=lugre(2), joint=free("1 mm"), controller=van_dijk())

@@ -159,6 +159,7 @@ def test_a_geometry_at_which_beams_fail_is_marked(
     assert "The beams gave up." in choice.passed_over
 
 
+@pytest.mark.thorough
 def test_relaxed_alone_a_requirement_lets_leaves_do(base: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is said to be enough is enough, and a tenth less is not."""
     monkeypatch.setattr(front_module, "GENERATIONS", 60)

@@ -116,6 +116,7 @@ def test_a_worker_uses_no_more_threads_than_it_was_given(rig: Stage, cluster: Lo
     assert sum(n > 2 for n in busy) < 0.05 * len(busy)  # the computing thread, and now and then the one that talks
 
 
+@pytest.mark.thorough
 def test_a_killed_worker_costs_only_its_blocks(rig: Stage, tmp_path: Path) -> None:
     study, path = Request(rig, AXES).study(rtol=1e-9), tmp_path / "a.zarr"
     computed: list[int] = []

@@ -283,6 +283,7 @@ def test_dollars_and_markup_in_names_are_text():
     assert "<script>$" not in json.dumps(packed_values(plotly_renderer.fragment(figure)))
 
 
+@pytest.mark.thorough
 def test_files_are_the_same_bytes_in_every_process(request, tmp_path, monkeypatch, printed):
     monkeypatch.setattr("friso.views.pages.foreign", list)  # other tests bring some to this process
     (tmp_path / "matplotlibrc").write_text("font.size: 30\n")

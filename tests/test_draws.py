@@ -36,6 +36,7 @@ def fate(stage: Stage, count: int, seed: int = 0) -> tuple[Fates, Sample]:
     return fates(stage, drawn, 1e-6)["given"], drawn
 
 
+@pytest.mark.thorough
 def test_half_of_the_stages_about_the_edge_hunt(rig: Stage) -> None:
     """Those below it have a cycle that attracts, and no other."""
     outcome, drawn = fate(locked(rig, "9.75 Hz +/- 1.5 Hz"), 16)

@@ -143,7 +143,12 @@ TOUCHES = stage(step(), friction=lugre(2), joint=TOUCHING, parasitic=PARASITIC, 
     ("chosen", "changes"),
     [
         pytest.param(VARIANTS["rigid"], {"motion.duration": 3.5}, id="rigid"),
-        pytest.param(VARIANTS["free, parasitic"], {"motion.duration": 0.12}, id="free, parasitic"),
+        pytest.param(
+            VARIANTS["free, parasitic"],
+            {"motion.duration": 0.12},
+            id="free, parasitic",
+            marks=pytest.mark.thorough,
+        ),
         pytest.param(by_gains(8, "6 N"), {"motion.duration": 0.5, "motion.displacement": 1e-2}, id="gains, limit"),
         pytest.param(VARIANTS["rigid, Stribeck 1.5, PD measured"], {"motion.duration": 0.4}, id="Stribeck, measured"),
         pytest.param(VARIANTS["rigid, limit, wound up"], {"motion.duration": 0.5}, id="wound up"),

@@ -129,6 +129,7 @@ def test_folders_in_which_windows_lets_nothing_be_made_are_refused_at_once(axis:
 
 
 @on_windows
+@pytest.mark.thorough
 def test_a_map_is_killed_resumed_and_drawn_again(host: str, axis: Path, whole: Path) -> None:
     process = started(host, axis, "map", "axis.toml", *SPAN, "--out", "killed.zarr", "--workers", "2")
     while not (axis / "killed.zarr").exists() and process.poll() is None:
@@ -171,6 +172,7 @@ if __name__ == "__main__":
 
 
 @on_windows
+@pytest.mark.thorough
 def test_a_store_is_made_in_an_empty_folder_replaced_and_put_back(host: str, axis: Path) -> None:
     """The lock of a store is a file in it, and Windows renames and deletes no folder with a file that is open."""
     (axis / "stores.py").write_text(STORES)
@@ -292,6 +294,7 @@ builder.end()
 
 
 @on_windows
+@pytest.mark.thorough
 def test_identify_reads_csv_with_crlf(host: str, tmp_path: Path) -> None:
     time = np.arange(0, 4, 2e-3)
     speed = 0.01 * (1 + time // 2) * np.where(time % 2 < 1, 1.0, -1.0)
@@ -306,6 +309,7 @@ def test_identify_reads_csv_with_crlf(host: str, tmp_path: Path) -> None:
 
 
 @on_windows
+@pytest.mark.thorough
 def test_two_processes_share_an_empty_cache(host: str, axis: Path, tmp_path: Path) -> None:
     arguments = ("simulate", "axis.toml", "--json", "--out")
     folder = tmp_path / "für Kernel"

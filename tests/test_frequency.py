@@ -251,7 +251,7 @@ def growing(flat: dict, one: Members) -> int:
 
 
 @given(stages, st.sampled_from(CASES), st.sampled_from(DRIVES))
-@settings(max_examples=60)
+@settings(max_examples=15)
 def test_margins_take_the_loop_to_the_edge(rig: Stage, changes: dict, case: str, drive_keys: dict) -> None:
     flat = rig.replace({**changes, **drive_keys}).flat()
     one = limit_cases(flat)[case]

@@ -194,6 +194,7 @@ def test_receptance_is_that_of_the_closed_loop() -> None:
 # where it does not
 
 
+@pytest.mark.thorough
 def test_hunting_by_harmonic_balance() -> None:
     """No cycle by one harmonic; by many, 0.6 % of the amplitude are left at the 101st, 0.01 % at the 201st."""
     result = harmonic_balance(hunting(8.0), [8.0], (1, 25, 51, 101, 201)).squeeze()

@@ -626,6 +626,7 @@ def at_speeds(seed: int) -> tuple[Log, dict[str, float]]:
 
 
 @pytest.mark.parametrize("stated", [False, True])
+@pytest.mark.thorough
 def test_what_constant_speeds_show_holds_the_truth_whatever_the_exponent(stated: bool) -> None:
     """An exponent of 2 assumed of all put static friction of 22 N at 19.05 N +/- 0.46 N."""
     held: dict[str, list[bool]] = {}

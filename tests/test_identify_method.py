@@ -240,6 +240,7 @@ def test_a_repeated_move_is_none(acceleration: float, rest: int) -> None:
 # what moves a loop from outside
 
 
+@pytest.mark.thorough
 def test_the_injected_force_makes_the_estimate_indirect() -> None:
     """A mass of 2 kg in a loop, with forces from elsewhere that bias the direct estimate."""
     rng = np.random.default_rng(0)

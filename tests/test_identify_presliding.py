@@ -183,6 +183,7 @@ def test_a_rig_that_is_shaken_off_its_bristles_shows_none(strength: float) -> No
     assert not any(item.determined for item in (bristles.mass, bristles.damping, bristles.stiffness))
 
 
+@pytest.mark.thorough
 def test_loops_before_sliding_close_under_gms_and_drift_under_lugre() -> None:
     """On the rig, up to half of static friction: by how much a turn ends beside the one before, over its width."""
     stage = locked_stage(friso.load(EXAMPLE)).replace({"rail": None})
@@ -238,6 +239,7 @@ def test_the_jackknife_is_the_covariance_of_least_squares() -> None:
     assert average / np.outer(size, size) == pytest.approx(expected / np.outer(size, size), abs=0.15)
 
 
+@pytest.mark.thorough
 def test_drawn_machines_show_their_bristles_on_the_rig() -> None:
     """12 machines with their drives as built: 36 intervals of stiffness, damping and mass; of 95 % intervals, 31 or
     fewer of 36 hold with a probability of 2 %."""

@@ -551,6 +551,7 @@ def test_one_rigid_mass_with_two_outputs_under_a_force_that_is_held() -> None:
     assert np.exp(one.parameters[0]) == pytest.approx(1.7, rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_masses_of_a_resonance_low_in_the_band_and_a_sign_that_is_told_first() -> None:
     """The mode lies below the seventh of the band that is fitted at first: masses made up from above it were wrong."""
     truth = dict(zip(("driven mass", "other mass", "joint stiffness"), np.exp(TRUE), strict=False))
@@ -567,6 +568,7 @@ def test_masses_of_a_resonance_low_in_the_band_and_a_sign_that_is_told_first() -
     assert all(cut[name].value == pytest.approx(value, rel=1e-2) for name, value in truth.items())
 
 
+@pytest.mark.thorough
 def test_one_mass_without_a_joint_is_not_told_as_two() -> None:
     """Its force is held between samples of 1 ms: a resonance near or above the band explained that, with certainty."""
     frequency, mass = np.geomspace(1.0, 100.0, 150), 10.0

@@ -183,6 +183,7 @@ def one_place(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("one_place")
+@pytest.mark.thorough
 def test_a_machine_on_which_no_slow_pass_is_steady_shows_its_friction_on_the_rig() -> None:
     """Drawn machine 93: its passes tell no Stribeck velocity, at whatever setting; friction as at the place."""
     machine = built(93)

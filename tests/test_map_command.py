@@ -201,6 +201,7 @@ def test_an_invalid_cell_gives_its_reason(tmp_path: Path, wording: Wording) -> N
     wording(done.stderr)
 
 
+@pytest.mark.thorough
 def test_samples_links_and_a_local_cluster(tmp_path: Path) -> None:
     options = ("--x", "mass=1 kg..3 kg", "--y", "controller.crossover=4 Hz..12 Hz", "--samples", "16", "--latin")
     links = ("--link", "masses.cart=0.7 * mass", "--link", "masses.stage=0.3 * mass", "--set", "parasitic.mass=0.1 kg")

@@ -98,6 +98,7 @@ def test_check(locked: Stage, tmp_path: Path) -> None:
     assert float(factor) >= EDGE / 6.0
 
 
+@pytest.mark.thorough
 def test_boundary(locked: Stage, tmp_path: Path) -> None:
     """Of all cycles of the stage none attracts beyond the edge."""
     document = answer(tmp_path, locked, "boundary", "--x", f"{BANDWIDTH}=6 Hz..15 Hz")
@@ -137,6 +138,7 @@ def test_rig_hunting(whole: Stage, tmp_path: Path) -> None:
     assert AsBuilt.of(as_built_keys(whole)).structure.controller is not None
 
 
+@pytest.mark.thorough
 def test_compare(whole: Stage, tmp_path: Path) -> None:
     with patched({crossover: {"STEPS": 21, "BIASES": 3}, study: {"FOLLOWED": 6, "LONGER": 3}}):
         document = answer(tmp_path, whole, "compare", "--machines", 20, "--seed", 1)
@@ -147,6 +149,7 @@ def test_compare(whole: Stage, tmp_path: Path) -> None:
         assert options["b"]["crossover_hz"] == pytest.approx(6.0 * options["b"]["bandwidth_factor"])
 
 
+@pytest.mark.thorough
 def test_tune(locked: Stage, tmp_path: Path) -> None:
     """Its cycles are known and its bandwidth is tuned; so few machines let nothing be sure to work."""
     tiny = Budget(points=2, generations=2, machines=3, surveyed=1, fresh=3)
@@ -172,6 +175,7 @@ def test_export(locked: Stage, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
+@pytest.mark.thorough
 def test_identify_in_its_own_loop(locked: Stage, tmp_path: Path) -> None:
     """A log that its own sampled loop wrote gives mass and friction back."""
     rigid = locked.replace({"joint": None, "rail": None, "cable": None, "drive": {"sample_time": "1 ms"}})

@@ -50,6 +50,7 @@ def test_friction_without_what_is_looked_for_is_refused(built: Stage, refused: R
         presliding.run_experiment(none, 1, silent)
 
 
+@pytest.mark.thorough
 def test_a_loop_that_swings_between_its_limits_is_told(built: Stage, wording: Wording) -> None:
     """Logs that end at once show no passes: their page is written all the same."""
     outcome = constant_speed.run_experiment(built.replace({"controller.crossover": "500 Hz"}), 1, silent)

@@ -230,6 +230,7 @@ def texts(value: Any) -> list[str]:
     return [value] if isinstance(value, str) else []
 
 
+@pytest.mark.thorough
 def test_logs_of_the_rig_are_in_its_units(folder: Path, undrawn: None) -> None:
     answer = friso_inside(folder, "rig", "presliding", "rotary.toml", "--out", "log", "--json")
     assert answer.returncode == 0, answer.stderr

@@ -108,6 +108,7 @@ def test_a_study_killed_several_times_is_as_if_it_never_was(rig: Stage, tmp_path
     same(resumed, sweep(rig, AXES, rtol=1e-9))
 
 
+@pytest.mark.thorough
 def test_a_refined_study_too(rig: Stage, tmp_path: Path) -> None:
     resumed, kills = killed_and_resumed(tmp_path, "--refine")
     assert kills >= 2

@@ -199,6 +199,7 @@ def test_trace_of_a_pid_on_the_load() -> None:
     assert np.abs(response["motor_position"].values - motor).max() < 2e-9
 
 
+@pytest.mark.thorough
 def test_trace_of_a_cascade_on_both_encoders() -> None:
     """Position from the load, velocity from the motor through a low-pass, the force through a notch."""
     notch = {"kind": "notch", "frequency": "200 Hz", "width": "80 Hz", "depth": 0.8}

@@ -821,6 +821,7 @@ def test_machines_not_seen_are_drawn_alone(rigid: Stage) -> None:
 DRIVE = {"sample_time": "1 ms", "delay": "3 ms", "current_bandwidth": "40 Hz .. 400 Hz"}
 
 
+@pytest.mark.thorough
 def test_what_is_uncertain_of_the_drive_is_the_same_on_all_machines_and_says_so(rigid: Stage) -> None:
     stage = rigid.replace({"drive": DRIVE, "friction.static": "20 N +/- 2 N"})
     pair = Correlations(("friction.static", "drive.current_bandwidth"), np.array([[1.0, 0.3], [0.3, 1.0]]))

@@ -285,6 +285,7 @@ def test_held_out_errors_tell_a_law_of_the_wrong_shape() -> None:
     assert Errors.between(wrong.edge(others), held_out).rms > 0.5
 
 
+@pytest.mark.thorough
 def test_free_law_takes_the_larger_rate_beside_the_locked_edge() -> None:
     values = sweeps.sobol_samples({**sweeps.LOCKED_BOX, **sweeps.JOINT_BOX, "joint": (1e-4, 0.1)}, 200, 3)
     locked = made(200, 3, 0.0)[1]

@@ -138,7 +138,7 @@ def made_rig() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def small() -> Reproduction:
+def thorough_study() -> Reproduction:
     """Everything, on maps of 5 x 5 cells, with two joint draws of as many: what it judges means little, but all of it
     is there."""
     with patched(
@@ -443,14 +443,14 @@ def test_f14b_names_the_stripe_and_its_dampings() -> None:
     assert [row[0] for row in plain.table.rows][::5] == ["0.01 to 0.1 N s/m", "1000 to 10000 N s/m"]
 
 
-def test_f21_tells_how_the_force_itself_oscillates(small: Reproduction) -> None:
+def test_f21_tells_how_the_force_itself_oscillates(thorough_study: Reproduction) -> None:
     """Not its mean at each place, in which an oscillation that does not repeat is averaged away."""
-    assert small.experiments is not None
-    for run in small.experiments.constant_speed:
+    assert thorough_study.experiments is not None
+    for run in thorough_study.experiments.constant_speed:
         for part, swing in zip(run.log.segments, force_swings(run), strict=True):
             force = run.log["force"][part][len(run.log["force"][part]) // 10 :]
             assert swing == pytest.approx(np.sqrt(np.mean(force**2) / np.mean(force) ** 2 - 1), abs=1e-6)
-    free, _ = small.experiments.constant_speed
+    free, _ = thorough_study.experiments.constant_speed
     assert min(force_swings(free)) > 0.4
 
 
@@ -572,8 +572,8 @@ def test_a_self_test_counts_for_nothing() -> None:
     assert Finding((Part("claim", True, "2"), replace(own, holds=False))).judgement == "holds"
 
 
-def test_a_contradiction_is_robust_or_arbitrary(small: Reproduction) -> None:
-    space = next(item.space for item in small.verdicts if item.space and item.space.draws == 2)
+def test_a_contradiction_is_robust_or_arbitrary(thorough_study: Reproduction) -> None:
+    space = next(item.space for item in thorough_study.verdicts if item.space and item.space.draws == 2)
     assert space is not None
     few, many = ((share(np.zeros(n, bool), np.ones(n, bool)), 0) for n in (12, 13))
     one = (share(np.arange(13) == 0, np.ones(13, bool)), 1)
@@ -709,8 +709,8 @@ def test_the_gains_of_the_design_method_are_those_of_the_stage() -> None:
     assert rig_gains(1.7)[0] == pytest.approx(1.5 * 1.7 * omega**2 / 10**0.5)
 
 
-def test_the_marker_is_told_as_friso_s(small: Reproduction) -> None:
-    figures = reproduction_figures(small)
+def test_the_marker_is_told_as_friso_s(thorough_study: Reproduction) -> None:
+    figures = reproduction_figures(thorough_study)
     assert all("friso's evaluation point" in figures[number].caption for number in ("11", "12", "14", "15", "16"))
 
 
@@ -912,8 +912,8 @@ def test_a_draw_that_decides_nothing_says_why() -> None:
     assert details(undecided) == [("Draw 1, undecided", "ValueError: the loop stops")]
 
 
-def test_document_and_page_have_every_claim(small: Reproduction, tmp_path: Path) -> None:
-    document = reproduce_document(small)
+def test_document_and_page_have_every_claim(thorough_study: Reproduction, tmp_path: Path) -> None:
+    document = reproduce_document(thorough_study)
     assert [entry["id"] for entry in document["claims"]] == [claim.id for claim in claims()]
     for entry in document["claims"]:
         covered = entry["judgement"] != "not yet covered"
@@ -924,9 +924,9 @@ def test_document_and_page_have_every_claim(small: Reproduction, tmp_path: Path)
         if entry["space"]:
             assert entry["space"]["seeds"] == [[1, number] for number in range(0, entry["space"]["draws"])]
             assert 0 <= entry["space"]["share"]["low"] <= entry["space"]["share"]["high"] <= 1
-    contents = reproduce_files(small)
+    contents = reproduce_files(thorough_study)
     page = str(contents["reproduction.html"])
-    places = [page.index(f'id="claim-{item.claim.id}"') for item in in_order(small.verdicts) if item.finding]
+    places = [page.index(f'id="claim-{item.claim.id}"') for item in in_order(thorough_study.verdicts) if item.finding]
     assert len(places) > 20
     for claim in claims():
         assert f">{claim.id}<" in page
@@ -935,21 +935,22 @@ def test_document_and_page_have_every_claim(small: Reproduction, tmp_path: Path)
     assert "default-src 'none'" in page
     assert {Path(name).suffix for name in contents} == {".html", ".json", ".pdf", ".png", ".svg"}
     pictures = [name for name in contents if name.startswith("figures/")]
-    assert len(pictures) == 2 * len(reproduction_figures(small))
+    assert len(pictures) == 2 * len(reproduction_figures(thorough_study))
     few = [name for name in contents if name not in pictures or name == "figures/figure-26.png"]  # drawing takes long
     paths = write({tmp_path / "new" / name: contents[name] for name in few}, ())
     assert all(path.stat().st_size > 1000 for path in paths)
 
 
+@pytest.mark.thorough
 def test_the_command_writes_its_page_and_claims(
-    small: Reproduction,
+    thorough_study: Reproduction,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     snapshots: Snapshots,
     undrawn: None,
 ) -> None:
-    """In this process, which keeps the linear analysis of `small`: it takes longer than all the rest."""
+    """In this process, which keeps the linear analysis of `thorough_study`: it takes longer than all the rest."""
 
     def run(*arguments: str) -> int:
         monkeypatch.setattr(sys, "argv", ["friso", "reproduce", *arguments])
@@ -986,21 +987,21 @@ def test_the_summary_has_every_text_whole_on_one_sheet() -> None:
     assert not [(a, b) for (a, first), (b, second) in combinations(boxes, 2) if first.overlaps(second)]
 
 
-def test_fig_14b_at_both_tolerances(small: Reproduction) -> None:
-    assert [runs.attrs["rtol"] for runs in small.tolerances.values()] == [1e-4, 1e-8]
-    loose, tight = small.tolerances.values()
-    assert small.changed[0] == pytest.approx(float((loose.keeps_moving != tight.keeps_moving).mean()))
-    assert small.changed[1] == pytest.approx(float((loose["count"] != tight["count"]).mean()))
+def test_fig_14b_at_both_tolerances(thorough_study: Reproduction) -> None:
+    assert [runs.attrs["rtol"] for runs in thorough_study.tolerances.values()] == [1e-4, 1e-8]
+    loose, tight = thorough_study.tolerances.values()
+    assert thorough_study.changed[0] == pytest.approx(float((loose.keeps_moving != tight.keeps_moving).mean()))
+    assert thorough_study.changed[1] == pytest.approx(float((loose["count"] != tight["count"]).mean()))
 
 
-def test_a_count_unknown_at_both_tolerances_does_not_differ(small: Reproduction) -> None:
+def test_a_count_unknown_at_both_tolerances_does_not_differ(thorough_study: Reproduction) -> None:
     loose = made("isolator-damping", lambda d, s: np.where(s < 1e-4, -1, 2 * (s < 1e-3)), 5)
     tight = loose.copy()
     assert np.isnan(loose["count"]).any()
     assert _changed({1e-4: loose, 1e-8: tight}) == (0.0, 0.0)
     other = loose.assign(count=loose["count"].fillna(1.0))
     assert _changed({1e-4: loose, 1e-8: other})[1] == pytest.approx(float(np.isnan(loose["count"]).mean()))
-    document = reproduce_document(replace(small, tolerances={1e-4: loose, 1e-8: tight}))
+    document = reproduce_document(replace(thorough_study, tolerances={1e-4: loose, 1e-8: tight}))
     assert document["figure_14b"]["rtol"] == [1e-8, 1e-4]
 
 
@@ -1028,14 +1029,16 @@ def luminance(colour: np.ndarray) -> float:
     return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
-def test_titles_say_what_is_drawn_whatever_was_found(small: Reproduction) -> None:
-    still = {name: Response(cell(0, 0.0, np.nan).cell, response.trace) for name, response in small.responses.items()}
-    for number, figure in reproduction_figures(replace(small, responses=still)).items():
+def test_titles_say_what_is_drawn_whatever_was_found(thorough_study: Reproduction) -> None:
+    still = {
+        name: Response(cell(0, 0.0, np.nan).cell, response.trace) for name, response in thorough_study.responses.items()
+    }
+    for number, figure in reproduction_figures(replace(thorough_study, responses=still)).items():
         assert "hunt" not in figure.title, number
         assert "symmetric" not in figure.caption, number
 
 
-def test_a_new_judge_needs_no_change_of_the_page(small: Reproduction, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_new_judge_needs_no_change_of_the_page(thorough_study: Reproduction, monkeypatch: pytest.MonkeyPatch) -> None:
     """The way in for later work: a decorated function, and its finding stands in page and document, escaped."""
     assert "F28" in registered()
     monkeypatch.delitem(_JUDGES, "F28")
@@ -1052,7 +1055,7 @@ def test_a_new_judge_needs_no_change_of_the_page(small: Reproduction, monkeypatc
         _JUDGES.pop("F28", None)
     (entry,) = (claim for claim in reproduce_document(reproduction)["claims"] if claim["id"] == "F28")
     assert (entry["judgement"], entry["number"]) == ("differs", "10.5 <i>Hz</i>")
-    page = reproduce_html(replace(small, verdicts=reproduction.verdicts))
+    page = reproduce_html(replace(thorough_study, verdicts=reproduction.verdicts))
     assert "Figure 28" in page
     linked = [int(number) for number in re.findall(r'<a href="#section-\d+">(\d+)</a>', page)]
     assert 28 in linked
@@ -1069,15 +1072,15 @@ def test_a_judge_of_no_claim_is_refused() -> None:
 
 
 @pytest.mark.thorough
-def test_the_edge_of_hunting_behind_a_map(small: Reproduction) -> None:
+def test_the_edge_of_hunting_behind_a_map(thorough_study: Reproduction) -> None:
     """Crossover and mass, locked: the flip of the rig's 1.7 kg lies at 9.75 Hz, on the drawn curve as in the check; the
     cells compared add up; the page shows curve and table."""
     study = STUDIES["system"]
     with patched({import_module("friso_thesis.studies.thesis.cycles"): {"NODES": 5}}):
         cycles_ = map_cycles(
             study,
-            small.maps["system"],
-            survey(small.maps["system"].isel(dict.fromkeys(STUDIES["system"].marker, slice(None, None, 2)))),
+            thorough_study.maps["system"],
+            survey(thorough_study.maps["system"].isel(dict.fromkeys(STUDIES["system"].marker, slice(None, None, 2)))),
         )
     counted = cycles_.comparison
     assert counted.cells == 9
@@ -1093,7 +1096,7 @@ def test_the_edge_of_hunting_behind_a_map(small: Reproduction) -> None:
     edge = margin(study.stage(), attracting=True)
     assert edge is not None
     assert crossover == pytest.approx(edge.crossover, rel=0.02)
-    shown = replace(small, cycles={"system": cycles_})
+    shown = replace(thorough_study, cycles={"system": cycles_})
     assert reproduce_document(shown)["cycles"]["system"]["cells"] == 9
     labels = {line.label for panel in reproduction_figures(shown)["11"].panels for line in panel.series}
     assert "edge of the attracting cycle (flip)" in labels
