@@ -18,6 +18,7 @@ from friso.hunting.attractors.rounds import RTOL, TIGHT, typical_period
 from friso.hunting.criteria.run_outcome import lasts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import pushed
+from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.measures import swing_of
 from friso.hunting.motions import run_motions, some_of
 from friso.shares import share_interval
@@ -48,9 +49,6 @@ BETWEEN = 7
 
 MOVES = 128
 """Moves drawn."""
-
-SHARES = (0.1, 2.0)
-"""Range of the moves drawn, in units of the acceleration and of the acceleration time of the stage file."""
 
 
 @dataclass(frozen=True)
@@ -247,8 +245,9 @@ def moves_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Mov
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
         return None
     acceleration, time = flat["motion.acceleration"], flat["motion.acceleration_time"]
-    accelerations = (SHARES[0] * acceleration, SHARES[1] * acceleration)
-    times = (SHARES[0] * time, min(SHARES[1] * time, flat["motion.return_at"] / (2 + flat.get(CRUISE, 0.0))))
+    least, most = SEARCH_LIMITS.move_shares
+    accelerations = (least * acceleration, most * acceleration)
+    times = (least * time, min(most * time, flat["motion.return_at"] / (2 + flat.get(CRUISE, 0.0))))
     (low, shortest), (high, longest) = zip(accelerations, times, strict=True)
     across, along = evenly(MOVES)
     moved = {

@@ -117,7 +117,7 @@ def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap |
     return _closed(stages, symmetric_guess(stages, positive, COARSE_RTOL), -1.0, rtol)
 
 
-def hunting_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
+def find_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
     """The hunting cycle of every stage: of a symmetric one the symmetric cycle, whose multiplier is that of half a
     period; of others, whose multiplier is that of a whole one (`sign` is 0 then if there are both kinds)."""
     symmetric = stages.symmetric
