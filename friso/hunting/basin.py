@@ -180,7 +180,8 @@ def _caught(
 
 
 def displacements_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Kick:
-    """The displacements that start hunting, as far as that is known of swings up to the `widest`, peak to peak [m]."""
+    """Find the displacements [m] from which a stage that is let go ends in its `target`; swings wider than `widest`,
+    peak to peak [m], are counted as unknown."""
     flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -204,7 +205,8 @@ def displacements_that_run_away(stage: Stage) -> Kick:
 
 
 def pushes_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Kick:
-    """The velocities that start hunting, in the same way."""
+    """Find the pushes, velocities [m/s] of all masses, after which a stage at rest ends in its `target`; swings wider
+    than `widest`, peak to peak [m], are counted as unknown."""
     stages = Ensemble.held(stage.flat(), 1)
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -239,8 +241,8 @@ def _kick(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: fl
 
 
 def moves_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> MoveShare | None:
-    """The share of moves that end in hunting, in the same way; None for motions that have no acceleration, or if every
-    run fails."""
+    """Draw moves about that of the stage's file and find the share of them that ends in its `target`; swings wider than
+    `widest`, peak to peak [m], are left out. None for motions that have no acceleration, or if every run fails."""
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
         return None

@@ -110,8 +110,9 @@ LONG_RUN_RTOL = 1e-6
 
 
 def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Progress = silent) -> dict[str, Case]:
-    """The cases "given" and, for a stage with a joint, "locked" and "free" (if the file tells its stiffness).
+    """Check a stage: what becomes of it as given ("given"), with its joint locked ("locked") and free ("free").
 
+    A stage without a joint has the case "given" alone, one whose file does not tell the joint's stiffness no "free".
     With `traces`, each case has its time response; `progress` is called as work is done, also from worker
     threads. Raises InputError for an `rtol` that is not usable.
     """
@@ -130,7 +131,7 @@ def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Prog
 
 
 def needed_kernels(stage: Stage) -> set[KernelRequest]:
-    """The kernels for all cases: who checks several stages has those of all compiled side by side."""
+    """The kernels that a check of a stage needs: who checks several stages has them compiled side by side."""
     return set[KernelRequest]().union(*map(_needed, stage.variants().values()))
 
 
@@ -141,7 +142,7 @@ def _share(stage: Stage) -> float:
 
 
 def check_given(stage: Stage, rtol: float = RTOL) -> Case:
-    """The case "given" alone. Raises InputError for an `rtol` that is not usable."""
+    """Check a stage as it is given, its joint as its file has it. Raises InputError for an unusable `rtol`."""
     checked_rtol(rtol)
     kernels(_needed(stage))
     return _case(stage, rtol, False, Tally(silent, len(PARTS)), WORK)

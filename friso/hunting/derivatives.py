@@ -39,8 +39,8 @@ class CycleDerivatives:
 
 @np.errstate(all="ignore")
 def cycle_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], rtol: float) -> CycleDerivatives | None:
-    """The derivatives of a stage's cycle to some of its flat keys, from runs to a relative tolerance; None where no
-    cycle could be closed. They are exact, from variational equations along the keys, with saltation at kinks."""
+    """Differentiate a stage's cycle by some of its flat keys, with runs to a relative tolerance; None where no cycle
+    could be closed. Derivatives are exact, by variational equations along the keys, with saltation at kinks."""
     stages = Ensemble.held(flat, 1)
     cycles = find_cycles(stages)
     if not cycles.closed[0]:
@@ -68,8 +68,8 @@ def cycle_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], rtol: floa
 def flow_derivatives(
     stages: Ensemble, keys: tuple[str, ...], state: np.ndarray, time: np.ndarray, rtol: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Where the flow takes a state (1, states) in a time (1,), with its derivatives to state and keys: (states,),
-    (states, states) and (states, keys)."""
+    """Where the flow of a stage takes a state (1, states) in a time [s] (1,), and the derivatives of that to the state
+    and to flat keys: shapes (states,), (states, states) and (states, keys). None where a run was not completed."""
     size, count = state.shape[1], state.shape[1] + len(keys)
     several = stages.take(np.zeros(count, np.int64))
     beside = {along(name): np.eye(len(keys))[k] for k, name in enumerate(keys)}

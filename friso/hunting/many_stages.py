@@ -97,11 +97,12 @@ def find_attractors(
     threads: int | None = None,
     cancel: np.ndarray | None = None,
 ) -> StageAttractors:
-    """What attracts stages of one structure; one motion that attracts is enough. Their own motions play no part.
+    """Find what attracts stages of one structure, one motion that attracts each being enough.
 
-    Orbits are closed to the relative tolerance; without `close_orbits` stages are searched by simulations alone,
-    and motions that have converged are taken for attracted. `threads` and `cancel` as in `RunOptions`.
-    Raises Exhausted where an allowance is used up.
+    Their own motions play no part, but that stages whose references never stand still cannot hunt. Orbits are closed to
+    the relative tolerance; without `close_orbits` stages are searched by simulations alone, and motions that have
+    converged are taken for attracted. `threads` and `cancel` as in `RunOptions`. Raises Exhausted where an allowance is
+    used up.
     """
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = attractors(stages, rtol=rtol, cycles=close_orbits) if can_hunt(flat) else None
@@ -109,16 +110,17 @@ def find_attractors(
 
 
 def loops_unstable(flat: Mapping[str, Any], count: int) -> np.ndarray:
-    """Of which stages of one structure the loop is not stable, sticking or sliding, whatever the friction does, shape
-    (count,)."""
+    """Which stages of one structure have a loop that is not stable, sticking or sliding, whatever the friction does,
+    shape (count,)."""
     states = unstable_among(Ensemble.held(flat, count, form=shared_structure(flat)))
     return np.any([*states.values()], axis=0)
 
 
 @np.errstate(all="ignore")
 def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
-    """The verdicts on stages of one structure, words of `friso.hunting.criteria.VERDICTS`, shape (count,), their
-    motions being run to a relative tolerance; "failed" where simulations that had to decide failed, or may mislead."""
+    """Judge stages of one structure, whose own motions are run to a relative tolerance: words of
+    `friso.hunting.criteria.VERDICTS`, shape (count,), "failed" where simulations that had to decide failed, or what
+    attracts is not certain."""
     attracted = find_attractors(flat, count)
     return judge_runs(flat, run_motions(flat, count, measuring_options(rtol)), attracted, rtol)
 
@@ -132,8 +134,8 @@ def judge_runs(
     threads: int | None = None,
     cancel: np.ndarray | None = None,
 ) -> np.ndarray:
-    """The verdicts on stages of one structure, as by `judge_many`, whose own motions were run, and of which it is known
-    what attracts them; `threads` and `cancel` as in `RunOptions`."""
+    """Judge stages of one structure as `judge_many` does, whose own motions were run already, to a relative tolerance,
+    and of which it is known what attracts them; `threads` and `cancel` as in `RunOptions`."""
     count, target = len(motions.completed), attracted.target
     stages = Ensemble.held(flat, count, form=shared_structure(flat))
     decided = motions.completed & attracted.certain

@@ -67,8 +67,8 @@ NOT_SOUGHT = SearchedBandwidths(None, ())
 
 
 def find_margin(stage: Stage, attracting: bool) -> Margin | None:
-    """The last edge above the bandwidth of a stage that something attracts, or the next one below that of one that
-    nothing does; None within a factor of ten."""
+    """Find the edge of hunting of a stage, whose own motion plays no part: above its bandwidth the last edge, if
+    something is `attracting` it at that, else the next one below. None where there is none within a factor of ten."""
     return search_bandwidths(stage, attracting).margin
 
 

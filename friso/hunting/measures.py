@@ -70,7 +70,8 @@ class Measures:
 
 
 def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarray | None = None) -> RunOptions:
-    """How to run for these measures; turning points are kept from a little before the first that may count."""
+    """How to run stages whose runs are to be measured, to a relative tolerance; `threads` and `cancel` as in
+    `RunOptions`. Turning points are kept from a little before the first that may count."""
     return RunOptions(
         rtol=rtol,
         bands=BANDS,

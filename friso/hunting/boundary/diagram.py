@@ -66,8 +66,9 @@ def _in_doubt(special: Sequence[Sequence[LocatedPoint]], places: np.ndarray) -> 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS, progress: Progress = silent) -> Diagram:
-    """Follow every cycle that is found at stages evenly over the range: those that the return map suggests, the
-    symmetric one and asymmetric ones, and those that simulations end in, of any number of swings."""
+    """Follow over the range of one key every cycle that is found at `seeds` stages evenly over it: those that the
+    return map suggests, the symmetric one and asymmetric ones, and those that simulations end in, of any number of
+    swings. Orbits are closed to a relative tolerance."""
     places = np.linspace(0, 1, seeds)
     places = places[space.allowed(places[:, None])]
     stages = space.stages(places[:, None])

@@ -51,8 +51,9 @@ def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> 
 
 
 def distinct_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """The same of distinct peaks alone, whose valleys on both sides are at least `DISTINCT` deep; times [s] and values
-    [m] of the turning points, shape (runs, room), valid up to counts (runs,)."""
+    """Which turning points of runs are distinct peaks, shape (runs, room): counted peaks whose valleys on both sides
+    are at least `DISTINCT` deep. `times` [s] and `values` [m] of position minus reference have the shape (runs, room)
+    and are valid up to `counts`, shape (runs,)."""
     nothing = np.zeros(len(counts))
     return scan_turning_points(times, values, counts, nothing, nothing).distinct
 
