@@ -203,7 +203,7 @@ def test_benchmarks_take_of_hunting_its_interface_alone() -> None:
 
 def test_tests_of_inner_modules_of_hunting_are_marked() -> None:
     """Whatever uses a name from behind the interface, itself or by a function beside it, is marked as `inner`."""
-    paths = (ROOT / "tests").glob("test_*.py")
+    paths = (ROOT / "tests").rglob("test_*.py")
     assert [f"{path.name}: {name}" for path in sorted(paths) for name in unmarked_tests(syntax(path))] == []
 
 
