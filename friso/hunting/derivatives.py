@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import faster
-from friso.equations.variational import along
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.find import Cycles, find_cycles
 from friso.hunting.cycle.multipliers import multipliers
@@ -70,6 +69,8 @@ def flow_derivatives(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Where the flow of a stage takes a state (1, states) in a time [s] (1,), and the derivatives of that to the state
     and to flat keys: shapes (states,), (states, states) and (states, keys). None where a run was not completed."""
+    from friso.equations.variational import along  # SymPy takes 0.3 s to import
+
     size, count = state.shape[1], state.shape[1] + len(keys)
     several = stages.take(np.zeros(count, np.int64))
     beside = {along(name): np.eye(len(keys))[k] for k, name in enumerate(keys)}
