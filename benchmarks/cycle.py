@@ -12,12 +12,16 @@ from typing import Any
 import numpy as np
 
 from benchmarks.report import Goal, clock, print_goals, print_table, spread
-from friso.hunting.basin import displacements_that_hunt, moves_that_hunt, pushes_that_hunt
-from friso.hunting.boundary import Plane
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import symmetric_cycles
-from friso.hunting.cycle.hunting import hunting
-from friso.hunting.margin import margin
+from friso.hunting import (
+    Ensemble,
+    Plane,
+    displacements_that_hunt,
+    find_cycles,
+    find_margin,
+    hunting,
+    moves_that_hunt,
+    pushes_that_hunt,
+)
 from friso.stage import Stage
 from friso.studies.boundary import boundary
 from friso.studies.sweep import sweep
@@ -66,7 +70,7 @@ def _what_starts(stage: Stage) -> None:
     if verdict.target:
         for starts in (displacements_that_hunt, pushes_that_hunt, moves_that_hunt):
             starts(stage, verdict.target)
-    margin(stage, verdict.target is not None)
+    find_margin(stage, verdict.target is not None)
 
 
 def run_curve(repetitions: int) -> list[Goal]:
@@ -113,7 +117,7 @@ def run_accuracy() -> list[Goal]:
     rows, goals = [], []
     for name, changes in {**CASES, "locked, 4 Hz": {**LOCKED, "controller.crossover": "4 Hz"}}.items():
         stages = Ensemble.held(stage_of(changes).flat(), 1)
-        plain, tight = (symmetric_cycles(stages, rtol) for rtol in (1e-9, 1e-11))
+        plain, tight = (find_cycles(stages, rtol) for rtol in (1e-9, 1e-11))
         if not plain.closed[0]:
             continue
         off = [

@@ -176,25 +176,23 @@ def hunting_limiter() -> Values:
     import numpy as np
 
     from friso.engine.simulate import output_variables
-    from friso.hunting.cycle.ensemble import Ensemble
-    from friso.hunting.cycle.find import COARSE_RTOL, RTOL, symmetric_cycles
-    from friso.hunting.cycle.multipliers import RANGE, multipliers
+    from friso.hunting import CYCLE_RTOL, Ensemble, find_cycles, multipliers
     from friso.stage import load
 
     stages = Ensemble.held(
         load(ROOT / "examples" / "thesis_rig.toml").replace({"controller.crossover": "5 Hz"}).flat(), 1
     )
-    cycles = symmetric_cycles(stages)
+    cycles = find_cycles(stages)
     half, points = float(cycles.orbits.times[0]), 400_000
-    samples = stages.run(cycles.states, cycles.orbits.times, COARSE_RTOL / 100, interval=half / points).samples[0].T
+    samples = stages.run(cycles.states, cycles.orbits.times, 1e-8, interval=half / points).samples[0].T
     flat = {**stages.flat, "motion.displacement": float(stages.length[0]), "motion.duration": half}
     outputs = output_variables(stages.kernel, flat, samples, np.arange(samples.shape[1]) * (half / points))
     touching = np.abs(np.asarray(outputs["joint_deflection"][1])) > flat["joint.stroke"]
-    aside = np.geomspace(1e-6, RANGE / 2, 40)
+    aside = np.geomspace(1e-6, 0.005, 40)  # over 1 % of the distance
     aside = np.concatenate([-aside, aside]) * np.abs(cycles.states[0, stages.sticking])
     several = np.zeros(len(aside), dtype=np.int64)
     beside = replace(cycles.take(several).orbits, states=cycles.states + aside[:, None] * cycles.direction)
-    local = np.real(multipliers(stages.take(several), beside, RTOL).local[:, 0])
+    local = np.real(multipliers(stages.take(several), beside, CYCLE_RTOL).local[:, 0])
     return {
         "touches": float(np.count_nonzero(np.diff(touching.astype(int)) == 1)),
         "least": float(local.min()),

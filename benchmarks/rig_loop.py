@@ -29,7 +29,7 @@ from benchmarks.identify import HEAD, Answer, Count, goals, rows
 from benchmarks.report import Goal, print_goals, print_table
 from friso.equations.rail import friction_factors
 from friso.errors import InputError
-from friso.hunting.check import check
+from friso.hunting import check
 from friso.identification.method import Identification, identify
 from friso.stage import Stage, load
 from friso.stage.files import save

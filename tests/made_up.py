@@ -13,9 +13,7 @@ import xarray as xr
 
 from friso.equations.controllers.pid_gains import PidGains
 from friso.equations.controllers.van_dijk import VanDijk
-from friso.hunting import Cycle, Hunting, Judgement, Kick, Margin, MoveShare
-from friso.hunting.attractors import Target
-from friso.hunting.cycle.return_map import ReturnMap
+from friso.hunting import Cycle, Hunting, Judgement, Kick, Margin, MoveShare, ReturnMap, Target
 from friso.views.check.page import check_html
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.figure import Axis, Figure, Limit, Map, Markers, Panel, Series

@@ -10,8 +10,9 @@ from friso.engine.allowance import Exhausted, allowance
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import CALL, OPERATION, STEP, kernel
 from friso.equations.structure import structure
+from friso.hunting import CheckPart
 from friso.hunting.measures import measured_run
-from friso.hunting.verdict import BANDWIDTHS, STARTS, judge
+from friso.hunting.verdict import judge
 from friso.stage import Stage
 
 
@@ -62,6 +63,7 @@ def test_runs_beyond_an_allowance_are_refused(locked: Stage) -> None:
     runs_of(locked, 1)  # without one, as many as are wanted
 
 
+@pytest.mark.inner
 @pytest.mark.thorough
 def test_what_too_little_work_does_not_settle_is_not_certain(locked: Stage) -> None:
     """The stage of the thesis hunts: the more of the work is missing, the less is said, and nothing else."""
@@ -72,7 +74,7 @@ def test_what_too_little_work_does_not_settle_is_not_certain(locked: Stage) -> N
     assert full.margin
     assert full.margin.certain
     assert half.verdict == full.verdict == "hunts"
-    assert BANDWIDTHS in half.given_up
+    assert CheckPart.BANDWIDTHS in half.given_up
     assert half.margin is None or not half.margin.certain
     assert not none.hunting.certain
-    assert STARTS in half.given_up
+    assert CheckPart.STARTS in half.given_up

@@ -20,25 +20,39 @@ from benchmarks.truth.draws import draw
 from friso.engine.allowance import allowance
 from friso.engine.arrays import STATISTICS
 from friso.equations.roles import Role
-from friso.hunting import verdict
+from friso.hunting import (
+    Ensemble,
+    KeyRange,
+    Motions,
+    Space,
+    StageAttractors,
+    check_given,
+    diagram,
+    find_margin,
+    hunting,
+    judge_many,
+    judge_runs,
+    stuck,
+    verdict,
+    wait,
+)
 from friso.hunting.attractors import Attractors, attractors, starts, survey
 from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.attractors.rounds import Ends, Pending, lengthened
 from friso.hunting.attractors.survey import Survey, Swinging
 from friso.hunting.basin import ends_in, swings_seldom
-from friso.hunting.boundary import KeyRange, Space, diagram
-from friso.hunting.check import check_given
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import FARTHER_KICKS, GROWS, MAY_GROW, hunting
-from friso.hunting.cycle.rest import bent, stuck, wait
-from friso.hunting.margin import NOT_SOUGHT, margin, search_bandwidths
+from friso.hunting.cycle.hunting import FARTHER_KICKS, GROWS, MAY_GROW
+from friso.hunting.cycle.rest import bent
+from friso.hunting.margin import NOT_SOUGHT, search_bandwidths
 from friso.hunting.measures import measuring_options
-from friso.hunting.motions import Motions, run_motions
+from friso.hunting.motions import run_motions
 from friso.hunting.outward import ALONG, BRACKET, PRECISE, Beyond, Outward
-from friso.hunting.verdict import STILL_SWINGS, WORK, judge_many, judge_runs, own_motion
+from friso.hunting.verdict import STILL_SWINGS, WORK, own_motion
 from friso.stage import Stage
 from friso.studies.boundary_lines import REPELS, UNKNOWN, place_verdicts
 from friso.studies.sweep import sweep
+
+pytestmark = pytest.mark.inner
 
 LONG_WAIT = VARIANTS["free, parasitic"].replace(
     {
@@ -183,7 +197,7 @@ def test_an_orbit_that_attracts_to_the_end_of_the_range_has_no_end_in_it() -> No
 def test_the_edge_is_that_of_the_last_attractor(crossover: float) -> None:
     """Beyond its flip at 11.97 Hz the creeping stage has asymmetric cycles, of one period and of many, up to 12.95 Hz,
     where the symmetric one attracts again, until it folds: by brute force between 13.026 and 13.029 Hz."""
-    edge = margin(CREEPING.replace({"controller.crossover": f"{crossover} Hz"}), attracting=crossover < 13)
+    edge = find_margin(CREEPING.replace({"controller.crossover": f"{crossover} Hz"}), attracting=crossover < 13)
     assert edge is not None
     assert edge.crossover is not None
     assert edge.certain
@@ -231,7 +245,7 @@ SciPy at 17.8762 Hz, +-0.17156 mm (`benchmarks.truth --seed 1301 --number 72`)."
 
 @pytest.mark.thorough
 def test_beyond_the_end_of_a_cycle_others_attract_close_by() -> None:
-    edge = margin(DOUBLED, attracting=True)
+    edge = find_margin(DOUBLED, attracting=True)
     assert edge is not None
     assert edge.crossover is not None
     assert edge.crossover > 17.8762
@@ -635,7 +649,7 @@ def test_a_motion_that_swings_on_by_less_than_what_was_found_to_attract_is_not_a
     survey = attractors(Ensemble.held(flat, 1))
     larger = replace(survey, motions=tuple(replace(m, amplitude=10 * m.amplitude) for m in survey.motions))
     still_moving = Motions(np.ones(1, bool), np.zeros(1, bool), np.zeros(1), np.full(1, np.nan), np.full(1, np.nan))
-    assert judge_runs(flat, still_moving, larger, larger.decided, 1e-6).tolist() == ["hunts"]
+    assert judge_runs(flat, still_moving, StageAttractors.of(larger, larger.decided), 1e-6).tolist() == ["hunts"]
 
 
 def test_runs_that_have_not_swung_are_not_followed_for_thousands_of_swings_next() -> None:
@@ -685,9 +699,9 @@ def test_a_motion_that_cannot_be_followed_to_its_end_is_not_decided() -> None:
     survey = attractors(Ensemble.held(flat, 1))
     assert not survey.attracts[0]
     moving = Motions(np.ones(1, bool), np.zeros(1, bool), np.zeros(1), np.full(1, 1e-4), np.full(1, np.nan))
-    assert judge_runs(flat, moving, survey, survey.decided, 1e-6).tolist() == ["transient"]
+    assert judge_runs(flat, moving, StageAttractors.of(survey, survey.decided), 1e-6).tolist() == ["transient"]
     with allowance(1):
-        assert judge_runs(flat, moving, survey, survey.decided, 1e-6).tolist() == ["failed"]
+        assert judge_runs(flat, moving, StageAttractors.of(survey, survey.decided), 1e-6).tolist() == ["failed"]
 
 
 @pytest.mark.usefixtures("own_bandwidth")
@@ -706,7 +720,9 @@ def test_a_motion_that_swings_on_within_the_band_of_10_um_is_not_at_rest_for_sur
     larger = tuple(replace(motion, amplitude=10 * motion.amplitude) for motion in survey.motions)
     moved = run_motions(flat, 1, measuring_options(1e-6))
     for motions in ((), larger):
-        assert judge_runs(flat, moved, replace(survey, motions=motions), survey.decided, 1e-6).tolist() == ["failed"]
+        assert judge_runs(
+            flat, moved, StageAttractors.of(replace(survey, motions=motions), survey.decided), 1e-6
+        ).tolist() == ["failed"]
 
 
 def asymmetric_stage() -> Stage:

@@ -16,24 +16,24 @@ from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.equations.bandwidth import faster
 from friso.equations.motion import last_corner, standing
-from friso.hunting.attractors import Target
-from friso.hunting.basin import (
-    EDGE,
-    MOVES,
-    SHARES,
+from friso.hunting import (
+    SEARCH_LIMITS,
+    AttractionEnd,
+    Cycle,
+    Ensemble,
     Kick,
     MoveShare,
+    Target,
     displacements_that_hunt,
-    ends_in,
-    evenly,
+    find_margin,
+    hunting,
     moves_that_hunt,
     pushes_that_hunt,
 )
-from friso.hunting.cycle.ensemble import Ensemble, done
-from friso.hunting.cycle.hunting import Cycle, hunting
+from friso.hunting.basin import EDGE, MOVES, ends_in, evenly
+from friso.hunting.cycle.ensemble import done
 from friso.hunting.cycle.rest import pushed
-from friso.hunting.margin import FARTHEST, margin
-from friso.hunting.outward import AttractionEnd, Outward
+from friso.hunting.outward import Outward
 from friso.hunting.verdict import BY_CHANCE, own_motion
 from friso.stage import Stage
 
@@ -80,6 +80,7 @@ def hunts(chosen: Stage) -> bool:
     return bool(swing > 0.5)
 
 
+@pytest.mark.inner
 @RIGID
 def test_a_motion_that_a_hair_turns_is_not_certain() -> None:
     """At the very end of a window of kicks; not a hundredth beside it."""
@@ -124,6 +125,7 @@ def test_edges_of_the_windows_by_single_runs(edge: int) -> None:
     assert not hunts(released(place / inwards))
 
 
+@pytest.mark.inner
 @RIGID
 def test_mirrored_releases_start_hunting_as_well() -> None:
     several = np.geomspace(1e-3, 0.1, 32)
@@ -136,6 +138,7 @@ def test_mirrored_releases_start_hunting_as_well() -> None:
     assert False in one
 
 
+@pytest.mark.inner
 @RIGID
 def test_pushes_that_start_hunting() -> None:
     """2 % inside the first window a push hunts, 2 % outside it does not: by runs from states by hand."""
@@ -162,6 +165,7 @@ def test_nothing_that_starts_hunting() -> None:
 MOVING = stage(there_and_back(), friction=lugre(2), controller=van_dijk("8 Hz"))
 
 
+@pytest.mark.inner
 @RIGID
 def test_share_of_moves_is_reproducible() -> None:
     """The same draws each time: the same numbers."""
@@ -193,6 +197,7 @@ def test_a_run_that_goes_on_where_its_reference_stands_is_the_whole_run(kind: st
     assert np.max(np.abs(on - ends(flat, first + rest))[:, : scales.shape[1]] / scales) < 1e-5
 
 
+@pytest.mark.inner
 @RIGID
 def test_moves_by_single_runs() -> None:
     """The count is that of single runs of the same draws; eight of them are simulated, hunting and resting ones."""
@@ -217,7 +222,7 @@ def test_moves_that_overlap_are_not_drawn() -> None:
     soon = MOVING.replace({"motion.return_at": "0.08 s"})
     result = moves_that_hunt(soon, target())
     assert result is not None
-    assert result.times == pytest.approx([SHARES[0] * 0.03, 0.04])
+    assert result.times == pytest.approx([SEARCH_LIMITS.move_shares[0] * 0.03, 0.04])
 
 
 @RIGID
@@ -254,7 +259,7 @@ def test_gains_hunt_like_the_tuned_controller_they_equal() -> None:
     assert result.amplitude == pytest.approx(cycle().amplitude, rel=1e-7)
     assert result.multiplier == pytest.approx(cycle().multiplier, rel=1e-4)
     assert result.growth == pytest.approx(cycle().growth, rel=1e-4)
-    edge, tuned = margin(chosen, attracting=True), margin(rigid(8), attracting=True)
+    edge, tuned = find_margin(chosen, attracting=True), find_margin(rigid(8), attracting=True)
     assert edge is not None
     assert tuned is not None
     assert edge.crossover is None
@@ -274,7 +279,7 @@ def test_faster_gains_are_those_of_the_tuned_controller_at_a_higher_crossover() 
 )
 def test_cycle_attracts_up_to_the_margin_and_not_beyond(chosen: Stage) -> None:
     """At 0.98 times the factor a cycle attracts, at 1.02 times none does; by hunting(), from stage files."""
-    edge = margin(chosen, attracting=True)
+    edge = find_margin(chosen, attracting=True)
     assert edge is not None
     for share, attracting in ((0.98, 1), (1.02, 0)):
         assert len(hunting(at(chosen, share * edge.factor)).attracting) == attracting
@@ -288,20 +293,21 @@ def at(chosen: Stage, factor: float) -> Stage:
     return chosen.replace({key: f"{float(scaled[key])!r} {unit}" for key, unit in texts.items()})
 
 
+@pytest.mark.inner
 @RIGID
 def test_an_edge_just_before_the_lowest_bandwidth_that_attracts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Within what it is known to: it was searched for among the bandwidths up to it, of which there are none then."""
     monkeypatch.setattr(Outward, "end", lambda _, at, *others: AttractionEnd(0.9999 * at, 1.01 * at, True, 5e-4))
-    edge = margin(rigid(95), attracting=False)
+    edge = find_margin(rigid(95), attracting=False)
     assert edge is not None
-    assert edge.factor == pytest.approx(0.9999 / FARTHEST)
+    assert edge.factor == pytest.approx(0.9999 / SEARCH_LIMITS.bandwidth_factor)
 
 
 @RIGID
 @pytest.mark.thorough
 def test_margin_from_above_is_that_from_below() -> None:
     """Whether the stage hunts or not, the edge in between is the same."""
-    below, above = margin(rigid(8), attracting=True), margin(rigid(14), attracting=False)
+    below, above = find_margin(rigid(8), attracting=True), find_margin(rigid(14), attracting=False)
     assert below is not None
     assert above is not None
     assert below.crossover == pytest.approx(above.crossover, rel=1e-5)
@@ -311,15 +317,17 @@ def test_margin_from_above_is_that_from_below() -> None:
 @pytest.mark.parametrize(("crossover", "attracting"), [(0.9, True), (110, False)])
 def test_no_margin_within_a_factor_of_ten(crossover: float, attracting: bool) -> None:
     """The edge at 9.77 Hz is too far off to be looked for."""
-    assert max(9.77 / crossover, crossover / 9.77) > FARTHEST
-    assert margin(rigid(crossover), attracting) is None
+    assert max(9.77 / crossover, crossover / 9.77) > SEARCH_LIMITS.bandwidth_factor
+    assert find_margin(rigid(crossover), attracting) is None
 
 
+@pytest.mark.inner
 def test_edges_are_sought_finer_than_they_are_checked() -> None:
     """The checks above at 2 % mean something only while edges are found to 1 %."""
     assert EDGE <= 0.01
 
 
+@pytest.mark.inner
 def test_a_stage_that_rests_just_below_break_away_is_not_shaken_loose_by_rounding() -> None:
     """Behind a backlash the motor stands on its flank with 99.94 % of the static friction once the error is gone: for
     ever, at tolerances of 1e-7 to 1e-9; at 1e-6 the stage broke away again."""

@@ -10,12 +10,11 @@ from refusals import Refused
 from variants import VARIANTS
 
 import friso
-from friso.hunting.boundary import Diagram, KeyRange, LocatedPoint, Plane, Space, diagram, plane
-from friso.hunting.boundary.branch import REACHED, Point, Tracer, continued
+from friso.hunting import Diagram, Ensemble, KeyRange, LocatedPoint, Plane, Point, Space, diagram, plane
+from friso.hunting.boundary.branch import REACHED, Tracer, continued
 from friso.hunting.boundary.crossing import crossing, turn
 from friso.hunting.boundary.diagram import each_once
 from friso.hunting.boundary.locate import changes, corrected
-from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import symmetric_cycles
 from friso.stage import Stage
 from friso.studies.boundary_lines import stability_changes
@@ -54,6 +53,7 @@ def test_one_rigid_mass_flips_at_9_77_hz_and_folds_at_16_2_hz(over_crossover: Di
     assert fold[1].point.multiplier == pytest.approx(1, abs=1e-3)
 
 
+@pytest.mark.inner
 def test_what_overlapping_branches_meet_is_listed_once(over_crossover: Diagram) -> None:
     """It is as uncertain as they differ; at another place, or of another cycle, it is another point."""
     (_, fold), *_ = special(over_crossover, symmetric=True)["fold"]
@@ -92,6 +92,7 @@ def test_a_hundredth_of_a_key_does_not_depend_on_the_range(swept: KeyRange, valu
     assert slanted(2 * place) == pytest.approx(2 * swept.hundredth(place))
 
 
+@pytest.mark.inner
 def test_a_crossing_of_values_that_scatter_is_told_with_an_honest_reserve() -> None:
     """Straight lines through values that scatter: the reserve mostly holds the true place; what is not known within
     half of the range is not told. Of three crossings the last is told, as uncertain as they are apart."""
@@ -111,6 +112,7 @@ def test_a_crossing_of_values_that_scatter_is_told_with_an_honest_reserve() -> N
     assert (thrice.place, thrice.reserve) == (pytest.approx(0.004), pytest.approx(0.008))
 
 
+@pytest.mark.inner
 def test_a_branch_whose_places_scatter_turns_within_its_reserve() -> None:
     """Parabolas through places that scatter: the reserve mostly holds the true one; a line does not turn."""
     draws, lengths = np.random.default_rng(1), np.linspace(-0.03, 0.03, 8)
@@ -176,6 +178,7 @@ def test_errors_are_honest(over_crossover: Diagram) -> None:
                 assert over_crossover.error(result) < 1e-4
 
 
+@pytest.mark.inner
 def test_the_branch_is_what_is_found_at_single_stages(over_crossover: Diagram) -> None:
     (symmetric,) = (branch for branch in over_crossover.branches if branch.sign < 0)
     part = [point for point in symmetric.points if 0 < point.place < 0.35][::6]
@@ -186,6 +189,7 @@ def test_the_branch_is_what_is_found_at_single_stages(over_crossover: Diagram) -
     assert alone.multiplier == pytest.approx([point.multiplier for point in part], rel=1e-3)
 
 
+@pytest.mark.inner
 @pytest.mark.thorough
 def test_a_branch_does_not_depend_on_where_it_is_begun(over_crossover: Diagram) -> None:
     """The fold is reached from 4 Hz as from 15 Hz."""
@@ -200,6 +204,7 @@ def test_a_branch_does_not_depend_on_where_it_is_begun(over_crossover: Diagram) 
     assert over_crossover.value(folds[0]) == pytest.approx(over_crossover.value(folds[1]), abs=1e-3)
 
 
+@pytest.mark.inner
 @pytest.mark.parametrize("poison", [np.nan, 0.0, 1.0, 1e6])
 def test_a_wrong_jacobian_does_not_end_a_walk(over_crossover: Diagram, poison: float) -> None:
     """From 9.6 Hz to the flip, with one to begin with that is none, singular, or of something else."""
@@ -216,6 +221,7 @@ def test_a_wrong_jacobian_does_not_end_a_walk(over_crossover: Diagram, poison: f
     assert over_crossover.value(points[-1].place) == pytest.approx(9.78, abs=0.2)
 
 
+@pytest.mark.inner
 def test_a_branch_that_turns_back_does_not_reach_the_farthest_place(over_crossover: Diagram) -> None:
     """The pair from 9.5 Hz on: it meets the symmetric cycle at 9.77 Hz, and goes on as its own mirror image."""
     space = over_crossover.space
@@ -229,6 +235,7 @@ def test_a_branch_that_turns_back_does_not_reach_the_farthest_place(over_crossov
     assert "symmetric" in reason
 
 
+@pytest.mark.inner
 def test_a_flip_is_not_where_a_wrong_slope_says(over_crossover: Diagram) -> None:
     """Begun 0.2 % beside it, with a slope by which it is there already."""
     space = over_crossover.space
@@ -249,6 +256,7 @@ def over_friction() -> Plane:
     return plane(Space.of(AT_8_HZ, axes), nodes=5)
 
 
+@pytest.mark.inner
 @pytest.mark.thorough
 def test_every_curve_lies_where_the_multiplier_says(over_friction: Plane) -> None:
     """Flips of the symmetric cycle: 1 % to either side of the curve the cycle attracts on one and repels on the other,
@@ -286,6 +294,7 @@ def at_1_n(plane: Plane, curve: Any) -> list[float]:
     return [float(static[i] - coulomb[i] * (static[i + 1] - static[i]) / (coulomb[i + 1] - coulomb[i])) for i in at]
 
 
+@pytest.mark.inner
 def test_multipliers_on_a_grid_and_the_curve_agree_within_a_cell(over_friction: Plane) -> None:
     """Of the symmetric cycle, whether it attracts or not."""
     static, coulomb = np.meshgrid(np.linspace(1.0, 6.0, 21), np.linspace(0.3, 2.5, 21), indexing="ij")
@@ -367,6 +376,7 @@ def test_what_has_no_boundary_is_refused(stage: Stage, axes: dict[str, str], ref
         friso.boundary(stage, axes)
 
 
+@pytest.mark.inner
 def test_a_branch_goes_on_along_a_parabola(over_crossover: Diagram) -> None:
     points = max((branch.points for branch in over_crossover.branches), key=len)[2:-2]  # its ends may stand there twice
     off: list[list[float]] = []

@@ -15,21 +15,22 @@ from refusals import Refused, Wording
 from snapshots import Snapshots
 
 from friso.answers.output_folder import MARKER
-from friso.hunting.boundary import (
+from friso.hunting import (
     Bifurcation,
     Branch,
     Curve,
+    Cycles,
     Diagram,
+    Ensemble,
     KeyRange,
     LocatedPoint,
     Plane,
     Point,
     Space,
     Spot,
+    find_cycles,
     plane,
 )
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import NOT_CLOSED, Cycles, symmetric_cycles
 from friso.stage import Stage
 from friso.studies.boundary_lines import corner_verdicts, end_verdicts, lines, plane_edge
 from friso.views.boundary.figures import LOST, NODES, boundary_figure
@@ -145,7 +146,7 @@ def test_the_curve_of_two_keys_separates_what_attracts(
             "masses.cart": np.tile(points[:, 1] / 1000, 2),
         }
     )
-    result = symmetric_cycles(Ensemble.held(flat, 2 * len(points)))
+    result = find_cycles(Ensemble.held(flat, 2 * len(points)))
     assert (np.split(np.abs(result.multiplier), 2)[0] < 1).all()
     assert (np.split(np.abs(result.multiplier), 2)[1] > 1).all()
 
@@ -186,7 +187,7 @@ def cycles(multipliers: Sequence[float], sign: float = -1.0) -> Cycles:
     """Made-up cycles of 1 mm and 2 s; NaN where there is none, infinite where the orbit could not be closed."""
     multiplier = np.array(multipliers)
     result, count = np.isfinite(multiplier), len(multiplier)
-    reasons = np.where(np.isinf(multiplier), NOT_CLOSED, "").astype(object)
+    reasons = np.where(np.isinf(multiplier), "not closed", "").astype(object)
     return Cycles(
         sign,
         1 if sign < 0 else 2,

@@ -32,8 +32,7 @@ from friso.frequency.describing.function import describing
 from friso.frequency.describing.waveform import OneStateLaw
 from friso.frequency.members import member
 from friso.frequency.parts import plant
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import hunting_cycles
+from friso.hunting import Ensemble, find_cycles
 from friso.identification.output_error.parameters import fit_parameters
 from friso.stage.tables import friction_law
 from friso.virtual_rig.run import failures, run
@@ -57,7 +56,7 @@ def test_cycles_against_simulation_and_scipy(law: str) -> None:
     """Amplitude by a long run at two tolerances, and half a period by Radau on the law written by hand."""
     hunting = HUNTING[law]
     stages = Ensemble.held(hunting.flat(), 1)
-    cycles = hunting_cycles(stages)
+    cycles = find_cycles(stages)
     assert cycles.closed[0], cycles.reasons[0]
     period, amplitude = float(cycles.period[0]), float(cycles.amplitude[0])
     assert abs(cycles.multiplier[0]) < 1

@@ -28,8 +28,8 @@ from friso.equations.structure import controller_form
 from friso.frequency import crossover
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases
-from friso.hunting.cycle.hunting import Hunting
-from friso.hunting.cycle.hunting import hunting as hunting_of
+from friso.hunting import Hunting
+from friso.hunting import hunting as hunting_of
 from friso.identification.experiments.moves import identify_moves
 from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.common import record

@@ -8,8 +8,8 @@ from variants import VARIANTS
 
 import friso
 from friso.answers.check import CheckAnswer
+from friso.hunting import check_given
 from friso.hunting.measures import measured_run
-from friso.hunting.verdict import judge
 from friso.stage import Stage
 from friso.studies.sweep import sweep
 
@@ -129,8 +129,8 @@ def test_a_stage_stuck_off_its_reference_does_not_hunt(rtol: float, displacement
 def test_a_run_too_short_for_the_peak_count_hunts_all_the_same(rig: Stage) -> None:
     """The cycle attracts, and the move ends in it, however short the run."""
     short = rig.replace({"motion.duration": "9.9 s", "joint.locked": True})
-    ran = measured_run(short)
-    assert (judge(short, ran, 1e-6).verdict, ran.peaks[0]) == ("hunts", 0)
+    case = check_given(short, 1e-6)
+    assert (case.verdict, case.peaks) == ("hunts", 0)
 
 
 def test_the_edge_of_hunting_of_the_thesis_rig(checked: CheckAnswer) -> None:
@@ -156,7 +156,7 @@ def test_the_edge_of_hunting_of_the_thesis_rig(checked: CheckAnswer) -> None:
 def test_verdicts_by_the_cycle(rig: Stage, crossover: str, joint: str, verdict: str, attracts: bool) -> None:
     """Just above the edge a move still swings for minutes; below that of the free rig it takes a kick to hunt."""
     stage = rig.replace({"controller.crossover": crossover, "joint.locked": joint == "locked"})
-    judgement = judge(stage, measured_run(stage), 1e-6)
+    judgement = check_given(stage, 1e-6).judgement
     assert judgement.verdict == verdict
     assert judgement.cycle is not None
     assert judgement.cycle.attracts == attracts

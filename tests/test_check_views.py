@@ -33,12 +33,8 @@ from patched import patched
 from refusals import Wording
 from snapshots import Snapshots
 
-from friso.hunting import Judgement, Kick, Margin
+from friso.hunting import AttractionEnd, BandwidthWindow, CheckPart, Judgement, Kick, LowerGains, Margin, Swing
 from friso.hunting.criteria import Verdict
-from friso.hunting.cycle.hunting import Swing
-from friso.hunting.loop import LowerGains
-from friso.hunting.outward import AttractionEnd, BandwidthWindow
-from friso.hunting.verdict import BANDWIDTHS, LOWER, STARTS
 from friso.version import VERSION
 from friso.views import pages
 from friso.views.check.cases import COLOURS, ShownCase, shown_cases
@@ -434,18 +430,18 @@ def test_kicks_that_were_given_up_are_told(wording: Wording) -> None:
 
 def test_kicks_that_start_hunting_are_told_where_others_were_given_up(wording: Wording) -> None:
     none = Kick((), (1e-5, 0.1), unknown=3)
-    silent = hunts(verdict="bistable", displacement=none, push=none, moves=None, given_up=(STARTS,))
+    silent = hunts(verdict="bistable", displacement=none, push=none, moves=None, given_up=(CheckPart.STARTS,))
     wording(sentence(silent))
-    assert "1.72 mm" in sentence(hunts(verdict="bistable", push=none, moves=None, given_up=(STARTS,)))
+    assert "1.72 mm" in sentence(hunts(verdict="bistable", push=none, moves=None, given_up=(CheckPart.STARTS,)))
 
 
 def test_what_a_search_left_open_depends_on_whether_the_edge_is_sure() -> None:
-    sure = hunts(given_up=(BANDWIDTHS,))
+    sure = hunts(given_up=(CheckPart.BANDWIDTHS,))
     assert sure.margin is not None
     unsure = replace(sure, margin=replace(sure.margin, certain=False))
     assert "other bandwidths" in sentence(sure)
     assert "other bandwidths" not in sentence(unsure)
-    everywhere = sentence(replace(sure, margin=None, given_up=(LOWER,)))
+    everywhere = sentence(replace(sure, margin=None, given_up=(CheckPart.LOWER_BANDWIDTHS,)))
     assert "still possible at 10 times" in everywhere
     assert "lower bandwidths" in everywhere
 

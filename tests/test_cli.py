@@ -17,7 +17,6 @@ from refusals import Refused
 import friso
 from friso.cli.app import _failed
 from friso.cli.progress import ProgressBar
-from friso.hunting.cycle.find import NO_RETURN
 from friso.progress import WORK_CLOCK
 from friso.system import LIBRARIES
 
@@ -141,7 +140,7 @@ def test_check_json_has_the_cycle_and_what_starts_it(checked: dict[str, Any]) ->
     assert locked["kick"]["velocity_m_per_s"][0][0] == pytest.approx(0.0231, rel=0.02)
     assert locked["moves"] == {"drawn": 128, "hunting": pytest.approx(111, abs=2)}
     assert (free["cycle"], free["cycles"], free["kick"], free["moves"]) == (None, 0, None, None)
-    assert free["reason"] == NO_RETURN
+    assert free["reason"] == "from every distance the stage swings back less far than it started"
     assert free["settled_after_s"] == free["settling_time_10um_s"]
 
 

@@ -17,11 +17,13 @@ import friso
 from friso.engine.batch import run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
+from friso.hunting import check_given, judge_many
 from friso.hunting.criteria import (
     ATTRACTED,
     BAND,
     COUNTED_ABOVE,
     COUNTED_AFTER,
+    DISTINCT,
     OUTCOMES,
     SEPARATION,
     VERDICTS,
@@ -34,10 +36,7 @@ from friso.hunting.criteria import (
     peaks_in_traces,
     verdicts,
 )
-from friso.hunting.criteria.peak_count import DISTINCT
-from friso.hunting.measures import measure_runs, measured_run, measuring_options
-from friso.hunting.turns import scan_turning_points
-from friso.hunting.verdict import judge, judge_many
+from friso.hunting.measures import measure_runs, measuring_options, scan_turning_points
 from friso.stage import Stage
 from friso.studies.rig.moves_on_rails import turning_points
 from friso.views.simulate.words import conclusion
@@ -86,7 +85,7 @@ def test_check_is_the_batch_of_one(rig: Stage) -> None:
     locked = rig.replace({"joint.locked": True})
     flat = locked.flat({"controller.crossover": crossovers})
     stages = [locked.replace({"controller.crossover": f"{f} Hz"}) for f in crossovers]
-    alone = [judge(stage, measured_run(stage), 1e-6).verdict for stage in stages]
+    alone = [check_given(stage, 1e-6).verdict for stage in stages]
     assert judge_many(flat, 4, 1e-6).tolist() == alone
     assert judge_many(locked.flat({"controller.crossover": crossovers[:1]}), 1, 1e-6).tolist() == alone[:1]
     assert set(alone) == {"hunts", "transient", "settles"}

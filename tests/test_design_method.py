@@ -28,7 +28,7 @@ from friso.design_method.verification import RTOL, MachineOutcomes, move_machine
 from friso.equations.breakaway import least_breakaway
 from friso.frequency.crossover import limits, settled_margin
 from friso.frequency.tuning import Tuning
-from friso.hunting.margin import margin
+from friso.hunting import find_margin
 from friso.hunting.measures import measured_run
 from friso.leaf_springs import beams as beams_module
 from friso.leaf_springs import closed_forms
@@ -213,7 +213,7 @@ def test_edges_are_those_that_check_finds(base: Stage) -> None:
     whole = friso.load(EXAMPLES / "thesis_rig.toml").replace({"joint": None, "parasitic": None})
     for k in range(2):
         stage = whole.with_numbers({**several.of(k), "controller.crossover": 5.0})
-        edge = margin(stage, attracting=True)
+        edge = find_margin(stage, attracting=True)
         assert edge is not None
         assert edges.edges[k] == pytest.approx(edge.crossover, rel=0.02)
     assert edges.highest == edges.edges.max()

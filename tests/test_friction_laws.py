@@ -18,8 +18,8 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.frequency.friction import steady_force
+from friso.hunting import Ensemble
 from friso.hunting.attractors import Attractors
-from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import NARROW_PLAY, beyond_the_survey, small_cycles_possible
 from friso.stage.tables import FRICTION
 
@@ -52,6 +52,7 @@ def test_friction_in_a_steady_motion_is_that_of_the_linear_systems(name: str) ->
     assert friction == pytest.approx(np.concatenate([forward, -backward]), rel=1e-12)
 
 
+@pytest.mark.inner
 @pytest.mark.parametrize(("share", "possible"), [(0.9995, True), (0.6, False)])
 def test_cycles_too_small_to_be_looked_for_are_possible_with_any_law_that_falls_a_little(
     share: float, possible: bool
@@ -60,6 +61,7 @@ def test_cycles_too_small_to_be_looked_for_are_possible_with_any_law_that_falls_
     assert small_cycles_possible(Ensemble.held(flat, 1)) == possible
 
 
+@pytest.mark.inner
 @pytest.mark.parametrize(("play", "why"), [("200 um", ""), ("20 um", ""), ("100 nm", NARROW_PLAY)])
 def test_what_a_backlash_deflects_the_loop_by_is_no_friction_that_falls(play: str, why: str) -> None:
     """Beside friction that falls by two thirds, over speeds far above those of small swings; in a backlash of less than

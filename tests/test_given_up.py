@@ -14,27 +14,35 @@ from variants import VARIANTS
 
 from friso.engine.allowance import Exhausted, allowance, current_allowance
 from friso.engine.arrays import Status
-from friso.hunting import basin, verdict
-from friso.hunting.attractors import Attractors, Target
-from friso.hunting.basin import Kick, MoveShare, displacements_that_hunt
-from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths
+from friso.hunting import (
+    AttractionEnd,
+    BandwidthWindow,
+    CheckPart,
+    Judgement,
+    Kick,
+    Margin,
+    MoveShare,
+    Target,
+    basin,
+    displacements_that_hunt,
+    verdict,
+)
+from friso.hunting.attractors import Attractors
+from friso.hunting.margin import NOT_SOUGHT, SearchedBandwidths
 from friso.hunting.measures import measuring_options
-from friso.hunting.outward import AttractionEnd, BandwidthWindow
 from friso.hunting.verdict import (
-    BANDWIDTHS,
     BY_CHANCE,
     CHANGED,
     LEFT_OVER,
-    LOWER,
     RUNS_AWAY,
-    STARTS,
     SWINGS_ON,
     UNCHECKED,
     UNFOLLOWED,
-    Judgement,
     judge,
 )
 from friso.stage import Stage
+
+pytestmark = pytest.mark.inner
 
 STAGE = VARIANTS["rigid"]
 TARGET = Target(1e-3, 1.6, 100.0, 25.0)
@@ -185,10 +193,10 @@ def test_no_edge_is_more_certain_than_the_verdict_or_than_large_motions_are_boun
     ],
 )
 def test_no_kick_or_move_starts_hunting_only_if_all_were_run(starts: Any, certain: bool) -> None:
-    assert (STARTS in judged(starts=starts).given_up) == (not certain)
+    assert (CheckPart.STARTS in judged(starts=starts).given_up) == (not certain)
 
 
-@pytest.mark.parametrize(("to_the_top", "left"), [(False, BANDWIDTHS), (True, LOWER)])
+@pytest.mark.parametrize(("to_the_top", "left"), [(False, CheckPart.BANDWIDTHS), (True, CheckPart.LOWER_BANDWIDTHS)])
 def test_of_a_stage_that_hunts_at_all_higher_bandwidths_the_lower_ones_alone_are_given_up(
     to_the_top: bool, left: str
 ) -> None:

@@ -17,8 +17,7 @@ from friso.errors import InputError
 from friso.frequency.describing.function import describing
 from friso.frequency.members import member
 from friso.frequency.parts import plant
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import hunting_cycles
+from friso.hunting import Ensemble, find_cycles
 from friso.studies.laws.conversion import measure_friction
 
 pytestmark = pytest.mark.xdist_group("gms")
@@ -120,7 +119,7 @@ def test_an_element_bent_against_the_motion_goes_on_sticking() -> None:
 
 def test_the_cycle_against_simulation_and_scipy_with_events() -> None:
     stages = Ensemble.held(HUNTS.flat(), 1)
-    cycles = hunting_cycles(stages)
+    cycles = find_cycles(stages)
     assert cycles.closed[0], cycles.reasons[0]
     ends = []
     for rtol in (1e-7, 1e-9):

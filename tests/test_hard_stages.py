@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from friso.equations.structure import structure
-from friso.hunting.verdict import judge_many
+from friso.hunting import judge_many
 from friso.stage import Stage
 
 ENTRIES = tomllib.loads(Path(__file__).with_name("hard_stages.toml").read_text(encoding="utf-8"))["stages"]

@@ -16,8 +16,7 @@ from friso.frequency.describing.function import dynamic_stiffness
 from friso.frequency.describing.loop import receptance
 from friso.frequency.describing.multi import DONE, OPEN, REST, HarmonicSeries, balanced
 from friso.frequency.describing.waveform import OneStateLaw, friction_answer
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import hunting_cycles
+from friso.hunting import Ensemble, find_cycles
 from friso.stage import Stage
 from friso.studies.harmonic_balance import harmonic_balance
 
@@ -253,7 +252,7 @@ def test_intervals_are_fine_enough() -> None:
 def one_period(one: Stage) -> tuple[np.ndarray, np.ndarray]:
     """A period of hunting, sampled: times [s] and positions [m]."""
     stages = Ensemble.held(one.flat(), 1)
-    cycle = hunting_cycles(stages)
+    cycle = find_cycles(stages)
     run = stages.run(cycle.states, cycle.period, 1e-9, interval=cycle.period[0] / 8192)
     times = np.arange(8192) * cycle.period[0] / 8192
     return times, run.samples[0, :8192, stages.sticking]

@@ -5,14 +5,13 @@ import pytest
 from beyond_flip import STEEP
 
 from friso.equations.bandwidth import faster
+from friso.hunting import Ensemble, KeyRange, Space, diagram, find_cycles, stuck
 from friso.hunting.attractors.survey import of_cycles
-from friso.hunting.boundary import KeyRange, Space, diagram
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.cycle.held import RANGE, held_by
-from friso.hunting.cycle.rest import stuck
 from friso.hunting.outward import Outward
 from friso.stage import Stage
+
+pytestmark = pytest.mark.inner
 
 BEFORE = np.linspace(-RANGE, RANGE, 61)
 
@@ -68,7 +67,7 @@ def test_a_flip_with_a_limiter_that_chatters_is_known_as_far_as_its_multipliers_
     for crossover in (5.45, 5.5):
         at = crossover / flat["controller.crossover"]
         stages = Ensemble.held(faster(flat, np.array([at])), 1)
-        (orbit,) = of_cycles(np.arange(1), hunting_cycles(stages), stages.sticking)
+        (orbit,) = of_cycles(np.arange(1), find_cycles(stages), stages.sticking)
         factor, _, end, reserve = outward.followed(at, orbit)
         flips.append((end, factor * flat["controller.crossover"], reserve))
     for end, flip, reserve in flips:
@@ -89,7 +88,7 @@ def test_a_fold_with_a_limiter_that_chatters_is_where_its_branch_turns_back(rig:
     leaning = rig.replace({**joint, "friction.asymmetry": 0.1, "controller.crossover": "3.63 Hz"})
     flat = leaning.flat()
     stages = Ensemble.held(flat, 1)
-    (orbit,) = of_cycles(np.arange(1), hunting_cycles(stages), stages.sticking)
+    (orbit,) = of_cycles(np.arange(1), find_cycles(stages), stages.sticking)
     factor, _, end, reserve = Outward(flat, 10.0).followed(1.0, orbit)
     assert end == "found"
     assert 3.6468 < 3.63 * factor < 3.647

@@ -12,7 +12,9 @@ from typer.core import TyperGroup
 
 import friso
 import friso_thesis
+from friso import hunting
 from friso.cli.app import command_line
+from friso.hunting import criteria, measures
 
 PACKAGE, THESIS = (Path(str(package.__file__)).parent for package in (friso, friso_thesis))
 ROOT = Path(__file__).parents[1]
@@ -55,6 +57,9 @@ RECIPES = {
 }
 """What CONTRIBUTING.md tells how to add, and the folder that takes its one file."""
 
+
+INTERFACE = {module.__name__: {*module.__all__} for module in (hunting, criteria, measures)}
+"""What friso.hunting offers to other floors, to benchmarks, and to tests that are not of its inner modules."""
 
 NARRATORS = {"found", "known", "told", "given", "each", "it"}
 """Names that do not say what a value is."""
@@ -191,3 +196,63 @@ def test_the_drawing_of_the_house_is_of_what_there_is() -> None:
     folders = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").exists()}
     modules = {path.stem for path in PACKAGE.glob("[a-z]*.py")}
     assert folders | modules == drawn
+
+
+def test_benchmarks_take_of_hunting_its_interface_alone() -> None:
+    behind = {path.name: inner_names(syntax(path)) for path in (ROOT / "benchmarks").rglob("*.py")}
+    assert {name: names for name, names in behind.items() if names} == {}
+
+
+def test_tests_of_inner_modules_of_hunting_are_marked() -> None:
+    """Whatever uses a name from behind the interface, itself or by a function beside it, is marked as `inner`."""
+    paths = (ROOT / "tests").rglob("test_*.py")
+    assert [f"{path.name}: {name}" for path in sorted(paths) for name in unmarked_tests(syntax(path))] == []
+
+
+def syntax(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def inner_names(tree: ast.Module) -> set[str]:
+    """The names under which a module has something from behind the interface of friso.hunting."""
+    behind: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("friso.hunting."):
+            offered = INTERFACE.get(node.module or "", set()) | {"criteria", "measures"}
+            behind |= {alias.asname or alias.name for alias in node.names if alias.name not in offered}
+        elif isinstance(node, ast.Import):
+            behind |= {alias.name for alias in node.names if is_inner(alias.name)}
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and is_inner(node.value):
+            behind.add(node.value)  # patched by its name
+    return behind
+
+
+def is_inner(path: str) -> bool:
+    """Whether a dotted path leads behind the interface."""
+    module = re.match(r"friso\.hunting\.\w+(?=[\w.]*$)", path)
+    return module is not None and module[0] not in INTERFACE
+
+
+def unmarked_tests(tree: ast.Module) -> list[str]:
+    """The tests of a module that look behind the interface and are not marked."""
+    named = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    named |= {target.id: node for node in tree.body if isinstance(node, ast.Assign) for target in node.targets
+              if isinstance(target, ast.Name)}  # fmt: skip
+    if "pytestmark" in named and "mark.inner" in ast.unparse(named["pytestmark"]):
+        return []
+    behind, before = inner_names(tree), -1
+    while len(behind) > before:
+        before = len(behind)
+        behind |= {name for name, node in named.items() if mentions(node, behind)}
+    tests = [named[name] for name in named if name.startswith("test_") and name in behind]
+    return [test.name for test in tests if isinstance(test, ast.FunctionDef) and "mark.inner" not in
+            " ".join(map(ast.unparse, test.decorator_list))]  # fmt: skip
+
+
+def mentions(node: ast.AST, names: set[str]) -> bool:
+    """Whether a part of a module mentions one of these names, which may be dotted paths."""
+    return any(
+        (isinstance(part, ast.Name | ast.Attribute) and ast.unparse(part) in names)
+        or (isinstance(part, ast.Constant) and str(part.value) in names and is_inner(str(part.value)))
+        for part in ast.walk(node)
+    )

@@ -17,14 +17,20 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.bandwidth import faster
 from friso.equations.structure import structure
-from friso.hunting.check import check_given
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import NO_PAIR, NO_RETURN, RTOL, asymmetric_cycles, hunting_cycles, symmetric_cycles
-from friso.hunting.cycle.hunting import Cycle, Hunting, hunting
+from friso.hunting import (
+    CYCLE_RTOL,
+    Cycle,
+    Ensemble,
+    Hunting,
+    check_given,
+    find_cycles,
+    find_margin,
+    hunting,
+    judge_many,
+)
+from friso.hunting.cycle.find import NO_PAIR, NO_RETURN, asymmetric_cycles, symmetric_cycles
 from friso.hunting.cycle.return_map import return_map
 from friso.hunting.cycle.shooting import close
-from friso.hunting.margin import margin
-from friso.hunting.verdict import judge_many
 from friso.stage import Stage
 from friso.studies.sweep import sweep
 
@@ -54,11 +60,11 @@ def rig(crossover: float, joint: str) -> Stage:
 
 
 @cache
-def hunting_of(chosen: Stage, rtol: float = RTOL) -> Hunting:
+def hunting_of(chosen: Stage, rtol: float = CYCLE_RTOL) -> Hunting:
     return hunting(chosen, rtol)
 
 
-def only(chosen: Stage, rtol: float = RTOL) -> Cycle:
+def only(chosen: Stage, rtol: float = CYCLE_RTOL) -> Cycle:
     """The one cycle there is."""
     (cycle,) = hunting_of(chosen, rtol).cycles
     return cycle
@@ -129,7 +135,7 @@ def test_cycles_of_the_rig_stay_what_they_were(
 @pytest.mark.parametrize(("crossover", "attracting"), [(8, True), (12, False)])
 def test_flip_of_the_rigid_mass(crossover: float, attracting: bool) -> None:
     """Its cycle stops attracting near 9.77 Hz: found from below and from above, where the multiplier passes -1."""
-    edge = margin(rigid(crossover), attracting)
+    edge = find_margin(rigid(crossover), attracting)
     assert edge is not None
     assert edge.crossover is not None
     assert 9.76 < edge.crossover < 9.78
@@ -151,7 +157,7 @@ def test_cycle_attracts_below_the_flip_only() -> None:
 @LOCKED_RIG
 def test_edge_of_the_locked_rig() -> None:
     """references.md: the slope passes -1 near 9.7 Hz (from fits to simulations, about 1 %)."""
-    edge = margin(rig(8, LOCKED), attracting=True)
+    edge = find_margin(rig(8, LOCKED), attracting=True)
     assert edge is not None
     assert edge.crossover == pytest.approx(9.7, rel=0.01)
 
@@ -159,7 +165,7 @@ def test_edge_of_the_locked_rig() -> None:
 @FREE_RIG
 def test_edge_of_the_free_rig() -> None:
     """About 5.6 Hz, where the multiplier grows from -0.954 at 5 Hz past -1."""
-    edge = margin(rig(5, free()), attracting=True)
+    edge = find_margin(rig(5, free()), attracting=True)
     assert edge is not None
     assert edge.crossover == pytest.approx(5.6, abs=0.05)
     assert edge.factor == pytest.approx(edge.crossover / 5, rel=1e-12)
@@ -194,6 +200,7 @@ def test_asymmetric_pair_shrinks_into_the_flip() -> None:
     assert off[9.65] / off[9.74] == pytest.approx(np.sqrt((9.77 - 9.65) / (9.77 - 9.74)), rel=0.02)
 
 
+@pytest.mark.inner
 @RIGID
 @pytest.mark.parametrize("crossover", [4, 8.3, 9.9, 12])
 def test_no_asymmetric_pair_elsewhere(crossover: float) -> None:
@@ -204,6 +211,7 @@ def test_no_asymmetric_pair_elsewhere(crossover: float) -> None:
     assert beside.reasons[0] in (NO_PAIR, NO_RETURN)
 
 
+@pytest.mark.inner
 @RIGID
 def test_unstable_cycle_above_the_flip_and_none_at_17_hz() -> None:
     """The cycle outlives the flip: at 12 Hz with a multiplier of -1.1335, until no swing returns as far at 17 Hz."""
@@ -238,6 +246,7 @@ def test_results_do_not_depend_on_the_tolerance(chosen: Stage) -> None:
         assert rough.residual < 1e-8
 
 
+@pytest.mark.inner
 @RIGID
 def test_orbits_are_closed_at_a_rough_tolerance_too() -> None:
     """However rough the runs, Newton's method goes on until the orbit counts as closed."""
@@ -366,6 +375,7 @@ def test_trace_of_an_asymmetric_cycle_is_periodic(chosen: Stage) -> None:
         assert abs(signal[-1] - signal[0]) < 1e-6 * np.ptp(signal), name
 
 
+@pytest.mark.inner
 @pytest.mark.parametrize(
     ("chosen", "sign"), [pytest.param(rigid(8), -1.0, marks=RIGID), pytest.param(rigid(9), 1.0, marks=RIGID)]
 )
@@ -373,7 +383,7 @@ def test_mirror_image_of_a_cycle_is_one(chosen: Stage, sign: float) -> None:
     """From the mirrored state, sticking on the other side, shooting closes the same orbit without a step."""
     stages = Ensemble.held(chosen.flat(), 1)
     result = symmetric_cycles(stages) if sign < 0 else asymmetric_cycles(stages, return_map(stages, 1e-6))
-    mirrored = close(stages, -result.states, result.orbits.times, sign, RTOL)
+    mirrored = close(stages, -result.states, result.orbits.times, sign, CYCLE_RTOL)
     assert mirrored.closed[0]
     assert mirrored.times == pytest.approx(result.orbits.times, rel=1e-8)
     assert mirrored.states == pytest.approx(-result.states, rel=1e-6, abs=1e-12)
@@ -417,6 +427,7 @@ def test_mirrored_friction_mirrors_the_cycle() -> None:
     assert float(one.trace.position.max()) == pytest.approx(-float(other.trace.position.min()), rel=1e-4)
 
 
+@pytest.mark.inner
 @UNEQUAL
 def test_much_unequal_friction_ends_hunting() -> None:
     """At 8 Hz, where the cycle attracts less, 5 % of difference is too much: simulations come to rest from anywhere."""
@@ -550,13 +561,14 @@ def same_but_for_scale(small: Cycle, large: Cycle, scale: float) -> None:
     assert large.multiplier == pytest.approx(small.multiplier, rel=1e-5)
 
 
+@pytest.mark.inner
 @RIGID
 def test_newton_does_not_slide_onto_the_rest_line() -> None:
     """Every stage rests at its reference, too: what is called a cycle swings by many deflections of the bristles, from
     2 Hz up to some crossover and nowhere beyond it, and is told why not there."""
     crossovers = np.linspace(2, 30, 57)
     flat = rigid(4).flat() | {"controller.crossover": crossovers}
-    cycles = hunting_cycles(Ensemble.held(flat, crossovers.size))
+    cycles = find_cycles(Ensemble.held(flat, crossovers.size))
     assert np.array_equal(cycles.closed, crossovers < crossovers[np.argmin(cycles.closed)])
     assert 15 < crossovers[cycles.closed].max() < 17
     assert np.all(cycles.amplitude[cycles.closed] > 4 * BRISTLES)
@@ -567,6 +579,7 @@ def test_newton_does_not_slide_onto_the_rest_line() -> None:
     assert {*cycles.reasons[cycles.closed]} == {""}
 
 
+@pytest.mark.inner
 @RIGID
 def test_no_cycle_at_18_hz() -> None:
     result = hunting_of(rigid(18))
@@ -580,7 +593,7 @@ def test_cycles_of_many_stages_are_those_of_each() -> None:
     """A stage's cycle does not depend on the stages that are computed beside it."""
     crossovers = np.array([4.0, 8.0, 18.0, 12.0])
     flat = rigid(4).flat() | {"controller.crossover": crossovers}
-    together = hunting_cycles(Ensemble.held(flat, crossovers.size))
+    together = find_cycles(Ensemble.held(flat, crossovers.size))
     assert together.closed.tolist() == [True, True, False, True]
     for k in np.flatnonzero(together.closed):
         alone = only_symmetric(hunting_of(rigid(float(crossovers[k]))))

@@ -79,6 +79,13 @@ def test_importing_friso_imports_neither_arrays_nor_units() -> None:
     assert done.stdout.strip() == "[]"
 
 
+def test_words_on_hunting_need_no_algebra() -> None:
+    """Views that quote a word or a limit import the interface of friso.hunting."""
+    code = "import friso.hunting, sys; print([m for m in ('sympy', 'xarray', 'scipy') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def test_the_help_imports_no_stage_and_lists_every_command_once() -> None:
     code = "import sys, friso.cli.app as a; sys.argv = ['friso', '--help']\ntry: a.main()\nfinally: print([m for m in "
     code += "('numpy', 'pydantic', 'pint') if m in sys.modules])"

@@ -11,7 +11,7 @@ from inside import friso_inside
 from refusals import Wording
 from variants import VARIANTS, gains, lugre, release, stage
 
-from friso.hunting.outward import PRECISE
+from friso.hunting import Margin
 from friso.stage import violations
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import convert
@@ -31,7 +31,7 @@ def case(
     cycle = SimpleNamespace(amplitude=5e-4, multiplier=-0.5) if verdict == "hunts" else None
     quiet = None if edge is None else edge / (4 if edge_certain else 3)
     margin = edge and SimpleNamespace(
-        crossover=edge, factor=edge / 4, certain=edge_certain, quiet=quiet, reserve=PRECISE
+        crossover=edge, factor=edge / 4, certain=edge_certain, quiet=quiet, reserve=Margin.reserve
     )
     hunting = SimpleNamespace(certain=certain, target=cycle)
     judgement = SimpleNamespace(cycle=cycle, margin=margin, hunting=hunting, given_up=given_up, observed=False)

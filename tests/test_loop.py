@@ -7,9 +7,8 @@ import pytest
 from variants import VARIANTS
 
 import friso
-from friso.hunting import loop
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.loop import at_lower_gains, unstable
+from friso.hunting import Ensemble, loop, unstable
+from friso.hunting.loop import at_lower_gains
 from friso.stage import Stage
 
 
@@ -31,6 +30,7 @@ def test_a_pi_controller_is_stable_as_far_as_viscous_friction_damps(
     assert unstable(chosen.replace({"controller.ki": f"{gain!r} N/(m*s)"})) == states
 
 
+@pytest.mark.inner
 @pytest.mark.parametrize(("share", "always"), [(0.98, "stable"), (1.02, "unstable")])
 def test_where_a_force_limit_unsettles_a_loop(share: float, always: str) -> None:
     """m s^3 + sigma_2 s^2 + N kp s + N ki has its roots on the left at all gains N where m ki < sigma_2 kp."""
@@ -41,6 +41,7 @@ def test_where_a_force_limit_unsettles_a_loop(share: float, always: str) -> None
     assert loop_at_lower_gains(chosen.replace({"controller.ki": f"{gain!r} N/(m*s)"})) == always
 
 
+@pytest.mark.inner
 def test_many_loops_are_looked_at_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     """All at once took 0.1 MB each, 1 GB for a map of 100 by 100."""
     flat, shares, held = VARIANTS["rigid, Stribeck 2, PI, limit"].flat(), np.array([0.9, 1.1, 0.9, 1.1, 1.1]), []
@@ -53,6 +54,7 @@ def test_many_loops_are_looked_at_in_parts(monkeypatch: pytest.MonkeyPatch) -> N
     assert max(held) == 2 * len(loop.LOWER)
 
 
+@pytest.mark.inner
 @pytest.mark.parametrize("mass", [0.01, 0.1, 0.3, 0.6, 1.7, 200.0])
 def test_van_dijks_rules_tuned_for_another_mass(mass: float) -> None:
     """The roots of (m s^2 + sigma_2 s) tau_i s (tau_p s + 1) + k_p (tau_z s + 1)(tau_i s + 1) decide (Eq. 7, 8)."""
@@ -69,6 +71,7 @@ def test_van_dijks_rules_tuned_for_another_mass(mass: float) -> None:
     assert lost == (mass < 0.2)
 
 
+@pytest.mark.inner
 def test_van_dijks_rules_need_their_gain_where_hardly_anything_is_viscous() -> None:
     """The derivative makes the loop stable at its own gain; at lower ones m ki > sigma_2 kp decides."""
     assert unstable(VARIANTS["rigid"]) == ()
@@ -83,6 +86,7 @@ def test_a_stage_without_friction_is_judged_too() -> None:
     assert unstable(smooth) == ("sticks", "slides")
 
 
+@pytest.mark.inner
 @pytest.mark.parametrize(
     ("changes", "always"),
     [

@@ -20,8 +20,8 @@ from friso.frequency.describing.waveform import OneStateLaw as Waveform
 from friso.frequency.friction import level, speeds, steady_force
 from friso.frequency.members import member
 from friso.frequency.parts import plant
-from friso.hunting.cycle.ensemble import Ensemble, done
-from friso.hunting.cycle.find import RTOL, Cycles, hunting_cycles
+from friso.hunting import CYCLE_RTOL, Cycles, Ensemble, find_cycles
+from friso.hunting.cycle.ensemble import done
 from friso.hunting.cycle.multipliers import slopes
 from friso.hunting.cycle.shooting import shoot
 from friso.identification.output_error.parameters import fit_parameters
@@ -146,11 +146,12 @@ def test_a_loop_against_scipy_with_events() -> None:
 @pytest.fixture(scope="module")
 def cycle() -> tuple[Ensemble, Cycles]:
     stages = Ensemble.held(DROPS.flat(), 1)
-    cycles = hunting_cycles(stages)
+    cycles = find_cycles(stages)
     assert cycles.closed[0], cycles.reasons[0]
     return stages, cycles
 
 
+@pytest.mark.inner
 def test_the_cycle_against_simulation(cycle: tuple[Ensemble, Cycles]) -> None:
     """Amplitude and period of the cycle that shooting closes are those in which a long run ends; so is its multiplier:
     neighbours drift away from it by as much as they do in runs of their own."""
@@ -172,7 +173,7 @@ def test_the_cycle_against_simulation(cycle: tuple[Ensemble, Cycles]) -> None:
     apart = apart - rates * apart[phase] / rates[phase]
     moved = apart[stages.sticking] / aside[stages.sticking]
     assert moved == pytest.approx(cycles.multiplier[0], rel=1e-3)
-    slope = slopes(stages, cycles.orbits, cycles.direction, RTOL)
+    slope = slopes(stages, cycles.orbits, cycles.direction, CYCLE_RTOL)
     assert slope[0] == pytest.approx(cycles.multiplier[0], rel=2e-2)
     assert abs(cycles.multiplier[0]) < 1
 
@@ -187,6 +188,7 @@ def test_the_cycle_against_scipy_with_events(cycle: tuple[Ensemble, Cycles]) -> 
     assert states[-1] == pytest.approx(-start, abs=1e-6 * cycles.amplitude[0])
 
 
+@pytest.mark.inner
 @pytest.mark.parametrize("duration", [0.004, 0.03])
 def test_deviations_through_switches_against_differences(duration: float) -> None:
     """The derivative of the flow by where it began, over elements that break loose, drop and stick again."""

@@ -13,8 +13,7 @@ from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.hunting import turns as scanning
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER, SEPARATION, distinct_peaks
-from friso.hunting.measures import measure_runs, measuring_options
-from friso.hunting.turns import scan_turning_points
+from friso.hunting.measures import measure_runs, measuring_options, scan_turning_points
 from friso.stage import Stage
 from friso.studies.request import Request
 from friso.studies.samples import Samples
@@ -73,6 +72,7 @@ def test_agrees_with_scipy(gaps: list[tuple[float, int]]) -> None:
         assert peaks(list(zip(times.tolist(), values.tolist(), strict=True))) == times[sorted(kept)].tolist()
 
 
+@pytest.mark.inner
 @pytest.mark.parametrize("many", [0, np.inf])
 def test_period_of_a_cycle_with_ringing_on_top(many: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """A 2 s cycle of 1 mm on which a 0.05 s ringing of 0.1 mm makes turning points of its own; compiled and plain."""
@@ -122,6 +122,7 @@ def test_ringing_on_a_peak_does_not_hide_it() -> None:
     assert peaks(turns) == [12.0]
 
 
+@pytest.mark.inner
 def test_compiled_loops_do_what_the_plain_ones_do(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(1)
     times = np.sort(rng.uniform(8, 20, (300, 40)), axis=1)

@@ -10,13 +10,14 @@ from variants import VARIANTS
 
 from friso.engine.allowance import allowance
 from friso.equations.bandwidth import faster
-from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting import BandwidthWindow, Ensemble, Margin
 from friso.hunting.cycle.find import symmetric_cycles
 from friso.hunting.cycle.swings import swings
-from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths, followed_on
-from friso.hunting.outward import BandwidthWindow
+from friso.hunting.margin import NOT_SOUGHT, SearchedBandwidths, followed_on
 from friso.hunting.restabilised import windows_again
 from friso.stage import Stage
+
+pytestmark = pytest.mark.inner
 
 TABLE = Stage(
     axis={"kind": "rotary"},

@@ -17,10 +17,8 @@ from friso.equations.sampled import sampled_controller
 from friso.equations.structure import controller_form
 from friso.errors import InputError
 from friso.frequency.parts import compensator
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import DITHERS
-from friso.hunting.cycle.hunting import hunting as hunting_of
-from friso.hunting.cycle.rest import stuck, wait
+from friso.hunting import DITHERS, Ensemble, stuck, wait
+from friso.hunting import hunting as hunting_of
 from friso.stage import Stage
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import MoveTask

@@ -14,8 +14,8 @@ import friso
 from friso.engine.batch import run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
+from friso.hunting import hunting
 from friso.hunting.basin import ends_in
-from friso.hunting.cycle.hunting import hunting
 from friso.hunting.measures import Measures, measure_runs, measuring_options
 from friso.hunting.verdict import judge
 from friso.stage import Stage
@@ -56,6 +56,7 @@ def test_a_run_that_is_drawn_has_the_extremes_of_the_run_alone(rig: Stage) -> No
         assert extremes == pytest.approx(pick(deviation, axis=1), abs=1e-12)
 
 
+@pytest.mark.inner
 @pytest.mark.usefixtures("own_bandwidth")
 def test_cells_equal_runs_alone(rig: Stage) -> None:
     """Any cell, run alone as a stage of its own, gives the same numbers bit for bit, and the verdict of a check."""

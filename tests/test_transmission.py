@@ -20,11 +20,9 @@ from friso.frequency.family import loops, spectral_abscissa
 from friso.frequency.loops import response
 from friso.frequency.members import concatenate_families, limit_cases, member
 from friso.frequency.parts import plant
+from friso.hunting import Decline, Ensemble, Feeding, cannot_hunt, hunting, unstable
 from friso.hunting import feeding as hunting_feeding
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import cannot_hunt, hunting
-from friso.hunting.feeding import Decline, Feeding, dry_friction, feeding
-from friso.hunting.loop import unstable
+from friso.hunting.feeding import dry_friction, feeding
 from friso.stage import Stage
 from friso.stage.plausible import idle_encoder
 from friso.views.bode.words import caveats
@@ -314,6 +312,7 @@ def test_without_backlash_and_friction_nothing_hunts(backlash_alone: Stage) -> N
     assert cannot_hunt(backlash_alone.replace({"transmission.backlash": "0 um"}))
 
 
+@pytest.mark.inner
 def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage, wording: Wording) -> None:
     """All motions shrink with it, so that no small share of it ends them."""
     result = feeding(backlash_alone)
@@ -322,6 +321,7 @@ def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage, 
     wording(" ".join(feeding_sentences(result)))
 
 
+@pytest.mark.inner
 @pytest.mark.parametrize(("share", "certain"), [(0.01, True), (0.001, False)])
 def test_what_feeds_it_is_computed(share: float, certain: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """A belt with play and little friction: without friction it swings on, with less play it rests, unless that is so
@@ -333,6 +333,7 @@ def test_what_feeds_it_is_computed(share: float, certain: bool, monkeypatch: pyt
     assert result == Feeding(Decline(share, None, True), Decline(1.0, share, certain))
 
 
+@pytest.mark.inner
 def test_what_feeds_it_is_told(wording: Wording) -> None:
     keys = dry_friction(machine().flat())
     assert {"friction.static", "motor_friction.bristle_stiffness", "friction.bristle_damping"} <= {*keys}

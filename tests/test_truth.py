@@ -16,7 +16,7 @@ from benchmarks.truth.refute import _edge, _kicks, refutations
 from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
 from benchmarks.truth.trials import Bench
 from friso.equations.bandwidth import bandwidth
-from friso.hunting.basin import Kick
+from friso.hunting import Kick
 from friso.stage.files import loads
 from friso.stage.tables import FRICTION
 

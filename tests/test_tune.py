@@ -33,13 +33,9 @@ from friso.errors import InputError
 from friso.frequency.bandwidth import bandwidths_at, loop_bandwidth, loop_bandwidths, rigid_bandwidth
 from friso.frequency.crossover import settled_margin
 from friso.frequency.family import controller_response
-from friso.hunting.check import check_given
+from friso.hunting import CheckPart, Ensemble, check_given, find_cycles, find_margin
 from friso.hunting.criteria import settling_of_runs
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import hunting_cycles
-from friso.hunting.margin import search_bandwidths
 from friso.hunting.measures import measured_run
-from friso.hunting.verdict import BANDWIDTHS
 from friso.remedies import method
 from friso.remedies import search as search_module
 from friso.remedies import verified as verified_module
@@ -1106,7 +1102,7 @@ def test_check_tells_what_an_isolator_would_do(rigid: Stage, wording: Wording) -
 @pytest.fixture(scope="module")
 def sensitivities(rigid: Stage) -> Sensitivities:
     """Of the thesis's rig without its joint, along several keys."""
-    return sensitivity(rigid, KEYS, edge=search_bandwidths(rigid, True).margin)
+    return sensitivity(rigid, KEYS, edge=find_margin(rigid, True))
 
 
 KEYS = (
@@ -1125,7 +1121,7 @@ def test_a_cycle_s_derivatives_are_those_of_finite_differences(
     """To 1e-6, by closing the cycle of stages that differ a little; through kinks and while it sticks."""
     flat = {**rigid.flat(), **as_tuned(rigid.flat())}
     nearby = Ensemble.held({**flat, name: flat[name] * (1 + STEP * np.array([-2, -1, 1, 2]))}, 4)
-    cycles = hunting_cycles(nearby, rtol=1e-11)
+    cycles = find_cycles(nearby, rtol=1e-11)
     exact, k = sensitivities.cycle, KEYS.index(name)
     assert exact is not None
     for values, by in ((cycles.amplitude, exact.amplitude_by[k]), (cycles.period, exact.period_by[k])):
@@ -1141,8 +1137,7 @@ def test_the_edge_s_derivative_is_that_of_edges_nearby(rigid: Stage, sensitiviti
     assert sensitivities.edge is not None
     static = rigid.flat()["friction.static"]
     edges = [
-        search_bandwidths(rigid.with_numbers({"friction.static": static * (1 + change)}), True).margin
-        for change in (-0.01, 0.01)
+        find_margin(rigid.with_numbers({"friction.static": static * (1 + change)}), True) for change in (-0.01, 0.01)
     ]
     low, high = (edge.crossover for edge in edges if edge and edge.crossover)
     assert (high - low) / (0.02 * static) == pytest.approx(sensitivities.edge.by[0], rel=0.02)
@@ -1163,7 +1158,7 @@ def test_a_settling_time_s_derivative_is_that_of_finite_differences(rigid: Stage
     released = {"motion": {"kind": "release", "displacement": "2 mm", "duration": "4 s"}}
     for stage in (rigid, rigid.replace(released)):
         settles = stage.replace({"controller.crossover": "20 Hz"})
-        exact = sensitivity(settles, KEYS, edge=search_bandwidths(rigid, True).margin, within=1e-6).settling
+        exact = sensitivity(settles, KEYS, edge=find_margin(rigid, True), within=1e-6).settling
         assert exact is not None
         assert exact.jump > 1e-3
         flat = {**settles.flat(), **as_tuned(settles.flat())}
@@ -1308,7 +1303,7 @@ def test_relaxations_that_were_not_sought_are_told_as_that() -> None:
 
 
 def test_an_edge_that_was_not_searched_to_the_end_is_a_doubt() -> None:
-    assert unmet_goals(*made_up(given_up=(BANDWIDTHS,)), FORCE_LIMITED) == ("given up",)
+    assert unmet_goals(*made_up(given_up=(CheckPart.BANDWIDTHS,)), FORCE_LIMITED) == ("given up",)
     assert {"given up", "together"} <= DOUBTS.keys()
 
 

@@ -22,7 +22,8 @@ from friso.equations.component import TIME, Kink
 from friso.equations.model import REFERENCE, Model, assemble
 from friso.equations.structure import structure
 from friso.equations.variational import PREFIX, variational
-from friso.hunting.cycle.ensemble import Ensemble, done
+from friso.hunting import Ensemble
+from friso.hunting.cycle.ensemble import done
 from friso.hunting.cycle.shooting import shoot
 from friso.stage import Stage
 
@@ -100,6 +101,7 @@ def velocities(stages: Ensemble, start: np.ndarray, time: float) -> np.ndarray:
     return results.samples[0][:, names.index("cart_velocity" if "cart_velocity" in names else "velocity")]
 
 
+@pytest.mark.inner
 @pytest.mark.xdist_group("rigid")
 @STEADY
 @given(
@@ -131,6 +133,7 @@ CASES = [
 ]
 
 
+@pytest.mark.inner
 @pytest.mark.parametrize(("name", "time", "crosses"), CASES)
 def test_flow_with_and_without_reversal(name: str, time: float, crosses: bool) -> None:
     """Each structure before its first reversal and after several; the parasitic mode rings, no limiter is touched."""
@@ -141,6 +144,7 @@ def test_flow_with_and_without_reversal(name: str, time: float, crosses: bool) -
     assert np.all(off(stages, start, time, flow(stages, start, time)) < CLOSE)
 
 
+@pytest.mark.inner
 @pytest.mark.xdist_group("gains")
 @pytest.mark.parametrize("time", [0.02, 0.05, 0.1, 0.3, 0.5])
 def test_flow_at_the_force_limit(time: float) -> None:
@@ -198,6 +202,7 @@ def bounce() -> Bounce:
     return Bounce()
 
 
+@pytest.mark.inner
 @pytest.mark.xdist_group("free")
 @pytest.mark.parametrize("time", [0.5e-3, 1e-3])
 def test_flow_into_the_limiter_and_out_of_it(bounce: Bounce, time: float) -> None:
@@ -206,6 +211,7 @@ def test_flow_into_the_limiter_and_out_of_it(bounce: Bounce, time: float) -> Non
     assert np.all(off(bounce.stages, bounce.start, time, flow(bounce.stages, bounce.start, time)) < CLOSE)
 
 
+@pytest.mark.inner
 @pytest.mark.xdist_group("free")
 @pytest.mark.parametrize("time", [0.5e-3, 1e-3])
 def test_deviations_jump_at_the_limiter_by_the_saltation_matrix(bounce: Bounce, time: float) -> None:

@@ -11,8 +11,7 @@ import numpy as np
 
 from benchmarks.laws.by_hand import by_hand
 from benchmarks.truth.claims import Claim
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import Cycles
+from friso.hunting import Cycles, Ensemble
 
 RTOL, BRUTE = 1e-9, (1e-7, 1e-9)
 """Tolerance of SciPy, and those of the simulations by brute force."""

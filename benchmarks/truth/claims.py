@@ -5,16 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from friso.engine.allowance import allowance
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
-from friso.hunting import Case, check
-from friso.hunting.attractors import Attractors
-from friso.hunting.basin import Kick
-from friso.hunting.verdict import BANDWIDTHS
+from friso.hunting import Case, CheckPart, Kick, check
 from friso.stage import Stage
 
 ATTRACTED = ("hunts", "bistable")
@@ -53,7 +51,7 @@ class Claim:
     sure: bool
     edge: Edge | None
     kick: Kick | None
-    surveyed: Attractors | None = None
+    surveyed: Any = None
     doubts: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -116,7 +114,7 @@ def _doubts(case: Case, sure: bool, edge: Edge | None) -> dict[str, str]:
     said, doubts = case.judgement, {}
     if not sure:
         doubts["verdict"] = case.solver.status if case.verdict == "failed" else said.hunting.reason
-    if BANDWIDTHS in said.given_up:
+    if CheckPart.BANDWIDTHS in said.given_up:
         doubts["edge"] = "given up for its work" + (" between two bandwidths" if edge else "")
     elif edge and not edge.sure:
         doubts["edge"] = "no orbit to its end, or simulations beyond it not decided" if sure else "the verdict is not"

@@ -13,7 +13,7 @@ from benchmarks.truth.claims import RUNS_AWAY, Claim
 from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE
 from benchmarks.truth.trials import FINE, LINGERING, NEIGHBOURS, ROUGH, ROUNDS, Bench, Trial
 from friso.equations.bandwidth import bandwidth, faster
-from friso.hunting.basin import Kick
+from friso.hunting import Kick
 
 ALL = (80, 40, 60, 20)
 """Releases, pushes, stuck and drawn starts of a whole battery."""

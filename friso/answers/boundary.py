@@ -20,11 +20,10 @@ from friso.answers.inputs import (
     wrong,
 )
 from friso.equations.bandwidth import range_example
-from friso.hunting.boundary import Diagram, KeyRange, Plane
+from friso.hunting import CYCLE_RTOL, Diagram, KeyRange, Plane
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, any_sign
 from friso.stage import Stage
-from friso.studies.boundary import RTOL
 
 if TYPE_CHECKING:
     from friso.views.boundary.words import ShownKey
@@ -86,7 +85,7 @@ def boundary(
     y: str | None = None,
     link: Changes = None,
     log: bool = False,
-    rtol: float | str = RTOL,
+    rtol: float | str = CYCLE_RTOL,
     set: Changes = None,
     progress: Progress = silent,
 ) -> BoundaryAnswer:

@@ -19,9 +19,9 @@ from friso.answers.inputs import (
     whole_number,
 )
 from friso.engine.kernel import kernels
-from friso.engine.simulate import simulate
+from friso.engine.simulate import RTOL, simulate
 from friso.errors import InputError
-from friso.hunting.check import LONG, RTOL, Case, needed_kernels
+from friso.hunting import LONG_RUN_RTOL, Case, needed_kernels
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.correlations import draw
@@ -190,13 +190,13 @@ def check(
             sample = draw(chosen, correlations_of(stage, chosen), draws, seed)
         except InputError as error:
             raise error if error.origin else error.found_in("draws") from None
-    from friso.hunting.check import check as judged
+    from friso.hunting import check as judged
 
     kernels(needed_kernels(chosen))
     mention_unstable_loop(chosen)
     cases = judged(chosen, tolerance, progress=progress)
     drawn = across = None
-    loose = max(tolerance, LONG)
+    loose = max(tolerance, LONG_RUN_RTOL)
     if sample is not None:
         from friso.studies.draws import fates
 

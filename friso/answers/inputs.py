@@ -96,7 +96,7 @@ def read_stage(
 def mention_unstable_loop(stage: Stage) -> None:
     """Mention (to the logger "friso") that the loop of a stage is unstable, if it is: before the work whose answer
     rests on that, which may take minutes."""
-    from friso.hunting.loop import unstable
+    from friso.hunting import unstable
     from friso.views.loop_words import unstable_loop
 
     for sentence in unstable_loop(unstable(stage)):

@@ -1,7 +1,6 @@
 """The edge of hunting over the corners of a specification: the highest crossover at which anything attracts.
 
-Coarser than the edges of the guideline, which tell how hunting ends and close orbits to find out: a design asks for 1
-or 2 % in seconds, and simulates all its moves afterwards.
+Coarse: a design asks for 1 or 2 % in seconds, and simulates all its moves afterwards.
 """
 
 from __future__ import annotations
@@ -14,9 +13,7 @@ import numpy as np
 
 from friso.design_method.population import Population
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.hunting.attractors import attractors
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import surely_surveyed
+from friso.hunting import find_attractors
 from friso.progress import Progress, silent
 
 ROUNDS = 3
@@ -66,12 +63,12 @@ def edges_over(
     """The edges of the stage `flat` in all corners, tuned by van Dijk's rules: on a grid of so many `steps` from `high`
     down to `low` [Hz], as far as to the first point at which anything attracts, and between that and the one above.
     `label` names the search to the progress."""
-    ensemble = Ensemble.held(population.over({**flat, CROSSOVER: np.nan}), population.count)
+    corners = population.over({**flat, CROSSOVER: np.nan, "motion.kind": "release"})  # whatever the stage's motion
     grid, count = np.log(np.geomspace(low, high, steps)), population.count
     inside, outside, unsure = np.full(count, -np.inf), np.full(count, np.inf), np.zeros((2, count), bool)
 
     def survey(which: np.ndarray, crossover: np.ndarray) -> None:
-        attract, certain = _attract(ensemble, which, crossover)
+        attract, certain = _attract(corners, which, crossover)
         outside[which[~attract]], inside[which[attract]] = crossover[~attract], crossover[attract]
         unsure[attract.astype(int), which] = ~certain
 
@@ -109,12 +106,12 @@ def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str,
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def _attract(ensemble: Ensemble, which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Whether anything attracts, or may for all that simulations show, in corners at logarithms of crossovers; and
     whether that is certain."""
-    stages = Ensemble.held({**ensemble.take(which).flat, CROSSOVER: np.exp(crossover)}, len(which))
-    survey = attractors(stages, rtol=RTOL)
-    return survey.attracts | ~survey.decided, surely_surveyed(stages, survey)
+    some = {key: value[which] if np.ndim(value) else value for key, value in corners.items()}
+    attracted = find_attractors({**some, CROSSOVER: np.exp(crossover)}, len(which), RTOL)
+    return attracted.attracts | ~attracted.decided, attracted.certain
 
 
 def rigid(flat: Mapping[str, Any]) -> dict[str, Any]:

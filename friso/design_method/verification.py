@@ -14,7 +14,7 @@ from friso.engine.kernel import kernel
 from friso.equations.controllers.van_dijk import TUNED_MASS
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
-from friso.hunting.criteria.run_outcome import CREEPS, FAILED, RESTS, SWINGS, outcomes
+from friso.hunting.criteria import CREEPS, FAILED, RESTS, SWINGS, outcomes
 from friso.hunting.measures import run_ends, turns_of
 from friso.progress import Progress, silent
 from friso.shares import share_interval

@@ -1,28 +1,117 @@
-"""What the numbers mean for hunting: peak count, hunting cycles, what starts them, margins, verdict."""
+"""Hunting of a stage: the interface of this folder, with `criteria` and `measures` beside it (docs/hunting.md).
 
-from friso.hunting.basin import Kick, MoveShare
-from friso.hunting.check import Case, Solver, check
-from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
-from friso.hunting.cycle.hunting import Cycle, Hunting, Swing, hunting
-from friso.hunting.margin import Margin
-from friso.hunting.measures import BANDS, Measures, measure_runs
-from friso.hunting.verdict import Judgement
+Other floors import from these three alone: what stands behind them may be replaced.
+"""
+
+from friso.hunting.attractors import Target
+from friso.hunting.basin import Kick, MoveShare, displacements_that_hunt, moves_that_hunt, pushes_that_hunt
+from friso.hunting.boundary import (
+    END_OF_RANGE,
+    Bifurcation,
+    Branch,
+    Curve,
+    Diagram,
+    KeyRange,
+    LocatedPoint,
+    Plane,
+    Point,
+    Space,
+    Spot,
+    diagram,
+    plane,
+)
+from friso.hunting.cases import LONG_RUN_RTOL, Case, Solver, check, check_given, needed_kernels
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import RTOL as CYCLE_RTOL
+from friso.hunting.cycle.find import Cycles, find_cycles
+from friso.hunting.cycle.hunting import DITHERS, Cycle, Hunting, Swing, cannot_hunt, hunting
+from friso.hunting.cycle.multipliers import Multipliers, multipliers
+from friso.hunting.cycle.rest import stuck, wait
+from friso.hunting.cycle.return_map import ReturnMap
+from friso.hunting.cycle.shooting import Orbits
+from friso.hunting.derivatives import CycleDerivatives, cycle_derivatives, edge_derivatives, flow_derivatives
+from friso.hunting.feeding import Decline, Feeding
+from friso.hunting.limits import SEARCH_LIMITS, SearchLimits
+from friso.hunting.loop import LoopState, LowerGains, unstable
+from friso.hunting.many_stages import (
+    StageAttractors,
+    can_hunt,
+    find_attractors,
+    judge_many,
+    judge_runs,
+    kernels_to_judge,
+    loops_unstable,
+)
+from friso.hunting.margin import Margin, find_margin
+from friso.hunting.motions import Motions
+from friso.hunting.outward import AttractionEnd, BandwidthWindow
+from friso.hunting.verdict import CheckPart, Judgement
 
 __all__ = [
-    "BANDS",
-    "COUNTED_ABOVE",
-    "COUNTED_AFTER",
+    "CYCLE_RTOL",
+    "DITHERS",
+    "END_OF_RANGE",
+    "LONG_RUN_RTOL",
+    "SEARCH_LIMITS",
+    "AttractionEnd",
+    "BandwidthWindow",
+    "Bifurcation",
+    "Branch",
     "Case",
+    "CheckPart",
+    "Curve",
     "Cycle",
+    "CycleDerivatives",
+    "Cycles",
+    "Decline",
+    "Diagram",
+    "Ensemble",
+    "Feeding",
     "Hunting",
     "Judgement",
+    "KeyRange",
     "Kick",
+    "LocatedPoint",
+    "LoopState",
+    "LowerGains",
     "Margin",
-    "Measures",
+    "Motions",
     "MoveShare",
+    "Multipliers",
+    "Orbits",
+    "Plane",
+    "Point",
+    "ReturnMap",
+    "SearchLimits",
     "Solver",
+    "Space",
+    "Spot",
+    "StageAttractors",
     "Swing",
+    "Target",
+    "can_hunt",
+    "cannot_hunt",
     "check",
+    "check_given",
+    "cycle_derivatives",
+    "diagram",
+    "displacements_that_hunt",
+    "edge_derivatives",
+    "find_attractors",
+    "find_cycles",
+    "find_margin",
+    "flow_derivatives",
     "hunting",
-    "measure_runs",
+    "judge_many",
+    "judge_runs",
+    "kernels_to_judge",
+    "loops_unstable",
+    "moves_that_hunt",
+    "multipliers",
+    "needed_kernels",
+    "plane",
+    "pushes_that_hunt",
+    "stuck",
+    "unstable",
+    "wait",
 ]

@@ -18,6 +18,7 @@ from friso.hunting.attractors.rounds import RTOL, TIGHT, typical_period
 from friso.hunting.criteria.run_outcome import lasts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import pushed
+from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.measures import swing_of
 from friso.hunting.motions import run_motions, some_of
 from friso.shares import share_interval
@@ -48,9 +49,6 @@ BETWEEN = 7
 
 MOVES = 128
 """Moves drawn."""
-
-SHARES = (0.1, 2.0)
-"""Range of the moves drawn, in units of the acceleration and of the acceleration time of the stage file."""
 
 
 @dataclass(frozen=True)
@@ -182,7 +180,8 @@ def _caught(
 
 
 def displacements_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Kick:
-    """The displacements that start hunting, as far as that is known of swings up to the `widest`, peak to peak [m]."""
+    """Find the displacements [m] from which a stage that is let go ends in its `target`; swings wider than `widest`,
+    peak to peak [m], are counted as unknown."""
     flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -206,7 +205,8 @@ def displacements_that_run_away(stage: Stage) -> Kick:
 
 
 def pushes_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Kick:
-    """The velocities that start hunting, in the same way."""
+    """Find the pushes, velocities [m/s] of all masses, after which a stage at rest ends in its `target`; swings wider
+    than `widest`, peak to peak [m], are counted as unknown."""
     stages = Ensemble.held(stage.flat(), 1)
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -241,14 +241,15 @@ def _kick(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: fl
 
 
 def moves_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> MoveShare | None:
-    """The share of moves that end in hunting, in the same way; None for motions that have no acceleration, or if every
-    run fails."""
+    """Draw moves about that of the stage's file and find the share of them that ends in its `target`; swings wider than
+    `widest`, peak to peak [m], are left out. None for motions that have no acceleration, or if every run fails."""
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
         return None
     acceleration, time = flat["motion.acceleration"], flat["motion.acceleration_time"]
-    accelerations = (SHARES[0] * acceleration, SHARES[1] * acceleration)
-    times = (SHARES[0] * time, min(SHARES[1] * time, flat["motion.return_at"] / (2 + flat.get(CRUISE, 0.0))))
+    least, most = SEARCH_LIMITS.move_shares
+    accelerations = (least * acceleration, most * acceleration)
+    times = (least * time, min(most * time, flat["motion.return_at"] / (2 + flat.get(CRUISE, 0.0))))
     (low, shortest), (high, longest) = zip(accelerations, times, strict=True)
     across, along = evenly(MOVES)
     moved = {

@@ -14,10 +14,8 @@ from typing import Any
 import numpy as np
 
 from friso.equations.structure import structure
-from friso.hunting.attractors import attractors
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable
+from friso.hunting.many_stages import find_attractors
 from friso.stage import Stage
 from friso.stage.stage import declared_keys
 from friso.stage.transmission import BACKLASH, MOTOR_FRICTION
@@ -83,13 +81,11 @@ def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
 def _decline(flat: Mapping[str, Any], keys: tuple[str, ...]) -> Decline:
     """What becomes of hunting with some keys at all shares."""
     scaled = {**flat, **{key: flat[key] * SHARES for key in keys}}
-    stages = Ensemble.held(scaled, len(SHARES), form=structure(flat))
-    survey = attractors(stages)
-    attracts = survey.attracts
-    gone = np.flatnonzero(~attracts)
+    attracted = find_attractors(scaled, len(SHARES))
+    gone = np.flatnonzero(~attracted.attracts)
     first = int(gone[0]) if gone.size else len(SHARES)
     return Decline(
         lasts=float(SHARES[first - 1]) if first else 1.0,
         gone=float(SHARES[first]) if gone.size else None,
-        certain=bool(surely_surveyed(stages, survey)[: first + 1].all()),
+        certain=bool(attracted.certain[: first + 1].all()),
     )

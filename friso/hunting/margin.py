@@ -13,19 +13,13 @@ from friso.equations.bandwidth import bandwidth
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.outward import ALONG, PRECISE, AttractionEnd, BandwidthWindow, Beyond, Outward
 from friso.hunting.restabilised import windows_again
 from friso.stage import Stage
 
-FARTHEST = 10.0
+FARTHEST = SEARCH_LIMITS.bandwidth_factor
 """Factor up to which the bandwidth is changed."""
-
-DISTANCE = 1.2
-"""Factor of the bandwidth by which advice keeps off the edge of hunting: machines differ, and surveys may miss some."""
-
-STEPS, COARSE = 20, 10
-"""Steps to a factor of ten in bandwidth where an edge is looked for, and beyond, where something may attract again:
-windows narrower than a step may be missed."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +66,9 @@ NOT_SOUGHT = SearchedBandwidths(None, ())
 """What is told of a stage that cannot hunt at any bandwidth, or where the allowance does not suffice for a survey."""
 
 
-def margin(stage: Stage, attracting: bool) -> Margin | None:
-    """The last edge above the bandwidth of a stage that something attracts, or the next one below that of one that
-    nothing does; None within a factor of ten."""
+def find_margin(stage: Stage, attracting: bool) -> Margin | None:
+    """Find the edge of hunting of a stage, whose own motion plays no part: above its bandwidth the last edge, if
+    something is `attracting` it at that, else the next one below. None where there is none within a factor of ten."""
     return search_bandwidths(stage, attracting).margin
 
 
@@ -83,7 +77,8 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     attracts the stage itself, if that was surveyed. Where an allowance is used up, ends are where they are known to be
     by then, and not certain."""
     flat, crossover = stage.flat(), bandwidth(stage.flat())
-    index, above = (COARSE, STEPS) if attracting else (STEPS, COARSE)
+    fine, coarse = SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond
+    index, above = (coarse, fine) if attracting else (fine, coarse)
     below = np.geomspace(1 / FARTHEST, 1.0, index, endpoint=False)
     factors = np.concatenate([below, np.geomspace(1.0, FARTHEST, above + 1)])
     survey = survey or attractors(Ensemble.held(flat, 1), thorough=True)

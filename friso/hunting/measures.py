@@ -1,4 +1,7 @@
-"""Measures of many runs at once, from their turning points and statistics."""
+"""Measures of many runs at once, from their turning points and statistics.
+
+Part of the interface of `friso.hunting` for other floors.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +17,26 @@ from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.hunting.criteria.run_outcome import BAND, End, outcomes
 from friso.hunting.criteria.settling import settling_in_the_end, settling_of_runs
-from friso.hunting.turning import COUNTED_AFTER, DISTINCT, WINDOW
+from friso.hunting.turning import COUNTED_AFTER, DISTINCT, HALF, WINDOW, zigzag
 from friso.hunting.turns import Turns, scan_turning_points
 from friso.stage import Stage
+
+__all__ = [
+    "BANDS",
+    "HALF",
+    "RESOLVED",
+    "WINDOW",
+    "Measures",
+    "Turns",
+    "measure_runs",
+    "measured_run",
+    "measuring_options",
+    "run_ends",
+    "scan_turning_points",
+    "swing_of",
+    "turns_of",
+    "zigzag",
+]
 
 BANDS = (1e-6, BAND)
 """Bands about the reference into which a stage settles [m]."""
@@ -50,7 +70,8 @@ class Measures:
 
 
 def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarray | None = None) -> RunOptions:
-    """How to run for these measures; turning points are kept from a little before the first that may count."""
+    """How to run stages whose runs are to be measured, to a relative tolerance; `threads` and `cancel` as in
+    `RunOptions`. Turning points are kept from a little before the first that may count."""
     return RunOptions(
         rtol=rtol,
         bands=BANDS,

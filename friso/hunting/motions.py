@@ -137,3 +137,8 @@ def resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
 def some_of(columns: Mapping[str, Any], which: np.ndarray) -> dict[str, Any]:
     """Some entries of the arrays among the values."""
     return {key: value[which] if np.ndim(value) else value for key, value in columns.items()}
+
+
+def keeps_moving(flat: Mapping[str, Any]) -> bool:
+    """Whether the reference of stages never stands still."""
+    return flat["motion.kind"] == "ramp" and bool(np.any(flat["motion.velocity"]))

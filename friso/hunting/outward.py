@@ -18,7 +18,7 @@ from friso.hunting.boundary.branch import END_OF_RANGE, NO_FARTHER, REACHED, Poi
 from friso.hunting.boundary.crossing import ENOUGH, SPREAD, crossing
 from friso.hunting.boundary.locate import TIGHTER, Bifurcation, changes, last_inside, smoothed, towards, turned
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL, Cycles, described, families, hunting_cycles, kept
+from friso.hunting.cycle.find import RTOL, Cycles, described, families, find_cycles, kept
 from friso.hunting.cycle.held import held_beside
 from friso.hunting.cycle.multipliers import multipliers
 from friso.hunting.cycle.shooting import close, swings_of_simplest
@@ -397,10 +397,10 @@ class Outward:
         laid twice, the second time over less; what both differ by, and twice what the multipliers scatter about the
         second one in terms of the factor, is the reserve. None if it does not, or too few are known."""
         factors = np.geomspace(at, outside, SPREAD)
-        beyond = hunting_cycles(self._stages(factors[ENOUGH:]))
+        beyond = find_cycles(self._stages(factors[ENOUGH:]))
         if not np.any(_excess(beyond) > 0):  # it ends in another way
             return None
-        within = hunting_cycles(self._stages(factors[:ENOUGH]))
+        within = find_cycles(self._stages(factors[:ENOUGH]))
         first = _crossed(factors, np.append(_excess(within), _excess(beyond)))
         if first is None:
             return None

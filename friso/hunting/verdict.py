@@ -1,22 +1,17 @@
-"""The verdict on stages: whether there is a cycle that attracts, and whether their own motion ends in it.
-
-`judge` tells of one stage what its verdict rests on; `judge_many` gives those of many stages at once.
-"""
+"""The verdict on one stage and what it rests on: whether a cycle attracts, and whether its own motion ends in it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from enum import StrEnum
 
 import numpy as np
 
 from friso.engine.allowance import Exhausted, allowance
-from friso.engine.batch import RunOptions
 from friso.equations.bandwidth import faster
 from friso.equations.motion import last_corner
-from friso.equations.structure import shared_structure
-from friso.hunting.attractors import Attractors, Target, attractors
+from friso.hunting.attractors import Target
 from friso.hunting.attractors.rounds import RTOL
 from friso.hunting.basin import (
     MOVES,
@@ -27,7 +22,6 @@ from friso.hunting.basin import (
     ends_in,
     moves_that_hunt,
     pushes_that_hunt,
-    swings_seldom,
 )
 from friso.hunting.criteria import Verdict, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
@@ -38,13 +32,12 @@ from friso.hunting.cycle.hunting import (
     Swing,
     cannot_hunt,
     hunting,
-    surely_surveyed,
-    why_not,
 )
-from friso.hunting.loop import leaves_for_good, may_run_away, winds_up_at_a_limit
-from friso.hunting.margin import DISTANCE, NOT_SOUGHT, Margin, SearchedBandwidths, followed_on, search_bandwidths
+from friso.hunting.limits import SEARCH_LIMITS
+from friso.hunting.loop import leaves_for_good, may_run_away
+from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths, followed_on, search_bandwidths
 from friso.hunting.measures import Measures, measuring_options
-from friso.hunting.motions import FollowedMotions, Motions, followed_motions, resting, run_motions, some_of
+from friso.hunting.motions import Motions, followed_motions, keeps_moving, resting, run_motions
 from friso.hunting.outward import AttractionEnd, BandwidthWindow
 from friso.stage import Stage
 
@@ -97,6 +90,26 @@ ROOM = 1 << 14
 """Room for turning points of a motion that is followed for long: one that needs more is run again."""
 
 
+class CheckPart(StrEnum):
+    """A part of a check: what is reported as it begins, and named where it is given up (`Judgement.given_up`), because
+    it would take more work than was allowed.
+
+    The first three are computed in this order; without anything that attracts `STARTS` is left out. `LOWER_BANDWIDTHS`
+    is what is given up of `BANDWIDTHS` where something attracts up to the highest one. `FEEDING` is computed behind
+    these, of a stage with a backlash that something attracts.
+    """
+
+    ATTRACTION = "what attracts the stage"
+    STARTS = "kicks and moves"
+    BANDWIDTHS = "other bandwidths"
+    LOWER_BANDWIDTHS = "lower bandwidths"
+    FEEDING = "what feeds it"
+
+
+PARTS = CheckPart.ATTRACTION, CheckPart.STARTS, CheckPart.BANDWIDTHS
+"""What is computed for a verdict, in this order."""
+
+
 @dataclass(frozen=True)
 class Judgement:
     """The verdict (see `friso.hunting.criteria.stage_verdict`) and what it rests on.
@@ -108,7 +121,7 @@ class Judgement:
     longer than its own end, as the longer run was not needed or not completed). `observed`: what attracts was observed
     in long simulations, no orbit that attracts could be closed. `lasting` [m], peak to peak, is where this motion alone
     was seen to swing on, at the end of the time for which it was followed; it `runs_away` if it leaves its reference
-    for good. `given_up`: what of `PARTS`, or `LOWER`, or `FEEDING`, would have taken more work than was allowed.
+    for good. `given_up`: the parts that would have taken more work than was allowed.
     """
 
     verdict: Verdict
@@ -125,7 +138,7 @@ class Judgement:
     lasting: float | None = None
     runs_away: bool = False
     running_away: Kick | None = None
-    given_up: tuple[str, ...] = ()
+    given_up: tuple[CheckPart, ...] = ()
 
     @property
     def swing(self) -> Cycle | Swing | None:
@@ -138,16 +151,6 @@ class Judgement:
         return next(iter((*self.hunting.attracting, *self.hunting.cycles)), None)
 
 
-PARTS = ATTRACTION, STARTS, BANDWIDTHS = "what attracts the stage", "kicks and moves", "other bandwidths"
-"""What is computed for a verdict, in this order; without a cycle that attracts the second is left out."""
-
-LOWER = "lower bandwidths"
-"""What is given up of the other bandwidths where something attracts up to the highest one."""
-
-FEEDING = "what feeds it"
-"""What is computed behind these of a stage with a backlash that something attracts."""
-
-
 def judge(
     stage: Stage,
     ran: Measures,
@@ -156,17 +159,17 @@ def judge(
     work: float = WORK,
 ) -> Judgement:
     """The verdict on a stage whose motion was run and measured at a relative tolerance; `begin` is told what is begun
-    (see `PARTS`). What cannot be settled by so much `work` (see `friso.engine.allowance`) is not certain."""
+    (see `CheckPart`). What cannot be settled by so much `work` (see `friso.engine.allowance`) is not certain."""
     motions = Motions.of(ran)
-    begin(ATTRACTION)
+    begin(CheckPart.ATTRACTION)
     with allowance() as spent:
-        moves_on = _keeps_moving(stage.flat()) and not cannot_hunt(stage)
+        moves_on = keeps_moving(stage.flat()) and not cannot_hunt(stage)
         attraction = Hunting((), MOVING, True, None) if moves_on else hunting(stage, work=SURVEY * work)
     if not motions.completed[0]:
         return Judgement("failed", attraction, runs_away=bool(motions.away[0]) and leaves_for_good(stage))
     if attraction.target:
         return _with_a_target(stage, motions, attraction, attraction.target, begin, work - spent.used)
-    begin(BANDWIDTHS)
+    begin(CheckPart.BANDWIDTHS)
     return _without_a_target(stage, motions, rtol, attraction, work - spent.used)
 
 
@@ -224,9 +227,9 @@ def _with_a_target(
         doubt = own.doubt or doubt
         if own.ends and own.swing > RUNNING_AWAY * _widest(attraction):
             doubt = RUNS_AWAY
-        begin(STARTS)
+        begin(CheckPart.STARTS)
         starts, started = _starts(stage, attraction, target, KICKS * work)
-    begin(BANDWIDTHS)
+    begin(CheckPart.BANDWIDTHS)
     sought, given_up = _sought(stage, attraction, work - spent.used)
     sought = _as_sure(stage, sought, attraction)
     return Judgement(
@@ -287,7 +290,7 @@ def _widest(attraction: Hunting) -> float:
 
 def _starts(
     stage: Stage, attraction: Hunting, target: Target, work: float
-) -> tuple[tuple[Kick | None, Kick | None, MoveShare | None], tuple[str, ...]]:
+) -> tuple[tuple[Kick | None, Kick | None, MoveShare | None], tuple[CheckPart, ...]]:
     """Which kicks and moves start hunting, as far as so much work shows, and what of that had to be given up."""
     starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
     if attraction.passing:  # what swings less at its end may be passing as well
@@ -301,8 +304,8 @@ def _starts(
                 moves_that_hunt(stage, target, widest),
             )
     except Exhausted:
-        return starts, (STARTS,)
-    return starts, (STARTS,) if _some_unknown(*starts) else ()
+        return starts, (CheckPart.STARTS,)
+    return starts, (CheckPart.STARTS,) if _some_unknown(*starts) else ()
 
 
 def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) -> str:
@@ -323,14 +326,14 @@ def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare
     return lost or (moved is not None and not moved.hunting and moved.count < MOVES)
 
 
-def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[str, ...]]:
+def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[CheckPart, ...]]:
     """What a search through the bandwidths shows that may use so much work, and what of it had to be given up."""
     attracting = attraction.target is not None
     with allowance(work) as search:
         sought = search_bandwidths(stage, attracting, attraction.surveyed)
     with allowance(AGAIN):
         sought = followed_on(stage, sought, attracting)
-    left = LOWER if sought.to_the_top else BANDWIDTHS
+    left = CheckPart.LOWER_BANDWIDTHS if sought.to_the_top else CheckPart.BANDWIDTHS
     return sought, (left,) if search.exhausted else ()
 
 
@@ -340,7 +343,8 @@ def _as_sure(stage: Stage, sought: SearchedBandwidths, attraction: Hunting) -> S
     def sure(end: AttractionEnd) -> bool:
         if not (end.certain and attraction.certain):
             return False
-        beyond = end.outside * (DISTANCE if end.outside > end.inside else 1 / DISTANCE)
+        distance = SEARCH_LIMITS.edge_distance
+        beyond = end.outside * (distance if end.outside > end.inside else 1 / distance)
         return not may_run_away(Ensemble.held(faster(stage.flat(), np.array([beyond])), 1))[0]
 
     def as_sure(end: AttractionEnd | None) -> AttractionEnd | None:
@@ -353,82 +357,3 @@ def _as_sure(stage: Stage, sought: SearchedBandwidths, attraction: Hunting) -> S
         windows=tuple(BandwidthWindow(as_sure(window.low), as_sure(window.high)) for window in sought.windows),
         lower=as_sure(sought.lower),
     )
-
-
-def _keeps_moving(flat: Mapping[str, Any]) -> bool:
-    return flat["motion.kind"] == "ramp" and bool(np.any(flat["motion.velocity"]))
-
-
-def can_hunt(flat: Mapping[str, Any]) -> bool:
-    """Whether stages of one structure may hunt: there is friction to stick to, integral action that winds up, and a
-    reference that stands still."""
-    return not why_not(shared_structure(flat)) and not _keeps_moving(flat)
-
-
-@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
-    """The verdicts on stages of one structure, given as flat keys to SI numbers or arrays of shape (count,).
-
-    As by `judge`, but from fewer starts, which may miss what attracts from a narrow range of them; simulations that
-    fail leave the verdict "failed".
-    """
-    stages = Ensemble.held(flat, count, form=shared_structure(flat))
-    survey = attractors(stages) if can_hunt(flat) else None
-    motions = run_motions(flat, count, measuring_options(rtol))
-    return judge_runs(flat, motions, survey, surely_surveyed(stages, survey), rtol)
-
-
-@np.errstate(all="ignore")
-def judge_runs(
-    flat: Mapping[str, Any],
-    motions: Motions,
-    survey: Attractors | None,
-    certain: np.ndarray,
-    rtol: float,
-    threads: int | None = None,
-    cancel: np.ndarray | None = None,
-) -> np.ndarray:
-    """The same where the stages' own motions were run, and what attracts is known already (None: they cannot hunt), and
-    of which that is `certain`, shape (count,); `threads` and `cancel` as in `RunOptions`."""
-    count = len(motions.completed)
-    stages = Ensemble.held(flat, count, form=shared_structure(flat))
-    decided = motions.completed & certain
-    attracts = np.zeros(count, bool) if survey is None else survey.attracts.copy()
-    in_cycle, rests = np.zeros(count, bool), np.zeros(count, bool)
-    run_options = measuring_options(rtol, threads, cancel)
-    attracted = np.flatnonzero(decided & attracts)
-    if survey is not None and attracted.size:
-        target = survey.take(attracted).target
-        ends, completed, swing = ends_in(
-            some_of(flat, attracted), attracted.size, target, threads=threads, cancel=cancel
-        )
-        completed &= ~swings_seldom(target, ends, swing)
-        if winds_up_at_a_limit(stages):
-            completed &= ~(ends & (swing > RUNNING_AWAY * 2 * target.amplitude))
-        in_cycle[attracted], decided[attracted] = ends, completed
-        settled = np.isfinite(motions.settling[attracted]) & (swing <= resting(flat, count)[attracted])
-        restless = attracted[completed & ~ends & ~settled]
-        if restless.size:  # something may attract them that swings less than what was found
-            moved = some_of(flat, restless), motions.take(restless)
-            in_cycle[restless], decided[restless] = _swing_on(*moved, run_options)
-    free = np.flatnonzero(decided & ~attracts)
-    if free.size:
-        rest = followed_motions(
-            some_of(flat, free), motions.take(free), free.size, run_options, possible=survey is not None
-        )
-        rests[free], attracts[free], in_cycle[free] = rest.rests, rest.steady, rest.steady
-        if survey is not None:
-            decided[free] = rest.steady | _stands(some_of(flat, free), rest)
-    return verdicts(decided, attracts, in_cycle, rests)
-
-
-def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions) -> tuple[np.ndarray, np.ndarray]:
-    """Of motions that do not end in what was found to attract their stages, which swing on by less once they were
-    followed for long, and of which that is decided: they do, or they have come to rest."""
-    rest = followed_motions(flat, motions, len(motions.completed), run_options, possible=True)
-    return rest.steady, rest.steady | _stands(flat, rest)
-
-
-def _stands(flat: Mapping[str, Any], rest: FollowedMotions) -> np.ndarray:
-    """Which motions were followed to where they do not swing any more, as far as they had to be, shape (count,)."""
-    return ~rest.unknown & (~rest.moving | (rest.swing <= resting(flat, len(rest.moving))))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.frequency.crossover import WANTED
-from friso.hunting.margin import DISTANCE
+from friso.hunting import SEARCH_LIMITS
 
 SHARE = 0.95
 """Share of the machines, each with a move of its own, that have to meet the goal."""
@@ -25,7 +25,7 @@ class Goal:
     force_limit: float | None = None
     bandwidth_limit: float | None = None
     margin: float = WANTED
-    distance: float = DISTANCE
+    distance: float = SEARCH_LIMITS.edge_distance
     share: float = SHARE
     controller: bool = True
     joint: bool = True

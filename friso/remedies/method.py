@@ -18,7 +18,7 @@ from friso.equations.motion import last_corner
 from friso.equations.structure import structure
 from friso.errors import InputError, StageError
 from friso.frequency.crossover import Limits, limits
-from friso.hunting.check import Case
+from friso.hunting import Case
 from friso.progress import Progress, silent
 from friso.remedies.catalogue import Remedy, remedies, with_bandwidth
 from friso.remedies.change import ChangeSize, change_size

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from friso.engine.arrays import STATISTICS
+from friso.engine.arrays import STATISTICS, Results, Status
 from friso.engine.batch import MOST_TURNS
-from friso.equations.bandwidth import bandwidth, faster
+from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import Stand, initial_displacement, pieces, size, stands
 from friso.equations.roles import Steady
 from friso.equations.structure import decisive_keys
-from friso.equations.variational import along
 from friso.errors import InputError
 from friso.frequency.crossover import settled_members
 from friso.frequency.drive import DriveTiming
@@ -22,27 +21,22 @@ from friso.frequency.family import scan_stability
 from friso.frequency.loops import response
 from friso.frequency.margins import margins
 from friso.frequency.members import Members
-from friso.hunting.cycle.ensemble import Ensemble, done
-from friso.hunting.cycle.find import Cycles, hunting_cycles
-from friso.hunting.cycle.multipliers import multipliers
-from friso.hunting.cycle.shooting import Orbits, close
-from friso.hunting.margin import Margin
-from friso.hunting.verdict import can_hunt
+from friso.hunting import (
+    CycleDerivatives,
+    Ensemble,
+    Margin,
+    can_hunt,
+    check_given,
+    cycle_derivatives,
+    edge_derivatives,
+    flow_derivatives,
+)
 from friso.stage import Stage, numeric_keys
 from friso.stage.arguments import check_arguments
 from friso.stage.controllers import as_tuned, controller_of
 
 RTOL = 1e-11
 """Relative tolerance of the runs: derivatives are needed to six digits."""
-
-NUDGE = 1e-3
-"""Share by which keys are changed to see how the multiplier changes, which is itself a derivative."""
-
-INSIDE = 1e-3
-"""Share of the bandwidth by which the cycle is looked at inside of the edge of hunting."""
-
-FLIP = 0.8
-"""Size of the multiplier from which on a cycle next to an edge is about to flip."""
 
 SMALL = 1e-5
 """Share by which keys are changed to see how the loop changes at one frequency, which is smooth."""
@@ -59,18 +53,6 @@ START = "motion.displacement"
 
 TABLES = ("masses.", "friction.", "joint.", "controller.", "bias.", "transmission.", "motor_friction.")
 """Where keys stand of which the cycle may depend."""
-
-
-@dataclass(frozen=True)
-class CycleDerivatives:
-    """The symmetric cycle (that over a whole period, of stages that are not symmetric), whether it `attracts`, its
-    `amplitude` [m] and `period` [s], and their derivatives to the keys [SI], each of shape (keys,)."""
-
-    attracts: bool
-    amplitude: float
-    period: float
-    amplitude_by: np.ndarray
-    period_by: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -175,7 +157,7 @@ def sensitivity(
         stage,
         names,
         values,
-        _of_cycle(flat, names) if hunts else None,
+        cycle_derivatives(flat, names, RTOL) if hunts else None,
         _of_edge(stage, flat, names, edge) if hunts else None,
         _of_margin(flat, names),
         None if within is None else _of_settling(flat, names, within),
@@ -209,111 +191,19 @@ def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str
     return nearby
 
 
-@np.errstate(all="ignore")
-def _of_cycle(flat: Mapping[str, Any], keys: tuple[str, ...]) -> CycleDerivatives | None:
-    stages = Ensemble.held(flat, 1)
-    cycles = hunting_cycles(stages)
-    if not cycles.closed[0]:
-        return None
-    orbits = close(stages, cycles.states, cycles.orbits.times, cycles.sign, RTOL, cycles.swings)
-    flow = _flow(stages, keys, orbits.states, orbits.times)
-    if flow is None:
-        return None
-    ends, by_states, by_keys = flow
-    size, sign = stages.scales.shape[1], orbits.sign
-    system = np.zeros((size + 1, size + 1))
-    system[:size, :size] = sign * by_states - np.eye(size)
-    system[:size, size] = stages.rates(sign * ends[None])[0]
-    system[size, stages.integral] = 1.0  # the section: period and amplitude do not depend on it
-    moved = np.linalg.solve(system, np.vstack([-sign * by_keys, np.zeros(len(keys))]))
-    halves = 2.0 if sign < 0 else 1.0
-    extremes = _extremes(stages, keys, orbits, moved[:size])
-    if extremes is None:
-        return None
-    amplitude, amplitude_by = extremes
-    attracts = bool(cycles.attracting[0])
-    return CycleDerivatives(attracts, amplitude, halves * float(orbits.times[0]), amplitude_by, halves * moved[size])
-
-
-def _flow(
-    stages: Ensemble, keys: tuple[str, ...], state: np.ndarray, time: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Where the flow takes a state (1, states) in a time (1,), with its derivatives to state and keys: (states,),
-    (states, states) and (states, keys)."""
-    size, count = state.shape[1], state.shape[1] + len(keys)
-    several = stages.take(np.zeros(count, np.int64))
-    beside = {along(name): np.eye(len(keys))[k] for k, name in enumerate(keys)}
-    flat = {**several.flat, **{name: np.concatenate([np.zeros(size), row]) for name, row in beside.items()}}
-    begun = Ensemble(flat, count, form=stages.structure)
-    starts = np.hstack([np.repeat(state, count, axis=0), np.eye(count, size)])
-    results = begun.run(starts, np.repeat(time, count), RTOL, variational=True, along=keys, window=0.0)
-    if not done(results).all():
-        return None
-    columns = results.ends[:, size : 2 * size]
-    return results.ends[0, :size], columns[:size].T, columns[size:].T
-
-
-def _extremes(
-    stages: Ensemble, keys: tuple[str, ...], orbits: Orbits, moved: np.ndarray
-) -> tuple[float, np.ndarray] | None:
-    """Half of peak to peak of the position on an orbit and its derivatives to the keys, the orbit's state being moved
-    (states, keys) by these."""
-    whole = orbits.times * (2.0 if orbits.sign < 0 else 1.0)
-    results = stages.run(orbits.states, whole, RTOL, least_swing=0.0)
-    turns = int(results.turn_counts[0])
-    if turns < 2:
-        return None
-    times, values = results.turn_times[0, :turns], results.turn_values[0, :turns]
-    sides = []
-    for at in (int(values.argmax()), int(values.argmin())):
-        flow = _flow(stages, keys, orbits.states, times[[at]])
-        if flow is None:
-            return None
-        _, by_states, by_keys = flow
-        sides.append((by_states @ moved + by_keys)[stages.kernel.position])
-    return float(np.ptp(values) / 2), (sides[0] - sides[1]) / 2
-
-
-@np.errstate(all="ignore")
 def _of_edge(
     stage: Stage, flat: Mapping[str, Any], keys: tuple[str, ...], edge: Margin | None
 ) -> EdgeDerivatives | None:
-    """The edge's derivatives: along it the multiplier stays what it is."""
-    if edge is None:
-        from friso.hunting.check import check_given
-
-        edge = check_given(stage).judgement.margin
-    if edge is None or not edge.certain:
+    """The edge's derivatives; the edge is that of a check unless it is told."""
+    edge = check_given(stage).judgement.margin if edge is None else edge
+    moved = None if edge is None or not edge.certain else edge_derivatives(flat, keys, edge.factor, RTOL)
+    if edge is None or moved is None:
         return None
-    inside = faster(flat, edge.factor * (1 - INSIDE))
-    first = hunting_cycles(Ensemble.held(inside, 1))
-    if not (first.closed[0] and -1 <= first.multiplier[0] < -FLIP) or Ensemble.held(inside, 1).chatters:
-        return None
-    changed = [{name: inside[name] * (1 + step)} for name in keys for step in (-NUDGE, NUDGE)]
-    changed += [faster(inside, 1 + step) for step in (-NUDGE, NUDGE)]
-    multiplier = _multipliers(inside, changed, first)
-    if multiplier is None:
-        return None
-    slopes = (multiplier[1::2] - multiplier[::2]) / (2 * NUDGE)
     named = bandwidth(stage.flat())
     hertz = edge.factor * (1.0 if named is None else float(named))
     stated = controller_of(flat).bandwidth_key  # the edge itself stays where it is when that changes
-    relative = -slopes[:-1] / slopes[-1] + np.array([float(name == stated) for name in keys])
+    relative = moved + np.array([float(name == stated) for name in keys])
     return EdgeDerivatives(hertz, hertz * relative / np.array([flat[name] for name in keys]))
-
-
-def _multipliers(inside: Mapping[str, Any], changed: Sequence[Mapping[str, Any]], first: Cycles) -> np.ndarray | None:
-    """The multipliers of stages that are a little different from one whose cycle is known, shape (stages,)."""
-    count = len(changed)
-    names = {name for change in changed for name, value in change.items() if value != inside[name]}
-    flat = {**inside, **{name: np.array([change.get(name, inside[name]) for change in changed]) for name in names}}
-    stages = Ensemble.held(flat, count)
-    start = np.repeat(first.states, count, axis=0), np.repeat(first.orbits.times, count)
-    orbits = close(stages, *start, first.sign, RTOL, first.swings)
-    if not orbits.closed.all():
-        return None
-    local = multipliers(stages, orbits, RTOL).local[:, 0]
-    return np.real(local) if np.all(np.abs(np.imag(local)) < 1e-9) else None
 
 
 @np.errstate(all="ignore")
@@ -326,13 +216,13 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     duration = np.array([float(flat["motion.duration"])])
     start = _starts(stages, flat, 1)
     results = stages.run(start, duration, RTOL, bands=(within, within))
-    if not done(results).all():
+    if not _all_done(results):
         return None
     column, place = _longest(flat, results.statistics[0])
     corner, entered = float(place.corner), results.statistics[:, column]
     if not corner < entered[0] < place.until:
         return None
-    flow = _flow(stages, keys, start, entered)
+    flow = flow_derivatives(stages, keys, start, entered, RTOL)
     if flow is None:
         return None
     end, by_states, by_keys = flow
@@ -342,13 +232,17 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     if not _is_smooth(flat, keys, column, float(entered[0]), settling, by, within):
         return None
     results = stages.run(start, duration, RTOL, least_swing=0.0, room=MOST_TURNS)  # once, however many turns there are
-    if not done(results).all():
+    if not _all_done(results):
         return None
     turns = slice(int(results.turn_counts[0]))
     off, times = np.abs(results.turn_values[0, turns]) / within, results.turn_times[0, turns]
     last = off[(times > corner) & (times <= entered[0])][-1:]
     jump = np.abs(np.append(last, off[(times > entered[0]) & (times < place.until)]) - 1).min(initial=np.inf)
     return SettlingDerivatives(within, settling, by, float(jump))
+
+
+def _all_done(results: Results) -> bool:
+    return bool(np.all(np.equal(results.statuses, Status.DONE)))
 
 
 def _longest(flat: Mapping[str, Any], statistics: np.ndarray) -> tuple[int, Stand]:
@@ -381,7 +275,7 @@ def _is_smooth(
     moved = results.statistics[:, column] - entered
     expected = np.concatenate([-step * by, step * by])
     allowed = SMOOTH * SMALL * settling + NOISE * entered
-    return bool(done(results).all() and np.all(np.abs(moved - expected) <= allowed))
+    return bool(_all_done(results) and np.all(np.abs(moved - expected) <= allowed))
 
 
 def _starts(stages: Ensemble, flat: Mapping[str, Any], count: int) -> np.ndarray:

@@ -9,12 +9,9 @@ import numpy as np
 from friso.design_method.isolator import isolated
 from friso.equations.bandwidth import faster
 from friso.equations.breakaway import least_breakaway
-from friso.equations.structure import shared_structure
 from friso.errors import InputError
 from friso.frequency.crossover import settled_margin
-from friso.hunting.attractors import attractors
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import surely_surveyed
+from friso.hunting import find_attractors
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.variables import DAMPING_RATIOS, joint_variables
@@ -60,10 +57,8 @@ def suggestion(stage: Stage) -> Suggestion | None:
     flat = {**free.flat(), **numbers}
     attracts = np.zeros(len(tried), bool)
     for factor in (1.0, 1 / Goal.distance):
-        slower = faster(flat, factor)
-        stages = Ensemble.held(slower, len(tried), form=shared_structure(slower))
-        survey = attractors(stages, cycles=False)
-        attracts |= survey.attracts | ~surely_surveyed(stages, survey)
+        attracted = find_attractors(faster(flat, factor), len(tried), close_orbits=False)
+        attracts |= attracted.attracts | ~attracted.certain
     for number in np.flatnonzero(~attracts):
         settled = remedy.tuned(shares[number])
         margin = settled_margin(settled.flat())

@@ -12,11 +12,8 @@ from friso.engine.kernel import kernel
 from friso.equations.bandwidth import faster
 from friso.equations.settings import gain_states
 from friso.equations.structure import shared_structure
-from friso.hunting.attractors import attractors
+from friso.hunting import find_attractors
 from friso.hunting.criteria import settling_of_runs
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import surely_surveyed
-from friso.hunting.verdict import can_hunt
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
@@ -135,11 +132,8 @@ def attraction(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal) 
     shape = len(shares), machines.count
     attracts, decided, certain = np.zeros(shape, bool), np.ones(shape, bool), np.ones(shape, bool)
     for factor in (1.0, goal.distance**-0.5, 1 / goal.distance):
-        slower = faster(flat, factor)
-        stages = Ensemble.held(slower, len(shares) * machines.count, form=shared_structure(slower))
-        survey = attractors(stages, cycles=False) if can_hunt(flat) else None
-        if survey is not None:
-            attracts |= survey.attracts.reshape(shape)
-            decided &= survey.decided.reshape(shape)
-        certain &= surely_surveyed(stages, survey).reshape(shape)
+        attracted = find_attractors(faster(flat, factor), len(shares) * machines.count, close_orbits=False)
+        attracts |= attracted.attracts.reshape(shape)
+        decided &= attracted.decided.reshape(shape)
+        certain &= attracted.certain.reshape(shape)
     return Attraction(attracts, decided, certain)

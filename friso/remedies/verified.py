@@ -13,8 +13,7 @@ from friso.equations.settings import gain_states
 from friso.frequency.bandwidth import loop_bandwidth
 from friso.frequency.crossover import settled_margin
 from friso.frequency.stiffness import in_series
-from friso.hunting.check import Case, check_given
-from friso.hunting.verdict import BANDWIDTHS
+from friso.hunting import Case, CheckPart, check_given
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
@@ -192,7 +191,7 @@ def unsettled_parts(case: Case, measured: Performance, goal: Goal) -> tuple[str,
         listed.append("verdict")
     elif not judgement.hunting.certain:
         listed.append("certain")
-    if BANDWIDTHS in judgement.given_up:
+    if CheckPart.BANDWIDTHS in judgement.given_up:
         listed.append("given up")
     if edge is not None and edge.quiet * goal.distance > 1 and edge.factor < 1:
         listed.append("distance")

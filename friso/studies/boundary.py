@@ -8,9 +8,7 @@ from friso.engine.kernel import KernelRequest, kernels
 from friso.engine.tolerance import checked_rtol
 from friso.equations.bandwidth import range_example
 from friso.errors import InputError
-from friso.hunting.boundary import Diagram, KeyRange, Plane, Space, diagram, plane
-from friso.hunting.cycle.find import RTOL
-from friso.hunting.cycle.hunting import DITHERS, cannot_hunt
+from friso.hunting import CYCLE_RTOL, DITHERS, Diagram, KeyRange, Plane, Space, cannot_hunt, diagram, plane
 from friso.progress import Progress, silent
 from friso.stage import Stage, violations
 from friso.studies.axes import SweptAxis, read_axis
@@ -28,7 +26,7 @@ def boundary(
     stage: Stage,
     axes: Mapping[str, str],
     links: Mapping[str, str] | None = None,
-    rtol: float = RTOL,
+    rtol: float = CYCLE_RTOL,
     log: bool = False,
     begins: Callable[[], None] = lambda: None,
     progress: Progress = silent,

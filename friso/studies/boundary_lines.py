@@ -8,9 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from friso.hunting.boundary import Branch, Curve, Diagram, LocatedPoint, Plane, Point, Space
-from friso.hunting.boundary.diagram import SAME
-from friso.hunting.cycle.find import Cycles
+from friso.hunting import Branch, Curve, Cycles, Diagram, LocatedPoint, Plane, Space
 
 CycleShape = Literal["symmetric", "asymmetric", "whole"]
 """A cycle that is its own mirror image; one that is not, of a stage that is; one of a stage that is not."""
@@ -79,7 +77,9 @@ def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
     """The points of a branch with those of its special points that are inside the range, in order, but for those within
     the error of one: there it is not known whether they attract."""
     path = np.array([point.vector for point in branch.points])
-    ordinary = [(k, point) for k, point in enumerate(branch.points) if not any(_in_doubt(s, point) for s in special)]
+    ordinary = [
+        (k, point) for k, point in enumerate(branch.points) if not any(spot.in_doubt(point) for spot in special)
+    ]
     placed = [(float(k), point, np.nan, "") for k, point in ordinary]
     placed += [
         (_path_coordinate(path, spot.point.vector), spot.point, spot.error, spot.kind)
@@ -90,12 +90,6 @@ def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
         _Row(np.array([point.place]), np.array([error]), point.cycle, kind)
         for _, point, error, kind in sorted(placed, key=lambda row: row[0])
     ]
-
-
-def _in_doubt(special: LocatedPoint, point: Point) -> bool:
-    """Whether a point of its branch lies within the error of a special one, if that is known."""
-    apart = np.abs(special.point.vector - point.vector)
-    return bool(np.isfinite(special.error) and apart[0] < special.error and apart[1:].max() < SAME)
 
 
 def _path_coordinate(path: np.ndarray, vector: np.ndarray) -> float:

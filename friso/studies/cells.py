@@ -12,13 +12,16 @@ from friso.engine.arrays import Status
 from friso.engine.batch import Runs, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import Structure, decisive_keys, structure
-from friso.hunting.attractors import Attractors, attractors
-from friso.hunting.criteria import peak_count, run_outcome, stage_verdict
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import surely_surveyed
+from friso.hunting import Motions, StageAttractors, find_attractors, judge_runs
+from friso.hunting.criteria import (
+    BAND,
+    DISTINCT_CRITERION,
+    FAILED,
+    OUTCOME_CRITERION,
+    PEAK_CRITERION,
+    VERDICT_CRITERION,
+)
 from friso.hunting.measures import BANDS, Measures, measure_runs, measuring_options
-from friso.hunting.motions import Motions
-from friso.hunting.verdict import can_hunt, judge_runs
 from friso.stage import Stage, violations
 from friso.studies.links import linked
 
@@ -71,11 +74,11 @@ OF_ATTRACTORS = (
 )
 
 CRITERIA = {
-    "outcome": run_outcome.CRITERION,
-    "verdict": stage_verdict.CRITERION,
+    "outcome": OUTCOME_CRITERION,
+    "verdict": VERDICT_CRITERION,
     **dict.fromkeys(("attractor", *CYCLE_UNITS), OF_ATTRACTORS),
-    "peaks": peak_count.CRITERION,
-    "distinct_peaks": peak_count.DISTINCT_CRITERION,
+    "peaks": PEAK_CRITERION,
+    "distinct_peaks": DISTINCT_CRITERION,
 }
 """By which criterion (`friso.hunting.criteria`) a measure says what hunts."""
 
@@ -86,7 +89,7 @@ INFERRED = "inferred"
 def attributes_of(metric: str, kind: AxisKind) -> dict[str, Any]:
     """The attributes of the variable of a metric, of stages with that kind of axis."""
     attributes: dict[str, Any] = {"units": kind.unit(UNITS[metric])} if metric in UNITS else {}
-    bands = {"settling_time": BANDS[0], "settling_time_10um": BANDS[1], "outcome": run_outcome.BAND}
+    bands = {"settling_time": BANDS[0], "settling_time_10um": BANDS[1], "outcome": BAND}
     attributes |= {kind.suffix("band_m"): bands[metric]} if metric in bands else {}
     return attributes | ({"criterion": kind.text(CRITERIA[metric])} if metric in CRITERIA else {})
 
@@ -115,10 +118,10 @@ def run_cells(
         for runs in run_chunks(kernel(shape), flat, len(cells), measuring_options(rtol, threads, cancel)):
             table.write(cells[runs.numbers], measure_runs(runs.part(flat), runs), runs)
     if any(name in metrics for name in BY_ATTRACTORS):
-        for flat, cells, survey, certain in cell_attractors(parts, table.ran, threads, cancel):
-            table.write_attractors(cells, survey, certain)
+        for flat, cells, attracted in cell_attractors(parts, table.ran, threads, cancel):
+            table.write_attractors(cells, attracted)
             if "verdict" in metrics:
-                words = judge_runs(flat, table.motions(cells), survey, certain, rtol, threads, cancel)
+                words = judge_runs(flat, table.motions(cells), attracted, rtol, threads, cancel)
                 table.columns["verdict"][cells] = words
     return table.columns
 
@@ -129,29 +132,25 @@ Parts = Iterable[tuple[dict[str, Any], np.ndarray]]
 
 def cell_attractors(
     parts: Parts, chosen: np.ndarray, threads: int | None = None, cancel: np.ndarray | None = None
-) -> Iterator[tuple[dict[str, Any], np.ndarray, Attractors | None, np.ndarray]]:
+) -> Iterator[tuple[dict[str, Any], np.ndarray, StageAttractors]]:
     """What attracts the stages of the cells that are chosen, shape (cells,), by the equations they need: their flat SI
-    form, their numbers, the survey (None where they cannot hunt), and whether what attracts each is certain.
+    form, their numbers, and what attracts them.
 
     The motion plays no part: of cells that differ in it alone one is surveyed.
     """
-    for flat, cells, shape in by_equations(parts, chosen):
-        yield flat, cells, *_once(flat, len(cells), shape, threads, cancel)
+    for flat, cells, _ in by_equations(parts, chosen):
+        yield flat, cells, _once(flat, len(cells), threads, cancel)
 
 
-def _once(
-    flat: Mapping[str, Any], count: int, shape: Structure, threads: int | None, cancel: np.ndarray | None
-) -> tuple[Attractors | None, np.ndarray]:
-    """What attracts stages of one structure, and of which that is certain, looked for once for all that differ in
-    their motion alone."""
+def _once(flat: Mapping[str, Any], count: int, threads: int | None, cancel: np.ndarray | None) -> StageAttractors:
+    """What attracts stages of one structure, looked for once for all that differ in their motion alone."""
     varied = [np.zeros(count)]
     varied += [value for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")]
     _, first, again = np.unique(np.stack(varied), axis=1, return_index=True, return_inverse=True)
-    of_structure = {key: value[first] if np.ndim(value) else value for key, value in flat.items()}
-    stages = Ensemble.held(of_structure, len(first), form=shape, threads=threads, cancel=cancel)
-    survey = attractors(stages) if can_hunt(flat) else None
-    certain = surely_surveyed(stages, survey)[again.ravel()]
-    return survey and survey.take(again.ravel()), certain
+    different = {
+        key: value[first] if np.ndim(value) and not key.startswith("motion.") else value for key, value in flat.items()
+    }
+    return find_attractors(different, len(first), threads=threads, cancel=cancel).take(again.ravel())
 
 
 def allowed_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -252,7 +251,7 @@ class _Table:
         """How the motions of the cells went."""
         columns = (self.columns[name][cells] for name in ("peaks", "peak_to_peak", "settling_time_10um"))
         away = self.columns["status"][cells] == Status.DIVERGED.text
-        return Motions(self.columns["outcome"][cells] != run_outcome.FAILED, away, *columns)
+        return Motions(self.columns["outcome"][cells] != FAILED, away, *columns)
 
     def write(self, which: np.ndarray, measures: Measures, runs: Runs) -> None:
         """Write the measures of the cells that were run."""
@@ -266,20 +265,15 @@ class _Table:
         for name, column in written.items():
             self.columns[name][which[ran]] = column[ran]
 
-    def write_attractors(self, cells: np.ndarray, survey: Attractors | None, certain: np.ndarray) -> None:
+    def write_attractors(self, cells: np.ndarray, attracted: StageAttractors) -> None:
         """Write those measures of what attracts the cells' stages that the table has: of the largest swing of each, as
         far as that is certain."""
-        word = np.where(certain, NOTHING, UNKNOWN).astype(object)
-        measures = {name: np.full(len(cells), np.nan) for name in CYCLE_UNITS}
-        motions = () if survey is None else survey.motions
-        for motion in sorted(motions, key=lambda motion: motion.amplitude):  # the largest last
-            k, orbit = motion.stage, motion.cycles
-            if not certain[k]:
-                continue
-            word[k] = SWING if orbit is None else CYCLE
-            multiplier = np.nan if orbit is None else orbit.multiplier[motion.number]
-            for name, value in zip(CYCLE_UNITS, (multiplier, motion.amplitude, motion.period), strict=True):
-                measures[name][k] = value
-        for name, column in {"attractor": word, **measures}.items():
+        kind = np.where(attracted.attracts, np.where(attracted.closed, CYCLE, SWING), NOTHING)
+        columns = {"attractor": np.where(attracted.certain, kind, UNKNOWN).astype(object)}
+        swing = attracted.multiplier, attracted.amplitude, attracted.period
+        columns |= {
+            name: np.where(attracted.certain, column, np.nan) for name, column in zip(CYCLE_UNITS, swing, strict=True)
+        }
+        for name, column in columns.items():
             if name in self.columns:
                 self.columns[name][cells] = column

@@ -9,11 +9,8 @@ import numpy as np
 
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.structure import shared_structure
+from friso.hunting import judge_many, kernels_to_judge, loops_unstable
 from friso.hunting.criteria import ATTRACTED, VERDICTS
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import why_not
-from friso.hunting.loop import unstable_among
-from friso.hunting.verdict import judge_many
 from friso.progress import Progress, Tally, silent
 from friso.shares import Share, share
 from friso.stage import Stage
@@ -29,7 +26,7 @@ MOST = 100_000
 @dataclass(frozen=True)
 class Fates:
     """The verdicts on drawn stages, words of `friso.hunting.criteria.VERDICTS`, and the loops of which are `unstable`,
-    sticking or sliding (see `friso.hunting.loop`), both of shape (count,)."""
+    sticking or sliding, both of shape (count,)."""
 
     verdicts: np.ndarray
     unstable: np.ndarray
@@ -67,7 +64,7 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
     """The fates of the drawn stages as given and, with a joint, locked and free."""
     variants = different(stage)
     structures = [shared_structure(laid_over(variant, sample.keys)) for variant in variants.values()]
-    kernels([KernelRequest(form, variational) for form in structures for variational in (False, not why_not(form))])
+    kernels(set[KernelRequest]().union(*map(kernels_to_judge, structures)))
     tally = Tally(progress, sample.count * len(variants))
     by_variant = {name: _fates(variant, sample, rtol, tally) for name, variant in variants.items()}
     return {
@@ -106,7 +103,6 @@ def _fates(stage: Stage, sample: Sample, rtol: float, tally: Tally) -> Fates:
         keys = {key: values[chunk] for key, values in sample.keys.items()}
         flat, count = laid_over(stage, keys), chunk.stop - first
         words[chunk] = judge_many(flat, count, rtol)
-        stages = Ensemble.held(flat, count, form=shared_structure(flat))
-        lost[chunk] = np.any([*unstable_among(stages).values()], axis=0)
+        lost[chunk] = loops_unstable(flat, count)
         tally.add(chunk.stop - first, "draws")
     return Fates(words, lost)

@@ -12,8 +12,7 @@ from friso.errors import InputError
 from friso.frequency.describing.balance import single_harmonic
 from friso.frequency.describing.function import checked_positive
 from friso.frequency.describing.multi import DONE, balanced
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL, Cycles, hunting_cycles
+from friso.hunting import CYCLE_RTOL, Cycles, Ensemble, find_cycles
 from friso.stage import Stage
 from friso.stage.arguments import check_arguments
 
@@ -37,7 +36,7 @@ def harmonic_balance(
     stage: Stage,
     crossovers: Sequence[float] | np.ndarray,
     harmonics: Sequence[int] = HARMONICS,
-    rtol: float = RTOL,
+    rtol: float = CYCLE_RTOL,
 ) -> xr.Dataset:
     """The symmetric hunting cycle of a stage at crossovers [Hz], by simulation and by harmonic balance.
 
@@ -91,7 +90,7 @@ def harmonic_balance(
 
 def _symmetric(stages: Ensemble, rtol: float) -> Cycles:
     """The cycle of every stage that is its own mirror image. Raises InputError where one has none."""
-    cycles = hunting_cycles(stages, rtol)
+    cycles = find_cycles(stages, rtol)
     if cycles.sign >= 0 or not cycles.closed.all():
         why = "; ".join({str(reason) for reason in cycles.reasons if reason}) or "a cycle that is not symmetric"
         raise InputError("crossovers", why, "a stage with a symmetric hunting cycle at each", "4 Hz")

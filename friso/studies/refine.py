@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from friso.errors import InputError
-from friso.hunting.criteria.run_outcome import SWINGS
+from friso.hunting.criteria import SWINGS
 from friso.studies.axes import SweptAxis
 from friso.studies.cells import INFERRED, METRICS, UNITS, USUAL, Columns
 from friso.studies.samples import SAMPLE

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from friso.views.drawing.prefixes import listed
 
 if TYPE_CHECKING:
-    from friso.hunting.loop import LoopState
+    from friso.hunting import LoopState
 
 
 def unstable_loop(states: tuple[LoopState, ...]) -> list[str]:

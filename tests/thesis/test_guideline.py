@@ -21,8 +21,7 @@ from friso.answers.output_folder import UNFINISHED, write
 from friso.cli import main
 from friso.equations.model import assemble
 from friso.equations.structure import structure
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import hunting_cycles
+from friso.hunting import Ensemble, find_cycles
 from friso.progress import Tally, silent
 from friso.stage import Stage
 from friso_thesis.studies.guideline import checks, compute, parasitic, persistence, sweeps, worked
@@ -58,7 +57,7 @@ def free_rig() -> Stage:
 
 
 def multiplier(flat: dict[str, Any]) -> float:
-    (result,) = hunting_cycles(Ensemble.held(flat, 1)).multiplier
+    (result,) = find_cycles(Ensemble.held(flat, 1)).multiplier
     return float(result)
 
 
@@ -208,7 +207,7 @@ def swept(values: dict[str, np.ndarray]) -> Edges:
 def test_simulation_sees_small_cycles() -> None:
     """At a gap of 0.12 a cycle swings by less than a tenth of the deflection by the break-away force."""
     stages = at(SMALL_CYCLE, 0.9 * 0.02619)
-    cycles = hunting_cycles(stages)
+    cycles = find_cycles(stages)
     assert cycles.attracting[0]
     assert 0.005 < cycles.amplitude[0] / stages.length[0] < 0.05
     assert [item[0] for item in swings_from_any_distance(stages)] == [True, True]

@@ -28,7 +28,7 @@ from friso.answers.output_folder import UNFINISHED, write
 from friso.cli import main
 from friso.cli.command import COMMANDS
 from friso.equations.motion import size
-from friso.hunting.margin import margin
+from friso.hunting import find_margin
 from friso.shares import share
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.studies.rig.moves_on_rails import distance
@@ -1093,7 +1093,7 @@ def test_the_edge_of_hunting_behind_a_map(thorough_study: Reproduction) -> None:
         if 1.2 < y < 2.2
     ]
     crossover = np.interp(1.7, *np.array(sorted((y, x) for x, y in near)).T)
-    edge = margin(study.stage(), attracting=True)
+    edge = find_margin(study.stage(), attracting=True)
     assert edge is not None
     assert crossover == pytest.approx(edge.crossover, rel=0.02)
     shown = replace(thorough_study, cycles={"system": cycles_})

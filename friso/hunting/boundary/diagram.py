@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.hunting.attractors import attractors
 from friso.hunting.boundary.branch import Branch, Point, Tracer
-from friso.hunting.boundary.locate import LocatedPoint, special_points
+from friso.hunting.boundary.locate import SAME_CYCLE, LocatedPoint, special_points
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL, Cycles, families
 from friso.hunting.cycle.hunting import surely_surveyed
@@ -23,9 +23,6 @@ SEEDS = 33
 OTHERS = 6
 """Branches at most of cycles that simulations end in, beside those that the return maps suggest: where periods double
 again and again there is no end of them."""
-
-SAME = 0.02
-"""Difference in the logarithm of distance up to which two cycles of one stage are the same."""
 
 BRANCHES = "branches of cycles"
 """What is reported to a progress: each cycle that was found lies on a branch."""
@@ -69,8 +66,9 @@ def _in_doubt(special: Sequence[Sequence[LocatedPoint]], places: np.ndarray) -> 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS, progress: Progress = silent) -> Diagram:
-    """Follow every cycle that is found at stages evenly over the range: those that the return map suggests, the
-    symmetric one and asymmetric ones, and those that simulations end in, of any number of swings."""
+    """Follow over the range of one key every cycle that is found at `seeds` stages evenly over it: those that the
+    return map suggests, the symmetric one and asymmetric ones, and those that simulations end in, of any number of
+    swings. Orbits are closed to a relative tolerance."""
     places = np.linspace(0, 1, seeds)
     places = places[space.allowed(places[:, None])]
     stages = space.stages(places[:, None])
@@ -133,7 +131,7 @@ def _same(first: LocatedPoint, second: LocatedPoint, close: float) -> bool:
     close = max([close, *(spot.error for spot in (first, second) if np.isfinite(spot.error))])
     apart = np.abs(first.point.vector - second.point.vector)
     kinds = [(spot.kind, spot.point.cycle.sign, spot.point.cycle.swings) for spot in (first, second)]
-    return bool(kinds[0] == kinds[1] and apart[0] < close and apart[1:].max() < SAME)
+    return bool(kinds[0] == kinds[1] and apart[0] < close and apart[1:].max() < SAME_CYCLE)
 
 
 def _passes(branch: Branch, point: Point) -> bool:
@@ -146,6 +144,6 @@ def _passes(branch: Branch, point: Point) -> bool:
         if low <= point.place <= high:
             share = (point.place - first[0]) / (second[0] - first[0]) if high > low else 0.0
             between = first + share * (second - first)
-            if np.abs(between - point.vector)[1:].max() < SAME or abs(between[2] - point.time) < SAME / 4:
+            if np.abs(between - point.vector)[1:].max() < SAME_CYCLE or abs(between[2] - point.time) < SAME_CYCLE / 4:
                 return True
     return False

@@ -30,6 +30,9 @@ TURNING = 0.03
 """How far on either side of a fold orbits are looked at where a limiter chatters, in the space of place, log distance
 and log time: the multiplier, over a range of a hundredth of the distance, may be 1 as far as that from it."""
 
+SAME_CYCLE = 0.02
+"""Difference in the logarithms of distance and time up to which two cycles of one stage are the same."""
+
 TIGHTER = 0.01
 """Share of the tolerance at which a point is computed again for its error."""
 
@@ -45,6 +48,12 @@ class LocatedPoint:
     direction: np.ndarray
     error: float
     slope: float = np.nan
+
+    def in_doubt(self, point: Point) -> bool:
+        """Whether a point of the same branch lies within the error of this one, if that is known: whether the cycle
+        attracts there is not."""
+        apart = np.abs(self.point.vector - point.vector)
+        return bool(np.isfinite(self.error) and apart[0] < self.error and apart[1:].max() < SAME_CYCLE)
 
 
 def distance_to(kind: Bifurcation, point: Point) -> float:

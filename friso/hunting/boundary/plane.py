@@ -54,8 +54,9 @@ class Plane:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def plane(space: Space, rtol: float = RTOL, nodes: int = NODES, progress: Progress = silent) -> Plane:
-    """All curves on which the hunting cycle stops attracting, and those on which an asymmetric cycle that bounds its
-    basin appears."""
+    """Find all curves in the plane of two keys on which the hunting cycle stops attracting, and those on which an
+    asymmetric cycle that bounds its basin appears; orbits are closed to a relative tolerance, and looked for from
+    `nodes` x `nodes` stages."""
     points = space.grid(nodes)
     allowed = np.flatnonzero(space.allowed(points))
     stages = space.stages(points[allowed])

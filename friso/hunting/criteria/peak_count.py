@@ -22,22 +22,22 @@ from friso.hunting.turns import scan_turning_points
 __all__ = [
     "COUNTED_ABOVE",
     "COUNTED_AFTER",
-    "CRITERION",
     "DISTINCT",
     "DISTINCT_CRITERION",
-    "RULE",
+    "PEAK_CRITERION",
+    "PEAK_RULE",
     "SEPARATION",
     "counted_peaks",
     "distinct_peaks",
     "peaks_in_traces",
 ]
 
-RULE = f"after {COUNTED_AFTER:g} s, higher than {1e3 * COUNTED_ABOVE:g} mm, {SEPARATION:g} s apart"
+PEAK_RULE = f"after {COUNTED_AFTER:g} s, higher than {1e3 * COUNTED_ABOVE:g} mm, {SEPARATION:g} s apart"
 """Which maxima count."""
 
-CRITERION = f"peak count of the thesis: maxima {RULE}, the tallest kept first"
+PEAK_CRITERION = f"peak count of the thesis: maxima {PEAK_RULE}, the tallest kept first"
 
-DISTINCT_CRITERION = f"{CRITERION}; of maxima with valleys of {1e6 * DISTINCT:g} um or more on both sides"
+DISTINCT_CRITERION = f"{PEAK_CRITERION}; of maxima with valleys of {1e6 * DISTINCT:g} um or more on both sides"
 
 
 def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
@@ -51,8 +51,9 @@ def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> 
 
 
 def distinct_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """The same of distinct peaks alone, whose valleys on both sides are at least `DISTINCT` deep; times [s] and values
-    [m] of the turning points, shape (runs, room), valid up to counts (runs,)."""
+    """Which turning points of runs are distinct peaks, shape (runs, room): counted peaks whose valleys on both sides
+    are at least `DISTINCT` deep. `times` [s] and `values` [m] of position minus reference have the shape (runs, room)
+    and are valid up to `counts`, shape (runs,)."""
     nothing = np.zeros(len(counts))
     return scan_turning_points(times, values, counts, nothing, nothing).distinct
 

@@ -37,7 +37,9 @@ LASTING = 0.5
 """Share of the peak-to-peak deviation of the last half that the last quarter has at least where a swing lasts: what
 dies out at a tenth of the rate at which it swings is gone by then."""
 
-CRITERION = "what the run does at its end: swings (a lasting swing), creeps (outside the band without), rests (inside)"
+OUTCOME_CRITERION = (
+    "what the run does at its end: swings (a lasting swing), creeps (outside the band without), rests (inside)"
+)
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,8 @@ def settling_of_runs(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.
 
 
 def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.ndarray:
-    """The same at the last place alone: the verdict on a stage asks no more."""
+    """The settling times [s] of a chunk of runs (see `settling_of_runs`) at the last place alone where the reference
+    stands, shape (runs,): the verdict on a stage asks no more."""
     return _at_stands(flat, runs, band)[-1]
 
 

@@ -27,7 +27,7 @@ VERDICTS: tuple[Verdict, ...] = ("hunts", "bistable", "transient", "settles", "f
 ATTRACTED: tuple[Verdict, ...] = ("hunts", "bistable")
 """Those of stages with a cycle that attracts."""
 
-CRITERION = "verdict on the stage, by its attracting cycles and where its own motion ends"
+VERDICT_CRITERION = "verdict on the stage, by its attracting cycles and where its own motion ends"
 
 
 def verdicts(decided: np.ndarray, attracts: np.ndarray, ends_in_cycle: np.ndarray, rests: np.ndarray) -> np.ndarray:

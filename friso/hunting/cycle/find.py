@@ -117,9 +117,10 @@ def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap |
     return _closed(stages, symmetric_guess(stages, positive, COARSE_RTOL), -1.0, rtol)
 
 
-def hunting_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
-    """The hunting cycle of every stage: of a symmetric one the symmetric cycle, whose multiplier is that of half a
-    period; of others, whose multiplier is that of a whole one (`sign` is 0 then if there are both kinds)."""
+def find_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
+    """Find one hunting cycle of every stage, attracting or not: of a symmetric stage the symmetric cycle, whose
+    multiplier is that of half a period, of others the cycle whose multiplier is that of a whole one (`sign` is 0 if
+    there are both kinds of stages). Orbits are closed to a relative tolerance."""
     symmetric = stages.symmetric
     kinds = ((symmetric, symmetric_cycles), (~symmetric, whole_cycles))
     parts = [(which, find(stages.take(which), rtol)) for mask, find in kinds if (which := np.flatnonzero(mask)).size]

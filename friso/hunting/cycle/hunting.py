@@ -218,11 +218,11 @@ def why_not(form: Structure) -> str:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
-    """The hunting cycles of a stage, and whatever else attracts it.
+    """Find the hunting cycles of a stage, and whatever else attracts it.
 
-    The motion of the stage file plays no part. The search for what attracts may use so much `work` (see
-    `friso.engine.allowance`); what it could not settle by then is not certain. Raises InputError for a tolerance that
-    is not usable.
+    The motion of the stage file plays no part. Cycles are followed to a relative tolerance. The search for what
+    attracts may use so much `work` (see `friso.engine.allowance`); what it could not settle by then is not certain.
+    Raises InputError for a tolerance that is not usable.
     """
     checked_rtol(rtol)
     if reason := cannot_hunt(stage):

@@ -37,7 +37,8 @@ class Multipliers:
 
 
 def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
-    """The multipliers of closed orbits; per half a period where that is what they were closed over."""
+    """The multipliers of closed orbits, one per stage, from runs to a relative tolerance; per half a period where that
+    is what they were closed over."""
     shot = shoot(stages, orbits.states, orbits.times, orbits.sign, rtol)
     flows = np.where(shot.done[:, None, None], shot.flows, np.nan)
     local, direction = _floquet(stages, flows, stages.rates(shot.ends))

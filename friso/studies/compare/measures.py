@@ -13,9 +13,8 @@ from friso.equations.motion import Stand
 from friso.frequency.family import about_resonances, for_poles
 from friso.frequency.loops import Poles
 from friso.frequency.members import limit_cases
-from friso.hunting.criteria import end_of_traces, outcomes, peaks_in_traces, settling_of_traces
-from friso.hunting.criteria.run_outcome import FAILED, RESTS, SWINGS
-from friso.hunting.turning import WINDOW
+from friso.hunting.criteria import FAILED, RESTS, SWINGS, end_of_traces, outcomes, peaks_in_traces, settling_of_traces
+from friso.hunting.measures import WINDOW
 from friso.stage import Stage
 from friso.virtual_rig.run import RecordedRuns
 

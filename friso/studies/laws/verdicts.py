@@ -12,9 +12,8 @@ from friso.design_method.edges import OtherLaws
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import bandwidth
 from friso.errors import InputError
-from friso.hunting.check import LONG, Case, check, needed_kernels
+from friso.hunting import LONG_RUN_RTOL, Case, CheckPart, check, needed_kernels
 from friso.hunting.criteria import ATTRACTED
-from friso.hunting.verdict import BANDWIDTHS
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.tables import friction_law
@@ -54,7 +53,7 @@ class Trial:
         """Whether the search for the edge of hunting in a case found one, or came to its end without."""
         shown = self.cases[case]
         judgement = shown.judgement
-        unsought = shown.verdict == "failed" or BANDWIDTHS in judgement.given_up
+        unsought = shown.verdict == "failed" or CheckPart.BANDWIDTHS in judgement.given_up
         unsought |= judgement.observed and judgement.hunting.target is None  # its own motion alone swings on
         return judgement.margin is not None or not unsought
 
@@ -176,7 +175,7 @@ class VerdictsByLaw:
 
 
 def verdicts_by_law(
-    stage: Stage, rtol: float = LONG, elements: int = ELEMENTS, progress: Progress = silent
+    stage: Stage, rtol: float = LONG_RUN_RTOL, elements: int = ELEMENTS, progress: Progress = silent
 ) -> VerdictsByLaw:
     """What becomes of a stage under each law that keeps what is measured of its own. Raises InputError for a law that
     does not declare what that is."""

@@ -12,10 +12,8 @@ from friso.engine.arrays import Status
 from friso.equations import motion
 from friso.equations.bandwidth import bandwidth
 from friso.errors import InputError
-from friso.hunting.criteria.peak_count import peaks_in_traces
-from friso.hunting.criteria.run_outcome import FAILED, SWINGS, End, last_outside, lasts, outcomes
-from friso.hunting.turning import COUNTED_ABOVE, HALF, WINDOW, zigzag
-from friso.hunting.turns import scan_turning_points
+from friso.hunting.criteria import COUNTED_ABOVE, FAILED, SWINGS, End, last_outside, lasts, outcomes, peaks_in_traces
+from friso.hunting.measures import HALF, WINDOW, scan_turning_points, zigzag
 from friso.progress import Progress, silent
 from friso.shares import Share, share
 from friso.stage import Stage

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.hunting.boundary import Diagram, Plane
+from friso.hunting import Diagram, Plane
 from friso.studies.boundary_lines import Line, corner_verdicts, end_verdicts, lines, lost_places
 from friso.views.boundary.words import ShownKey, conclusion
 from friso.views.documents import plain_json

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from friso.hunting.boundary import Diagram, KeyRange, Plane
+from friso.hunting import Diagram, KeyRange, Plane
 from friso.studies.boundary_lines import (
     ATTRACTS,
     INVALID,

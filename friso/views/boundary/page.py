@@ -6,7 +6,7 @@ from functools import partial
 from itertools import repeat
 from pathlib import Path
 
-from friso.hunting.boundary import Diagram, Plane
+from friso.hunting import Diagram, Plane
 from friso.studies.boundary_lines import lines
 from friso.views.boundary.figures import boundary_figure
 from friso.views.boundary.words import ShownKey

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from friso.hunting.boundary import END_OF_RANGE, Diagram, KeyRange, Plane, Space
+from friso.hunting import END_OF_RANGE, Diagram, KeyRange, Plane, Space
 from friso.studies.boundary_lines import (
     ATTRACTS,
     INVALID,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from friso.axis import axis_shown
-from friso.hunting import BANDS as SETTLING_BANDS
+from friso.hunting.measures import BANDS as SETTLING_BANDS
 from friso.views.drawing.figure import BLUE, GREEN, VERMILLION
 
 if TYPE_CHECKING:

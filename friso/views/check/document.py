@@ -12,9 +12,7 @@ from friso.views.check.words import answer
 from friso.views.documents import plain_json
 
 if TYPE_CHECKING:
-    from friso.hunting import Case, Cycle, Judgement, Margin, Swing
-    from friso.hunting.feeding import Feeding
-    from friso.hunting.outward import AttractionEnd
+    from friso.hunting import AttractionEnd, Case, Cycle, Feeding, Judgement, Margin, Swing
     from friso.remedies.suggestion import Suggestion
     from friso.shares import Share
     from friso.studies.draws import Draws
@@ -157,8 +155,7 @@ def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
 
 def draws_document(draws: Draws, case: str) -> dict[str, Any]:
     """What became of the stages drawn, in a case."""
-    from friso.hunting.criteria import ATTRACTED
-    from friso.hunting.criteria.stage_verdict import CRITERION
+    from friso.hunting.criteria import ATTRACTED, VERDICT_CRITERION
 
     fates = draws.fates[case]
     return {
@@ -167,7 +164,7 @@ def draws_document(draws: Draws, case: str) -> dict[str, Any]:
         "left_out": draws.sample.left_out,
         "hunts": _share_document(fates.share(("hunts",))),
         "attracting_cycle": _share_document(fates.share(ATTRACTED)),
-        "criterion": CRITERION,
+        "criterion": VERDICT_CRITERION,
         "verdicts": fates.counts,
         "loop_unstable": int(fates.unstable.sum()),
         "separation": fates.separations(draws.sample.keys),

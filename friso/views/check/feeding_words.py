@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from friso.hunting.feeding import Decline, Feeding
+from friso.hunting import Decline, Feeding
 from friso.quantities import percent
 
 

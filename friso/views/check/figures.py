@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.axis import axis_shown
-from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
-from friso.hunting.criteria.peak_count import RULE
+from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER, PEAK_RULE
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.check.cycle_figures import cycle_figure, return_map_figure
 from friso.views.check.traces import common_range, samples, subject, trace_of
@@ -111,7 +110,7 @@ def _settling_figure(cases: list[ShownCase]) -> Figure:
     )
     caption = (
         "Hunting appears as a deviation that keeps coming back; so does a long transient, for a while. Peaks are "
-        f"counted as in the thesis (Sec. 3.2.2): {RULE}. Below: the size of the "
+        f"counted as in the thesis (Sec. 3.2.2): {PEAK_RULE}. Below: the size of the "
         "deviation over the whole run, on a logarithmic scale that ends at 1 nm; a stage that hunts never stays under "
         "the lines."
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from friso.hunting.margin import DISTANCE
+from friso.hunting import SEARCH_LIMITS
 from friso.views.drawing.prefixes import with_unit
 
 if TYPE_CHECKING:
@@ -27,6 +27,6 @@ def isolator_sentence(suggestion: Suggestion) -> str:
     masses = [with_unit(flat[f"masses.{part}"], "kg") for part in ("cart", "stage")]
     return (
         f"On {joint} between {masses[0]} on the cart and {masses[1]} on the stage it would settle: nothing was found "
-        f"to attract it down to 1/{DISTANCE:g} of this bandwidth. Its modulus margin would be {suggestion.margin:.2f}"
-        f"{low}. This is a first estimate: friso tune finds the best isolator and verifies it."
+        f"to attract it down to 1/{SEARCH_LIMITS.edge_distance:g} of this bandwidth. Its modulus margin would be "
+        f"{suggestion.margin:.2f}{low}. This is a first estimate: friso tune finds the best isolator and verifies it."
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from friso.axis import axis_shown
-from friso.hunting.margin import FARTHEST
+from friso.hunting import SEARCH_LIMITS
 from friso.quantities import percent
 from friso.stage.stage import declared_keys
 from friso.views.check.cases import case_labels
@@ -116,7 +116,7 @@ def _edges(laws: VerdictsByLaw, case: str) -> str:
     part = "in part " if any(verdict.edges(case) for verdict in laws.verdicts if verdict.law in unsought) else ""
     missing = f"{part}not determined under {listed(unsought, 'and')}" if unsought else ""
     if not edges:
-        none = f"no edge of hunting within a factor of {FARTHEST:g} of its bandwidth"
+        none = f"no edge of hunting within a factor of {SEARCH_LIMITS.bandwidth_factor:g} of its bandwidth"
         return f"its edge of hunting {missing}" if missing else none
     low, high = min(edge[0] for edge in edges), max(edge[1] for edge in edges)
     doubt = "" if all(verdict.edges_certain(case) for verdict in laws.verdicts) else " (not certain)"

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from friso.axis import axis_shown
-from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
-from friso.hunting.verdict import BANDWIDTHS, STARTS
+from friso.hunting import CheckPart
+from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
 from friso.quantities import percent
 from friso.views.check.cases import BANDS, ShownCase
 from friso.views.check.words import at_the_end, edge_text
@@ -93,13 +93,13 @@ def _verdict(case: Case) -> str:
 def _edge(case: Case) -> str:
     edge = case.judgement.margin
     if edge is None:
-        return UNKNOWN if BANDWIDTHS in case.judgement.given_up else NOTHING
+        return UNKNOWN if CheckPart.BANDWIDTHS in case.judgement.given_up else NOTHING
     return f"{edge_text(case, edge.end)}{'' if edge.certain else ' (not certain)'}"
 
 
 def _kicks(case: Case, kick: Kick | None, unit: str) -> str:
     if kick is None:
-        return UNKNOWN if STARTS in case.judgement.given_up else NOTHING
+        return UNKNOWN if CheckPart.STARTS in case.judgement.given_up else NOTHING
     searched = range_with_unit(*kick.searched, unit)
     if not kick.windows:
         return UNKNOWN if kick.unknown else f"none from {searched}"
@@ -121,7 +121,7 @@ def _windows(kick: Kick, unit: str, searched: str) -> str:
 def _moves(case: Case) -> str:
     moves = case.judgement.moves
     if moves is None:
-        return UNKNOWN if STARTS in case.judgement.given_up else NOTHING
+        return UNKNOWN if CheckPart.STARTS in case.judgement.given_up else NOTHING
     low, high = moves.interval
     return f"{percent(moves.fraction)} ({percent_range(low, high)}) of {moves.count} moves"
 

@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from friso.equations.bandwidth import bandwidth
-from friso.hunting.basin import SHARES
+from friso.hunting import SEARCH_LIMITS, CheckPart
 from friso.hunting.criteria import ATTRACTED
-from friso.hunting.margin import COARSE, DISTANCE, FARTHEST, STEPS
-from friso.hunting.verdict import BANDWIDTHS, FEEDING, LOWER, STARTS
 from friso.quantities import percent, plain_factor
 from friso.stage.controllers import FORCE_LIMIT
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
@@ -26,8 +24,7 @@ from friso.views.drawing.prefixes import (
 from friso.views.loop_words import unstable_where
 
 if TYPE_CHECKING:
-    from friso.hunting import Case, Kick, Margin
-    from friso.hunting.outward import AttractionEnd, BandwidthWindow
+    from friso.hunting import AttractionEnd, BandwidthWindow, Case, Kick, Margin
 
 _MICRON, _TEN_MICRON = BANDS
 
@@ -63,7 +60,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     if case.verdict not in says:
         return " ".join([*loop, f"could not be simulated to the end of its motion ({case.solver.status})."])
     feeds = feeding_sentences(case.feeding) if case.feeding else []
-    feeds += [f"{_too_much('What feeds it')}."] if FEEDING in case.judgement.given_up else []
+    feeds += [f"{_too_much('What feeds it')}."] if CheckPart.FEEDING in case.judgement.given_up else []
     after = _remedy(item, cases) if case.verdict in ATTRACTED else _outlook(case)
     return " ".join([*loop, says[case.verdict](case), *feeds, *_doubts(case), *_running_away(case), *after])
 
@@ -114,10 +111,11 @@ def _bistable(case: Case) -> str:
     kicks = (("displacement", case.judgement.displacement, "m"), ("push", case.judgement.push, "m/s"))
     starts = [_kick(name, kick, unit) for name, kick, unit in kicks if kick and kick.windows]
     if (moves := case.judgement.moves) and moves.hunting:
-        like = f"this move at {SHARES[0]:g} to {SHARES[1]:g} times its acceleration and acceleration time"
+        least, most = SEARCH_LIMITS.move_shares
+        like = f"this move at {least:g} to {most:g} times its acceleration and acceleration time"
         starts.append(f"{percent(moves.fraction)} of the moves tried ({like})")
     first = f"settles after this move{_stuck(case)}"
-    if not starts and STARTS in case.judgement.given_up:
+    if not starts and CheckPart.STARTS in case.judgement.given_up:
         return f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."
     if case.judgement.hunting.passing:
         after = _AFTERWARDS[case.judgement.hunting.lower_gains or "unknown"]
@@ -255,14 +253,14 @@ def _outlook(case: Case) -> list[str]:
     if judgement.margin:
         up_to = "below" if judgement.margin.certain else "up to"
         says.append(f"Hunting is possible {up_to} {edge_text(case, judgement.margin.end)}.")
-    elif judgement.hunting.possible and BANDWIDTHS not in judgement.given_up:
-        says.append(f"No hunting was found down to 1/{FARTHEST:g} of this bandwidth.")
+    elif judgement.hunting.possible and CheckPart.BANDWIDTHS not in judgement.given_up:
+        says.append(f"No hunting was found down to 1/{SEARCH_LIMITS.bandwidth_factor:g} of this bandwidth.")
     return [*says, *_windows(case), *_unsearched(case)]
 
 
 def _unsearched(case: Case) -> list[str]:
     """That the search through the bandwidths was given up."""
-    if BANDWIDTHS not in case.judgement.given_up:
+    if CheckPart.BANDWIDTHS not in case.judgement.given_up:
         return []
     if case.judgement.margin and case.judgement.margin.certain:
         return [f"{_too_much('Whether hunting is possible again at other bandwidths')}."]
@@ -333,10 +331,11 @@ def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
     for an edge surveys: others may lie between them."""
     if all(case.judgement.margin is None for case in cases.values()):
         return []
-    fine, coarse = (percent(FARTHEST ** (1 / steps) - 1) for steps in (STEPS, COARSE))
+    farthest, steps = SEARCH_LIMITS.bandwidth_factor, (SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond)
+    fine, coarse = (percent(farthest ** (1 / count) - 1) for count in steps)
     return [
         *(f"{item.label}: {sentence}" for item in shown_cases(cases) for sentence in _windows(item.case, narrow=True)),
-        f"Bandwidths up to {FARTHEST:g} times as high and as low were surveyed, {fine} or {coarse} apart, and cycles "
+        f"Bandwidths up to {farthest:g} times as high and as low were surveyed, {fine} or {coarse} apart, and cycles "
         "that begin to repel at the edge were followed to where they turn back. Other ranges in which the stage hunts, "
         "narrower than these steps, may lie between (friso boundary follows cycles from more bandwidths).",
     ]
@@ -350,13 +349,14 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     ways += [_slower(item.case, judgement.lower)] if judgement.lower else []
     ways += ["free the joint"] if _freeing_helps(item, cases) else []
     says = [f"{ways[0][0].upper()}{listed(ways, 'or')[1:]}."] if ways else []
-    if judgement.margin or BANDWIDTHS in judgement.given_up:
+    if judgement.margin or CheckPart.BANDWIDTHS in judgement.given_up:
         return [*says, *_windows(item.case), *_unsearched(item.case)]
     if judgement.hunting.target is None:
         return says
-    lower = [f"{_too_much('Whether it hunts at lower bandwidths')}."] if LOWER in judgement.given_up else []
+    given_up = CheckPart.LOWER_BANDWIDTHS in judgement.given_up
+    lower = [f"{_too_much('Whether it hunts at lower bandwidths')}."] if given_up else []
     still = "is still possible" if judgement.hunting.certain else "was still found"
-    return [f"Hunting {still} at {FARTHEST:g} times this bandwidth.", *says, *lower]
+    return [f"Hunting {still} at {SEARCH_LIMITS.bandwidth_factor:g} times this bandwidth.", *says, *lower]
 
 
 def _slower(case: Case, end: AttractionEnd) -> str:
@@ -390,7 +390,8 @@ def _faster(case: Case, edge: Margin) -> str:
 def _distance(case: Case, edge: Margin) -> float:
     """The factor from the edge that advice keeps; 1 where something attracts again within it, over more than a
     hundredth of the bandwidth or as close to where the advice leads."""
-    to = edge.quiet * DISTANCE
+    distance = SEARCH_LIMITS.edge_distance
+    to = edge.quiet * distance
 
     def in_the_way(window: BandwidthWindow) -> bool:
         low, high = window.low, window.high
@@ -399,7 +400,7 @@ def _distance(case: Case, edge: Margin) -> float:
         return high is None or high.inside * ONE_PLACE >= min(to, low.inside * ONE_PLACE**2)
 
     again = any(in_the_way(window) for window in case.judgement.windows)
-    return 1.0 if again or to > FARTHEST else DISTANCE
+    return 1.0 if again or to > SEARCH_LIMITS.bandwidth_factor else distance
 
 
 def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:

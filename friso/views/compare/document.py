@@ -7,8 +7,8 @@ from typing import Any
 
 from friso.axis import axis_shown
 from friso.equations.bandwidth import bandwidth
-from friso.hunting.criteria.peak_count import DISTINCT_CRITERION as PEAKS
-from friso.hunting.criteria.run_outcome import CRITERION as OUTCOME
+from friso.hunting.criteria import DISTINCT_CRITERION as PEAKS
+from friso.hunting.criteria import OUTCOME_CRITERION as OUTCOME
 from friso.studies.compare.study import Comparison, OptionResult
 from friso.views.compare.words import sentences
 from friso.views.documents import plain_json

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.axis import axis_shown
-from friso.hunting.criteria.run_outcome import BAND, CREEPS, LASTING, RESTS, SWINGS
+from friso.hunting.criteria import BAND, CREEPS, LASTING, RESTS, SWINGS
 from friso.quantities import percent
 from friso.shares import share_interval
 from friso.studies.cells import CYCLE, CYCLE_UNITS, SWING, UNKNOWN
@@ -246,6 +246,6 @@ def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
 
 def loop_first(stage: Stage) -> list[str]:
     """That the loop of the stage as its file gives it is unstable, if it is."""
-    from friso.hunting.loop import unstable  # looking at a map needs no engine
+    from friso.hunting import unstable  # looking at a map needs no engine
 
     return unstable_loop(unstable(stage))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from friso.hunting.criteria.run_outcome import CRITERION
+from friso.hunting.criteria import OUTCOME_CRITERION
 from friso.hunting.measures import Measures
 from friso.views.documents import plain_json
 
@@ -20,7 +20,7 @@ def simulate_document(response: xr.Dataset, measures: Measures, name: str, concl
             "conclusion": conclusion,
             "stage": name,
             "outcome": measures.outcome[0],
-            "criterion": CRITERION,
+            "criterion": OUTCOME_CRITERION,
             "peak_to_peak_m": measures.peak_to_peak[0],
             "period_s": measures.period[0],
             "settling_time_s": into_1um[0],

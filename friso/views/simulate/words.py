@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.hunting.criteria.run_outcome import BAND, CREEPS, RESTS, SWINGS
-from friso.hunting.measures import BANDS, Measures
-from friso.hunting.turning import WINDOW
+from friso.hunting.criteria import BAND, CREEPS, RESTS, SWINGS
+from friso.hunting.measures import BANDS, WINDOW, Measures
 from friso.views.drawing.prefixes import plus_minus, with_unit
 
 GROWN = 1.1

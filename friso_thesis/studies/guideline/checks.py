@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting import Ensemble
 from friso_thesis.studies.guideline.groups import flat_of
 from friso_thesis.studies.guideline.persistence import DISTANCES, Begin, from_rest, still_swings
 from friso_thesis.studies.guideline.sweeps import Sweep

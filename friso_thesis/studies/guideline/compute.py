@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from friso.engine.kernel import KernelRequest, kernels
+from friso.equations.structure import shared_structure
 from friso.errors import InputError
-from friso.hunting.cycle.ensemble import shared_structure
 from friso.progress import Progress, Tally, silent
 from friso.quantities import quoted
 from friso.system import usable_cores

@@ -12,8 +12,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import hunting_cycles
+from friso.hunting import Ensemble, find_cycles
 from friso_thesis.studies.guideline.persistence import swings_from_any_distance
 
 OF = (
@@ -98,7 +97,7 @@ class _AtCrossovers:
 def _at_crossovers(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> _AtCrossovers:
     """Where an orbit may be but could not be closed, a long simulation tells whether anything hunts on."""
     part = stages(which, crossover)
-    cycles = hunting_cycles(part)
+    cycles = find_cycles(part)
     attracts, failed, unsure = cycles.attracting, np.zeros(part.count, bool), np.flatnonzero(cycles.uncertain)
     if unsure.size:
         attracts[unsure], decided = swings_from_any_distance(part.take(unsure))

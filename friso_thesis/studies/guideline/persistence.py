@@ -12,9 +12,8 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
-from friso.hunting.criteria.run_outcome import lasts
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.rest import stuck, wait
+from friso.hunting import Ensemble, stuck, wait
+from friso.hunting.criteria import lasts
 from friso.hunting.measures import swing_of
 
 DISTANCES = np.geomspace(0.02, 2.0, 95)

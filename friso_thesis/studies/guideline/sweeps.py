@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from scipy.stats import qmc
 
-from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting import Ensemble
 from friso.progress import Tally
 from friso_thesis.studies.guideline.edges import Edges, concatenate_edges, find_edges
 from friso_thesis.studies.guideline.groups import flat_of

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.margin import margin
+from friso.hunting import Ensemble, find_margin
 from friso.stage import Stage
 from friso_thesis.studies.guideline.edges import ABOVE, BELOW, FLIP, find_edges
 from friso_thesis.studies.guideline.groups import values_of
@@ -104,5 +103,5 @@ def cases(laws: Laws, changes: Sequence[RigChanges], free: bool) -> list[ThesisC
 
 def direct(stage: Stage) -> float:
     """The edge [Hz] as `friso check` finds it, from a crossover at which the stage hunts; NaN without one."""
-    edge = margin(stage, attracting=True)
+    edge = find_margin(stage, attracting=True)
     return edge.crossover if edge and edge.crossover else np.nan

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from friso.hunting.boundary import Bifurcation, KeyRange, Space, plane
+from friso.hunting import Bifurcation, KeyRange, Space, plane
 from friso.studies.cells import by_words, cell_attractors, flat_cells
 from friso.studies.study import study_of
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
@@ -117,8 +117,8 @@ def _survey(coarse: xr.Dataset) -> dict[str, np.ndarray]:
     valid = (coarse["outcome"].values != "invalid").ravel()
     attracts, decided = np.zeros(study.cells, bool), np.zeros(study.cells, bool)
     parts = by_words(study.stage, study.links, study.columns(np.arange(study.cells)))
-    for _, cells, survey, certain in cell_attractors(parts, valid):
-        attracts[cells], decided[cells] = survey is not None and survey.attracts, certain
+    for _, cells, attracted in cell_attractors(parts, valid):
+        attracts[cells], decided[cells] = attracted.attracts, attracted.certain
     return {"attracts": attracts, "decided": decided & valid}
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import rankdata
 
-from friso.hunting.criteria.run_outcome import FAILED
+from friso.hunting.criteria import FAILED
 from friso.quantities import percent
 
 if TYPE_CHECKING:

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.hunting import COUNTED_ABOVE
-from friso.hunting.criteria.peak_count import CRITERION as PEAK_CRITERION
-from friso.hunting.criteria.run_outcome import BAND, CREEPS, CRITERION, FAILED, RESTS, SWINGS
+from friso.hunting.criteria import BAND, COUNTED_ABOVE, CREEPS, FAILED, OUTCOME_CRITERION, RESTS, SWINGS
+from friso.hunting.criteria import PEAK_CRITERION as PEAK_CRITERION
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, Response
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ def by_peak_count(runs: xr.Dataset) -> xr.Dataset:
 def by_swing_at_end(runs: xr.Dataset) -> xr.Dataset:
     """The same by the end of the run: whether it swings there; the peaks of others do not count, but for invalid and
     failed cells."""
-    swings = (runs["outcome"] == SWINGS).assign_attrs(criterion=CRITERION)
+    swings = (runs["outcome"] == SWINGS).assign_attrs(criterion=OUTCOME_CRITERION)
     ended = runs["outcome"].isin([SWINGS, CREEPS, RESTS])
     return runs.assign(
         keeps_moving=swings,

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
-from friso.hunting.criteria import counted_peaks
-from friso.hunting.criteria.peak_count import RULE
+from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER, PEAK_RULE, counted_peaks
 from friso.quantities import percent
 from friso.views.boundary.figures import DASHES
 from friso.views.check.figures import SHARES
@@ -132,7 +130,7 @@ def _response(reproduction: Reproduction) -> Figure:
         markers,
         (Limit((COUNTED_ABOVE,), "peaks count above", GREY, "dotted"),),
     )
-    caption = f"The rig with its joint locked. Peaks count {RULE}."
+    caption = f"The rig with its joint locked. Peaks count {PEAK_RULE}."
     return Figure("figure-5", "Figure 5: position of the locked rig after the return move", caption, (panel,))
 
 

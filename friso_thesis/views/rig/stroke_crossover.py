@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.hunting.criteria.peak_count import CRITERION
+from friso.hunting.criteria import PEAK_CRITERION
 from friso.studies.rig.outcome import Outcome
 from friso.views.drawing.colours import ramp
 from friso.views.drawing.figure import INK, Axis, Figure, Map, Panel, Series
@@ -59,7 +59,7 @@ def figures(outcome: Outcome) -> list[Figure]:
     finite = np.isfinite(counts.limits) & (counts.limits > 0)
     border = Series(counts.strokes[finite], counts.limits[finite], "no counted peaks above", INK, width=2.0)
     panel = replace(rails_panel(counts), series=(border,))
-    caption = f"Each cell: {len(counts.rails)} rails, one move each, {CRITERION} (Fig. 26: of one run)."
+    caption = f"Each cell: {len(counts.rails)} rails, one move each, {PEAK_CRITERION} (Fig. 26: of one run)."
     return [Figure("stroke_crossover", "Joint free: rails with counted peaks", caption, (panel,))]
 
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from friso.axis import axis_shown
-from friso.hunting.criteria.peak_count import COUNTED_ABOVE, CRITERION, DISTINCT_CRITERION
-from friso.hunting.criteria.run_outcome import CRITERION as OUTCOME
+from friso.hunting.criteria import COUNTED_ABOVE, DISTINCT_CRITERION, PEAK_CRITERION
+from friso.hunting.criteria import OUTCOME_CRITERION as OUTCOME
 from friso.quantities import percent
 from friso.shares import Share
 from friso.studies.rig.experiments.hunting import HuntingResult, Trace
@@ -197,7 +197,7 @@ def _shares(moves: HuntingResult) -> Figure:
     return Figure(
         "hunting_shares",
         f"Share of {len(moves.rails)} rails with counted peaks after the move",
-        axis_shown().text(f"{CRITERION[0].upper()}{CRITERION[1:]}."),
+        axis_shown().text(f"{PEAK_CRITERION[0].upper()}{PEAK_CRITERION[1:]}."),
         (Panel(panel.title, panel.x, panel.y, panel.series, bands=tuple(bands[:1])),),
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.frequency.crossover import settled_margin
-from friso.hunting.criteria.run_outcome import FAILED, SWINGS
+from friso.hunting.criteria import FAILED, SWINGS
 from friso.quantities import percent
 from friso.stage import loads
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, Response, judges

@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.crossover import WANTED, settled_margin
-from friso.hunting.margin import margin
+from friso.hunting import find_margin
 from friso.quantities import percent
 from friso.stage import Stage, loads
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges, number_text
@@ -151,7 +151,7 @@ def _gap(evidence: Evidence) -> Part:
 @cache
 def _locked_edge() -> str:
     """Up to where the cycle of the locked rig attracts with the mass of the rule, as `friso check` finds it."""
-    edge = margin(thesis_rig().replace({**masses(_MOVING_MASS), **LOCKED}), attracting=True)
+    edge = find_margin(thesis_rig().replace({**masses(_MOVING_MASS), **LOCKED}), attracting=True)
     rig = f"With the friction of Table 2 and {_MOVING_MASS:g} kg"
     if edge is None or edge.crossover is None:
         return f"{rig} no edge of hunting was found."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.hunting import BANDS
+from friso.hunting.measures import BANDS
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
 from friso_thesis.studies.thesis.reading import reading
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.hunting import COUNTED_AFTER
+from friso.hunting.criteria import COUNTED_AFTER
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, Response, judges
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.evidence import findings_on_file
-from friso.hunting.criteria.run_outcome import SWINGS
+from friso.hunting.criteria import SWINGS
 from friso.quantities import percent
 from friso.studies.sweep import sweep
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges

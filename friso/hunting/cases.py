@@ -19,11 +19,11 @@ from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import structure
 from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import cannot_hunt
 from friso.hunting.feeding import Feeding, feeding
 from friso.hunting.loop import LoopState, unstable
+from friso.hunting.many_stages import kernels_to_judge
 from friso.hunting.measures import BANDS, measure_runs, measuring_options
-from friso.hunting.verdict import ATTRACTION, FEEDING, PARTS, ROOM, WORK, Judgement, judge
+from friso.hunting.verdict import PARTS, ROOM, WORK, CheckPart, Judgement, judge
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
@@ -105,13 +105,14 @@ FREE = 0.58
 FED = 0.3
 """Share of the work of a case that the search for what feeds its cycle may use at least."""
 
-LONG = 1e-6
+LONG_RUN_RTOL = 1e-6
 """Relative tolerance of runs that only tell what becomes of a motion; that of which times are told is finer."""
 
 
 def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Progress = silent) -> dict[str, Case]:
-    """The cases "given" and, for a stage with a joint, "locked" and "free" (if the file tells its stiffness).
+    """Check a stage: what becomes of it as given ("given"), with its joint locked ("locked") and free ("free").
 
+    A stage without a joint has the case "given" alone, one whose file does not tell the joint's stiffness no "free".
     With `traces`, each case has its time response; `progress` is called as work is done, also from worker
     threads. Raises InputError for an `rtol` that is not usable.
     """
@@ -130,7 +131,7 @@ def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Prog
 
 
 def needed_kernels(stage: Stage) -> set[KernelRequest]:
-    """The kernels for all cases: who checks several stages has those of all compiled side by side."""
+    """The kernels that a check of a stage needs: who checks several stages has them compiled side by side."""
     return set[KernelRequest]().union(*map(_needed, stage.variants().values()))
 
 
@@ -141,7 +142,7 @@ def _share(stage: Stage) -> float:
 
 
 def check_given(stage: Stage, rtol: float = RTOL) -> Case:
-    """The case "given" alone. Raises InputError for an `rtol` that is not usable."""
+    """Check a stage as it is given, its joint as its file has it. Raises InputError for an unusable `rtol`."""
     checked_rtol(rtol)
     kernels(_needed(stage))
     return _case(stage, rtol, False, Tally(silent, len(PARTS)), WORK)
@@ -149,10 +150,7 @@ def check_given(stage: Stage, rtol: float = RTOL) -> Case:
 
 def _needed(stage: Stage) -> set[KernelRequest]:
     """The kernels for a case."""
-    shape = structure(stage.flat())
-    return (
-        {KernelRequest(shape)} if cannot_hunt(stage) else {KernelRequest(shape), KernelRequest(shape, variational=True)}
-    )
+    return kernels_to_judge(structure(stage.flat()))
 
 
 def _case(stage: Stage, rtol: float, traces: bool, done: Tally, work: float) -> Case:
@@ -160,19 +158,19 @@ def _case(stage: Stage, rtol: float, traces: bool, done: Tally, work: float) -> 
 
     def begin(part: str) -> None:
         nonlocal ended
-        ended += (step := int(part != ATTRACTION))
+        ended += (step := int(part != CheckPart.ATTRACTION))
         done.add(step, part)
 
     with allowance() as spent:
         (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(measuring_options(rtol), room=ROOM))
         measures = measure_runs(flat, runs)
-        judgement = judge(stage, measures, max(rtol, LONG), begin, work - spent.used)
+        judgement = judge(stage, measures, max(rtol, LONG_RUN_RTOL), begin, work - spent.used)
     room = measures.turns.shape[1]
     status = Status(int(measures.status[0]))
     fed = None
     if judgement.swing and structure(flat).plays:
         fed = _fed(stage, max(work - spent.used, FED * work))
-        judgement = judgement if fed else replace(judgement, given_up=(*judgement.given_up, FEEDING))
+        judgement = judgement if fed else replace(judgement, given_up=(*judgement.given_up, CheckPart.FEEDING))
     breakaway = _breakaway(flat)
     done.add(len(PARTS) - ended, PARTS[-1])  # the last, too, where nothing attracts
     return Case(

@@ -1,0 +1,178 @@
+"""Many stages of one structure at once: what attracts them, and the verdicts on them.
+
+Stages are given as flat keys to SI numbers, or to arrays of shape (count,) where they differ. From fewer starts than
+`friso.hunting.check` takes, so that what attracts from a narrow range of them may be missed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from friso.engine.batch import RunOptions
+from friso.engine.kernel import KernelRequest
+from friso.equations.structure import Structure, shared_structure
+from friso.hunting.attractors import Attractors, Target, attractors
+from friso.hunting.basin import ends_in, swings_seldom
+from friso.hunting.criteria import verdicts
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import RTOL
+from friso.hunting.cycle.hunting import surely_surveyed, why_not
+from friso.hunting.loop import unstable_among, winds_up_at_a_limit
+from friso.hunting.measures import measuring_options
+from friso.hunting.motions import (
+    FollowedMotions,
+    Motions,
+    followed_motions,
+    keeps_moving,
+    resting,
+    run_motions,
+    some_of,
+)
+from friso.hunting.verdict import RUNNING_AWAY
+
+
+@dataclass(frozen=True)
+class StageAttractors:
+    """What attracts each of many stages that swings for ever, arrays of shape (count,).
+
+    Whether anything that `attracts` was found; whether that is `decided`, as every simulation that had to decide was
+    completed; whether it is `certain`, as nothing may attract beyond what is searched either. Of the largest swing
+    found: its `amplitude` [m], half of peak to peak, and `period` [s] (NaN: nothing attracts); whether it was `closed`
+    as an orbit, and the `multiplier` of that (NaN: it was not). `target` is what motions of the stages end in that do
+    not come to rest (None: stages of this structure cannot hunt, and nothing was searched).
+    """
+
+    attracts: np.ndarray
+    decided: np.ndarray
+    certain: np.ndarray
+    closed: np.ndarray
+    amplitude: np.ndarray
+    period: np.ndarray
+    multiplier: np.ndarray
+    target: Target | None
+
+    @classmethod
+    def of(cls, survey: Attractors | None, certain: np.ndarray) -> StageAttractors:
+        """What a survey shows (None: none was made, as the stages cannot hunt), and of which stages that is certain."""
+        count = len(certain)
+        closed, (amplitude, period, multiplier) = np.zeros(count, bool), np.full((3, count), np.nan)
+        if survey is None:
+            nothing, decided = np.zeros(count, bool), np.ones(count, bool)
+            return cls(nothing, decided, certain, closed, amplitude, period, multiplier, None)
+        for motion in sorted(survey.motions, key=lambda motion: motion.amplitude):  # the largest last
+            k, orbit = motion.stage, motion.cycles
+            closed[k], amplitude[k], period[k] = orbit is not None, motion.amplitude, motion.period
+            multiplier[k] = np.nan if orbit is None else orbit.multiplier[motion.number]
+        swing = closed, amplitude, period, multiplier
+        return cls(survey.attracts, survey.decided, certain, *swing, survey.target)
+
+    def take(self, numbers: np.ndarray) -> StageAttractors:
+        """What attracts the stages with these numbers, any of them as often as wanted."""
+        arrays = {entry.name: getattr(self, entry.name)[numbers] for entry in fields(self) if entry.name != "target"}
+        return StageAttractors(**arrays, target=self.target and self.target.of(numbers))
+
+
+def can_hunt(flat: Mapping[str, Any]) -> bool:
+    """Whether stages of one structure may hunt: there is friction to stick to, integral action that winds up, and a
+    reference that stands still."""
+    return not why_not(shared_structure(flat)) and not keeps_moving(flat)
+
+
+def kernels_to_judge(form: Structure) -> set[KernelRequest]:
+    """The kernels that a verdict on stages of a structure needs: who judges several has those of all built at once."""
+    variational = set() if why_not(form) else {KernelRequest(form, variational=True)}
+    return {KernelRequest(form), *variational}
+
+
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
+def find_attractors(
+    flat: Mapping[str, Any],
+    count: int,
+    rtol: float = RTOL,
+    close_orbits: bool = True,
+    threads: int | None = None,
+    cancel: np.ndarray | None = None,
+) -> StageAttractors:
+    """Find what attracts stages of one structure, one motion that attracts each being enough.
+
+    Their own motions play no part, but that stages whose references never stand still cannot hunt. Orbits are closed to
+    the relative tolerance; without `close_orbits` stages are searched by simulations alone, and motions that have
+    converged are taken for attracted. `threads` and `cancel` as in `RunOptions`. Raises Exhausted where an allowance is
+    used up.
+    """
+    stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
+    survey = attractors(stages, rtol=rtol, cycles=close_orbits) if can_hunt(flat) else None
+    return StageAttractors.of(survey, surely_surveyed(stages, survey))
+
+
+def loops_unstable(flat: Mapping[str, Any], count: int) -> np.ndarray:
+    """Which stages of one structure have a loop that is not stable, sticking or sliding, whatever the friction does,
+    shape (count,)."""
+    states = unstable_among(Ensemble.held(flat, count, form=shared_structure(flat)))
+    return np.any([*states.values()], axis=0)
+
+
+@np.errstate(all="ignore")
+def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
+    """Judge stages of one structure, whose own motions are run to a relative tolerance: words of
+    `friso.hunting.criteria.VERDICTS`, shape (count,), "failed" where simulations that had to decide failed, or what
+    attracts is not certain."""
+    attracted = find_attractors(flat, count)
+    return judge_runs(flat, run_motions(flat, count, measuring_options(rtol)), attracted, rtol)
+
+
+@np.errstate(all="ignore")
+def judge_runs(
+    flat: Mapping[str, Any],
+    motions: Motions,
+    attracted: StageAttractors,
+    rtol: float,
+    threads: int | None = None,
+    cancel: np.ndarray | None = None,
+) -> np.ndarray:
+    """Judge stages of one structure as `judge_many` does, whose own motions were run already, to a relative tolerance,
+    and of which it is known what attracts them; `threads` and `cancel` as in `RunOptions`."""
+    count, target = len(motions.completed), attracted.target
+    stages = Ensemble.held(flat, count, form=shared_structure(flat))
+    decided = motions.completed & attracted.certain
+    attracts = attracted.attracts.copy()
+    in_cycle, rests = np.zeros(count, bool), np.zeros(count, bool)
+    run_options = measuring_options(rtol, threads, cancel)
+    chosen = np.flatnonzero(decided & attracts)
+    if target is not None and chosen.size:
+        targets = target.of(chosen)
+        ends, completed, swing = ends_in(some_of(flat, chosen), chosen.size, targets, threads=threads, cancel=cancel)
+        completed &= ~swings_seldom(targets, ends, swing)
+        if winds_up_at_a_limit(stages):
+            completed &= ~(ends & (swing > RUNNING_AWAY * 2 * targets.amplitude))
+        in_cycle[chosen], decided[chosen] = ends, completed
+        settled = np.isfinite(motions.settling[chosen]) & (swing <= resting(flat, count)[chosen])
+        restless = chosen[completed & ~ends & ~settled]
+        if restless.size:  # something may attract them that swings less than what was found
+            moved = some_of(flat, restless), motions.take(restless)
+            in_cycle[restless], decided[restless] = _swing_on(*moved, run_options)
+    free = np.flatnonzero(decided & ~attracts)
+    if free.size:
+        rest = followed_motions(
+            some_of(flat, free), motions.take(free), free.size, run_options, possible=target is not None
+        )
+        rests[free], attracts[free], in_cycle[free] = rest.rests, rest.steady, rest.steady
+        if target is not None:
+            decided[free] = rest.steady | _stands(some_of(flat, free), rest)
+    return verdicts(decided, attracts, in_cycle, rests)
+
+
+def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions) -> tuple[np.ndarray, np.ndarray]:
+    """Of motions that do not end in what was found to attract their stages, which swing on by less once they were
+    followed for long, and of which that is decided: they do, or they have come to rest."""
+    rest = followed_motions(flat, motions, len(motions.completed), run_options, possible=True)
+    return rest.steady, rest.steady | _stands(flat, rest)
+
+
+def _stands(flat: Mapping[str, Any], rest: FollowedMotions) -> np.ndarray:
+    """Which motions were followed to where they do not swing any more, as far as they had to be, shape (count,)."""
+    return ~rest.unknown & (~rest.moving | (rest.swing <= resting(flat, len(rest.moving))))
