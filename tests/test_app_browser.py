@@ -26,9 +26,22 @@ from friso.views.drawing.figure import INK, Axis, Figure, Panel, Series
 from friso.views.map.page import map_html
 from friso.views.pages import Report
 
-pytestmark = needs_browser
+pytestmark = [needs_browser, pytest.mark.usefixtures("own_bandwidth")]
 
 RIG = Path(friso.example("thesis_rig"))
+SERVER = """
+from friso.hunting import verdict
+from friso.hunting.margin import NOT_SOUGHT
+
+verdict.search_bandwidths = lambda *how: NOT_SOUGHT
+verdict.followed_on = lambda stage, sought, attracting: sought
+
+from friso.cli import main
+
+main()
+"""
+"""friso, whose checks search no other bandwidths (`own_bandwidth`)."""
+
 FIELD = '[data-path="controller.crossover"] input[type=text]'
 
 
@@ -139,7 +152,7 @@ def first_sentence(crossover: str) -> str:
 @pytest.fixture(scope="module")
 def opened() -> Iterator[Browsed]:
     driver = pytest.importorskip("playwright.sync_api")
-    command = [sys.executable, "-m", "friso", "app", str(RIG), "--no-browser", "--port", "0"]
+    command = [sys.executable, "-c", SERVER, "app", str(RIG), "--no-browser", "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server, driver.sync_playwright() as play:
         try:
             assert server.stdout is not None
