@@ -22,9 +22,9 @@ class Registry(Generic[Item]):
     "break-away".
 
     The modules are those of a `package`, and, where there is a `group` of entry points, those that installed packages
-    name in it, whose entry is of a `kind`. The names, and what each is in one line, the first one of the module's
-    docstring, are read without importing any of them; a module is imported when what it declares is first asked for.
-    `added` takes what is declared elsewhere, as (declared, one line), by name.
+    name in it; what the latter declare has to be of a `kind`. The names are read without importing any module, and so
+    is what each is in one line, the first one of its docstring; a module is imported when what it declares is first
+    asked for. `added` takes what is declared elsewhere, as (declared, one line), by name.
     """
 
     def __init__(self, package: str, attribute: str, group: str = "", kind: type = object) -> None:

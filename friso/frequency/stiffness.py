@@ -1,4 +1,4 @@
-"""Springs in series: the joint and the pre-sliding stiffness of the bearing (thesis, Eq. 1 and 2), and the formula
+"""Springs in series: the joint and the pre-sliding stiffness of the bearing (thesis, Eq. 1), and the formula
 that Table 1 prints for a touched limiter."""
 
 from __future__ import annotations
