@@ -25,6 +25,7 @@ from friso.hunting import (
     check_given,
     find_cycles,
     find_margin,
+    find_swings,
     hunting,
     judge_many,
 )
@@ -68,6 +69,15 @@ def only(chosen: Stage, rtol: float = CYCLE_RTOL) -> Cycle:
     """The one cycle there is."""
     (cycle,) = hunting_of(chosen, rtol).cycles
     return cycle
+
+
+@RIGID
+def test_what_attracts_one_stage_is_what_its_flat_keys_tell() -> None:
+    """As large and as long as the cycle that attracts; nothing beyond its edge."""
+    stage = rigid(4)
+    (swing,), cycle = find_swings(stage.flat()), only(stage)
+    assert (swing.amplitude, swing.period) == pytest.approx((cycle.amplitude, cycle.period), rel=1e-9)
+    assert find_swings(rigid(20).flat()) == ()
 
 
 @RIGID

@@ -4,6 +4,7 @@ Other floors import from these three alone: what stands behind them may be repla
 """
 
 from friso.hunting.attractors import Target
+from friso.hunting.attractors.survey import Swinging
 from friso.hunting.basin import Kick, MoveShare, displacements_that_hunt, moves_that_hunt, pushes_that_hunt
 from friso.hunting.boundary import (
     END_OF_RANGE,
@@ -37,6 +38,7 @@ from friso.hunting.many_stages import (
     StageAttractors,
     can_hunt,
     find_attractors,
+    find_swings,
     judge_many,
     judge_runs,
     kernels_to_judge,
@@ -88,6 +90,7 @@ __all__ = [
     "Spot",
     "StageAttractors",
     "Swing",
+    "Swinging",
     "Target",
     "can_hunt",
     "cannot_hunt",
@@ -100,6 +103,7 @@ __all__ = [
     "find_attractors",
     "find_cycles",
     "find_margin",
+    "find_swings",
     "flow_derivatives",
     "hunting",
     "judge_many",

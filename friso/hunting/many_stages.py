@@ -16,6 +16,7 @@ from friso.engine.batch import RunOptions
 from friso.engine.kernel import KernelRequest
 from friso.equations.structure import Structure, shared_structure
 from friso.hunting.attractors import Attractors, Target, attractors
+from friso.hunting.attractors.survey import Swinging
 from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.criteria import verdicts
 from friso.hunting.cycle.ensemble import Ensemble
@@ -107,6 +108,12 @@ def find_attractors(
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = attractors(stages, rtol=rtol, cycles=close_orbits) if can_hunt(flat) else None
     return StageAttractors.of(survey, surely_surveyed(stages, survey))
+
+
+def find_swings(flat: Mapping[str, Any]) -> tuple[Swinging, ...]:
+    """Find all that attracts one stage, given as flat keys, as thoroughly as a check does; its own motion plays no
+    part. As far as an allowance reaches."""
+    return attractors(Ensemble.held(flat, 1), thorough=True).motions
 
 
 def loops_unstable(flat: Mapping[str, Any], count: int) -> np.ndarray:
