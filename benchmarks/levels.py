@@ -14,6 +14,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -32,17 +33,17 @@ NEAR = 1e-3
 """Relative difference of numbers up to which they are told as the same."""
 
 
-def _check(stage: friso.Stage, folder: Path) -> object:
+def _check(stage: friso.Stage, folder: Path) -> Any:
     return friso.check(stage)
 
 
-def _boundary(stage: friso.Stage, folder: Path) -> object:
+def _boundary(stage: friso.Stage, folder: Path) -> Any:
     key = next(key for key in ("controller.crossover", "friction.static") if key in stage.flat())
     value, unit = stage.flat()[key], "Hz" if "crossover" in key else "N"
     return friso.boundary(stage, {key: f"{value / 3} {unit}..{3 * value} {unit}"})
 
 
-def _map(stage: friso.Stage, folder: Path) -> object:
+def _map(stage: friso.Stage, folder: Path) -> Any:
     static, mass = stage.flat()["friction.static"], stage.flat()["masses.stage"]
     ranges = {
         "friction.static": (static * np.geomspace(0.5, 2, 9), "N"),
@@ -52,11 +53,11 @@ def _map(stage: friso.Stage, folder: Path) -> object:
     return " ".join(f"{(outcomes == name).sum()} {name}" for name in np.unique(outcomes))
 
 
-def _tune(stage: friso.Stage, folder: Path) -> object:
+def _tune(stage: friso.Stage, folder: Path) -> Any:
     return friso.tune(stage)
 
 
-def _identify(stage: friso.Stage, folder: Path) -> object:
+def _identify(stage: friso.Stage, folder: Path) -> Any:
     run = friso.simulate(stage).data
     noise = np.random.default_rng(1).normal(size=(2, run.time.size))
     columns = [run.time.values, run.position.values + 2e-8 * noise[0], run.force.values + 0.02 * noise[1]]
@@ -66,7 +67,7 @@ def _identify(stage: friso.Stage, folder: Path) -> object:
     return friso.identify(log, stage=file)
 
 
-QUESTIONS: dict[str, tuple[int, Callable[[friso.Stage, Path], object]]] = {
+QUESTIONS: dict[str, tuple[int, Callable[[friso.Stage, Path], Any]]] = {
     "check": (1, _check),
     "boundary": (4, _boundary),
     "map": (4, _map),
