@@ -29,6 +29,8 @@ from friso.hunting import (
     hunting,
     judge_many,
 )
+from friso.hunting.attractors.closing import close_orbits
+from friso.hunting.attractors.rounds import Pending
 from friso.hunting.cycle.find import NO_PAIR, NO_RETURN, asymmetric_cycles, symmetric_cycles
 from friso.hunting.cycle.return_map import return_map
 from friso.hunting.cycle.shooting import close
@@ -638,3 +640,19 @@ def test_an_asymmetric_pair_takes_over_beyond_a_supercritical_flip() -> None:
     assert (symmetric.symmetric, symmetric.attracts, pair.symmetric, pair.attracts) == (True, False, False, True)
     assert abs(pair.middle) == pytest.approx(0.0161 * pair.amplitude, rel=0.02)
     assert pair.growth == pytest.approx(pair.multiplier, rel=0.02)
+
+
+def test_a_cycle_that_is_passed_through_several_times_is_closed_as_itself() -> None:
+    """Whatever number of swings a run beside it seems to repeat itself after, near a flip or where a limiter chatters."""
+    stages = Ensemble.held(rigid(8.0).flat(), 1)
+    cycle = symmetric_cycles(stages)
+    passes = np.array([1, 2, 3, 4, 6, 12])
+    several = stages.take(np.zeros(passes.size, np.int64))
+    runs = Pending(several, np.repeat(cycle.states, passes.size, axis=0), *np.ones((2, passes.size)), several.symmetric)
+    times, sizes = passes * cycle.orbits.times, np.full(passes.size, 2 * cycle.amplitude[0])
+    closed = np.zeros(passes.size)
+    for numbers, cycles in close_orbits(runs, passes, times, sizes, CYCLE_RTOL):
+        closed[numbers[cycles.closed]] += 1
+        assert (cycles.swings, cycles.sign) == (1, -1.0) or not cycles.closed.any()
+        assert cycles.multiplier[cycles.closed] == pytest.approx(cycle.multiplier[0], rel=1e-4)
+    assert closed.tolist() == [1.0] * passes.size

@@ -5,14 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from friso.hunting.attractors.rounds import Pending
-from friso.hunting.cycle.find import LEANING, Cycles, described
-from friso.hunting.cycle.shooting import close
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import Cycles, described
+from friso.hunting.cycle.shooting import Orbits, close
 
 SAMPLES = 400
 """Samples of the time in which a run repeats itself."""
 
 STILL = 1e-3
 """Share of peak to peak by which a stage that stands still moves from one sample to the next at most."""
+
+REPEATED = 1e-3
+"""Share of distance and time by which an orbit may differ from the simpler one that it passes through several times."""
 
 NEAR = 0.2
 """Share of peak to peak by which that of an orbit may differ from the run that it was closed from."""
@@ -38,14 +42,34 @@ def close_orbits(
         parts.append((group, cycles))
         return cycles
 
-    for n in np.unique(swings):
+    for n in np.unique(swings).tolist():
         group = np.flatnonzero(swings == n)
-        cycles = close_from(group, states[group], times[group], int(n))
-        upright = np.abs(cycles.middle) < LEANING * cycles.amplitude
-        if n == 2 and (twice := np.flatnonzero(cycles.closed & upright & runs.mirrored[group])).size:
-            orbits = cycles.orbits.take(twice)  # symmetric cycles, passed through twice
-            cycles.closed[twice] &= ~close_from(group[twice], orbits.states, orbits.times / 2, 1).closed
+        cycles = close_from(group, states[group], times[group], n)
+        for fewer in (m for m in range(1, n) if n % m == 0):
+            which = np.flatnonzero(cycles.closed & (runs.mirrored[group] | (fewer % 2 == 0)))
+            which = which[_repeat_after(runs.stages.take(group[which]), cycles.orbits.take(which), fewer, rtol)]
+            if which.size:
+                orbits = cycles.orbits.take(which)
+                once = close_from(group[which], orbits.states, orbits.times * fewer / n, fewer)
+                once.closed[~_alike(once.orbits, orbits, n / fewer, runs.stages.sticking)] = False
+                cycles.closed[which] &= ~once.closed
     return parts
+
+
+def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> np.ndarray:
+    """Which closed orbits, shape (count,), are simpler ones passed through several times: `fewer` swings lead back to
+    where the stage sticks, or, if their number is odd, to its mirror image."""
+    if not stages.count:
+        return np.zeros(0, bool)
+    ends = stages.run(orbits.states, orbits.times * fewer / orbits.swings, rtol).ends[:, stages.sticking]
+    sign, sticks = -1.0 if fewer % 2 else 1.0, orbits.states[:, stages.sticking]
+    return np.abs(sign * ends - sticks) < REPEATED * np.abs(sticks)
+
+
+def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.ndarray:
+    """Which orbits, (count,), are others passed through so many times, by where they stick and how long they take."""
+    distances = np.abs(once.states[:, sticking]) / np.abs(orbits.states[:, sticking])
+    return (np.abs(distances - 1) < REPEATED) & (np.abs(passes * once.times / orbits.times - 1) < REPEATED)
 
 
 def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
