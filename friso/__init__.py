@@ -4,7 +4,7 @@ import friso.early  # noqa: F401 (notes a signal that comes while the rest is im
 
 # isort: split
 import importlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any
 
@@ -125,9 +125,13 @@ def __getattr__(name: str) -> Any:
     if name in _LAZY:
         return getattr(importlib.import_module(_LAZY[name]), name)
     if not name.startswith("_") and PathFinder.find_spec(f"friso.{name}", __path__) is None and name in _installed():
+        from friso.errors import InputError
         from friso.installed import FUNCTIONS, load_declared
 
-        return load_declared(FUNCTIONS, name, _installed()[name], name)
+        try:
+            return load_declared(FUNCTIONS, name, _installed()[name], name, Callable)
+        except InputError as error:
+            raise AttributeError(str(error)) from error
     raise AttributeError(f"module 'friso' has no attribute {name!r}")
 
 

@@ -75,10 +75,10 @@ class Registry(Generic[Item]):
         module = self._own.get(name) or self._installed[name]
         try:
             loader: Any = getattr(find_spec(module), "loader", None)
-            source = loader.get_source(module)
+            docstring = ast.get_docstring(ast.parse(loader.get_source(module)))
         except (Exception, SystemExit):  # of another package, told where it is used
-            return f"cannot be imported from {module}"
-        return (ast.get_docstring(ast.parse(source)) or "").partition("\n")[0].removesuffix(".")
+            return f"cannot be read from {module}"
+        return (docstring or "").partition("\n")[0].removesuffix(".")
 
     def checked(self, name: str, option: str, example: str) -> str:
         """The name, if it is one of these. Raises InputError for the `option` otherwise, whose `example`, with {} for

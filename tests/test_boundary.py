@@ -257,7 +257,6 @@ def over_friction() -> Plane:
 
 
 @pytest.mark.inner
-@pytest.mark.thorough
 def test_every_curve_lies_where_the_multiplier_says(over_friction: Plane) -> None:
     """Flips of the symmetric cycle: 1 % to either side of the curve the cycle attracts on one and repels on the other,
     by cycles that are found from scratch."""

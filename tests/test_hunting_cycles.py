@@ -642,8 +642,9 @@ def test_an_asymmetric_pair_takes_over_beyond_a_supercritical_flip() -> None:
     assert pair.growth == pytest.approx(pair.multiplier, rel=0.02)
 
 
+@pytest.mark.inner
 def test_a_cycle_that_is_passed_through_several_times_is_closed_as_itself() -> None:
-    """Whatever number of swings a run beside it seems to repeat itself after, near a flip or where a limiter chatters."""
+    """After whatever number of swings a run beside it seems to repeat itself."""
     stages = Ensemble.held(rigid(8.0).flat(), 1)
     cycle = symmetric_cycles(stages)
     passes = np.array([1, 2, 3, 4, 6, 12])

@@ -110,16 +110,16 @@ def test_a_load_under_which_no_leaves_stand_has_none() -> None:
 
 
 @pytest.fixture(scope="module")
-def thorough_tuning() -> Advice:
+def tuning() -> Advice:
     rigid = RIG.replace({"joint": None, "parasitic": None})
     budget = Budget(points=4, generations=2, refined=1, machines=4, surveyed=3, fresh=20)
     return tune(rigid, Goal(controller=False), budget=budget, chosen=["isolator"])
 
 
-def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(thorough_tuning: Advice) -> None:
-    isolator, made = thorough_tuning.outcomes
-    assert thorough_tuning.working == (isolator,)
-    assert thorough_tuning.made_of_leaves(isolator) is made
+def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(tuning: Advice) -> None:
+    isolator, made = tuning.outcomes
+    assert tuning.working == (isolator,)
+    assert tuning.made_of_leaves(isolator) is made
     assert isolator.stage is not None
     assert made.stage is not None
     assert made.stage.flat()["joint.stiffness"] == pytest.approx(isolator.stage.flat()["joint.stiffness"], rel=0.01)
@@ -127,39 +127,39 @@ def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(thorough_tuning:
     assert made.case is not None
     assert (made.case.verdict, made.case.judgement.hunting.certain) == ("settles", True)
     length = f"{made.stage.flat()['flexure.length'] * 1e3:.3g} x"
-    assert any("2 leaves of" in line and length in line for line in answer(thorough_tuning))
-    files = stage_files(thorough_tuning)
+    assert any("2 leaves of" in line and length in line for line in answer(tuning))
+    files = stage_files(tuning)
     written = loads(str(files["tuned-isolator-of-leaf-springs.toml"]))
     assert written.flat()["flexure.length"] == made.stage.flat()["flexure.length"]
     paths = [Path("tuned") / name for name in files]
-    assert TuneAnswer(thorough_tuning).next_steps(paths) == [
+    assert TuneAnswer(tuning).next_steps(paths) == [
         "friso design tuned/tuned-isolator.toml",
         "friso flexure tuned/tuned-isolator-of-leaf-springs.toml",
     ]
 
 
-def test_the_mode_of_the_file_whose_place_the_leaves_take_is_named(thorough_tuning: Advice) -> None:
+def test_the_mode_of_the_file_whose_place_the_leaves_take_is_named(tuning: Advice) -> None:
     """That of the joint as it is, as a number; not that of leaf springs, which are in the file."""
 
     def replaced(present: Stage) -> bool:
-        sentences = " ".join(answer(replace(thorough_tuning, stage=present)))
+        sentences = " ".join(answer(replace(tuning, stage=present)))
         assert "Leaf springs for its joint" in sentences
         return ", in place of the parasitic mode of the file (300 Hz). With them" in sentences
 
-    assert [replaced(stage) for stage in (thorough_tuning.stage, RIG, LEAVES)] == [False, True, False]
+    assert [replaced(stage) for stage in (tuning.stage, RIG, LEAVES)] == [False, True, False]
 
 
 @pytest.mark.parametrize("why", get_args(Unmade))
-def test_why_no_leaves_were_sized_is_said(thorough_tuning: Advice, why: Unmade) -> None:
-    (isolator, _) = thorough_tuning.outcomes
-    without = replace(thorough_tuning, outcomes=(isolator,), unmade={isolator.remedy.name: why})
+def test_why_no_leaves_were_sized_is_said(tuning: Advice, why: Unmade) -> None:
+    (isolator, _) = tuning.outcomes
+    without = replace(tuning, outcomes=(isolator,), unmade={isolator.remedy.name: why})
     (sentence,) = (line for line in answer(without) if "leaf springs" in line)
     assert UNMADE[why] in sentence
 
 
-def test_leaves_that_are_not_sure_to_work_are_not_recommended(thorough_tuning: Advice) -> None:
-    isolator, made = thorough_tuning.outcomes
-    doubted = replace(thorough_tuning, outcomes=(isolator, replace(made, doubts=("distance",))))
+def test_leaves_that_are_not_sure_to_work_are_not_recommended(tuning: Advice) -> None:
+    isolator, made = tuning.outcomes
+    doubted = replace(tuning, outcomes=(isolator, replace(made, doubts=("distance",))))
     (sentence,) = (line for line in answer(doubted) if line.startswith("Leaf springs"))
     assert DOUBTS["distance"] in sentence
     names = [name for name in stage_files(doubted) if "leaf-springs" in name]
@@ -168,15 +168,15 @@ def test_leaves_that_are_not_sure_to_work_are_not_recommended(thorough_tuning: A
     assert TuneAnswer(doubted).next_steps(paths) == ["friso design tuned/tuned-isolator.toml"]
 
 
-def test_the_least_change_has_leaves_of_its_own(thorough_tuning: Advice, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_least_change_has_leaves_of_its_own(tuning: Advice, monkeypatch: pytest.MonkeyPatch) -> None:
     """It stands first in the answer, and is searched otherwise than what it was found from."""
-    (isolator, _), tried = thorough_tuning.outcomes, []
+    (isolator, _), tried = tuning.outcomes, []
     monkeypatch.setattr(_Session, "_verified", lambda self, search, shares: isolator)
     monkeypatch.setattr(_Session, "tries", lambda self, remedy: tried.append(remedy.makes))
     session = _Session(
-        thorough_tuning.stage,
-        thorough_tuning.stage,
-        thorough_tuning.goal,
+        tuning.stage,
+        tuning.stage,
+        tuning.goal,
         *[None] * 4,
         Budget(),
         None,

@@ -98,7 +98,6 @@ def test_check(locked: Stage, tmp_path: Path) -> None:
     assert float(factor) >= EDGE / 6.0
 
 
-@pytest.mark.thorough
 def test_boundary(locked: Stage, tmp_path: Path) -> None:
     """Of all cycles of the stage none attracts beyond the edge."""
     document = answer(tmp_path, locked, "boundary", "--x", f"{BANDWIDTH}=6 Hz..15 Hz")
@@ -149,7 +148,6 @@ def test_compare(whole: Stage, tmp_path: Path) -> None:
         assert options["b"]["crossover_hz"] == pytest.approx(6.0 * options["b"]["bandwidth_factor"])
 
 
-@pytest.mark.thorough
 def test_tune(locked: Stage, tmp_path: Path) -> None:
     """Its cycles are known and its bandwidth is tuned; so few machines let nothing be sure to work."""
     tiny = Budget(points=2, generations=2, machines=3, surveyed=1, fresh=3)
@@ -175,7 +173,6 @@ def test_export(locked: Stage, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
-@pytest.mark.thorough
 def test_identify_in_its_own_loop(locked: Stage, tmp_path: Path) -> None:
     """A log that its own sampled loop wrote gives mass and friction back."""
     rigid = locked.replace({"joint": None, "rail": None, "cable": None, "drive": {"sample_time": "1 ms"}})

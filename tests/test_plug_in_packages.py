@@ -187,6 +187,18 @@ def python(folder: Path, code: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
+COMMANDS = {
+    name: f"from friso.cli.command import Command\ndef run(stage: {kind}) -> None: ...\nCOMMAND = Command({declared})"
+    for name, kind, declared in (
+        ("unread", "Nowhere", "run, 1"),
+        ("early", "str", "run, 'early'"),
+        ("lost", "str", "run, 1, 'Why?'"),
+        ("number", "str", "3, 1"),
+    )
+}
+"""Modules whose command friso cannot show or run."""
+
+
 @pytest.mark.parametrize(
     ("name", "module", "why"),
     [
@@ -196,12 +208,18 @@ def python(folder: Path, code: str) -> subprocess.CompletedProcess[str]:
         ("empty", "empty", "whose COMMAND is missing"),
         ("wrong", "wrong", "whose COMMAND is int"),
         ("leaves", "leaves", "cannot be imported"),
+        ("broken", "broken", "cannot be imported: invalid syntax"),
+        ("unread", "unread", "name 'Nowhere' is not defined"),
+        ("early", "early", "place 'early' is not a number"),
+        ("lost", "lost", "question 'Why?' is none of"),
+        ("number", "number", "3 is not a callable object"),
     ],
 )
 def test_a_command_that_is_of_no_use_is_one_sentence_and_hinders_no_other(
     name: str, module: str, why: str, tmp_path: Path
 ) -> None:
-    for file, text in {"empty": "", "wrong": "COMMAND = 1", "leaves": "raise SystemExit(0)"}.items():
+    texts = {"empty": "", "wrong": "COMMAND = 1", "leaves": "raise SystemExit(0)", "broken": "def", **COMMANDS}
+    for file, text in texts.items():
         (tmp_path / f"{file}.py").write_text(text)
     package(tmp_path, "other", commands={name: module}, functions={name: module}, rig_experiments={name: module})
     listed = friso_command(tmp_path, "--help")
@@ -228,7 +246,7 @@ def test_a_function_that_is_of_no_use_is_refused_and_leaves_the_others(tmp_path:
     done = python(tmp_path, code)
     assert done.stdout == "friso.answers.check friso.stage\n"
     assert "friso.functions: check is left out: taken; expected: a name that is not taken: friso has it" in done.stderr
-    assert "InputError: friso.functions: missing" in done.stderr
+    assert "AttributeError: friso.functions: missing" in done.stderr
     assert "which cannot be imported: No module named 'missing'" in done.stderr
 
 

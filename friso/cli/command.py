@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from inspect import signature
 from typing import Any
 
 from typer.core import TyperArgument, TyperCommand
@@ -43,12 +44,20 @@ class Choices:
 @dataclass(frozen=True)
 class Command:
     """A command of friso: the function that typer calls, whose docstring is the help; its `place` in the list of
-    commands, which goes by increasing numbers, under the `question` that it answers."""
+    commands, which goes by increasing numbers, under the `question` that it answers. Raises ValueError for a question
+    that is not one of QUESTIONS, TypeError or NameError for a function whose options typer could not read."""
 
     function: Callable[..., None]
-    place: int
+    place: float
     question: str = HELP
     choices: Choices | None = None
+
+    def __post_init__(self) -> None:
+        signature(self.function, eval_str=True)
+        if self.question not in QUESTIONS:
+            raise ValueError(f"question {self.question!r} is none of {', '.join(QUESTIONS)}")
+        if not isinstance(self.place, int | float):
+            raise TypeError(f"place {self.place!r} is not a number")
 
     @property
     def summary(self) -> str:

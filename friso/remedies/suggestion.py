@@ -54,7 +54,7 @@ def suggestion(stage: Stage) -> Suggestion | None:
     )
     shares = np.array([_shares(remedy, stroke, damping) for stroke, damping in tried])
     numbers = remedy.changes(shares)
-    flat = {**free.flat(), **numbers}
+    flat = {**free.flat(), **numbers, "motion.kind": "release"}  # what attracts matters, whatever the motion
     attracts = np.zeros(len(tried), bool)
     for factor in (1.0, 1 / Goal.distance):
         attracted = find_attractors(faster(flat, factor), len(tried), close_orbits=False)

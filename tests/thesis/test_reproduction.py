@@ -687,6 +687,16 @@ def test_the_conclusions_under_each_law_are_of_the_claims_asked_for() -> None:
     assert [item.claim.id for item in by_law.conclusions] == ["E1"]
 
 
+def test_claims_asked_for_have_a_page_of_their_own() -> None:
+    """As the whole page has all of them (`test_document_and_page_have_every_claim`)."""
+    asked = reproduce(only=["E1", "S35"], points=3, with_cycles=False, draws=0)
+    judged = {entry["id"] for entry in reproduce_document(asked)["claims"] if entry["parts"]}
+    assert judged == {"E1", "S35"}
+    page = str(reproduce_files(asked)["reproduction.html"])
+    assert [claim for claim in judged if f'id="claim-{claim}"' not in page] == []
+    assert "default-src 'none'" in page
+
+
 def test_one_peak_moves_everywhere() -> None:
     """F5 and the maps call the same a cycle: one peak counted."""
     assert registered()["F5"].judge(Evidence({}, {"locked": cell(1)})).parts[0].holds

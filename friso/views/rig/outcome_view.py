@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from friso.errors import InputError
+from friso.installed import leave_out
 from friso.registry import Registry
 from friso.studies.rig.outcome import Outcome
 from friso.views.drawing.figure import Figure
@@ -29,8 +31,16 @@ the name of its experiment."""
 
 
 def view_of(experiment: str) -> OutcomeView:
-    """How outcomes of an experiment are shown: as its view declares, or else by its logs."""
-    return OUTCOME_VIEWS[experiment] if experiment in OUTCOME_VIEWS else OutcomeView(_lengths, _records, lambda _: {})
+    """How outcomes of an experiment are shown: as its view declares, or else by its logs.
+
+    A view of another package that cannot be used is told and left out: the experiment has been run by then.
+    """
+    try:
+        if experiment in OUTCOME_VIEWS:
+            return OUTCOME_VIEWS[experiment]
+    except InputError as error:
+        leave_out(error)
+    return OutcomeView(_lengths, _records, lambda _: {})
 
 
 def _lengths(outcome: Outcome) -> list[str]:
