@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from friso.engine.allowance import allowance
-from friso.engine.kernel import kernel
-from friso.equations.structure import structure
+from friso.engine.kernel import kernels
 from friso.hunting import Case, check
-from friso.hunting.attractors import Attractors
+from friso.hunting.attractors import Attractors, attractors
+from friso.hunting.attractors.survey import Swinging
 from friso.hunting.basin import Kick
+from friso.hunting.check import needed_kernels
+from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.verdict import BANDWIDTHS
 from friso.stage import Stage
 
@@ -61,10 +64,14 @@ class Claim:
         return self.verdict in ATTRACTED
 
     @property
+    def motions(self) -> tuple[Swinging, ...]:
+        """What is said to attract."""
+        return self.surveyed.motions if self.surveyed else ()
+
+    @property
     def swing(self) -> float:
         """Half of peak to peak of the least of what attracts [m]; infinite where nothing does."""
-        motions = self.surveyed.motions if self.surveyed else ()
-        return min((motion.amplitude for motion in motions), default=np.inf)
+        return least_swing(self.motions)
 
     def __str__(self) -> str:
         text = f"{self.case}: {self.verdict}{'' if self.sure else ' (not sure)'}"
@@ -85,9 +92,7 @@ class Checked:
 
 def checked(stage: Stage) -> Checked:
     """What a check of the stage says; cases that are one and the same stage once."""
-    for variant in stage.variants().values():
-        for variational in (False, True):
-            kernel(structure(variant.flat()), variational)
+    kernels(needed_kernels(stage))
     start = time.process_time()
     with allowance() as spent:
         cases = check(stage)
@@ -96,6 +101,16 @@ def checked(stage: Stage) -> Checked:
     for name, case in cases.items():
         unique.setdefault(id(case), (name, case))
     return Checked(tuple(_claim(name, case) for name, case in unique.values()), cpu, spent.used)
+
+
+def surveyed(flat: Mapping[str, Any]) -> tuple[Swinging, ...]:
+    """What friso says attracts a stage given as flat keys."""
+    return attractors(Ensemble.held(flat, 1), thorough=True).motions
+
+
+def least_swing(motions: Iterable[Swinging]) -> float:
+    """Half of peak to peak of the least of some motions [m]; infinite without any."""
+    return min((motion.amplitude for motion in motions), default=np.inf)
 
 
 def _claim(name: str, case: Case) -> Claim:
