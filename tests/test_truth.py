@@ -20,10 +20,10 @@ from benchmarks.truth.claims import RUNS_AWAY, Claim, Edge, checked, surveyed
 from benchmarks.truth.classes import classes_of
 from benchmarks.truth.draws import FORMS, SERIES, draw
 from benchmarks.truth.kept import KeptAttacks
-from benchmarks.truth.refute import ALL, Refutation, _edge, _kicks, _verdict, attempts, may_attract
+from benchmarks.truth.refute import ALL, Refutation, _different, _edge, _kicks, _verdict, attempts, may_attract
 from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
 from benchmarks.truth.tally import COLUMNS, document, page
-from benchmarks.truth.trials import Bench
+from benchmarks.truth.trials import Bench, Outcome
 from friso.engine.allowance import Exhausted
 from friso.equations.bandwidth import bandwidth, faster
 from friso.hunting.basin import Kick
@@ -126,7 +126,7 @@ def test_above_an_edge_nothing_is_tried_where_hunting_is_said_to_be_possible(mon
             return super().starts(1, 1, 1, 0, 0)
 
         def follow(self, *args: Any, **options: Any) -> Any:
-            return SimpleNamespace(words=np.array([UNSURE]), swinging=np.array([], int))
+            return SimpleNamespace(words=np.array([UNSURE]), swinging=np.array([], int), amplitude=np.zeros(1))
 
     monkeypatch.setattr(refute, "Bench", Quiet)
     chosen = VARIANTS["rigid"]
@@ -139,6 +139,7 @@ def test_above_an_edge_nothing_is_tried_where_hunting_is_said_to_be_possible(mon
 
 
 HUNTING = VARIANTS["rigid"]
+SWINGING = np.array([SWINGS, SWINGS, SWINGS, RESTS, SWINGS], dtype=object)
 
 
 @cache
@@ -170,6 +171,11 @@ def test_what_is_said_to_attract_is_followed_from_close_beside_it() -> None:
     """A hunting stage keeps its cycle up, and a much faster one, begun there, does not."""
     assert may_attract(Bench(HUNTING.flat()), attracting())
     assert not may_attract(Bench(faster(HUNTING.flat(), 8)), attracting())
+
+
+def test_starts_that_swing_alike_are_looked_at_once() -> None:
+    amplitude = np.array([2.0, 1.0, 2.0001, 0.0, 3.0])
+    assert _different(Outcome(SWINGING, amplitude, *[np.zeros(5)] * 3)).tolist() == [0, 1, 4]
 
 
 def refutation(number: int) -> Refutation:

@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.truth.by_hand import NotWritten, by_hand
 from benchmarks.truth.claims import RUNS_AWAY, Claim, Edge, least_swing, surveyed
 from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE
-from benchmarks.truth.trials import FINE, LINGERING, ROUGH, ROUNDS, Bench, Trial
+from benchmarks.truth.trials import CLOSER, FINE, LINGERING, ROUGH, ROUNDS, Bench, Outcome, Trial
 from friso.equations.bandwidth import bandwidth, faster
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.basin import Kick
@@ -30,8 +30,9 @@ FEW = (16, 8, 32, 8)
 SECOND = 24
 """Starts of a battery that are followed at the finer tolerance too."""
 
-TRIED = 3
-"""Starts of those that swing on which are looked at closely."""
+TRIED, APART = 3, 1e-3
+"""Starts of those that swing on which are looked at closely, and the share by which their amplitudes differ: others
+are in the same swing."""
 
 CONSTANTS = 10.0
 """Time constants of what is said to attract for which its neighbours are followed: if it repels by half of what it is
@@ -115,29 +116,24 @@ def _may_hunt(bench: Bench, trial: Trial, kicks: tuple[float, ...] = ()) -> bool
 
 
 def swinging(bench: Bench, trial: Trial) -> str:
-    """From which start, and how, a stage swings on; "" where it does not. What a run at one tolerance shows has to be
-    shown at the fine one, and by its neighbours at two; SciPy says what it makes of it."""
-    rough = bench.follow(trial, ROUGH)
-    for start in rough.swinging[:: max(1, len(rough.swinging) // TRIED)][:TRIED]:
-        fine = bench.follow(trial.take(np.array([start])), FINE, ROUNDS[1:])
-        if fine.words[0] == SWINGS and attracts(bench, fine.ends[0], fine.periods[0]):
-            return "; ".join(
-                [
-                    f"{trial.kinds[start]} {trial.sizes[start]:.6g} swings on by {rough.amplitude[start]:.6g} m, "
-                    f"followed for {rough.followed[start]:.4g} s at {ROUGH:g}",
-                    f"by {fine.amplitude[0]:.6g} m for {fine.followed[0]:.4g} s at {FINE:g}, and so do its neighbours",
-                    by_scipy(bench, fine.ends[0], float(fine.amplitude[0])),
-                ]
-            )
-    second = trial.take(np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int)))
-    fine = bench.follow(second, FINE)
-    for start in fine.swinging[:TRIED]:
-        if attracts(bench, fine.ends[start], float(fine.periods[start])):
-            size, swing = second.sizes[start], fine.amplitude[start]
-            kind, followed = second.kinds[start], fine.followed[start]
-            about = by_scipy(bench, fine.ends[start], float(swing))
-            return f"{kind} {size:.6g} swings on by {swing:.6g} m for {followed:.4g} s at {FINE:g}; {about}"
+    """From which start, and how, a stage swings on, as its neighbours do; "" where it does not. SciPy says what it
+    makes of it."""
+    few = np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int))
+    for rtol, begun in ((ROUGH, trial), (FINE, trial.take(few))):
+        run = bench.follow(begun, rtol)
+        for start in _different(run):
+            if attracts(bench, run.ends[start], float(run.periods[start])):
+                swing, begins = float(run.amplitude[start]), f"{begun.kinds[start]} {begun.sizes[start]:.6g}"
+                seen = f"swings on by {swing:.6g} m for {run.followed[start]:.4g} s at {rtol:g}"
+                beside = f"and so do its neighbours at {CLOSER:g} and {FINE:g}"
+                return f"{begins} {seen}, {beside}; {by_scipy(bench, run.ends[start], swing)}"
     return ""
+
+
+def _different(run: Outcome) -> np.ndarray:
+    """A few of the runs that swing on, each by another amplitude."""
+    _, first = np.unique(np.round(np.log(run.amplitude[run.swinging]) / APART), return_index=True)
+    return run.swinging[np.sort(first)][:: max(1, len(first) // TRIED)][:TRIED]
 
 
 def attracts(bench: Bench, end: np.ndarray, period: float) -> bool:
@@ -270,7 +266,7 @@ def _may_attract_at(flat: dict[str, Any]) -> bool:
 def _swings(bench: Bench, seed: int) -> np.ndarray:
     """States in swings that go on, a few of them, made larger and smaller, (starts, states)."""
     run = bench.follow(bench.starts(*FEW, seed), ROUGH)
-    chosen = run.swinging[:: max(1, len(run.swinging) // TRIED)][:TRIED]
+    chosen = _different(run)
     if not chosen.size:
         return np.empty((0, 0))
     return np.vstack([bench.beside(end, DENSE) for end in run.ends[chosen]])[:, : bench.kernel.initial_size]
