@@ -118,9 +118,9 @@ def _attacked(arguments: argparse.Namespace, numbers: Sequence[int]) -> Generato
         for job in as_completed([pool.submit(attack, *task) for task in tasks]):
             yield job.result()
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
         for worker in multiprocessing.active_children():
             worker.terminate()
+        pool.shutdown(cancel_futures=True)
 
 
 def _end_with_parent() -> None:
