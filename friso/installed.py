@@ -58,7 +58,7 @@ def load_module(group: str, name: str, module: str) -> ModuleType:
         raise InputError(f"{group}: {name}", actual, "a module that can be imported") from error
 
 
-def load_declared(group: str, name: str, module: str, attribute: str, kind: type = object) -> Any:
+def load_declared(group: str, name: str, module: str, attribute: str, kind: Any = object) -> Any:
     """What the module that a package names declares as an `attribute`. Raises InputError where the module cannot be
     imported, or declares nothing of this `kind`."""
     declared = getattr(load_module(group, name, module), attribute, None)

@@ -14,6 +14,7 @@ import os
 import sys
 import time
 from dataclasses import astuple
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from benchmarks.laws.cycles import cycles_of
 from benchmarks.laws.draws import numbers, under
 from benchmarks.report import Goal, print_goals, print_table
 from benchmarks.truth.claims import checked
-from benchmarks.truth.refute import refutations
+from benchmarks.truth.refute import attempts
 
 
 def main() -> None:
@@ -59,7 +60,7 @@ def _record(law: str, seed: int, number: int) -> dict[str, Any]:
                 cycles.append(list(astuple(cycle)))
                 if cycle.wrong:
                     wrong.append(f"WRONG: {claim.case}, cycle of {cycle.amplitude:.4g} m: {cycle.wrong}")
-        for refutation in refutations(claim, number):
+        for refutation in chain.from_iterable(attempts(claim, number).values()):
             word = "WRONG" if refutation.sure else "wrong, but not sure"
             wrong.append(f"{word}: {claim.case}, {refutation.of}: {refutation.why}")
     return {

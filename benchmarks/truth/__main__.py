@@ -1,34 +1,38 @@
 """Draws stages, checks them, and tries to refute every verdict and edge: `python -m benchmarks.truth`.
 
-Prints the share of sure verdicts, how many of these are wrong (their stage files, each with a note, are written to a
-folder), the CPU time of a check, and why what is not sure is not. Interrupted, it prints what there is. `--number`
-takes single stages of a seed; `--checks` checks them and tries to refute nothing.
+Prints by class of machine how many verdicts and edges are certain and how many of these are wrong (their stage files,
+each with a note, are written to a folder), the CPU time of a check, and why what is not certain is not. Attacks are
+kept in a file, and a run goes on where one was stopped; interrupted, it prints what there is. `--number` takes single
+stages of a seed; `--checks` checks them, tries to refute nothing and keeps nothing.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import multiprocessing
 import os
+import signal
 import sys
+import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when NumPy is loaded
 
-import numpy as np
-
-from benchmarks.report import Goal, print_goals, print_table
 from benchmarks.truth.attack import attack
 from benchmarks.truth.by_hand import NotWritten
-from benchmarks.truth.draws import SERIES
+from benchmarks.truth.draws import SERIES, draw
+from benchmarks.truth.kept import KeptAttacks, Record, is_current
 from benchmarks.truth.positions import compared, summary
-
-SLOWEST = 8
-"""Checks that are listed for the work they take."""
+from benchmarks.truth.tally import document, page, print_tally
+from friso.engine.kernel import kernels
+from friso.hunting import needed_kernels
+from friso.system import usable_cores
 
 
 def main() -> None:
@@ -37,19 +41,48 @@ def main() -> None:
     if arguments.simulate:
         _simulate(arguments.seed, numbers, arguments.series)
         return
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    records: list[dict[str, Any]] = []
-    start = time.perf_counter()
+    kept = KeptAttacks(arguments.kept or arguments.out / "attacks.jsonl")
+    for line in kept.damaged:
+        _tell(f"{kept.file}, line {line}, is damaged: if no other line tells of its stage, that is attacked again")
+    if arguments.report:
+        records = [*kept.records.values()]
+    elif arguments.checks:
+        records = []
+        _attack_all(arguments, numbers, records.append)
+    else:
+        there = {r["number"] for r in kept.of(arguments.series, arguments.seed, numbers) if _stays(r, arguments.redo)}
+        _attack_all(arguments, [number for number in numbers if number not in there], kept.add)
+        records = kept.of(arguments.series, arguments.seed, numbers)
+    if not records:
+        return
+    tally = document(records)
+    print(json.dumps(tally, indent=1)) if arguments.json else print_tally(records, tally)
+    if arguments.table:
+        arguments.table.parent.mkdir(parents=True, exist_ok=True)
+        arguments.table.write_text(page(records, tally))
+
+
+def _stays(record: Record, redo: bool) -> bool:
+    """Whether a stage is not attacked again."""
+    return is_current(record) or not redo
+
+
+def _tell(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _attack_all(arguments: argparse.Namespace, numbers: Sequence[int], keep: Callable[[Record], object]) -> None:
+    """Attack stages up to Ctrl-C; each attack is kept and told as it ends."""
+    start, busy = time.perf_counter(), 0.0
     try:
-        with (arguments.out / "records.jsonl").open("a") as log:
-            for record in _attacked(arguments, numbers):
-                records.append(record)
-                log.write(json.dumps(record) + "\n")
-                log.flush()
-                print(_line(record), flush=True)
+        with closing(_attacked(arguments, numbers)) as records:
+            for record in records:
+                keep(record)
+                busy += record.get("cpu", 0.0) + record.get("attack_cpu", 0.0)
+                _tell(_line(record))
     except KeyboardInterrupt:
-        print("interrupted")
-    _summary(records, time.perf_counter() - start)
+        _tell("interrupted")
+    _tell(f"  {time.perf_counter() - start:.0f} s, in which checks and attacks took {busy:.0f} s of CPU")
 
 
 def _simulate(seed: int, numbers: Iterable[int], series: str) -> None:
@@ -71,80 +104,46 @@ def _simulate(seed: int, numbers: Iterable[int], series: str) -> None:
         summary(records)
 
 
-def _attacked(arguments: argparse.Namespace, numbers: Any) -> Iterator[dict[str, Any]]:
-    tasks = [
-        (arguments.seed, number, arguments.scipy_share, arguments.out, arguments.checks, arguments.series)
-        for number in numbers
-    ]
+def _attacked(arguments: argparse.Namespace, numbers: Sequence[int]) -> Generator[Record]:
+    """Attacks on stages as they end, several at a time. What has to be compiled is, ahead and side by side."""
+    series, seed = arguments.series, arguments.seed
+    kernels(set().union(*(needed_kernels(draw(seed, number, series)) for number in numbers)))
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    tasks = [(seed, n, arguments.scipy_share, arguments.out, arguments.checks, series) for n in numbers]
     if arguments.workers == 1:
         yield from (attack(*task) for task in tasks)
         return
-    pool = ProcessPoolExecutor(arguments.workers)
+    pool = ProcessPoolExecutor(arguments.workers, initializer=_end_with_parent)
     try:
         for job in as_completed([pool.submit(attack, *task) for task in tasks]):
             yield job.result()
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+        for worker in multiprocessing.active_children():
+            worker.terminate()
+        pool.shutdown(cancel_futures=True)
 
 
-def _line(record: dict[str, Any]) -> str:
-    said = "; ".join(claim["says"] for claim in record["claims"])
-    lines = [f"  {record['number']:5d}  {record['cpu']:6.2f} s  {said}"]
+def _end_with_parent() -> None:
+    """Have a worker leave Ctrl-C to the process that started it, and end with that, however it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent
+
+    def end() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=end, daemon=True).start()
+
+
+def _line(record: Record) -> str:
+    said = record["error"] or "; ".join(claim["says"] for claim in record["claims"])
+    seconds = [record.get(name, 0.0) for name in ("cpu", "attack_cpu")]
+    lines = [f"  {record['number']:5d}  {seconds[0]:6.2f} s + {seconds[1]:6.2f} s  {said}"]
     for witness in record["refuted"]:
-        word = "WRONG" if witness["sure"] else "wrong, but not sure"
+        word = "WRONG" if witness["sure"] else "wrong, but not certain"
         lines.append(f"      {word}: {witness['case']}, {witness['of']}: {witness['why']}")
     return "\n".join(lines)
-
-
-def _summary(records: list[dict[str, Any]], seconds: float) -> None:
-    if not records:
-        return
-    claims = [claim for record in records for claim in record["claims"]]
-    sure = sum(claim["sure"] for claim in claims)
-    edges = [claim for claim in claims if claim["edge"] is not None]
-    wrong = [record["number"] for record in records if any(witness["sure"] for witness in record["refuted"])]
-    unsure_wrong = sum(any(not witness["sure"] for witness in record["refuted"]) for record in records)
-    cpu = [record["cpu"] for record in records]
-    print()
-    print_table(
-        ("", ""),
-        [
-            ["stages, verdicts", f"{len(records)}, {len(claims)}"],
-            ["sure verdicts", f"{sure} ({100 * sure / len(claims):.1f} %)"],
-            ["edges, sure ones", f"{len(edges)}, {sum(claim['edge_sure'] for claim in edges)}"],
-            ["stages with something sure that is wrong", f"{len(wrong)}: {', '.join(map(str, sorted(wrong)))}"],
-            ["stages with something wrong that was not sure", unsure_wrong],
-            ["claims whose attack was given up for its work", sum(len(record["given_up"]) for record in records)],
-            ["wall time [s]", f"{seconds:.0f}"],
-        ],
-    )
-    _doubts(records)
-    share, median, worst = sure / len(claims), float(np.median(cpu)), max(cpu)
-    print_goals(
-        [
-            Goal("sure verdicts", "97 %", f"{100 * share:.1f} %", share >= 0.97),
-            Goal("wrong among the sure", "none", str(len(wrong)), not wrong),
-            Goal("CPU of a check, median", "0.5 s", f"{median:.2f} s", median <= 0.5),
-            Goal("CPU of a check, worst", "10 s", f"{worst:.1f} s", worst <= 10),
-        ],
-        "Goals of issue 21, section 3",
-    )
-
-
-def _doubts(records: list[dict[str, Any]]) -> None:
-    """Print why what is not sure is not, and of which stages; and which checks take the most work."""
-    stages: dict[tuple[str, str], list[str]] = {}
-    for record in records:
-        for claim in record["claims"]:
-            for doubt in claim["doubts"].items():
-                stages.setdefault(doubt, []).append(f"{record['seed']}:{record['number']}")
-    rows = [[of, why, len(which), ", ".join(which)] for (of, why), which in stages.items()]
-    print_table(("not sure", "why", "", "stages"), sorted(rows, key=lambda row: -row[2]))
-    slowest = sorted(records, key=lambda record: -record["work"])[:SLOWEST]
-    print_table(
-        ("most work, in units of 12 ns", "", "CPU [s]"),
-        [[f"{r['seed']}:{r['number']}", f"{r['work']:.1e}", f"{r['cpu']:.1f}"] for r in slowest],
-    )
 
 
 def _arguments() -> argparse.Namespace:
@@ -158,11 +157,17 @@ def _arguments() -> argparse.Namespace:
         "--series",
         choices=SERIES,
         default="stages",
-        help="machines: cascades, transmissions, deadbands; axes: of machine tools, with settings against friction",
+        help="machines: cascades, transmissions, deadbands; axes: of machine tools, with settings against friction; "
+        "drives: axes with friction at the motor",
     )
     parser.add_argument("--checks", action="store_true", help="check the stages alone, and refute nothing")
     parser.add_argument("--simulate", action="store_true", help="compare runs of the stages with SciPy instead")
-    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--kept", type=Path, help="file of attacks, gone on with; default: attacks.jsonl in --out")
+    parser.add_argument("--redo", action="store_true", help="attack stages again that other code was attacked with")
+    parser.add_argument("--report", action="store_true", help="attack nothing; report all that the file holds")
+    parser.add_argument("--json", action="store_true", help="print the report as JSON")
+    parser.add_argument("--table", type=Path, help="write the report to this file, in Markdown")
+    parser.add_argument("--workers", type=int, default=usable_cores(), help="processes; default: as many as cores")
     parser.add_argument("--out", type=Path, default=Path("benchmark_results/truth"), help="folder for refuted stages")
     return parser.parse_args()
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import asdict
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.truth.claims import Claim, checked
+from benchmarks.truth.classes import classes_of
 from benchmarks.truth.draws import draw
-from benchmarks.truth.refute import Refutation, refutations
+from benchmarks.truth.refute import Refutation, attempts
 from benchmarks.truth.second_opinion import scipy_refutations
 from friso.engine.allowance import Exhausted, allowance
 from friso.stage import Stage
@@ -21,53 +23,71 @@ WORK = 4e9
 """Work of an attack on a claim (see `friso.engine.allowance`), about 50 s on one core: verdict, own motion and edge in
 this order. SciPy's is not counted. Free joints whose limiter rattles would take a hundred times that."""
 
+STOOD, WRONG, GIVEN_UP = "stood", "wrong", "given up"
+"""What becomes of a verdict or an edge that is attacked."""
+
 
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
 def attack(seed: int, number: int, scipy_share: float, folder: Path, checks: bool, series: str) -> dict[str, Any]:
-    """What friso says of the stage with this number, of a series, and what refutes it
-    (nothing is tried for `checks` alone); refuted stages are written to a folder."""
+    """What friso says of the stage with this number, of a series, and what refutes it (nothing is tried for `checks`
+    alone); stages that are refuted, or of which an error is raised, are written to a folder."""
     stage = draw(seed, number, series)
-    said = checked(stage)
-    start = time.process_time()
-    refuted: list[dict[str, Any]] = []
-    given_up: list[str] = []
-    for claim in () if checks else said.claims:
-        try:
-            with allowance(WORK):
-                for refutation in _against(claim, number, scipy_share):
-                    refuted.append({"case": claim.case, **asdict(refutation)})
-        except Exhausted:
-            given_up.append(claim.case)
-    record = {
-        "seed": seed,
-        "number": number,
-        "cpu": said.cpu,
-        "work": said.work,
-        "attack_cpu": time.process_time() - start,
-        "given_up": given_up,
-        "claims": [
-            {
-                "says": str(claim),
-                "case": claim.case,
-                "verdict": claim.verdict,
-                "sure": claim.sure,
-                "edge": claim.edge.factor if claim.edge else None,
-                "edge_sure": bool(claim.edge and claim.edge.sure),
-                "doubts": dict(claim.doubts),
-            }
-            for claim in said.claims
-        ],
-        "refuted": refuted,
-    }
-    if refuted:
+    record: dict[str, Any] = {"series": series, "seed": seed, "number": number, "claims": [], "refuted": []}
+    try:
+        _attack(stage, record, scipy_share, checks)
+        record["error"] = ""
+    except Exception as error:  # a finding as well
+        record["error"] = f"{type(error).__name__}: {error}"
+    if record["refuted"] or record["error"]:
         _write(folder / f"{series}-{seed}-{number}", stage, record)
     return record
 
 
-def _against(claim: Claim, number: int, scipy_share: float) -> Iterator[Refutation]:
-    yield from refutations(claim, number)
-    if np.random.default_rng([number, 5]).random() < scipy_share:
-        yield from scipy_refutations(claim)
+def _attack(stage: Stage, record: dict[str, Any], scipy_share: float, checks: bool) -> None:
+    said = checked(stage)
+    record |= {"cpu": said.cpu, "work": said.work}
+    start = time.process_time()
+    for claim in said.claims:
+        tried = {} if checks else _tried(claim, record["number"], scipy_share)
+        outcomes, refuted = _outcomes(tried)
+        record["claims"].append(_as_data(claim) | {"outcomes": outcomes})
+        record["refuted"] += [{"case": claim.case, **asdict(refutation)} for refutation in refuted]
+    record["attack_cpu"] = time.process_time() - start
+
+
+def _as_data(claim: Claim) -> dict[str, Any]:
+    return {
+        "says": str(claim),
+        "case": claim.case,
+        "classes": classes_of(claim.stage.flat()),
+        "verdict": claim.verdict,
+        "sure": claim.sure,
+        "edge": claim.edge.factor if claim.edge else None,
+        "edge_sure": bool(claim.edge and claim.edge.sure),
+        "doubts": dict(claim.doubts),
+    }
+
+
+def _tried(claim: Claim, number: int, scipy_share: float) -> dict[str, Iterator[Refutation]]:
+    """The attempts to refute a claim, SciPy's too, where its turn has come."""
+    tried = attempts(claim, number)
+    if "verdict" in tried and np.random.default_rng([number, 5]).random() < scipy_share:
+        tried["verdict"] = chain(tried["verdict"], scipy_refutations(claim))
+    return tried
+
+
+def _outcomes(tried: dict[str, Iterator[Refutation]]) -> tuple[dict[str, str], list[Refutation]]:
+    """What becomes of the parts of a claim that are attacked, within the same allowance, and what refutes them."""
+    outcomes, refuted = {}, []
+    with allowance(WORK):
+        for part, attempt in tried.items():
+            before, ends_as = len(refuted), STOOD
+            try:
+                refuted += attempt  # those that were found before it is given up stay
+            except Exhausted:
+                ends_as = GIVEN_UP
+            outcomes[part] = WRONG if len(refuted) > before else ends_as
+    return outcomes, refuted
 
 
 def _write(name: Path, stage: Stage, record: dict[str, Any]) -> None:
@@ -76,5 +96,6 @@ def _write(name: Path, stage: Stage, record: dict[str, Any]) -> None:
     for refutation in record["refuted"]:
         word = "wrong" if refutation["sure"] else "wrong (not sure)"
         lines.append(f"{word}, {refutation['case']}, {refutation['of']}: {refutation['why']}")
+    lines += [record["error"]] if record["error"] else []
     name.with_suffix(".toml").write_text(stage.to_toml())
     name.with_suffix(".txt").write_text("\n".join(lines) + "\n")

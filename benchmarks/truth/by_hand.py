@@ -153,7 +153,7 @@ class ByHand:
 
 def by_hand(flat: Mapping[str, Any]) -> ByHand:
     """The equations of a stage given as flat keys to SI numbers. Raises NotWritten."""
-    law, joint = flat["friction.model"], _joint(flat)
+    law, joint = flat["friction.model"], joint_state(flat)
     if law not in LAWS:
         raise NotWritten(law)
     if missing := [key for key in flat if not key.startswith(WRITTEN)]:
@@ -216,7 +216,8 @@ def _side(flat: Mapping[str, Any]) -> float:
     return float("motor" in sides)
 
 
-def _joint(flat: Mapping[str, Any]) -> str:
+def joint_state(flat: Mapping[str, Any]) -> str:
+    """Which of `JOINTS` a stage has."""
     if "joint.limiter_stiffness" not in flat:
         return "rigid"
     if flat["joint.locked"]:

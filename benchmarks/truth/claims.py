@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from friso.engine.allowance import allowance
-from friso.engine.kernel import kernel
-from friso.equations.structure import structure
-from friso.hunting import Case, CheckPart, Kick, check
+from friso.engine.kernel import kernels
+from friso.hunting import Case, CheckPart, Kick, Swinging, check, needed_kernels
 from friso.stage import Stage
 
 ATTRACTED = ("hunts", "bistable")
@@ -59,10 +58,14 @@ class Claim:
         return self.verdict in ATTRACTED
 
     @property
+    def motions(self) -> tuple[Swinging, ...]:
+        """What is said to attract."""
+        return self.surveyed.motions if self.surveyed else ()
+
+    @property
     def swing(self) -> float:
         """Half of peak to peak of the least of what attracts [m]; infinite where nothing does."""
-        motions = self.surveyed.motions if self.surveyed else ()
-        return min((motion.amplitude for motion in motions), default=np.inf)
+        return least_swing(self.motions)
 
     def __str__(self) -> str:
         text = f"{self.case}: {self.verdict}{'' if self.sure else ' (not sure)'}"
@@ -83,9 +86,7 @@ class Checked:
 
 def checked(stage: Stage) -> Checked:
     """What a check of the stage says; cases that are one and the same stage once."""
-    for variant in stage.variants().values():
-        for variational in (False, True):
-            kernel(structure(variant.flat()), variational)
+    kernels(needed_kernels(stage))
     start = time.process_time()
     with allowance() as spent:
         cases = check(stage)
@@ -94,6 +95,11 @@ def checked(stage: Stage) -> Checked:
     for name, case in cases.items():
         unique.setdefault(id(case), (name, case))
     return Checked(tuple(_claim(name, case) for name, case in unique.values()), cpu, spent.used)
+
+
+def least_swing(motions: Iterable[Swinging]) -> float:
+    """Half of peak to peak of the least of some motions [m]; infinite without any."""
+    return min((motion.amplitude for motion in motions), default=np.inf)
 
 
 def _claim(name: str, case: Case) -> Claim:

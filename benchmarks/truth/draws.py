@@ -31,8 +31,9 @@ class Form:
     """What decides on the structure of a stage. `exponent` None: any number; `control`: "rules" of van Dijk, or gains
     with their derivative "on error", or on the measurement, "filtered" or "plain"; `windup`: what the
     integrator does where the force is limited; `bias`: the mass it acts on; `deadband`: of the error; `drive`: a
-    "transmission", with a "backlash" or none, and where the encoder is; `filtered`: a notch and a low-pass filter;
-    `setting`: one against friction; `axis`: of a size that axes of machines have."""
+    "transmission", with a "backlash" or none, and where the encoder is; `motor`: the law of the friction at the motor;
+    `filtered`: a notch and a low-pass filter; `setting`: one against friction; `axis`: of a size that axes of machines
+    have."""
 
     joint: str
     friction: str = "lugre"
@@ -44,6 +45,7 @@ class Form:
     bias: str = ""
     deadband: bool = False
     drive: str = ""
+    motor: str = ""
     filtered: bool = False
     setting: str = ""
     axis: bool = False
@@ -119,7 +121,15 @@ AXES = tuple(
 )
 """Axes of machines: 5 to 200 kg, 3 to 100 N of friction, crossovers of 5 to 80 Hz, with settings against friction."""
 
-SERIES = {"stages": FORMS, "machines": MACHINES, "axes": AXES}
+DRIVES = (
+    Form("rigid", control="filtered", drive="transmission at the motor", motor="lugre", axis=True),
+    Form("rigid", control="cascade", drive="backlash at the load", motor="lugre", axis=True),
+    Form("rigid", "none", control="filtered", drive="transmission at the load", motor="lugre", axis=True),
+    Form("rigid", "dahl", control="filtered", drive="backlash at the motor", motor="stribeck", axis=True),
+)
+"""Axes with friction at the motor, beside that of the guide or alone."""
+
+SERIES = {"stages": FORMS, "machines": MACHINES, "axes": AXES, "drives": DRIVES}
 
 
 def draw(seed: int, number: int, series: str = "stages") -> Stage:
@@ -167,7 +177,7 @@ class _Draw:
     def tables(self) -> dict[str, Any]:
         tables: dict[str, Any] = {
             "masses": {"cart": _text(self.cart, "kg"), "stage": _text(self.stage, "kg")},
-            "friction": self.friction(),
+            "friction": self.friction(self.form.friction, self.static),
             "controller": self.controller(),
         }
         if self.form.joint != "rigid":
@@ -182,15 +192,17 @@ class _Draw:
             tables |= self.drive()
         if self.form.bias:
             tables["bias"] = {self.form.bias: _text(self.sign() * self.static * self.log(0.01, 2.0), "N")}
+        if self.form.motor:
+            tables["motor_friction"] = self.friction(self.form.motor, self.static * self.log(0.1, 2.0))
         return tables | {"motion": self.motion()}
 
-    def friction(self) -> dict[str, Any]:
-        """Known keys from what bearings are like; others about their examples."""
-        law = FRICTION.classes[self.form.friction]
-        bristles = self.static / self.log(2e-7, 1e-4)
-        coulomb = self.static * self.rng.uniform(0.2, 1.0)
+    def friction(self, model: str, static: float) -> dict[str, Any]:
+        """Friction that breaks away at a force [N]: known keys from what bearings are like, others about examples."""
+        law = FRICTION.classes[model]
+        bristles = static / self.log(2e-7, 1e-4)
+        coulomb = static * self.rng.uniform(0.2, 1.0)
         keys: dict[str, Any] = {
-            "static": _text(self.static, "N"),
+            "static": _text(static, "N"),
             "coulomb": _text(coulomb, "N"),
             "stribeck_velocity": _text(self.log(1e-4, 3e-3 if self.form.axis else 5e-2), "m/s"),
             "stribeck_exponent": self.form.exponent or self.rng.uniform(0.6, 2.6),
@@ -201,17 +213,17 @@ class _Draw:
         }
         if self.form.asymmetry:
             keys["asymmetry"] = self.sign() * self.log(0.01, 0.4)
-        table: dict[str, Any] = {"model": self.form.friction}
+        table: dict[str, Any] = {"model": model}
         for name, field in numeric_fields(law).items():
             if name in keys:
                 table[name] = keys[name]
             elif law.model_fields[name].is_required():
                 table[name] = self.about(field)
-        if self.form.friction == "elasto_plastic":
+        if model == "elasto_plastic":
             table["breakaway_deflection"] = _text(coulomb / bristles * self.rng.uniform(0.1, 0.95), "m")
-        if self.form.friction == "rolling":
+        if model == "rolling":
             table["rolling_exponent"] = self.rng.uniform(1.0, 3.0)
-        if self.form.friction == "gms":
+        if model == "gms":
             table |= self.elements(bristles)
             table["attraction"] = _text(bristles * self.log(3e-5, 0.15), "N/s")
         return table

@@ -1,4 +1,9 @@
-"""Attempts to refute what was claimed of a stage; what stands up to a second, finer look is a refutation."""
+"""Attempts to refute what was claimed of a stage.
+
+Before a claim is called wrong the attack closes in, one way or the other: what swings on and should not has to attract
+its neighbours (`attracts`), and where nothing swings on that should, starts close beside what is said to attract must
+not either (`may_attract`), at two tolerances.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.truth.by_hand import NotWritten, by_hand
-from benchmarks.truth.claims import RUNS_AWAY, Claim
+from benchmarks.truth.claims import RUNS_AWAY, Claim, Edge, least_swing
 from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE
-from benchmarks.truth.trials import FINE, LINGERING, NEIGHBOURS, ROUGH, ROUNDS, Bench, Trial
+from benchmarks.truth.trials import CLOSER, FINE, LINGERING, ROUGH, ROUNDS, Bench, Outcome, Trial
 from friso.equations.bandwidth import bandwidth, faster
-from friso.hunting import Kick
+from friso.hunting import Kick, Swinging, find_swings
 
 ALL = (80, 40, 60, 20)
 """Releases, pushes, stuck and drawn starts of a whole battery."""
@@ -21,22 +26,29 @@ ALL = (80, 40, 60, 20)
 FEW = (16, 8, 32, 8)
 """The same at a crossover beside an edge."""
 
-CLOSE = (0, 0, 600, 0)
-"""Starts 1.2 % apart, tried where none of these swings on although something is said to attract just below an edge:
-there it may do so from no farther than 1.5 % about its own distance."""
-
 SECOND = 24
 """Starts of a battery that are followed at the finer tolerance too."""
 
-TRIED, MOST = 3, 0.5
-"""Starts of those that swing on which are looked at closely, and the share of its neighbours that take a swing up."""
+TRIED, APART = 3, 1e-3
+"""Starts of those that swing on which are looked at closely, and the share by which their amplitudes differ: others
+are in the same swing."""
+
+CONSTANTS = 10.0
+"""Time constants of what is said to attract for which its neighbours are followed: if it repels by half of what it is
+said to attract by, they leave in that time."""
+
+POSSIBLE = (SWINGS, UNSURE, FAILED)
+"""What is seen of neighbours of a motion that attracts, for all that is known."""
+
+NEITHER = "from 0.1 to 1 % beside what is said to attract"
 
 ABOVE = (1.002, 1.005, 1.01, 1.1, 1.6)
 """Factors above the edge at which nothing may attract; those within the range that the edge itself is known to are left
 out."""
 
-BELOW = (0.995, 0.98, 0.95)
-"""Factors below it; at one of them at least something must."""
+BELOW, NEAREST = (0.995, 0.98, 0.95), 0.999
+"""Factors below it; at one of them at least something must, or at the nearest one, where all that friso's own survey
+finds there is tried."""
 
 JUST, DENSE = 1.01, 1 + 0.06 * np.linspace(-1, 1, 24)
 """Factors up to which stages just beyond an edge are also begun from swings just below it, made larger and smaller by
@@ -59,20 +71,26 @@ class Refutation:
     why: str
 
 
-def refutations(claim: Claim, seed: int) -> Iterator[Refutation]:
-    """All that is wrong with a claim."""
-    bench = Bench(claim.stage.flat(), claim.swing)
+def attempts(claim: Claim, seed: int) -> dict[str, Iterator[Refutation]]:
+    """What is tried against a claim: attempts to refute its "verdict", and its "edge", as far as there is one."""
+    bench, tried = Bench(claim.stage.flat(), claim.swing), dict[str, Iterator[Refutation]]()
     if claim.verdict == "failed" or not bench.length > 0:
-        return
+        return tried
     if claim.verdict == RUNS_AWAY:
-        yield from _away(claim, bench)
+        tried["verdict"] = _away(claim, bench)
     elif bench.flat["motion.kind"] != "ramp":  # whose reference never stands still
-        yield from _verdict(claim, bench, seed)
-        yield from _own_motion(claim, bench)
-        if claim.kick is not None and not claim.kick.unknown:
-            yield from _kicks(claim, claim.kick, bench)
+        tried["verdict"] = _hunting(claim, bench, seed)
     if claim.edge is not None:
-        yield from _edge(claim, seed)
+        tried["edge"] = _edge(claim, claim.edge, seed)
+    return tried
+
+
+def _hunting(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
+    """Whether something attracts, the stage's own motion ends in it, and displacements do."""
+    yield from _verdict(claim, bench, seed)
+    yield from _own_motion(claim, bench)
+    if claim.kick is not None and not claim.kick.unknown:
+        yield from _kicks(claim, claim.kick, bench)
 
 
 def _verdict(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
@@ -80,8 +98,10 @@ def _verdict(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
     trial = bench.starts(*ALL, seed)
     if claim.attracted:
         windows = claim.kick.windows if claim.kick else ()
-        if not _may_hunt(bench, trial, tuple((low * high) ** 0.5 for low, high in windows)):
-            yield Refutation("verdict", claim.sure, "no start swings on, at either tolerance")
+        if _may_hunt(bench, trial, tuple((low * high) ** 0.5 for low, high in windows)):
+            return
+        if not any(may_attract(bench, motion) for motion in claim.motions):
+            yield Refutation("verdict", claim.sure, f"no start swings on, at either tolerance, nor {NEITHER}")
         return
     if why := swinging(bench, trial):
         yield Refutation("verdict", claim.sure, why)
@@ -95,37 +115,41 @@ def _may_hunt(bench: Bench, trial: Trial, kicks: tuple[float, ...] = ()) -> bool
 
 
 def swinging(bench: Bench, trial: Trial) -> str:
-    """From which start, and how, a stage swings on; "" where it does not. What a run at one tolerance shows has to be
-    shown at the other, and by its neighbours; SciPy says what it makes of it."""
-    rough = bench.follow(trial, ROUGH)
-    for start in rough.swinging[:: max(1, len(rough.swinging) // TRIED)][:TRIED]:
-        fine = bench.follow(trial.take(np.array([start])), FINE, ROUNDS[1:])
-        if fine.words[0] == SWINGS and attracts(bench, fine.ends[0], fine.periods[0]):
-            return "; ".join(
-                [
-                    f"{trial.kinds[start]} {trial.sizes[start]:.6g} swings on by {rough.amplitude[start]:.6g} m, "
-                    f"followed for {rough.followed[start]:.4g} s at {ROUGH:g}",
-                    f"by {fine.amplitude[0]:.6g} m for {fine.followed[0]:.4g} s at {FINE:g}, and so do its neighbours",
-                    by_scipy(bench, fine.ends[0], float(fine.amplitude[0])),
-                ]
-            )
-    second = trial.take(np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int)))
-    fine = bench.follow(second, FINE)
-    for start in fine.swinging[:TRIED]:
-        if attracts(bench, fine.ends[start], float(fine.periods[start])):
-            size, swing = second.sizes[start], fine.amplitude[start]
-            kind, followed = second.kinds[start], fine.followed[start]
-            about = by_scipy(bench, fine.ends[start], float(swing))
-            return f"{kind} {size:.6g} swings on by {swing:.6g} m for {followed:.4g} s at {FINE:g} alone; {about}"
+    """From which start, and how, a stage swings on, as its neighbours do; "" where it does not. SciPy says what it
+    makes of it."""
+    few = np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int))
+    for rtol, begun in ((ROUGH, trial), (FINE, trial.take(few))):
+        run = bench.follow(begun, rtol)
+        for start in _different(run):
+            if attracts(bench, run.ends[start], float(run.periods[start])):
+                swing, begins = float(run.amplitude[start]), f"{begun.kinds[start]} {begun.sizes[start]:.6g}"
+                seen = f"swings on by {swing:.6g} m for {run.followed[start]:.4g} s at {rtol:g}"
+                beside = f"and so do its neighbours at {CLOSER:g} and {FINE:g}"
+                return f"{begins} {seen}, {beside}; {by_scipy(bench, run.ends[start], swing)}"
     return ""
+
+
+def _different(run: Outcome) -> np.ndarray:
+    """A few of the runs that swing on, each by another amplitude."""
+    _, first = np.unique(np.round(np.log(run.amplitude[run.swinging]) / APART), return_index=True)
+    return run.swinging[np.sort(first)][:: max(1, len(first) // TRIED)][:TRIED]
 
 
 def attracts(bench: Bench, end: np.ndarray, period: float) -> bool:
     """Whether neighbours of a state that a run ended in, which swung for long with a period [s], swing on too, for very
-    long."""
-    beside = Trial(bench.beside(end), ("beside a swing",) * len(NEIGHBOURS), NEIGHBOURS)
-    words = bench.follow(beside, FINE, (LINGERING * period / bench.period,)).words
-    return bool(np.mean(words == SWINGS) >= MOST)
+    long: before it is said that something attracts that should not."""
+    return bench.sustains(lambda factors: bench.beside(end, factors), LINGERING * period, (SWINGS,))
+
+
+def may_attract(bench: Bench, motion: Swinging) -> bool:
+    """Whether starts beside a motion that is said to attract swing on, or might, for as long as its multiplier takes to
+    show: before it is said that nothing attracts. They begin about its orbit, and stuck about its distance."""
+    lasting = np.fmin(CONSTANTS * motion.time_constant, LINGERING * motion.period)
+    time = max(lasting, ROUNDS[0] * motion.period)
+    state = motion.seen if motion.cycles is None else motion.cycles.states[motion.number]
+    if state is not None and bench.sustains(lambda factors: bench.beside(state, factors), time, POSSIBLE):
+        return True
+    return bench.sustains(lambda factors: bench.stuck_at(motion.distance * factors), time, POSSIBLE)
 
 
 def by_scipy(bench: Bench, end: np.ndarray, amplitude: float) -> str:
@@ -178,10 +202,12 @@ def _away(claim: Claim, bench: Bench) -> Iterator[Refutation]:
 
 def _own_motion(claim: Claim, bench: Bench) -> Iterator[Refutation]:
     """Whether the stage's own motion ends as it is said to."""
-    wanted = SWINGS if claim.verdict == "hunts" else RESTS
-    words = {rtol: str(bench.follow_own(rtol).words[0]) for rtol in (ROUGH, FINE)}
-    if all(word not in (wanted, UNSURE, FAILED) for word in words.values()):
-        why = f"the motion followed for long {words[FINE]} at {ROUGH:g} and {FINE:g}"
+    hunts = claim.verdict == "hunts"
+    runs = [bench.follow_own(rtol) for rtol in (ROUGH, FINE)]
+    if any(run.words[0] != (RESTS if hunts else SWINGS) for run in runs):
+        return
+    if hunts or attracts(bench, runs[-1].ends[0], float(runs[-1].periods[0])):
+        why = f"the motion followed for long {runs[-1].words[0]} at {ROUGH:g} and {FINE:g}"
         yield Refutation("own motion", claim.sure, why)
 
 
@@ -194,41 +220,52 @@ def _kicks(claim: Claim, kick: Kick, bench: Bench) -> Iterator[Refutation]:
     broad = (said == said[:, :1]).all(axis=1)  # no end of a window among the three
     tried, said = tried[broad], said[broad, 0]
     for rtol in (ROUGH, FINE):
-        words = bench.follow(bench.released(tried.ravel()), rtol, any_will_do=False).words.reshape(tried.shape)
+        run = bench.follow(bench.released(tried.ravel()), rtol, any_will_do=False)
+        words = run.words.reshape(tried.shape)
         contrary = np.where(said[:, None], words == RESTS, words == SWINGS).all(axis=1)
+        own = len(BROAD) * np.flatnonzero(contrary) + 1  # the run from the displacement itself
         tried, said = tried[contrary], said[contrary]
-    for size, hunts in zip(tried[:, 1], said, strict=True):
-        word = "rests, and is said to hunt" if hunts else "hunts, and is said to rest"
-        yield Refutation("kicks", claim.sure, f"displaced by {size:.4g} m, it {word}")
+    for size, hunts, number in zip(tried[:, 1], said, own, strict=True):
+        if hunts or attracts(bench, run.ends[number], float(run.periods[number])):
+            word = "rests, and is said to hunt" if hunts else "hunts, and is said to rest"
+            yield Refutation("kicks", claim.sure, f"displaced by {size:.4g} m, it {word}")
 
 
-def _edge(claim: Claim, seed: int) -> Iterator[Refutation]:
+def _edge(claim: Claim, edge: Edge, seed: int) -> Iterator[Refutation]:
     """Whether nothing attracts on the far side of the edge, but in the windows told, and something on the near side."""
-    assert claim.edge
-    edge, nearest = claim.edge.factor, claim.edge.beyond / claim.edge.factor
-    benches = [Bench(at(claim, edge * factor)) for factor in BELOW]
+    end, nearest = edge.factor, edge.beyond / edge.factor
+    benches = [Bench(at(claim, end * factor)) for factor in BELOW]
     swings = _swings(benches[0], seed)
-    beyond = ABOVE if claim.attracted else [factor for factor in (*ABOVE[:4], edge**-0.5) if edge * factor < 1]
+    beyond = ABOVE if claim.attracted else [factor for factor in (*ABOVE[:4], end**-0.5) if end * factor < 1]
     for factor in (nearest * factor for factor in beyond):
-        if any(low < edge * factor < high for low, high in claim.edge.windows):
+        if any(low < end * factor < high for low, high in edge.windows):
             continue
-        bench = Bench(at(claim, edge * factor))
+        bench = Bench(at(claim, end * factor))
         trial = bench.starts(*FEW, seed)
         if factor <= nearest * JUST and len(swings):
             trial = trial.and_more(swings, "just below the edge, by")
         if why := swinging(bench, trial):
             place = f"at {factor:.4g} times the edge{_crossover(bench.flat)}"
-            yield Refutation("edge", claim.edge.sure, f"{place} {why}")
+            yield Refutation("edge", edge.sure, f"{place} {why}")
             return
-    if not any(_may_hunt(bench, bench.starts(*starts, seed)) for starts in (ALL, CLOSE) for bench in benches):
-        places = ", ".join(f"{factor:g}" for factor in BELOW)
-        yield Refutation("edge", claim.edge.sure, f"at {places} times the edge no start swings on")
+    if any(_may_hunt(bench, bench.starts(*ALL, seed)) for bench in benches):
+        return
+    if not any(_may_attract_at(at(claim, end * factor)) for factor in (NEAREST, *BELOW)):
+        places = ", ".join(f"{factor:g}" for factor in (*BELOW, NEAREST))
+        yield Refutation("edge", edge.sure, f"at {places} times the edge no start swings on, nor {NEITHER}")
+
+
+def _may_attract_at(flat: dict[str, Any]) -> bool:
+    """Whether what friso itself finds of a stage, given as flat keys, attracts."""
+    motions = find_swings(flat)
+    bench = Bench(flat, least_swing(motions))
+    return any(may_attract(bench, motion) for motion in motions)
 
 
 def _swings(bench: Bench, seed: int) -> np.ndarray:
     """States in swings that go on, a few of them, made larger and smaller, (starts, states)."""
     run = bench.follow(bench.starts(*FEW, seed), ROUGH)
-    chosen = run.swinging[:: max(1, len(run.swinging) // TRIED)][:TRIED]
+    chosen = _different(run)
     if not chosen.size:
         return np.empty((0, 0))
     return np.vstack([bench.beside(end, DENSE) for end in run.ends[chosen]])[:, : bench.kernel.initial_size]

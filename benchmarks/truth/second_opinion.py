@@ -19,6 +19,9 @@ RELEASES = (0.3, 1.5, 20.0)
 PERIODS, SAMPLES = 40.0, 8000
 """Periods for which is followed, and samples in which turning points are sought."""
 
+TWICE = 1e-9, 1e-11
+"""The two relative tolerances at which it has to show what it has against a verdict."""
+
 LONGER = 10.0
 """How many times as long one is followed on that swings then: it may be on its way to rest for hundreds of periods."""
 
@@ -34,36 +37,40 @@ def scipy_refutations(claim: Claim) -> Iterator[Refutation]:
     if flat["motion.kind"] == "ramp" or not np.isfinite(equations.wait) or claim.verdict == "failed":
         return
     displaced = flat["motion.displacement"] if flat["motion.kind"] == "release" else 0.0
-    own = followed(equations, equations.start(displaced))
-    if claim.verdict in ("hunts", RUNS_AWAY) and own == RESTS:
+    start, still = equations.start(displaced), equations.held()
+    if claim.verdict in ("hunts", RUNS_AWAY) and ends_so(equations, start, RESTS):
         yield Refutation("own motion", claim.sure, "SciPy: the motion rests in the end")
     if claim.attracted or claim.verdict == RUNS_AWAY:
         return
-    still = equations.held()
-    words = {"its own motion": own}
-    words |= {f"release {d:.6g}": followed(still, still.start(d)) for d in np.array(RELEASES) * equations.length}
-    for name, word in words.items():
-        if word == SWINGS:
+    begun = {"its own motion": (equations, start)}
+    begun |= {f"release {d:.6g}": (still, still.start(d)) for d in np.array(RELEASES) * equations.length}
+    for name, run in begun.items():
+        if ends_so(*run, SWINGS):
             yield Refutation("verdict", claim.sure, f"SciPy: {name} swings on")
             return
 
 
-def followed(equations: ByHand, start: np.ndarray) -> str:
+def ends_so(equations: ByHand, start: np.ndarray, word: str) -> bool:
+    """Whether a word of `swings` tells what becomes of a stage from a state, at both tolerances."""
+    return all(followed(equations, start, rtol) == word for rtol in TWICE)
+
+
+def followed(equations: ByHand, start: np.ndarray, rtol: float) -> str:
     """What becomes of a stage from a state; a word of `swings`."""
     corner = float(equations.pieces[-1, 0])
     period = 2 * (3 * equations.wait + 2 * np.pi / equations.omega)
     times = corner + np.linspace(0.0, PERIODS * period, SAMPLES)
     if corner > 0:
         before = np.linspace(0.0, corner, 100)
-        start = equations.run(start, before)[-1]
+        start = equations.run(start, before, rtol)[-1]
         if not np.isfinite(start).all():
             return UNSURE
     last = replace(equations, pieces=equations.pieces[-1:])
-    run = last.run(start, times)
+    run = last.run(start, times, rtol)
     if (word := _word(equations, run, times - corner)) != SWINGS:
         return word
     longer = np.linspace(0.0, LONGER * PERIODS * period, int(LONGER) * SAMPLES)
-    return _word(equations, last.run(run[-1], times[-1] + longer), longer)
+    return _word(equations, last.run(run[-1], times[-1] + longer, rtol), longer)
 
 
 def _word(equations: ByHand, run: np.ndarray, times: np.ndarray) -> str:

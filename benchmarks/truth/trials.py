@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,8 +18,8 @@ from friso.equations.motion import last_corner
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import structure
 
-ROUGH, FINE = 1e-6, 1e-9
-"""The two relative tolerances."""
+ROUGH, CLOSER, FINE = 1e-6, 1e-7, 1e-9
+"""Relative tolerances: of many starts, and the two at which the attack closes in on a swing."""
 
 DECADES = (1e-4, 1e3)
 """Releases and pushes in units of the deflection of the loop by the break-away force, and of that times its natural
@@ -37,13 +37,13 @@ SMALL = 2e-3
 ROUNDS = (150.0, 800.0, 4000.0)
 """Periods for which a run is followed, and followed on where that does not tell."""
 
-NEIGHBOURS = np.array([0.99, 0.997, 1.003, 1.01])
-"""Factors of a state that has swung for long, beside which the swing has to be taken up again."""
+BESIDE = np.array([0.001, 0.003, 0.01])
+"""Shares by which a state in a swing is made larger and smaller: from both sides the swing has to be taken up again."""
 
 LINGERING = 12_000.0
-"""Periods of a swing for which its neighbours are followed, at the fine tolerance: a deviation of 0.3 % from a cycle
-that repels by 0.03 % a swing grows by a factor of a thousand in that time. Errors of 1e-6 change such a multiplier by
-as much as it is off 1: at the rough tolerance runs stay at it for 60 000 periods."""
+"""Periods of a swing for which its neighbours are followed: a deviation of 0.3 % from a cycle that repels by 0.03 % a
+swing grows by a factor of a thousand in that time. Errors of 1e-6 change such a multiplier by as much as it is off 1:
+at the rough tolerance runs stay at it for 60 000 periods."""
 
 FOLLOWED = 6
 """Runs that are followed on."""
@@ -71,8 +71,9 @@ class Trial:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of starts: words of `swings`, half of peak to peak at the end [m], states at the end, the time
-    [s] for which each was followed, and the mean time of two large legs in the last quarter of that [s]."""
+    """What became of starts: words of `swings`, half of peak to peak at the end [m], states at the end (positions
+    count from where the reference rests), the time [s] for which each was followed, and the mean time of two large legs
+    in the last quarter of that [s]."""
 
     words: np.ndarray
     amplitude: np.ndarray
@@ -146,7 +147,7 @@ class Bench:
         blocks = [
             self._settled(np.zeros(releases), released),
             self._moving(np.zeros(pushes), pushed),
-            self._settled(-stands, stands),
+            self.stuck_at(stands),
             self._moving(places, speeds, forces),
         ]
         kinds = ["release"] * releases + ["push"] * pushes + ["stuck at"] * stuck + ["drawn at"] * drawn
@@ -170,12 +171,29 @@ class Bench:
         all that is looked for."""
         return self._follow(self.held, trial.states, 0.0, rtol, rounds, any_will_do)
 
-    def beside(self, end: np.ndarray, factors: np.ndarray = NEIGHBOURS) -> np.ndarray:
+    def stuck_at(self, displacements: np.ndarray) -> np.ndarray:
+        """States of the stage stuck at displacements [m], no force exerted."""
+        return self._settled(-displacements, displacements)
+
+    def beside(self, end: np.ndarray, factors: np.ndarray) -> np.ndarray:
         """A state in which a run ended, made larger and smaller by factors, (factors, kept): near a cycle that repels
         but weakly a run lingers, the longer the finer the tolerance, and only its neighbours leave."""
         states = end * factors[:, None]
         states[:, len(self.kernel.states) :] = end[len(self.kernel.states) :]
         return states
+
+    def sustains(self, beside: Callable[[np.ndarray], np.ndarray], time: float, words: Sequence[str]) -> bool:
+        """Whether starts beside a swing, made by `beside` from factors, end in one of some words after a time [s], at
+        both tolerances: as many per cent, or tenths of one, to one side as to the other."""
+        states = beside(1 + np.concatenate([-BESIDE, BESIDE]))
+        trial = Trial(states, ("beside a swing",) * len(states), np.ones(len(states)))
+        both = np.ones(len(BESIDE), bool)
+        for rtol in (CLOSER, FINE):
+            ended = np.isin(self.follow(trial, rtol, (time / self.period,)).words.astype(str), words)
+            both &= ended.reshape(2, -1).all(axis=0)
+            if not both.any():
+                return False
+        return True
 
     def follow_own(self, rtol: float, longest: float = 100.0) -> Outcome:
         """What becomes of the stage's own motion, followed as many times its duration, and for `ROUNDS`."""
@@ -203,13 +221,13 @@ class Bench:
             for part in run_chunks(self.kernel, own, len(on), self._options(rtol), begin):
                 which = on[part.numbers]
                 words[which], amplitude[which], own_periods[which] = self._words(part, end, number == len(rounds) - 1)
-                ends[which] = part.results.ends
+                ends[which] = self._at_rest(part.results.ends, flat)
                 followed[which] += end
             unsure = np.flatnonzero(words == UNSURE)
             if not unsure.size or (any_will_do and SWINGS in words):
                 break
             on = unsure[np.unique(np.linspace(0, len(unsure) - 1, FOLLOWED).astype(int))]
-            begin, corner = self._resumed(ends[on], flat), 0.0
+            begin, corner = ends[on], 0.0
             flat = self._after(flat)
         return Outcome(words, amplitude, ends, followed, own_periods)
 
@@ -217,7 +235,7 @@ class Bench:
         """The stage once its reference has come to rest; positions count from there."""
         return self.held if flat["motion.kind"] != "ramp" else dict(flat)
 
-    def _resumed(self, ends: np.ndarray, flat: Mapping[str, Any]) -> np.ndarray:
+    def _at_rest(self, ends: np.ndarray, flat: Mapping[str, Any]) -> np.ndarray:
         """States to go on from: positions, and what filters know of them, count from where the reference rests."""
         rest = flat["motion.size"] if flat["motion.kind"] == "step" else 0.0
         ends = ends.copy()
