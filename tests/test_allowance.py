@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from variants import VARIANTS
 
-from friso.engine.allowance import Exhausted, allowance
+from friso.engine.allowance import PER_BATCH, Exhausted, allowance
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import CALL, OPERATION, STEP, kernel
 from friso.equations.structure import structure
@@ -37,6 +37,14 @@ def test_work_is_counted_by_steps_and_what_they_compute(locked: Stage) -> None:
     with allowance() as single:
         runs_of(locked, 1)
     assert several.used / 24 < single.used < several.used  # a run alone keeps a whole vector busy
+
+
+def test_work_is_counted_alike_on_every_processor(locked: Stage) -> None:
+    """As if eight runs were done side by side, however many this processor does."""
+    work = kernel(structure(locked.flat())).work
+    with allowance() as single:
+        (steps,) = runs_of(locked, 1)
+    assert single.used == PER_BATCH + 8 * work * steps
 
 
 def test_a_step_is_as_dear_as_the_operations_in_it() -> None:

@@ -11,10 +11,12 @@ from typing import NoReturn
 
 import numpy as np
 
-from friso.engine.layout import LANES
-
 PER_BATCH = 1e5
 """Work to prepare a batch of runs."""
+
+COUNTED_LANES = 8
+"""Runs that are counted as done side by side on every processor: one with fewer lanes takes longer, and gives up where
+others do."""
 
 FAIR = 2.0
 """Share of what is left that each of several runs may take, in units of an equal share."""
@@ -46,7 +48,7 @@ class Allowance:
         left = self.left
         if left <= 0:
             self.exhaust()
-        return left / step * min(1 / LANES, FAIR / runs)
+        return left / step * min(1 / COUNTED_LANES, FAIR / runs)
 
     def exhaust(self) -> NoReturn:
         """Tell that the allowance does not suffice: raises Exhausted."""
@@ -56,7 +58,7 @@ class Allowance:
     def charge(self, steps: np.ndarray, step: float) -> None:
         """Count the work of a batch of runs by their steps, shape (runs,), each of so much work: a run alone takes as
         long as eight."""
-        work = PER_BATCH + step * max(float(np.sum(steps)), LANES * float(np.max(steps, initial=0.0)))
+        work = PER_BATCH + step * max(float(np.sum(steps)), COUNTED_LANES * float(np.max(steps, initial=0.0)))
         at: Allowance | None = self
         while at is not None:
             at.used += work
