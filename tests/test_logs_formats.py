@@ -468,6 +468,10 @@ def test_lvm(tmp_path: Path) -> None:
     assert channel(table, "position").time == pytest.approx(M["time"], abs=1e-9)
     assert channel(table, "force").unit == "N"
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]  # the library leaves a cache unless told not to
+    with pytest.raises(LogError, match="without numbers"):
+        read_table(
+            log_files.write_lvm(tmp_path / "b.lvm", {name: (unit, x[:0]) for name, (unit, x) in SIGNALS.items()})
+        )
 
 
 @pytest.mark.parametrize(("library", "name"), [("pyuff", "a.uff"), ("lvm_read", "a.lvm")])
