@@ -353,7 +353,7 @@ def _filled(
 
 
 def _checked_exports(export: Iterable[str | os.PathLike[str]]) -> list[Path]:
-    files = [Path(path) for path in export]
+    files = [Path(os.path.realpath(path) if os.path.islink(path) else path) for path in export]  # a link stays one
     for path in files:
         refuse_place("export", path)
         if path.suffix not in (".nc", ".csv") or path.is_dir():
