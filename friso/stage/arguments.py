@@ -193,11 +193,11 @@ def near_words(word: str, words: Iterable[str]) -> str:
     return f"; did you mean {near[0]!r}?" if near else f"; it has {', '.join(words)}"
 
 
-def _read_stage(given: Any) -> Stage:
+def _read_stage(source: Any) -> Stage:
     """The stage of a file, or of tables."""
     from friso.stage.files import load
 
-    return Stage(**given) if isinstance(given, Mapping) else load(given)
+    return Stage(**source) if isinstance(source, Mapping) else load(source)
 
 
 def _check(name: str, value: Any, kinds: Mapping[str, ArgumentKind], sets: bool) -> None:
