@@ -132,7 +132,10 @@ def __getattr__(name: str) -> Any:
             return load_declared(FUNCTIONS, name, _installed()[name], name, Callable)
         except InputError as error:
             raise AttributeError(str(error)) from error
-    raise AttributeError(f"module 'friso' has no attribute {name!r}")
+    from difflib import get_close_matches
+
+    nearest = "".join(f"; did you mean {near!r}?" for near in get_close_matches(name, __dir__(), 1))
+    raise AttributeError(f"module 'friso' has no attribute {name!r}{nearest}")
 
 
 def __dir__() -> list[str]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Self
 
-from friso.escapes import one_line
+from friso.escapes import escaped, one_line
 
 _LONGEST = 1200
 """Characters of a line that are shown, at most: longer ones come from no person, and hide what is wrong."""
@@ -41,7 +41,7 @@ class InputError(ValueError):
         rows = {"given:": self.actual, "expected:": self.expected, "example:": self.example}
         lines = [f"  {name:<9} {shortened(text)}" for name, text in rows.items() if text]
         lines += [f"  {'also:':<9} {shortened(f'{one_line(key)}: {actual}')}" for key, actual in self.also]
-        return "\n".join([head, *lines]).lstrip("\n")
+        return escaped("\n".join([head, *lines]).lstrip("\n"))
 
     @classmethod
     def of(cls, error: "InputError") -> Self:

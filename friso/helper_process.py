@@ -9,9 +9,10 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from threading import Timer
+from threading import Thread, Timer
 from typing import Any
 
 PATIENCE = 60.0
@@ -27,6 +28,7 @@ class HelperProcess:
         command = [sys.executable, "-P", "-m", module, *arguments]
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._messages, env=environ)
+        Thread(target=self._process.wait, daemon=True).start()  # one that has ended does not stay as a zombie
 
     def ask(self, question: object) -> Any:
         """What it answers. Raises EOFError where it has ended instead."""
@@ -54,9 +56,11 @@ class HelperProcess:
         self._process.kill()
 
 
-def answer_questions(answer: Callable[[Any], Any]) -> None:
+def answer_questions(answer: Callable[[Any], Any], orphaned: bool = True) -> None:
     """What such a process does: answer the questions on standard input until there are no more, or none comes for a
-    while."""
+    while. Unless it may be `orphaned`, it ends, whatever it is at, once the process that started it has."""
+    if not orphaned:
+        Thread(target=_end_with, args=[os.getppid()], daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: who started this one ends it
     answers, sys.stdout = sys.stdout, sys.stderr  # what plug-ins print is no answer
     while True:
@@ -70,3 +74,10 @@ def answer_questions(answer: Callable[[Any], Any]) -> None:
         patience.cancel()
         pickle.dump(answer(question), answers.buffer)
         answers.buffer.flush()
+
+
+def _end_with(parent: int) -> None:
+    """End this process once it is no child of that one any more, which Windows does not tell."""
+    while os.getppid() == parent:
+        time.sleep(0.5)
+    os._exit(1)

@@ -15,8 +15,20 @@ class Progress(Protocol):
     def __call__(self, done: int, total: int, label: str, /) -> None: ...
 
 
-def silent(done: int, total: int, label: str) -> None:
+class _Silent:
     """Progress that is not shown."""
+
+    def __call__(self, done: int, total: int, label: str, /) -> None:
+        pass
+
+    def __repr__(self) -> str:
+        return "silent"
+
+    def __reduce__(self) -> str:
+        return "silent"  # the one there is, in other processes too
+
+
+silent = _Silent()
 
 
 def share_of(progress: Progress, number: int, count: int) -> Progress:

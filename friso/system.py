@@ -190,7 +190,9 @@ else:
         return False
 
     def check_free(path: Path) -> None:
-        """Nothing: see `once_free`."""
+        """Raises OSError where a file cannot be replaced, since it is read-only, for root too."""
+        if not (os.access(path, os.W_OK) and path.stat().st_mode & 0o222):
+            raise OSError(errno.EROFS, "it is read-only", str(path))
 
     def name_new_file(draft: Path, path: Path) -> None:
         """Give a file a name and place where there is nothing. Raises OSError, FileExistsError where there is."""

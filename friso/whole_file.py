@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -20,14 +21,17 @@ FOR_ALL, FOR_USER = 0o666, 0o600
 
 
 @contextmanager
-def whole_file(path: Path, mode: int = FOR_ALL, new: bool = False) -> Iterator[BinaryIO]:
+def whole_file(path: Path, mode: int = FOR_ALL, new: bool = False, kept: bool = False) -> Iterator[BinaryIO]:
     """A stream whose content takes the place of a file when the block ends; of a block that fails nothing is left. A
-    new file is for whom the user lets read files, or with `FOR_USER` for this user alone. Raises OSError,
-    FileExistsError where it has to be `new` and something is there by then."""
+    new file is for whom the user lets read files, or with `FOR_USER` for this user alone; the permissions of one that
+    is replaced may be `kept`. Raises OSError, FileExistsError where it has to be `new` and something is there by
+    then."""
     draft = path.with_name(f"{path.name}.{uuid.uuid4().hex}{PARTIAL}")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
     try:
         with open(os.open(draft, flags, mode), "wb") as stream:
+            if kept and path.exists():
+                shutil.copymode(path, draft)
             yield stream
             stream.flush()
             os.fsync(stream.fileno())

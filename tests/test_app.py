@@ -14,6 +14,8 @@ import logging
 import os
 import socket
 import struct
+import subprocess
+import sys
 import threading
 import time
 import weakref
@@ -803,6 +805,20 @@ def test_a_question_that_computes_nothing_does_not_wait_for_those_that_do() -> N
 
     (frame,) = asyncio.run(asked())
     assert b"answer" in frame
+
+
+IMPORTED = """
+import sys
+from importlib import import_module
+from friso.app.work import Workshop
+sys.setswitchinterval(1e-6)
+list(Workshop().pool.map(import_module, ["dask.array.ma", "dask.array", "dask.array.routines", "dask.array.core"]))
+"""
+
+
+def test_questions_that_begin_at_once_import_what_they_need() -> None:
+    """Two threads that import modules which import one another each found one half done."""
+    subprocess.run([sys.executable, "-c", IMPORTED], check=True)
 
 
 def test_at_the_end_answers_end_before_what_computes_notices() -> None:

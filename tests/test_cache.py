@@ -14,12 +14,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 from systems import posix
 
 from friso.engine import building, cache, private, prune
 from friso.engine.cache import DAY
 from friso.engine.prune import KEPT_FOR
 from friso.engine.seal import LENGTH, SECRET, read_sealed, write_sealed
+from friso.helper_process import HelperProcess
 from friso.whole_file import PARTIAL
 
 BUILDER = """
@@ -271,12 +273,74 @@ def test_what_killed_processes_left_is_deleted(copied: Path) -> None:
     assert [draft.exists() for draft in drafts] == [False, True]
 
 
-def test_a_full_disk_is_said_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "full_builder.py").write_text("def build(folder, task):\n    raise OSError(28, 'No space left')\n")
+FULL = """
+from friso.engine.cache import is_passing, keep
+
+def build(folder, task):
+    if not is_passing(folder) or task:
+        raise OSError(28, "No space left", str(folder))
+    return keep(folder, "NUMBER = 3", lambda module: b"")
+"""
+
+
+@pytest.fixture
+def full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    (tmp_path / "full_builder.py").write_text(FULL)
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(RuntimeError, match="No space left") as raised:
-        building.built_entries([cache.CodeRequest("full", "what needs room", "full_builder")])
-    assert "Traceback" not in str(raised.value)
+    yield
+    cache._UNWRITABLE.clear()
+    cache.cache_folder.cache_clear()
+
+
+@pytest.mark.usefixtures("full_disk")
+def test_where_the_disk_is_full_kernels_are_compiled_and_not_kept(caplog: pytest.LogCaptureFixture) -> None:
+    for name in ("one", "two"):
+        (entry,) = building.built_entries([cache.CodeRequest(name, "what needs room", "full_builder")])
+        assert entry.module().NUMBER == 3
+    assert caplog.text.count("temporary folder and not kept: No space left") == 1
+
+
+@pytest.mark.usefixtures("full_disk")
+def test_disks_that_are_all_full_are_said_in_a_line() -> None:
+    with pytest.raises(OSError, match="No space left"):
+        building.built_entries([cache.CodeRequest("full", "what needs room", "full_builder", b"always")])
+
+
+ASKING = """
+import sys
+from friso.helper_process import HelperProcess
+HelperProcess("sleeping", sys.argv[1], paths=sys.path).ask(60.0)
+"""
+SLEEPING = """
+import sys, time
+from filelock import FileLock
+from friso.helper_process import answer_questions
+with FileLock(sys.argv[1]):
+    answer_questions(time.sleep, orphaned=False)
+"""
+
+
+@posix
+def test_a_helper_that_may_not_be_orphaned_ends_in_the_midst_of_its_work(tmp_path: Path) -> None:
+    (tmp_path / "sleeping.py").write_text(SLEEPING)
+    held = FileLock(tmp_path / "held")
+    environ = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *filter(None, sys.path)])}
+    with subprocess.Popen([sys.executable, "-c", ASKING, held.lock_file], env=environ) as parent:
+        while not Path(held.lock_file).exists():
+            time.sleep(0.05)
+        time.sleep(0.5)
+        parent.kill()
+    held.acquire(timeout=20)
+
+
+@posix
+def test_a_helper_that_has_ended_leaves_no_zombie() -> None:
+    helper = HelperProcess("friso.engine.builder", ".", paths=sys.path)
+    helper.kill()
+    time.sleep(1.0)
+    with pytest.raises(ProcessLookupError):
+        os.kill(helper._process.pid, 0)
+    helper.end()
 
 
 def test_without_a_folder_kernels_are_compiled_and_not_kept(tmp_path: Path) -> None:

@@ -269,3 +269,10 @@ def test_as_a_module_friso_imports_nothing_from_the_current_folder(tmp_path: Pat
     done = subprocess.run([sys.executable, *module, "--version"], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert not (tmp_path / "run").exists()
+
+
+def test_a_path_with_blanks_that_lacks_its_quotes_is_told(tmp_path: Path) -> None:
+    (tmp_path / "my rig.toml").write_text("")
+    done = friso_inside(tmp_path, "check", "my", "rig.toml")
+    assert done.returncode == 2
+    assert "needs quotes: 'my rig.toml'" in done.stderr.replace('"', "'")

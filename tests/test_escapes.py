@@ -43,6 +43,10 @@ def test_no_text_steers(text: str) -> None:
     assert table_cell(text)[:1] not in ("=", "+", "-", "@", "\t", "\uff1d")
 
 
+def test_the_text_of_an_error_steers_nothing() -> None:
+    assert not steers(str(friso.InputError(HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE, ((HOSTILE, HOSTILE),))))
+
+
 @pytest.mark.parametrize("text", ["Ångström µm²", "שלום", "ruler −5 °C", "a\tb\nc", "日本"])
 def test_a_harmless_text_stays(text: str) -> None:
     assert escaped(text) == text

@@ -9,6 +9,7 @@ from refusals import Refused, Wording
 from scipy import signal
 from scipy.linalg import expm
 
+from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
@@ -99,6 +100,12 @@ def test_noise_on_the_input_does_not_move_the_period() -> None:
     record = played(rng, rig, np.arange(1, 40))
     periods = find_periods(record.input + 0.1 * np.std(record.input) * rng.normal(size=len(record.input)))
     assert (periods.samples, periods.count) == (PERIOD, 6)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_record_that_is_constant_before_a_step_does_not_repeat() -> None:
+    with pytest.raises(InputError, match="constant"):
+        find_periods(np.repeat([0.0, 5.0], 2000))
 
 
 def test_what_does_not_repeat_is_refused(refused: Refused) -> None:

@@ -468,6 +468,10 @@ def test_lvm(tmp_path: Path) -> None:
     assert channel(table, "position").time == pytest.approx(M["time"], abs=1e-9)
     assert channel(table, "force").unit == "N"
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]  # the library leaves a cache unless told not to
+    with pytest.raises(LogError, match="without numbers"):
+        read_table(
+            log_files.write_lvm(tmp_path / "b.lvm", {name: (unit, x[:0]) for name, (unit, x) in SIGNALS.items()})
+        )
 
 
 @pytest.mark.parametrize(("library", "name"), [("pyuff", "a.uff"), ("lvm_read", "a.lvm")])
@@ -703,6 +707,27 @@ def test_a_file_that_never_ends_is_an_error_of_its_own(
     endless_mat(tmp_path / "a.mat")
     with refused("log"):
         read_table(tmp_path / "a.mat")
+
+
+SLOW = """
+import runpy, time
+time.sleep(2.5)
+runpy.run_path({program!r}, run_name="__main__")
+"""
+
+
+def test_a_file_is_given_the_time_that_a_busy_machine_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a processor spends on it counts, and only what takes very much longer is given up."""
+    slow = tmp_path / "slow.py"
+    slow.write_text(SLOW.format(program=confined.binary.__file__))
+    monkeypatch.setattr(confined.binary, "__file__", str(slow))
+    monkeypatch.setattr(confined, "SECONDS", 2.0)
+    zeros_as_mat(tmp_path / "a.mat", 1000)
+    assert channel(read_table(tmp_path / "a.mat"), "x").values.shape == (1000,)
+    monkeypatch.setattr(confined, "PATIENCE", 0.5)
+    zeros_as_mat(tmp_path / "b.mat", 1000)
+    with pytest.raises(LogError, match="the machine is busy"):
+        read_table(tmp_path / "b.mat")
 
 
 def test_cells_nested_so_deeply_that_the_library_crashes(tmp_path: Path, refused: Refused) -> None:

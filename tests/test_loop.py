@@ -30,6 +30,11 @@ def test_a_pi_controller_is_stable_as_far_as_viscous_friction_damps(
     assert unstable(chosen.replace({"controller.ki": f"{gain!r} N/(m*s)"})) == states
 
 
+def test_a_loop_without_proportional_gain_is_looked_at() -> None:
+    """An integral gain alone: neither a length nor a natural frequency gives its states a scale."""
+    assert unstable(VARIANTS["rigid stage, PI"].replace({"controller.kp": "0 N/m"})) == ()
+
+
 @pytest.mark.inner
 @pytest.mark.parametrize(("share", "always"), [(0.98, "stable"), (1.02, "unstable")])
 def test_where_a_force_limit_unsettles_a_loop(share: float, always: str) -> None:

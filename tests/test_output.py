@@ -21,7 +21,15 @@ from systems import posix
 
 from friso.answers import drafts as drafts_module
 from friso.answers.drafts import DRAFTS, Drafts, made
-from friso.answers.output_folder import MARKER, UNFINISHED, OutputFolder, _check_writable, check_store_folder, write
+from friso.answers.output_folder import (
+    MARKER,
+    UNFINISHED,
+    OutputFolder,
+    _check_writable,
+    check_store_folder,
+    write,
+    write_file,
+)
 from friso.cli.app import command_line
 from friso.errors import InputError
 from friso.stage import load
@@ -470,3 +478,19 @@ def test_a_marker_of_others_marks_nothing(tmp_path: Path, content: bytes | None)
         (tmp_path / MARKER).write_bytes(content)
     with pytest.raises(InputError, match="--overwrite"):
         place(tmp_path)
+
+
+@posix
+def test_a_file_that_is_overwritten_keeps_its_permissions_and_its_link(tmp_path: Path) -> None:
+    file, link = tmp_path / "elsewhere" / "a.txt", tmp_path / "a.txt"
+    file.parent.mkdir()
+    file.write_text("old")
+    file.chmod(0o600)
+    link.symlink_to(file)
+    write_file("FILE", link, "new", True)
+    assert (file.read_text(), file.stat().st_mode & 0o777, link.is_symlink()) == ("new", 0o600, True)
+    assert [*file.parent.iterdir()] == [file]
+    file.chmod(0o400)
+    with pytest.raises(InputError, match="read-only"):
+        write_file("FILE", link, "newer", True)
+    assert file.read_text() == "new"

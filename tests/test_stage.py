@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from refusals import Refused, Wording
+from systems import posix
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
 from friso import paths
@@ -204,6 +205,27 @@ def test_save_keeps_an_existing_file(tmp_path: Path, rig: Stage, refused: Refuse
     save(rig, path, overwrite=True)
     assert load(path) == rig
     assert [*tmp_path.iterdir()] == [path]
+
+
+@posix
+@pytest.mark.parametrize("mode", [0o600, 0o664])
+def test_save_keeps_permissions_and_links(tmp_path: Path, rig: Stage, mode: int) -> None:
+    file, link = tmp_path / "rig.toml", tmp_path / "link.toml"
+    file.write_text("")
+    file.chmod(mode)
+    link.symlink_to(file)
+    save(rig, link, overwrite=True)
+    assert load(file) == rig
+    assert (link.is_symlink(), file.stat().st_mode & 0o777) == (True, mode)
+
+
+def test_save_replaces_nothing_that_is_read_only(tmp_path: Path, rig: Stage) -> None:
+    file = tmp_path / "rig.toml"
+    file.write_text("mine")
+    file.chmod(0o400)
+    with pytest.raises(InputError, match="read-only"):
+        save(rig, file, overwrite=True)
+    assert file.read_text() == "mine"
 
 
 def test_save_into_nowhere(tmp_path: Path, rig: Stage, refused: Refused) -> None:

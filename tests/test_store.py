@@ -42,6 +42,7 @@ from friso.studies.sealed_store import SealedStore
 from friso.studies.store import Store, check_store, read_store
 from friso.studies.store_files import keep_arrays, kept_arrays
 from friso.studies.store_folder import LOCK, make
+from friso.studies.study import study_of
 from friso.studies.sweep import run_in_store, sweep
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -158,6 +159,8 @@ def test_a_full_disk_stops_the_study_and_a_later_run_ends_it(
     monkeypatch.setattr(local, "_put", full)
     with pytest.raises(OSError, match="No space left"), local_crew(2) as crew:
         run_in_store(study, path, crew)
+    with pytest.raises(StoreError, match=r"No space left on device; \d+ of 192 cells are stored\n"):
+        friso_api.sweep(rig, AXES, out=path)
     monkeypatch.undo()
     with Store.opened(path, study) as store:
         assert 0 < len(list(store.missing())) < len(list(study.blocks(store.blocks)))
@@ -523,13 +526,13 @@ def test_missing_metadata_and_damaged_axes_are_refused(stored: Path, refused: Re
 
 
 def test_a_store_once_checked_pickles_and_its_metadata_are_not_read_again(stored: Path) -> None:
-    runs, files = read_store(stored), checked_metadata(stored).all_files
-    for name in files:
+    runs, metadata = read_store(stored), checked_metadata(stored)
+    for name in metadata.all_files:
         (stored / name).unlink()
     other = pickle.loads(pickle.dumps(runs))
     assert other.encoding["source"] == str(stored)
     assert float(other["peaks"][0, 0]) == float(runs["peaks"][0, 0])
-    group = zarr.open_consolidated(SealedStore.at(stored, files).with_read_only(True), mode="r", zarr_format=2)
+    group = zarr.open_consolidated(SealedStore.at(stored, metadata).with_read_only(True), mode="r", zarr_format=2)
     assert group["peaks"].shape == runs["peaks"].shape
 
 
@@ -784,6 +787,37 @@ def test_exchanged_chunks_are_run_again(
     sweep(rig, AXES, store=stored, verify=0.3)
     assert "block 0.0" in caplog.text
     xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
+
+
+@pytest.mark.parametrize("damage", ["exchanged", "missing", "foreign", "entry", "unreadable"])
+def test_damaged_cells_are_not_handed_out(stored: Path, damage: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error names variable and cells; the others are read."""
+    runs, first = read_store(stored), slice(0, Store(stored, study_of(read_store(stored))).blocks[0])
+    if damage == "exchanged":
+        exchange(stored / "peaks" / "0.0", stored / "peaks" / "1.0")
+    elif damage == "missing":
+        shutil.rmtree(stored / "peaks")
+    elif damage == "foreign":
+        (stored / "peaks" / "0.0").write_bytes(b"mine")
+    elif damage == "entry":
+        (stored / ".blocks" / "0.0").write_bytes(b"{}")
+    else:
+
+        def may_not(*_: object) -> None:
+            raise PermissionError(errno.EACCES, "Permission denied")
+
+        monkeypatch.setattr(ledger, "stored", may_not)
+    with pytest.raises(StoreError, match=rf"peaks\[0:{first.stop}, 0:16\] \(controller.crossover, joint.stroke\)"):
+        runs["peaks"][first].load()
+    if damage in ("missing", "foreign"):
+        assert runs["steps"][first].notnull().all()
+
+
+def test_blocks_that_are_not_done_are_read_as_empty(stored: Path) -> None:
+    (stored / ".blocks" / "0.0").unlink()
+    peaks = read_store(stored)["peaks"]
+    assert peaks[0].isnull().all()
+    assert peaks[-1].notnull().all()
 
 
 def test_exchanged_axes_are_refused(rig: Stage, tmp_path: Path, refused: Refused) -> None:

@@ -78,7 +78,7 @@ def _binary_log(path: Path) -> None:
 
 def _forked(command: list[str], seconds: float, most: int) -> bytes:
     """Run the program that reads a binary log, within its bounds of memory and time."""
-    kind, file, memory, longest = command[-4:]
+    kind, file, memory, cpu, longest = command[-5:]
     held, holds = os.pipe()
     with tempfile.TemporaryFile() as out:
         child = os.fork()
@@ -90,7 +90,7 @@ def _forked(command: list[str], seconds: float, most: int) -> bytes:
                 signal.signal(signal.SIGALRM, signal.SIG_DFL)
                 signal.alarm(int(seconds))
                 used = psutil.Process().memory_info().vms
-                binary.main(kind, Path(file), int(memory) + used if int(memory) else 0, float(longest))
+                binary.main(kind, Path(file), int(memory) + used if int(memory) else 0, float(cpu), float(longest))
                 sys.stdout.flush()
             finally:
                 os._exit(0)

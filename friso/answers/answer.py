@@ -261,7 +261,8 @@ class Answer(ABC):
         return True
 
     def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *(name for name in dir(self.result) if not name.startswith("_"))})
+        own = (name for name in super().__dir__() if name.startswith("__") or not name.startswith("_"))
+        return sorted({*own, *(name for name in dir(self.result) if not name.startswith("_"))})
 
 
 def _html_table(table: AnswerTable) -> str:

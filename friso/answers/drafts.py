@@ -77,6 +77,8 @@ class Drafts:
                     if draft is None:
                         delete_file(path)
                     else:
+                        with suppress(FileNotFoundError):  # of a link that leads nowhere
+                            shutil.copymode(path, draft)
                         replace_file(draft, path)
                 elif draft is not None:
                     name_new_file(draft, path)

@@ -120,7 +120,7 @@ def identify(
     period: str | float | None = None,
     laws: bool = False,
     folder: Path = Path(),
-    keep: MappingKeeper = lambda _: None,
+    keep: MappingKeeper | None = None,
     progress: Progress = silent,
 ) -> IdentifyAnswer:
     """A stage with uncertainties from measured logs: mass, friction, stiffness, and what the logs cannot show.
@@ -190,7 +190,8 @@ def identify(
     settings, options = _settings(bandwidth, band, period), options_of(map, unit, scale, dt, as_, axis)
     paths, other_paths = paths_of(logs), paths_of(predict)
     inputs = read_all([*paths, *other_paths], options, folder)
-    keep({file.path: file.mapping for file in inputs})
+    if keep is not None:
+        keep({file.path: file.mapping for file in inputs})
     inputs = [per_unit_of_force(file, beside) for file in inputs]
     sources = [(file.source, file.kind) for file in inputs[: len(paths)]]
     made_up: list[str] = []

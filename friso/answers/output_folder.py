@@ -174,9 +174,10 @@ def check_file(
 def write_file(option: str, path: Path, content: Content, overwrite: bool) -> None:
     """Write a file that the user names, whole or not at all. Raises InputError where that must not be, or cannot."""
     check_file(option, path, overwrite)
+    place = Path(os.path.realpath(path))  # a link stays one
     try:
         path.parent.stat()  # a folder that is missing is a mistake, not one to make
-        write({path: content}, [path] if overwrite else ())
+        write({place: content}, [place] if overwrite else ())
     except OSError as error:
         raise _unwritable(option, path, error, path.name) from None
 

@@ -41,7 +41,7 @@ from friso.studies.store_folder import ReadOnlyStoreError
 from friso.studies.study import Study
 from friso.studies.sweep import fill, run_in_memory
 from friso.studies.verify import WANTED, checked_share, loosest_rtol, verify_cells
-from friso.system import MOST_PROCESSES, shell_word, usable_cores
+from friso.system import MOST_PROCESSES, cause_of, path_of, shell_word, usable_cores
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -340,15 +340,20 @@ def _filled(
         runs = read_store(store)
         runs.attrs |= verify_cells(study, runs, crew, share)
         return runs, False
-    except (KeyboardInterrupt, OSError, RuntimeError):
+    except (KeyboardInterrupt, OSError, RuntimeError) as error:
+        far, resumed = f"{stored} of {study.cells} cells are stored", f"friso map {shell_word(str(store))}"
+        if isinstance(error, OSError):
+            actual = f"{cause_of(error)}: {path_of(error)}".removesuffix(": ")
+            raise StoreError(
+                "", f"{actual}; {far}", "a disk that can be written, to resume", resumed, str(store)
+            ) from None
         if store.exists():
-            resumed = f"friso map {shell_word(str(store))}"
-            LOGGER.warning(f"{stored} of {study.cells} cells are stored; to resume: {resumed}")
+            LOGGER.warning(f"{far}; to resume: {resumed}")
         raise
 
 
 def _checked_exports(export: Iterable[str | os.PathLike[str]]) -> list[Path]:
-    files = [Path(path) for path in export]
+    files = [Path(os.path.realpath(path) if os.path.islink(path) else path) for path in export]  # a link stays one
     for path in files:
         refuse_place("export", path)
         if path.suffix not in (".nc", ".csv") or path.is_dir():

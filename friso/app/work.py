@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar, copy_context
 from dataclasses import dataclass, field
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -107,12 +108,21 @@ class Messages(logging.Handler):
             listener.put({"kind": "message", "text": text, "lasts": lasts})
 
 
+def _import_libraries() -> None:
+    """Import what cannot be imported by two threads at once: its modules import one another."""
+    with _IMPORTING:
+        import dask.array  # noqa: F401
+
+
+_IMPORTING = Lock()
+
+
 class Workshop:
     """The questions at work, one on every lane of a page: a newer one, which has a larger number, overtakes the one
     before it, in whatever order they arrive."""
 
     def __init__(self) -> None:
-        self.pool = ThreadPoolExecutor(THREADS, thread_name_prefix="friso-app")
+        self.pool = ThreadPoolExecutor(THREADS, thread_name_prefix="friso-app", initializer=_import_libraries)
         self.quick = ThreadPoolExecutor(2, thread_name_prefix="friso-app-quick")
         self.lanes: dict[tuple[str, str], Work] = {}
 

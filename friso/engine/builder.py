@@ -1,7 +1,7 @@
 """The program that fills the cache: ``python -m friso.engine.builder FOLDER``.
 
 It is asked pairs, the name of a module and a task (`friso.helper_process`), has the module's `build(folder, task)` keep
-what the task asks for in the cache's FOLDER, and answers the name of the entry.
+what the task asks for in the cache's FOLDER, and answers the name of the entry, or the OSError that kept it from that.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ def main(folder: Path) -> None:
     """Build what is asked for."""
     gc.set_threshold(*GARBAGE)
 
-    def built(asked: tuple[str, bytes]) -> str:
+    def built(asked: tuple[str, bytes]) -> str | OSError:
         builder, task = asked
         try:
             return import_module(builder).build(folder, task)
         except OSError as error:  # the disk is full: no fault of what is built, whose traceback would help
-            sys.exit(f"{folder}: {error.strerror or error}")
+            return error
 
     answer_questions(built)
 

@@ -18,7 +18,7 @@ from threading import Lock, Semaphore, Thread
 
 from filelock import FileLock, Timeout
 
-from friso.engine.cache import CodeRequest, Compiled, cache_folder, logger
+from friso.engine.cache import CodeRequest, Compiled, cache_folder, leave_cache, logger
 from friso.engine.overtaken import Overtaken, go_on
 from friso.engine.prune import prune
 from friso.helper_process import HelperProcess
@@ -34,13 +34,17 @@ _AT_THE_END = 2.0
 
 def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
     """The entries of what is requested; what is missing in the cache is built, and what is said about it logged.
-    Raises RuntimeError with the builder's message if that fails, OSError where the cache cannot be written, Overtaken
+    Raises RuntimeError with the builder's message if that fails, OSError where no folder can be written, Overtaken
     where nobody waits for them any more: what is being built is, to its end, for whoever asks next."""
-    requests = list(requests)
+    requests, folder = list(requests), cache_folder()
     compiled = {request: request.entry() for request in requests}
     if missing := [request for request, entry in compiled.items() if entry is None]:
-        with WORK_CLOCK.stands():
-            _work().finish(missing)
+        try:
+            with WORK_CLOCK.stands():
+                _work().finish(missing)
+        except OSError as error:
+            leave_cache(folder, error)
+            return built_entries(requests)
         prune(cache_folder())
         compiled |= {request: request.entry() for request in missing}
     if dropped := [request.title for request, entry in compiled.items() if entry is None]:
@@ -224,11 +228,16 @@ class _Builder(HelperProcess):
         super().__init__("friso.engine.builder", str(surroundings.folder), paths=surroundings.paths)
 
     def build(self, request: CodeRequest) -> str:
-        """Build what is requested; the name of its entry, "" where the process ended instead."""
+        """Build what is requested; the name of its entry, "" where the process ended instead. Raises OSError where the
+        entry cannot be kept."""
         try:
-            return self.ask((request.builder, request.task))
+            answer = self.ask((request.builder, request.task))
         except EOFError:
             return ""
+        if isinstance(answer, OSError):
+            _waiting.append(self)
+            raise answer
+        return answer
 
 
 _waiting: list[_Builder] = []

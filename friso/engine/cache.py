@@ -27,6 +27,7 @@ from importlib.abc import InspectLoader
 from importlib.metadata import version
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
+from threading import Lock
 from types import CodeType, ModuleType
 
 import llvmlite
@@ -56,6 +57,8 @@ DAY = 86_400.0
 def cache_folder() -> Path:
     """The folder of compiled code, mode 0700; a temporary one, with a warning, where that cannot be had."""
     try:
+        for error in _UNWRITABLE:
+            raise error
         chosen = Path(os.environ.get(FOLDER_VARIABLE) or user_cache_dir("friso")).expanduser()
         folder = (chosen / "kernels").absolute()
         make_private(folder)
@@ -74,11 +77,29 @@ def cache_folder() -> Path:
         return folder
 
 
+_UNWRITABLE: list[OSError] = []
+"""Why nothing can be kept in the folder of compiled code."""
+
+
+def leave_cache(folder: Path, error: OSError) -> None:
+    """Have kernels compiled into a temporary folder from now on, since nothing can be kept in this one: its disk is
+    full, for example. Raises the error where that is temporary already."""
+    if is_passing(folder):
+        raise error
+    with _LEAVING:
+        if cache_folder() == folder:  # no other thread has left it meanwhile
+            _UNWRITABLE[:] = [error]
+            cache_folder.cache_clear()
+
+
+_LEAVING = Lock()
+
+
 def _in_words(error: OSError | RuntimeError) -> str:
     """Why a folder cannot be had, without a number of the system's."""
-    if isinstance(error, OSError) and error.filename is not None:
-        return f"{cause_of(error)} ({path_of(error)})"
-    return str(error)
+    if not isinstance(error, OSError):
+        return str(error)
+    return f"{cause_of(error)} ({path_of(error)})".removesuffix(" ()")
 
 
 _PASSING = "friso-kernels-"

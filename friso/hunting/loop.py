@@ -215,7 +215,8 @@ def _slid(stages: Ensemble, speed: np.ndarray) -> np.ndarray:
         moved = states.copy()
         moved[:, k] += stages.scales[:, k]
         changes[:, :, column] = (stages.rates(moved)[:, bristles] - begun) / stages.scales[:, k, None]
-    states[:, bristles] -= (np.linalg.pinv(changes) @ begun[:, :, None])[:, :, 0]
+    finite = np.isfinite(changes).all(axis=(1, 2))
+    states[np.ix_(finite, np.array(bristles))] -= (np.linalg.pinv(changes[finite]) @ begun[finite, :, None])[:, :, 0]
     return states
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import wraps
 from inspect import signature
@@ -91,13 +91,13 @@ _KINDS: dict[str, ArgumentKind] = {
     "bool": ArgumentKind(lambda value: isinstance(value, bool | np.bool_), "True or False", "True"),
     "os.PathLike[str]": ArgumentKind(_is_path, "a path", '"report"'),
     "Path": ArgumentKind(lambda value: isinstance(value, Path), "a path", 'Path("report")'),
-    "Stage": ArgumentKind(
-        lambda value: isinstance(value, Stage), "a stage, such as friso.load(path)", 'friso.load("rig.toml")'
-    ),
-    "StageLike": ArgumentKind(
-        lambda value: isinstance(value, Stage) or _has_text_keys(value) or _is_path(value),
-        "a stage, the path of a stage file, or its tables as a dictionary",
-        '"rig.toml"',
+    **dict.fromkeys(
+        ("Stage", "StageLike"),
+        ArgumentKind(
+            lambda value: isinstance(value, Stage) or _has_text_keys(value) or _is_path(value),
+            "a stage, the path of a stage file, or its tables as a dictionary",
+            '"rig.toml"',
+        ),
     ),
     "Changes": ArgumentKind(
         lambda value: value is None or _has_text_keys(value) or _is_list(value, _is_text),
@@ -139,7 +139,7 @@ _KINDS: dict[str, ArgumentKind] = {
 }
 """The kinds of arguments, by the annotations of public functions."""
 
-_PATH_KINDS = {"os.PathLike[str]", "Path", "StageLike", "LogFiles", "Iterable[str | os.PathLike[str]]"}
+_PATH_KINDS = {"os.PathLike[str]", "Path", "Stage", "StageLike", "LogFiles", "Iterable[str | os.PathLike[str]]"}
 
 
 def _alternatives(annotation: str) -> list[str]:
@@ -155,8 +155,9 @@ def _alternatives(annotation: str) -> list[str]:
 
 
 def check_arguments(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
-    """A function that raises InputError for an argument of another type than is annotated, and for a path that is none.
-    Raises KeyError for an annotation that is no kind of argument."""
+    """A function that raises InputError for an argument of another type than is annotated, and for a path that is none,
+    and TypeError for a keyword that it lacks; where it takes a Stage, it takes its file or tables as well. Raises
+    KeyError for an annotation that is no kind of argument."""
     parameters = signature(function)
     kinds = {
         name: {part: _KINDS[part] for part in _alternatives(str(parameter.annotation))}
@@ -164,13 +165,39 @@ def check_arguments(function: Callable[Arguments, Returned]) -> Callable[Argumen
         if parameter.kind is not parameter.VAR_KEYWORD
     }
 
+    takes_no_others = len(kinds) == len(parameters.parameters)
+
     @wraps(function)
     def call(*arguments: Arguments.args, **options: Arguments.kwargs) -> Returned:
-        for name, value in parameters.bind(*arguments, **options).arguments.items():
+        if unknown := options.keys() - parameters.parameters.keys() if takes_no_others else ():
+            nearest = near_words(min(unknown), parameters.parameters)
+            raise TypeError(f"{function.__name__}() has no keyword {min(unknown)!r}{nearest}")
+        try:
+            bound = parameters.bind(*arguments, **options)
+        except TypeError as error:
+            raise TypeError(f"{function.__name__}(): {error}") from None
+        for name, value in bound.arguments.items():
             _check(name, value, kinds.get(name, {}), "set" in kinds)
-        return function(*arguments, **options)
+            if "Stage" in kinds.get(name, {}) and not isinstance(value, Stage):
+                bound.arguments[name] = _read_stage(value)
+        return function(*bound.args, **bound.kwargs)
 
     return call
+
+
+def near_words(word: str, words: Iterable[str]) -> str:
+    """What to say of a word that is none of some words: which is nearest, or all of them."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(word, words := [*words], 1)
+    return f"; did you mean {near[0]!r}?" if near else f"; it has {', '.join(words)}"
+
+
+def _read_stage(source: Any) -> Stage:
+    """The stage of a file, or of tables."""
+    from friso.stage.files import load
+
+    return Stage(**source) if isinstance(source, Mapping) else load(source)
 
 
 def _check(name: str, value: Any, kinds: Mapping[str, ArgumentKind], sets: bool) -> None:

@@ -17,7 +17,7 @@ from friso.escapes import one_line
 from friso.quantities import quoted
 from friso.stage.arguments import check_arguments
 from friso.stage.stage import Stage, changed
-from friso.system import cause_of, shell_word
+from friso.system import cause_of, check_free, shell_word
 from friso.whole_file import whole_file
 
 MOST_BYTES = 4_000_000
@@ -108,7 +108,8 @@ def _refuse_specification(tables: Mapping[str, Any]) -> None:
 def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) -> None:
     """Write a stage file to `path`, all of it or nothing.
 
-    Raises InputError where there is a file already (unless `overwrite`) or the place cannot be written to.
+    A file that is overwritten keeps its permissions, a link to it stays. Raises InputError where there is a file
+    already (unless `overwrite`), or one that is read-only, or the place cannot be written to.
 
     Examples
     --------
@@ -121,8 +122,11 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
         raise InputError("path", *why, 'path="stage.toml"')
     if os.path.lexists(place) and not (overwrite and place.is_file()):
         raise InputError("", "a file that already exists", "a new file, or overwrite=True", origin=str(place))
+    place = Path(os.path.realpath(place))  # a link stays one
     try:
-        with whole_file(place, new=not overwrite) as file:
+        if place.exists():
+            check_free(place)
+        with whole_file(place, new=not overwrite, kept=True) as file:
             file.write(stage.to_toml().encode())
     except OSError as error:
         raise InputError("", _reason(error), "a writable location", origin=str(place)) from error

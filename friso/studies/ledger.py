@@ -43,6 +43,19 @@ class Ledger:
         except OSError:
             return False
 
+    def digest(self, number: str, name: str) -> str | None:
+        """The digest of a chunk as it was entered; None where its block was not, "" where the entry is damaged. Raises
+        PermissionError."""
+        try:
+            entry = json.loads(stored(self._file(number)))
+            return entry["sha256"][name] if (entry["study"], entry["block"]) == (self.study, number) else ""
+        except PermissionError:
+            raise
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, LookupError, TypeError, RecursionError):
+            return ""
+
     def _entry(self, number: str) -> bytes:
         digests = {name: digest_of(self.path / name / number) for name in self.metrics}
         return json.dumps({"study": self.study, "block": number, "sha256": digests}, indent=1).encode()

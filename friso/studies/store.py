@@ -234,8 +234,8 @@ class Store:
 def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     """The study in the store at `path`, finished or not, as a dataset whose values are read when they are looked at.
 
-    Raises StoreError if there is none, its metadata or axes are damaged, or anything but files is in it; RuntimeError
-    where a damaged value is looked at.
+    Cells that were not run yet are empty. Raises StoreError if there is none, its metadata or axes are damaged, or
+    anything but files is in it, and where damaged cells are looked at.
 
     Examples
     --------
@@ -251,7 +251,7 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     try:
         if metadata.damaged_axes(Path(path)):
             raise ValueError("other axes than were written")
-        runs = xr.open_zarr(SealedStore.at(Path(path), metadata.all_files), chunks=None, zarr_format=_FORMAT)
+        runs = xr.open_zarr(SealedStore.at(Path(path), metadata), chunks=None, zarr_format=_FORMAT)
         runs.attrs = metadata.attributes
         runs = runs.assign_coords({name: axis.load() for name, axis in runs.coords.items()})
         runs.encoding["source"] = os.path.abspath(path)

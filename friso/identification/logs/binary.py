@@ -1,16 +1,18 @@
 """The program in which binary logs are read, by the libraries of their formats; `friso.identification.logs.confined`
 runs it.
 
-It needs nothing of friso, so that it starts quickly: ``python binary.py KIND FILE MEMORY SECONDS``, the memory in bytes
-(0 for no limit). On standard output, pickled: what the file holds as plain dicts, lists, texts, numbers and NumPy
-arrays, and the message of the error. It ends after these seconds whatever the library is at, and at once when nobody
-holds its standard input open any more: who started it was killed.
+It needs nothing of friso, so that it starts quickly: ``python binary.py KIND FILE MEMORY CPU SECONDS``, the memory in
+bytes (0 for no limit), and the time [s] of a processor, which not every system counts. On standard output, pickled:
+what the file holds as plain dicts, lists, texts, numbers and NumPy arrays, and the message of the error. It ends after
+these seconds whatever the library is at, and at once when nobody holds its standard input open any more: who started it
+was killed.
 """
 
 from __future__ import annotations
 
 import faulthandler
 import logging
+import math
 import os
 import pickle
 import sys
@@ -227,10 +229,16 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def main(kind: str, path: Path, memory: int, seconds: float) -> None:
-    """Read a file within so much memory [B] and time [s]."""
+def main(kind: str, path: Path, memory: int, cpu: float, seconds: float) -> None:
+    """Read a file within so much memory [B], time of a processor [s] and time [s]."""
     faulthandler.dump_traceback_later(seconds, exit=True)  # by a thread that needs no lock of the interpreter
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    if sys.platform != "win32":
+        import resource
+
+        _, allowed = resource.getrlimit(resource.RLIMIT_CPU)
+        limit = math.ceil(cpu)
+        resource.setrlimit(resource.RLIMIT_CPU, (limit if allowed < 0 else min(limit, allowed), allowed))
     if sys.platform != "win32" and memory:
         import resource
 
@@ -252,4 +260,4 @@ def main(kind: str, path: Path, memory: int, seconds: float) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]))
+    main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]), float(sys.argv[5]))

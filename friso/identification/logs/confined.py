@@ -6,6 +6,7 @@ from __future__ import annotations
 import io
 import os
 import pickle
+import signal
 import subprocess
 import sys
 from functools import lru_cache
@@ -17,11 +18,15 @@ from friso.errors import LogError
 from friso.identification.logs import binary
 from friso.system import LIMITS_MEMORY
 
+CPU_SIGNAL = getattr(signal, "SIGXCPU", 0)
+"""What ends a process that has taken a processor's time for too long, where the system counts that."""
+
 MEMORY, PER_BYTE = 1 << 30, 12
 """Memory [B] that reading may take, besides a multiple of the size of the file."""
 
-SECONDS, BYTES_A_SECOND = 10.0, 5e6
-"""Time [s] that reading may take, besides that for the size of the file."""
+SECONDS, BYTES_A_SECOND, PATIENCE = 10.0, 5e6, 10.0
+"""Time [s] that a processor may take to read a file, besides that for its size; and how many times as long is waited,
+since a machine that is busy, or a disk that is slow, takes longer."""
 
 
 def content(kind: str, path: Path) -> dict[str, Any]:
@@ -35,11 +40,15 @@ def content(kind: str, path: Path) -> dict[str, Any]:
 def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
     memory = MEMORY + PER_BYTE * size if LIMITS_MEMORY else 0
     seconds = SECONDS + size / BYTES_A_SECOND
-    command = [sys.executable, "-P", binary.__file__, kind, str(path), str(memory), str(2 * seconds)]
+    patience = PATIENCE * seconds
+    command = [sys.executable, "-P", binary.__file__, kind, str(path), *map(str, (memory, seconds, 2 * patience))]
     try:
-        answer = _answer(command, seconds, binary.most_bytes(size))
+        answer = _answer(command, patience, binary.most_bytes(size))
     except TimeoutError:
-        raise broken(kind, f"reading it takes more than {seconds:.0f} s", path) from None
+        why = f"it was not read within {patience:.0f} s: the machine is busy, or the disk slow"
+        raise broken(kind, why, path) from None
+    if answer is None:
+        raise broken(kind, f"reading it takes more than {seconds:.0f} s", path)
     try:
         read, message = _PlainUnpickler(io.BytesIO(answer)).load()
     except Exception:  # whatever is wrong with what came, it is not what the reader writes
@@ -49,8 +58,9 @@ def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
     return read
 
 
-def _answer(command: list[str], seconds: float, most: int) -> bytes:
-    """What a program says, of more than `most` bytes the first. Raises TimeoutError where it takes longer."""
+def _answer(command: list[str], seconds: float, most: int) -> bytes | None:
+    """What a program says, of more than `most` bytes the first; None where it took more of a processor's time than it
+    may. Raises TimeoutError where it takes longer."""
     environ = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each of its threads reserves memory
     pipe, late = subprocess.PIPE, []
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, env=environ) as process:
@@ -59,12 +69,14 @@ def _answer(command: list[str], seconds: float, most: int) -> bytes:
         try:
             assert process.stdout is not None
             answer = process.stdout.read(most + 1)
+            if not answer:
+                process.wait()
         finally:
             timer.cancel()
             process.kill()
     if late:
         raise TimeoutError
-    return answer
+    return None if process.returncode == -CPU_SIGNAL < 0 else answer
 
 
 class _PlainUnpickler(pickle.Unpickler):

@@ -45,9 +45,9 @@ def find_periods(signal: np.ndarray, expected: float | None = None) -> Periods:
     `expected` is about how many samples a period has: it is then looked for within 2 % of that. Raises InputError
     where the signal does not repeat, or has fewer than two periods.
     """
-    if not np.ptp(signal) > 0:
-        raise _not_periodic("an input that is constant")
     stop = _switched_off(signal)
+    if np.unique(signal[:stop]).size < 2:
+        raise _not_periodic("an input that is constant")
     change = repetition(signal[:stop])
     samples = _shortest(change) if expected is None else _near(change, expected)
     warnings: tuple[str, ...] = ()
@@ -74,7 +74,7 @@ def repetition(signal: np.ndarray) -> np.ndarray:
 def _switched_off(signal: np.ndarray) -> int:
     """One past the last sample before the input rests for good, if it does so for more than 10 samples."""
     moving = np.flatnonzero(np.abs(signal - signal[-1]) > QUIET * np.ptp(signal))
-    stop = int(moving[-1]) + 1
+    stop = int(moving[-1]) + 1 if moving.size else 0
     return stop if len(signal) - stop > max(10, len(signal) // 200) else len(signal)
 
 

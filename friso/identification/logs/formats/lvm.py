@@ -26,7 +26,7 @@ def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) 
     """The channels of a segment, each with the number of samples that the header states, or None: values over an X
     column in seconds (the first, or one per channel). What the header states of a channel stands above its column, the
     first column being that of the keys."""
-    names, data = segment["Channel names"], np.asarray(segment["data"], dtype=float)
+    names, data = segment["Channel names"], np.atleast_2d(np.asarray(segment["data"], dtype=float))
     each_own, none = content.get("X_Columns") == "Multi", content.get("X_Columns") == "No"
     above = 0 if none else -1  # the reader leaves out the empty first column of files without X values
     out, time = [], None
