@@ -124,17 +124,19 @@ def __getattr__(name: str) -> Any:
     have itself is looked for among the functions of installed packages."""
     if name in _LAZY:
         return getattr(importlib.import_module(_LAZY[name]), name)
-    if not name.startswith("_") and PathFinder.find_spec(f"friso.{name}", __path__) is None and name in _installed():
+    nearest = ""
+    if not name.startswith("_") and PathFinder.find_spec(f"friso.{name}", __path__) is None:
+        from difflib import get_close_matches
+
         from friso.errors import InputError
         from friso.installed import FUNCTIONS, load_declared
 
-        try:
-            return load_declared(FUNCTIONS, name, _installed()[name], name, Callable)
-        except InputError as error:
-            raise AttributeError(str(error)) from error
-    from difflib import get_close_matches
-
-    nearest = "".join(f"; did you mean {near!r}?" for near in get_close_matches(name, __dir__(), 1))
+        if name in _installed():
+            try:
+                return load_declared(FUNCTIONS, name, _installed()[name], name, Callable)
+            except InputError as error:
+                raise AttributeError(str(error)) from error
+        nearest = "".join(f"; did you mean {near!r}?" for near in get_close_matches(name, __dir__(), 1))
     raise AttributeError(f"module 'friso' has no attribute {name!r}{nearest}")
 
 

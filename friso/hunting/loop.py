@@ -216,7 +216,9 @@ def _slid(stages: Ensemble, speed: np.ndarray) -> np.ndarray:
         moved[:, k] += stages.scales[:, k]
         changes[:, :, column] = (stages.rates(moved)[:, bristles] - begun) / stages.scales[:, k, None]
     finite = np.isfinite(changes).all(axis=(1, 2))
-    states[np.ix_(finite, np.array(bristles))] -= (np.linalg.pinv(changes[finite]) @ begun[finite, :, None])[:, :, 0]
+    states[np.ix_(finite, np.array(bristles, np.intp))] -= (np.linalg.pinv(changes[finite]) @ begun[finite, :, None])[
+        :, :, 0
+    ]
     return states
 
 
