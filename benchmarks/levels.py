@@ -1,6 +1,6 @@
 """Answers by the level of the processor: `python -m benchmarks.levels [--stages 40] [--kept FOLDER]`.
 
-Stages drawn from the three series of `benchmarks.truth` are checked, followed (`boundary`), mapped, tuned and
+Stages drawn from the series of `benchmarks.truth` are checked, followed (`boundary`), mapped, tuned and
 identified from logs of their own, with code for AVX-512 (or what this machine has), AVX2 and SSE2. What is said is
 compared, its words and the numbers in it. Fewer stages are asked what takes long. `--kept` keeps the answers of each
 level in a folder, one file a question and stage, so that a run goes on where one was stopped.
@@ -69,16 +69,16 @@ def _identify(stage: friso.Stage, folder: Path) -> Any:
 
 QUESTIONS: dict[str, tuple[int, Callable[[friso.Stage, Path], Any]]] = {
     "check": (1, _check),
-    "boundary": (4, _boundary),
-    "map": (4, _map),
-    "tune": (20, _tune),
-    "identify": (10, _identify),
+    "boundary": (5, _boundary),
+    "map": (5, _map),
+    "tune": (21, _tune),
+    "identify": (11, _identify),
 }
 """Questions: of how many stages one is asked it, and how."""
 
 
 def drawn(number: int) -> friso.Stage:
-    """A stage of the three series in turns."""
+    """A stage of the series in turns."""
     series = [*SERIES]
     return draw(SEED, number // len(series), series[number % len(series)])
 

@@ -17,6 +17,7 @@ def friso_inside(folder: Path, *arguments: object) -> subprocess.CompletedProces
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
         patch.chdir(folder)
         patch.setattr(sys, "argv", command)
+        patch.setattr(sys.modules["__main__"], "__package__", None)  # of `python -m pytest`, which messages would name
         with pytest.raises(SystemExit) as left:
             main()
     return subprocess.CompletedProcess(command, int(left.value.code or 0), out.getvalue(), err.getvalue())
