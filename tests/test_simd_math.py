@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable
 
-import llvmlite.binding as llvm
 import numpy as np
 import pytest
 from compiled import in_all
@@ -16,9 +15,8 @@ from friso.engine.machine_code import optimised
 from friso.engine.processor import processor
 from friso.equations.structure import structure
 
-FEATURES = llvm.get_host_cpu_features()
-WIDE = "zmm|ymm" if FEATURES.get("avx512f") else "ymm"
-VECTORS = pytest.mark.skipif(not FEATURES.get("avx2"), reason="this processor has no 256-bit arithmetic")
+WIDE = {8: "zmm|ymm", 4: "ymm"}.get(LANES, "")
+VECTORS = pytest.mark.skipif(not WIDE, reason="this processor has no 256-bit arithmetic")
 
 
 @pytest.fixture(scope="module")
