@@ -58,7 +58,8 @@ class StageAttractors:
 
     @classmethod
     def of(cls, survey: Attractors | None, certain: np.ndarray) -> StageAttractors:
-        """What a survey shows (None: none was made, as the stages cannot hunt), and of which stages that is certain."""
+        """Summarise a survey of stages, and which of them it is certain about, shape (count,); a survey of None stands
+        for stages that cannot hunt."""
         count = len(certain)
         closed, (amplitude, period, multiplier) = np.zeros(count, bool), np.full((3, count), np.nan)
         if survey is None:
@@ -111,8 +112,10 @@ def find_attractors(
 
 
 def find_swings(flat: Mapping[str, Any]) -> tuple[Swinging, ...]:
-    """Find all that attracts one stage, given as flat keys, as thoroughly as a check does; its own motion plays no
-    part. As far as an allowance reaches."""
+    """Find all that attracts one stage, given as flat keys, as thoroughly as a check does.
+
+    The stage's own motion plays no part. Where an allowance is used up, what was found until then is returned.
+    """
     return attractors(Ensemble.held(flat, 1), thorough=True).motions
 
 
@@ -174,8 +177,8 @@ def judge_runs(
 
 
 def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions) -> tuple[np.ndarray, np.ndarray]:
-    """Of motions that do not end in what was found to attract their stages, which swing on by less once they were
-    followed for long, and of which that is decided: they do, or they have come to rest."""
+    """Follow motions that do not end in what was found to attract their stages: which swing on by less, and for which
+    it is decided that they swing on or rest, both of shape (motions,)."""
     rest = followed_motions(flat, motions, len(motions.completed), run_options, possible=True)
     return rest.steady, rest.steady | _stands(flat, rest)
 
