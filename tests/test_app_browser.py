@@ -443,6 +443,15 @@ def test_an_earlier_answer_leads_back_to_its_machine(browsed: Browsed) -> None:
     assert browsed.changes() == {"controller.crossover": "11 Hz"}
 
 
+def test_an_answer_that_comes_before_its_picture_is_kept_as_an_earlier_one(browsed: Browsed) -> None:
+    page, held = browsed.page, []
+    page.route("**/ask/run", lambda route: held.append(route))
+    page.evaluate("async () => (await import('/state.js')).set({ 'controller.crossover': '13 Hz' })")
+    page.wait_for_selector("#history [title*='13 Hz']")
+    assert held
+    held.pop().continue_()
+
+
 def test_earlier_answers_are_named_by_what_changed_and_are_one_stop_of_tab(browsed: Browsed) -> None:
     page, places = browsed.page, "#history button"
     names: dict[str, dict[str, str]] = {

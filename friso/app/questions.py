@@ -140,7 +140,8 @@ def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     ghosts = _ghosts(asked, work, friso.check)
     answer = KEPT.answer(friso.check, asked.machine, work, options)
     cases = {name: case.verdict for name, case in answer.result.items()}
-    more = {"cases": _labelled(asked.machine.stage, cases), **_lines("check", asked, options)}
+    stage = asked.machine.stage
+    more = {"cases": _labelled(stage, cases), "verdict": cases[_given(stage)], **_lines("check", asked, options)}
     yield parts_of(answer, ghosts, **more)
 
 

@@ -150,6 +150,7 @@ function without(part) {
 }
 
 async function check(draws) {
+  const asked = { machine: machines.current(), given: machines.changes() };
   const part = await ask("check", pictures.body(draws ? { draws } : {}), "check", (item) => item.kind !== "answer" && answers.progress(item));
   if (!part) return;
   answers.progress(null);
@@ -157,6 +158,7 @@ async function check(draws) {
   verdict.stop();
   clearTimeout(aging);
   answers.whole(part, shown.uncertain.length ? check : null);
+  answers.note(part.verdict, asked, machines.back); // it may come before the quick verdict, which is then not asked for
   given.set("check", part);
   pictures.checked(part);
 }
