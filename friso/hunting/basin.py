@@ -187,7 +187,7 @@ def displacements_that_hunt(stage: Stage, target: Target, widest: float = np.inf
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return _caught({**flat, "motion.displacement": kicks}, len(kicks), target, widest)
 
-    return _kick(hunts, target.amplitude)
+    return kick_windows(hunts, target.amplitude)
 
 
 def displacements_that_run_away(stage: Stage) -> Kick:
@@ -201,7 +201,7 @@ def displacements_that_run_away(stage: Stage) -> Kick:
         motions = run_motions({**flat, "motion.displacement": kicks, "motion.duration": end}, len(kicks), options)
         return motions.away, motions.away | motions.completed
 
-    return _kick(runs_away, flat[FORCE_LIMIT] / float(stages.number("stiffness")[0]))
+    return kick_windows(runs_away, flat[FORCE_LIMIT] / float(stages.number("stiffness")[0]))
 
 
 def pushes_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Kick:
@@ -214,10 +214,10 @@ def pushes_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Ki
         released = {**several.flat, "motion.displacement": float(stages.length[0])}
         return _caught(released, len(kicks), target, widest, pushed(several, kicks))
 
-    return _kick(hunts, target.amplitude * float(stages.number("rate")[0]))
+    return kick_windows(hunts, target.amplitude * float(stages.number("rate")[0]))
 
 
-def _kick(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: float) -> Kick:
+def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: float) -> Kick:
     """The windows of kicks that hunt, searched on a grid about `unit`, their edges closer and closer; `hunts` tells
     which kicks do, and whose runs were completed."""
     tried = np.geomspace(RANGE[0] * unit, RANGE[1] * unit, POINTS)
@@ -243,6 +243,14 @@ def _kick(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: fl
 def moves_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> MoveShare | None:
     """Draw moves about that of the stage's file and find the share of them that ends in its `target`; swings wider than
     `widest`, peak to peak [m], are left out. None for motions that have no acceleration, or if every run fails."""
+    return move_share(stage, lambda moved, count: _caught(moved, count, target, widest))
+
+
+def move_share(
+    stage: Stage, hunts: Callable[[Mapping[str, Any], int], tuple[np.ndarray, np.ndarray]]
+) -> MoveShare | None:
+    """Draw moves about that of the stage's file and find the share of them that `hunts` tells to hunt, of those of which
+    it is known. None for motions that have no acceleration, or if it is known of none."""
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
         return None
@@ -257,8 +265,8 @@ def moves_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Mov
         "motion.acceleration": low + across * (high - low),
         "motion.acceleration_time": shortest + along * (longest - shortest),
     }
-    hunts, ended = _caught(moved, MOVES, target, widest)
-    return MoveShare(int(ended.sum()), int(hunts[ended].sum()), accelerations, times) if ended.any() else None
+    ends, known = hunts(moved, MOVES)
+    return MoveShare(int(known.sum()), int(ends[known].sum()), accelerations, times) if known.any() else None
 
 
 def evenly(count: int) -> np.ndarray:

@@ -157,11 +157,14 @@ class Beyond(Exception):
 @dataclass(frozen=True)
 class Outward:
     """The search for the end of what attracts a stage, given as flat keys, from a bandwidth towards the `farthest` one
-    (factors). Nothing attracts at the one that is `settled`, if any: a window beyond it is another one."""
+    (factors). Nothing attracts at the one that is `settled`, if any: a window beyond it is another one. Branches are
+    followed at a `pace`, in steps no shorter than the `shortest`."""
 
     flat: Mapping[str, Any]
     farthest: float
     settled: float | None = None
+    shortest: float = SHORTEST
+    pace: float = PACE
 
     def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> AttractionEnd:
         """The end of what attracts: these motions do at a factor, nothing does at the one `outside`. Raises Beyond
@@ -353,7 +356,7 @@ class Outward:
             return self._stages(at * np.exp(ahead * places))
 
         length = abs(float(np.log(self.farthest / at)))
-        tracer = Tracer(family, cycles.sign, farthest=length, swings=cycles.swings, pace=PACE, shortest=SHORTEST)
+        tracer = Tracer(family, cycles.sign, farthest=length, swings=cycles.swings, pace=self.pace, shortest=self.shortest)
         start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
         farthest, reserve = start, PRECISE
 

@@ -150,8 +150,8 @@ def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
     return like
 
 
-def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int) -> list[Swinging]:
-    """The cycles of the stages with some numbers as motions, where they attract."""
+def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int, which: np.ndarray | None = None) -> list[Swinging]:
+    """The cycles of the stages with some numbers as motions: those that attract, or `which` are asked for, (count,)."""
     return [
         Swinging(
             int(numbers[k]),
@@ -163,7 +163,7 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int) -> list[Swingi
             cycles,
             int(k),
         )
-        for k in np.flatnonzero(cycles.attracting)
+        for k in np.flatnonzero(cycles.attracting if which is None else which)
     ]
 
 

@@ -1,0 +1,180 @@
+"""What attracts stages, by their return maps: each attractor of a map is followed by a run, and closed as an orbit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.hunting.attractors.closing import close_orbits
+from friso.hunting.attractors.recurrence import MOST as MOST_SWINGS
+from friso.hunting.attractors.rounds import RTOL as RUN_RTOL
+from friso.hunting.attractors.rounds import Pending
+from friso.hunting.attractors.survey import Swinging, of_cycles
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import RTOL
+from friso.hunting.return_map.landing_map import MapAttractor
+from friso.hunting.return_map.mapped import Mapped, map_stages
+
+TRIES = 4
+"""How often attractors of the maps are followed, whose landings join the maps."""
+
+FOLLOWED = 3
+"""Cycles for which an attractor of a map is followed at least."""
+
+ABOUT = 0.05
+"""Share by which landings differ at most from those of a cycle before that is tried to be closed."""
+
+ALIKE = 0.05
+"""Share by which the mean distance of landings of an attractor of a map differs at most from that of its orbit."""
+
+
+SCATTER = 0.05
+"""Share by which landings may differ from what their neighbours foretell: by more, this is not a map."""
+
+UNCLOSED = "an attractor of the map was neither closed as an orbit nor left"
+LOST = "runs were not completed"
+SCATTERS = "landings at equal distances return differently: the stage remembers more than its distance"
+"""Why it is not known what attracts a stage."""
+
+
+@dataclass(frozen=True)
+class MapSurvey:
+    """What the return maps of stages show: the `mapped` runs; the `motions` that attract; orbits that were closed and
+    repel, `repelling`; and of which stages it is not known, `open`, shape (count,): an attractor of the map was neither
+    closed nor left by the runs that came to it."""
+
+    mapped: Mapped
+    motions: tuple[Swinging, ...]
+    repelling: tuple[Swinging, ...]
+    open: np.ndarray
+
+    @property
+    def doubts(self) -> np.ndarray:
+        """Why it is not known what attracts stages, words of shape (count,), "" where it is."""
+        why = np.full(self.mapped.stages.count, "", dtype=object)
+        for stage, found in enumerate(self.mapped.maps):
+            scatter, _ = found.scatter
+            if self.open[stage]:
+                why[stage] = UNCLOSED
+            elif found.lost:
+                why[stage] = LOST
+            elif scatter > SCATTER:
+                why[stage] = SCATTERS
+        return why
+
+    @property
+    def resolved(self) -> np.ndarray:
+        """Of which stages it is known what attracts them, shape (count,)."""
+        return np.equal(self.doubts, "")
+
+    @property
+    def attracts(self) -> np.ndarray:
+        """Which stages something attracts, shape (count,)."""
+        attracted = np.zeros(self.mapped.stages.count, bool)
+        attracted[[motion.stage for motion in self.motions]] = True
+        return attracted
+
+
+@dataclass(frozen=True)
+class _Proposal:
+    """An attractor of a stage's map, and the run that goes on beside it."""
+
+    stage: int
+    attractor: MapAttractor
+    run: int
+
+
+def survey_maps(stages: Ensemble, rtol: float = RTOL, mapped: Mapped | None = None) -> MapSurvey:
+    """What attracts stages, found by their return maps; orbits are closed to a relative tolerance."""
+    mapped = mapped or map_stages(stages)
+    motions: list[Swinging] = []
+    repelling: list[Swinging] = []
+    for _ in range(TRIES):
+        proposals = _left(mapped, motions, repelling)
+        if not proposals:
+            break
+        runs = np.array([proposal.run for proposal in proposals])
+        most = max(MOST_SWINGS, FOLLOWED * max(_swings(p.attractor) for p in proposals))
+        before = len(mapped.owners)
+        mapped = mapped.gone_on(runs, most)
+        _close(mapped, np.arange(before, len(mapped.owners)), rtol, motions, repelling)
+    undecided = np.zeros(stages.count, bool)
+    undecided[[proposal.stage for proposal in _left(mapped, motions, repelling)]] = True
+    return MapSurvey(mapped, tuple(motions), tuple(repelling), undecided)
+
+
+def _left(mapped: Mapped, motions: list[Swinging], repelling: list[Swinging]) -> list[_Proposal]:
+    """The attractors of all maps of which it is not known whether they attract, but those that no run comes to which
+    may go on."""
+    return [p for p in _proposals(mapped) if not any(_is(p, motion, mapped.stages) for motion in (*motions, *repelling))]
+
+
+def _swings(attractor: MapAttractor) -> int:
+    return len(attractor.distances) if attractor.periodic else 1
+
+
+def _proposals(mapped: Mapped) -> list[_Proposal]:
+    """The attractors of all maps, each with the run in its basin that ended nearest to it."""
+    found = []
+    for stage, landing_map in enumerate(mapped.maps):
+        for attractor in landing_map.attractors:
+            basin = attractor.basin
+            ending = basin[landing_map.final[basin] & ~mapped.continued[landing_map.run[basin]]]
+            if not ending.size:
+                continue
+            after = landing_map.after[ending]
+            with np.errstate(all="ignore"):
+                apart = np.abs(np.log(after[:, None] / attractor.distances[None, :]))
+            nearest = ending[int(np.nan_to_num(apart, nan=np.inf).min(axis=1).argmin())]
+            found.append(_Proposal(stage, attractor, int(landing_map.run[nearest])))
+    return found
+
+
+def _is(proposal: _Proposal, motion: Swinging, stages: Ensemble) -> bool:
+    """Whether an attractor of a map is a motion of the stage."""
+    if motion.stage != proposal.stage:
+        return False
+    distances = np.abs(proposal.attractor.distances) * stages.length[motion.stage]
+    simple = motion.swings == 2 or not proposal.attractor.periodic
+    size = distances.mean() if simple else (distances.max() + distances.min()) / 2
+    alike = abs(size / motion.amplitude - 1) < ALIKE
+    return bool(alike and (not proposal.attractor.periodic or motion.swings % len(distances) == 0))
+
+
+def _close(
+    mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging], repelling: list[Swinging]
+) -> None:
+    """Close orbits from runs that repeat themselves: those that attract join the motions, the others what repels."""
+    landings, owners = mapped.landings.take(runs), mapped.owners[runs]
+    sizes, times, swings = np.zeros(len(runs)), np.zeros(len(runs)), np.zeros(len(runs), np.int64)
+    for k, owner in enumerate(owners.tolist()):
+        end = 0 if landings.rest[k] or landings.lost[k] else int(landings.count[k]) + 1
+        path, when = landings.distances[k, 1:end], landings.times[k, 1:end]
+        known = {motion.swings for motion in repelling if motion.stage == owner}
+        swings[k] = _repeats(path, bool(mapped.stages.symmetric[owner]), known)
+        if swings[k]:
+            times[k], sizes[k] = when[-1] - when[-1 - swings[k]], np.ptp(path)
+    which = np.flatnonzero(swings)
+    if not which.size:
+        return
+    some = mapped.stages.take(owners[which])
+    pending = Pending(some, landings.ends[which], times[which], np.zeros(which.size), some.symmetric, RUN_RTOL)
+    for group, cycles in close_orbits(pending, swings[which], times[which], sizes[which], rtol):
+        numbers = owners[which[group]]
+        for found, those in ((motions, cycles.attracting), (repelling, cycles.closed & ~cycles.attracting)):
+            for motion in of_cycles(numbers, cycles, mapped.stages.sticking, those):
+                if not any(motion.like(other) for other in found):
+                    found.append(motion)
+
+
+def _repeats(path: np.ndarray, symmetric: bool, known: set[int]) -> int:
+    """The least number of swings after which the last landings of a run, (landings,), about repeat themselves, but those
+    of cycles that are `known`, by the swings in their periods; 0 if they do not."""
+    sizes = np.abs(path) if symmetric else path
+    for swings in range(1 if symmetric else 2, len(path) // 2 + 1, 1 if symmetric else 2):
+        last = min(max(swings, 2), len(path) - swings)
+        again = sizes[-last:] / sizes[-last - swings : len(path) - swings]
+        if swings * (1 + swings % 2) not in known and np.all(np.abs(again - 1) < ABOUT):
+            return swings
+    return 0

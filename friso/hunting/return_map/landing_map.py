@@ -1,0 +1,285 @@
+"""The return map of a stage: from one landing to the next, as landings of runs show it, and what it comes to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from friso.hunting.attractors.recurrence import MOST as MOST_SWINGS
+from friso.hunting.attractors.rounds import RESOLVED
+from friso.hunting.return_map.landings import Landings
+
+JUMP, STEEPEST = 0.5, 3.0
+"""Where the map breaks off: two neighbouring returns differ in their logarithms by more than this, and so many times the
+difference of the logarithms of their distances."""
+
+ITERATIONS, TIMES = 200, 4
+"""Landings after which the map may have come to what attracts it, and how often their number is doubled while it still
+leaves a cycle."""
+
+ROUNDING = 1e-6
+"""Share up to which landings have come to a cycle."""
+
+SAME = 2e-3
+"""Share by which landings differ at most that are the same after a cycle."""
+
+ALIKE = 0.02
+"""Share by which the landings of one attractor of the map differ at most from those of another start."""
+
+FAR = 3.0
+"""Distance, in units of the deflection of the loop by the break-away force, beyond which a stage hardly sticks."""
+
+NEAR = 0.05
+"""Range of the logarithm of distance over which points beside each other tell the scatter."""
+
+OTHER_SIDE = 1e3
+"""What places on the negative side are shifted by."""
+
+REST = -1e6
+"""The place of a stage that rests, or has run away."""
+
+
+@dataclass(frozen=True)
+class MapAttractor:
+    """What landings come to: signed distances, shape (swings,), one after the other, in units of the deflection of the
+    loop by the break-away force, and the points of the map that come to it, `basin` (points,). It is a cycle if it is
+    `periodic`, after so many swings; else these are the last of its landings."""
+
+    distances: np.ndarray
+    basin: np.ndarray
+    periodic: bool
+
+
+@dataclass(frozen=True)
+class LandingMap:
+    """The return map of one stage, points in ascending order of distance: signed distances of landings, `before`
+    (points,), and of the next ones, `after` (points,), 0 where the stage rests instead, infinite where it runs away.
+
+    Distances are in units of the deflection of the loop by the break-away force, without sign where the stage is
+    `symmetric`. `run` (points,) tells in which run each was, `final` (points,) whether that ended with the next landing,
+    so that it may go on. `lost` counts runs that were not completed.
+    """
+
+    before: np.ndarray
+    after: np.ndarray
+    run: np.ndarray
+    final: np.ndarray
+    symmetric: bool
+    lost: int
+
+    @classmethod
+    def of(cls, landings: Landings, length: float, symmetric: bool, first: np.ndarray) -> LandingMap:
+        """The map from the landings of runs of one stage, but those before the `first` of a run, shape (runs,): these
+        depend on how it began. `length` [m] is the deflection of the loop by the break-away force."""
+        distances = landings.distances / length
+        ended = np.where(landings.rest, 0.0, np.where(landings.away, np.inf, np.nan))
+        distances, count = _without_excursions(np.abs(distances) if symmetric else distances, landings.count)
+        columns: list[tuple[np.ndarray, ...]] = []
+        for k in range(distances.shape[1]):
+            here = distances[:, k]
+            ahead = distances[:, min(k + 1, distances.shape[1] - 1)]
+            following = np.where(k < count, ahead, ended)
+            following = np.where(np.abs(following) < RESOLVED, 0.0, following)
+            which = np.flatnonzero((np.abs(here) >= RESOLVED) & ~np.isnan(following) & (k <= count) & (k >= first))
+            columns.append((here[which], following[which], which, k + 1 == count[which]))
+        before, after, run, final = (np.concatenate(part) for part in zip(*columns, strict=True))
+        order = np.argsort(before, kind="stable")
+        lost = int(np.count_nonzero(landings.lost & ~landings.away))
+        return cls(before[order], after[order], run[order], final[order], symmetric, lost)
+
+    def renumbered(self, runs: np.ndarray) -> LandingMap:
+        """The map, its runs having other numbers, shape (runs,)."""
+        return replace(self, run=runs[self.run])
+
+    @property
+    def sides(self) -> tuple[float, ...]:
+        """The signs of the sides on which landings are told apart."""
+        return (1.0,) if self.symmetric else (1.0, -1.0)
+
+    def points(self, side: float) -> np.ndarray:
+        """The numbers of the points on a side, by ascending distance."""
+        return np.flatnonzero(self.before * side > 0)[:: int(side)]
+
+    @property
+    def gain(self) -> np.ndarray:
+        """How far the next landing is in units of the last one, shape (points,)."""
+        return np.abs(self.after / self.before)
+
+    @cached_property
+    def _lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Straight pieces over places (see `_place`), ascending: where each begins, and its value at place 0 and slope.
+
+        Between two points the logarithm of distance goes straight, or, where the map breaks off, with the gain of the
+        nearer point.
+        """
+        begins, values, slopes = [-np.inf], [REST], [0.0]
+
+        def piece(begin: float, value: float, slope: float) -> None:
+            begins.append(begin)
+            values.append(value)
+            slopes.append(slope)
+
+        def beside(begin: float, at: float, after: float) -> None:
+            goes = np.isfinite(after) and after != 0
+            piece(begin, *((_place(np.array(after)) - at, 1.0) if goes else (REST, 0.0)))
+
+        for side in self.sides:
+            points = self.points(side)
+            places, after = _place(self.before[points]), self.after[points]
+            for k, (low, high) in enumerate(zip(places[:-1], places[1:], strict=True)):
+                if high <= low:
+                    continue
+                one, two = after[k], after[k + 1]
+                if np.isfinite(one) and np.isfinite(two) and one * two > 0:
+                    rise = np.log(two / one)
+                    if abs(rise) < JUMP + STEEPEST * (high - low):
+                        slope = rise / (high - low)
+                        piece(low, float(_place(np.array(one))) - slope * low, slope)
+                        continue
+                beside(low, low, one)
+                beside((low + high) / 2, high, two)
+            if len(points):
+                beside(places[-1], places[-1], after[-1] if abs(after[-1]) < abs(self.before[points[-1]]) else 0.0)
+            piece(OTHER_SIDE / 2 if side > 0 else np.inf, REST, 0.0)
+        return np.array(begins), np.array(values), np.array(slopes)
+
+    def next(self, places: np.ndarray) -> np.ndarray:
+        """The places of the next landings after those at places (see `_place`), shape (count,), straight between the
+        points of the map."""
+        begins, values, slopes = self._lines
+        pieces = np.searchsorted(begins, places, side="right") - 1
+        after = values[pieces] + slopes[pieces] * places
+        nearest = np.where(after > OTHER_SIDE / 2, after - OTHER_SIDE, after) < np.log(RESOLVED)
+        return np.where(nearest, REST, after)
+
+    @cached_property
+    def attractors(self) -> tuple[MapAttractor, ...]:
+        """What landings come to that go on for ever, from the points of the map, by iteration."""
+        goes = np.isfinite(self.after) & (self.after != 0)
+        at = np.where(goes, _place(np.where(goes, self.after, 1.0)), REST)
+        return tuple(self._told_apart(self._followed(at)))
+
+    def _followed(self, at: np.ndarray) -> np.ndarray:
+        """The last of the landings that follow places, shape (points, landings), once the map has come to what attracts
+        it."""
+        iterations, before = ITERATIONS, np.full(len(at), np.inf)
+        for _ in range(TIMES):
+            for _ in range(iterations):
+                at = self.next(at)
+            orbits = [at]
+            for _ in range(2 * MOST_SWINGS):
+                orbits.append(self.next(orbits[-1]))
+            paths = np.array(orbits).T
+            strays = _strays(paths)
+            if not np.any((strays > ROUNDING) & (strays > before) | ((strays > SAME) & ~np.isfinite(before))):
+                break
+            at, iterations, before = orbits[-1], 2 * iterations, strays
+        return paths
+
+    def foretold(self, distances: np.ndarray) -> np.ndarray:
+        """The signed distances of the next landings, shape (count,), 0 where the stage rests."""
+        at = np.abs(distances) if self.symmetric else distances
+        moves = np.isfinite(at) & (np.abs(at) >= RESOLVED)
+        places = np.where(moves, _place(np.where(moves, at, 1.0)), REST)
+        return _distance(self.next(places))
+
+    def goes_on(self, distances: np.ndarray) -> np.ndarray:
+        """Whether landings at signed distances go on for ever, shape (count,)."""
+        at = np.abs(distances) if self.symmetric else distances
+        moves = np.isfinite(at) & (np.abs(at) >= RESOLVED)
+        places = np.where(moves, _place(np.where(moves, at, 1.0)), REST)
+        return np.all(self._followed(places) > REST, axis=1)
+
+    def _told_apart(self, paths: np.ndarray) -> Iterator[MapAttractor]:
+        """The attractors that paths of places, shape (points, landings), are on, each once."""
+        left = np.all(paths > REST, axis=1)
+        while left.any():
+            number = int(np.flatnonzero(left)[0])
+            first = paths[number]
+            swings = _repeats_after(first, self.symmetric)
+            near = np.abs(paths[:, :, None] - first[None, None, : max(swings, 1)]) < ALIKE
+            same = left & (near.any(axis=1).all(axis=1) if swings else _mixed(paths, first))
+            same[number] = True
+            yield MapAttractor(_distance(first[: swings or len(first)]), np.flatnonzero(same), swings > 0)
+            left &= ~same
+
+    @property
+    def returns(self) -> bool:
+        """Whether the stage lands as far off again from somewhere, and less far from beyond: there is a fixed point of
+        the distance, attracting or not, of symmetric stages; of others there may be one."""
+        for side in self.sides:
+            gain = self.gain[self.points(side)]
+            if len(gain) > 1 and not np.any((gain[:-1] > 1) & (gain[1:] <= 1) & (gain[1:] > 0)):
+                return False
+        return True
+
+    @property
+    def scatter(self) -> tuple[float, float]:
+        """By how much, at worst, a landing differs from what its neighbours predict, as a share of it, and at which
+        distance; infinite where a stage rests between two landings that go on alike, or the other way round; 0 where no
+        three points are close together. Only points that land at more than half of their distance count."""
+        worst, place = 0.0, np.nan
+        for side in self.sides:
+            points = self.points(side)
+            if len(points) < 3:
+                continue
+            u, after = np.log(np.abs(self.before[points])), self.after[points]
+            goes = np.isfinite(after) & (after != 0)
+            with np.errstate(all="ignore"):
+                v = np.log(np.abs(after))
+                share = (u[1:-1] - u[:-2]) / np.maximum(u[2:] - u[:-2], 1e-12)
+                off = np.abs(v[1:-1] - (1 - share) * v[:-2] - share * v[2:])
+            alike = (goes[:-2] == goes[2:]) & ~(np.abs(v[2:] - v[:-2]) > JUMP)
+            off = np.where(goes[1:-1] & goes[:-2] & goes[2:], off, np.where(goes[:-2] != goes[1:-1], np.inf, 0.0))
+            off = np.where(alike & (u[2:] - u[:-2] < NEAR), off, 0.0)
+            off[np.fmax(v[1:-1] - u[1:-1], v[2:] - u[2:]) < np.log(0.5)] = 0.0
+            if off.max() > worst:
+                k = int(off.argmax())
+                worst, place = float(off[k]), side * float(np.exp(u[k + 1]))
+        return worst, place
+
+
+def _place(distances: np.ndarray) -> np.ndarray:
+    """The logarithms of signed distances, those on the negative side shifted."""
+    return np.log(np.abs(distances)) + OTHER_SIDE * (distances < 0)
+
+
+def _distance(places: np.ndarray) -> np.ndarray:
+    """The signed distances at places."""
+    negative = places > OTHER_SIDE / 2
+    return np.where(negative, -1.0, 1.0) * np.exp(np.where(negative, places - OTHER_SIDE, places))
+
+
+def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Landings of runs, shape (runs, landings), the start first, without those farther off than `FAR` from which a run
+    comes back, and how many are left without the start: there it passes its reference without sticking, so that
+    distance alone does not tell what follows."""
+    rows, order = np.arange(len(distances))[:, None], np.arange(distances.shape[1])
+    near = (np.abs(distances) <= FAR) & (order <= count[:, None])
+    last = np.where(near.any(axis=1), distances.shape[1] - 1 - near[:, ::-1].argmax(axis=1), -1)
+    kept = (near | (order > last[:, None]) | (order == 0)) & (order <= count[:, None])
+    kept_first = np.argsort(~kept, axis=1, kind="stable")
+    left = kept.sum(axis=1)
+    return np.where(order < left[:, None], distances[rows, kept_first], np.nan), left - 1
+
+
+def _strays(paths: np.ndarray) -> np.ndarray:
+    """By how much the places of paths, shape (points, landings), differ at least from those of a cycle before, shape
+    (points,)."""
+    return np.min([np.abs(paths[:, n:] - paths[:, :-n]).max(axis=1) for n in range(1, MOST_SWINGS + 1)], axis=0)
+
+
+def _repeats_after(path: np.ndarray, symmetric: bool) -> int:
+    """The number of swings after which the places of landings repeat themselves, 0 if they do not."""
+    for swings in range(1 if symmetric else 2, MOST_SWINGS + 1, 1 if symmetric else 2):
+        if np.all(np.abs(path[swings:] - path[:-swings]) < SAME):
+            return swings
+    return 0
+
+
+def _mixed(paths: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Which paths wander over the range of one, shape (points,)."""
+    return (paths.min(axis=1) > first.min() - 10 * ALIKE) & (paths.max(axis=1) < first.max() + 10 * ALIKE)

@@ -1,0 +1,133 @@
+"""Landings of stages: how far from its reference a stage turns on either side, one swing after the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from friso.equations.roles import Role
+from friso.hunting.attractors.rounds import RESOLVED
+from friso.hunting.cycle.ensemble import Ensemble, done
+from friso.hunting.cycle.rest import wait
+from friso.hunting.cycle.return_map import FLIGHT, PATIENCE
+
+RTOL = 1e-6
+"""Relative tolerance of the runs."""
+
+LEG = 0.05
+"""Share of its distance by which a stage moves back and forth at most that rings where it has landed."""
+
+STANDS = 1e-3
+"""Speed, in units of its distance times the natural frequency of mass and loop, up to which a stage has landed."""
+
+RESTS = 0.01
+"""Share of its distance by which a stage moves at most, while it could have broken away, that rests or creeps home."""
+
+BUDGET = 20_000
+"""Steps that a run takes in a round at most: a swing takes a thousand, but where a limiter or a controller chatters."""
+
+ROUNDS = 3
+"""Rounds of runs more than the landings wanted: a stage that stops short of its reference needs two for a swing."""
+
+
+@dataclass(frozen=True)
+class Landings:
+    """Runs and their landings: signed distances from the reference [m] and times [s], shape (runs, landings), NaN after
+    the last, the start first; how many there are without the start, `count` (runs,); the states in which the runs
+    ended, shape (runs, states); which of them `rest` and which ran `away` or failed, `lost`, shape (runs,)."""
+
+    distances: np.ndarray
+    times: np.ndarray
+    count: np.ndarray
+    ends: np.ndarray
+    rest: np.ndarray
+    away: np.ndarray
+    lost: np.ndarray
+
+    def take(self, numbers: np.ndarray) -> Landings:
+        """The runs with these numbers."""
+        return Landings(*(getattr(self, entry.name)[numbers] for entry in fields(self)))
+
+    def joined(self, more: Landings) -> Landings:
+        """These runs and more."""
+        room = max(self.distances.shape[1], more.distances.shape[1])
+        pairs = ((getattr(part._with(room), entry.name) for part in (self, more)) for entry in fields(self))
+        return Landings(*(np.concatenate([*pair]) for pair in pairs))
+
+    def _with(self, room: int) -> Landings:
+        """The runs with room for so many landings."""
+        wider = ((0, 0), (0, room - self.distances.shape[1]))
+        distances, times = (np.pad(part, wider, constant_values=np.nan) for part in (self.distances, self.times))
+        return replace(self, distances=distances, times=times)
+
+
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
+def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float = RTOL) -> Landings:
+    """Follow stages from states in which they stand still, shape (runs, states), to a relative tolerance, each until it
+    has landed `most` times, or rests.
+
+    A round of runs is as long as each stage may take to wind up where it sticks and to cross its reference.
+    """
+    count, position, sticking = len(starts), stages.kernel.position, stages.sticking
+    speeds = stages.kernel.having(Role.VELOCITY)
+    states = stages.kernel.with_modes(starts, np.zeros(3), stages.values)
+    values, times = starts[:, position, None].copy(), np.zeros((count, 1))
+    rest, away, lost = (np.zeros(count, bool) for _ in range(3))
+    passed, left, found = np.zeros(count), np.arange(count), None
+    for _ in range(most + ROUNDS):
+        some, begun = stages.take(left), states[left]
+        sticks = np.abs(begun[:, sticking])
+        small = RESOLVED * some.length
+        durations = PATIENCE * wait(some, np.maximum(sticks, small)) + FLIGHT / some.number("rate")
+        legs = np.maximum(LEG * sticks, small)
+        results = some.run(begun, durations, rtol, with_modes=True, least_swing=legs, budget=BUDGET)
+        fine, room = done(results), results.turn_values.shape[1]
+        held = (np.arange(room) < results.turn_counts[:, None]) & fine[:, None]
+        more, at = np.full((2, count, room + 1), np.nan)
+        more[left] = np.hstack([np.where(held, results.turn_values, np.nan), results.ends[:, [position]]])
+        at[left] = passed[left, None] + np.hstack([results.turn_times, durations[:, None]])
+        values, times = np.hstack([values, more]), np.hstack([times, at])
+        states[left], passed[left] = results.ends, passed[left] + durations
+        away[left], lost[left] = ~fine & (np.abs(results.ends[:, position]) > 1e5 * some.length), ~fine
+        before = np.zeros(left.size, np.int64) if found is None else found.count[left]
+        speed = np.abs(results.ends[:, speeds]).max(axis=1)
+        stands = speed < STANDS * some.number("rate") * np.maximum(np.abs(results.ends[:, position]), small)
+        found = _landings(values, times, most)
+        ends = np.abs(results.ends[:, sticking])
+        rest[left] = fine & stands & (found.count[left] == before) & (before < most)
+        rest[left] &= np.abs(ends - sticks) < np.maximum(RESTS * sticks, small)
+        last = np.abs(found.distances[left, found.count[left]])
+        rest[left] |= fine & stands & (ends < small) & (last < small)
+        unfinished = ~stands & (found.count[left] == most) & (before < most)
+        left = left[fine & ~rest[left] & ((found.count[left] < most) | unfinished)]
+        if not left.size:
+            break
+    assert found is not None
+    return Landings(found.distances, found.times, found.count, states, rest, away, lost)
+
+
+@dataclass(frozen=True)
+class _Found:
+    distances: np.ndarray
+    times: np.ndarray
+    count: np.ndarray
+
+
+def _landings(values: np.ndarray, times: np.ndarray, most: int) -> _Found:
+    """The farthest of the places [m] that runs pass on one side of the reference, one side after the other, and when
+    [s]; places of shape (runs, places), NaN where there is none."""
+    count = len(values)
+    rows = np.arange(count)
+    where, when = np.full((count, most + 1), np.nan), np.full((count, most + 1), np.nan)
+    where[:, 0], when[:, 0] = values[:, 0], times[:, 0]
+    number, side = np.zeros(count, np.int64), np.where(values[:, 0] < 0, -1.0, 1.0)
+    for value, time in zip(values.T[1:], times.T[1:], strict=True):
+        crossed = (side * value < 0) & (number <= most)
+        number[crossed] += 1
+        side[crossed] *= -1
+        open_ = np.minimum(number, most)
+        farther = (crossed | (side * value > side * where[rows, open_])) & (number <= most) & np.isfinite(value)
+        farther &= number > 0
+        where[rows[farther], open_[farther]], when[rows[farther], open_[farther]] = value[farther], time[farther]
+    return _Found(where, when, np.minimum(number, most))

@@ -1,0 +1,205 @@
+"""Return maps of many stages at once: where runs begin, and where more are needed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.rest import stuck
+from friso.hunting.return_map.landing_map import JUMP, LandingMap
+from friso.hunting.return_map.landings import RTOL, Landings, find_landings
+from friso.stage.controllers import FORCE_LIMIT
+
+NEAR, FAR = np.geomspace(0.01, 3.0, 24), np.geomspace(5.0, 300.0, 6)
+"""Distances at which stages are stuck at first, in units of the deflection of the loop by the break-away force."""
+
+NEAREST = np.geomspace(0.001, 0.007, 4)
+"""Distances nearer than these, in those units: from there most stages creep home."""
+
+LIMITED = np.geomspace(600.0, 30000.0, 6)
+"""Distances beyond these, in those units, of stages with a force limit."""
+
+LANDINGS = 3
+"""Landings of a run: what follows the first of them does not depend any more on how the run began."""
+
+COARSE, FINE = 0.15, 0.01
+"""Widest gap between neighbouring logarithms of distance, and where the map comes near its diagonal."""
+
+DIAGONAL = 0.1
+"""Logarithm of the gain up to which the map is near its diagonal."""
+
+OUTERMOST = 0.3
+"""The same beyond which nothing more is looked for outside the outermost points."""
+
+MOST = 12
+"""Runs that are added for a stage at once, at most."""
+
+ROUNDS = 2
+"""How often runs are added."""
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """Stages and runs of theirs: `owners` (runs,), the numbers of their stages; where they were stuck at first, `starts`
+    (runs,), signed, in units of the deflection of the loop by the break-away force, NaN where a run goes on from
+    another one; whether a run was `continued` by another one, (runs,); their `landings`; and the relative tolerance
+    `rtol`."""
+
+    stages: Ensemble
+    owners: np.ndarray
+    starts: np.ndarray
+    continued: np.ndarray
+    landings: Landings
+    rtol: float = RTOL
+
+    @cached_property
+    def maps(self) -> tuple[LandingMap, ...]:
+        """The return map of each stage."""
+        return tuple(self._map(k) for k in range(self.stages.count))
+
+    def _map(self, stage: int) -> LandingMap:
+        which = np.flatnonzero(self.owners == stage)
+        length, symmetric = float(self.stages.length[stage]), bool(self.stages.symmetric[stage])
+        first = np.isfinite(self.starts[which]).astype(int)
+        return LandingMap.of(self.landings.take(which), length, symmetric, first).renumbered(which)
+
+    @property
+    def attracts(self) -> np.ndarray:
+        """On which maps landings go on for ever, shape (count,)."""
+        return np.array([bool(found.attractors) for found in self.maps], bool)
+
+    def take(self, numbers: np.ndarray) -> Mapped:
+        """The stages with these numbers, each once, and their runs."""
+        which = np.flatnonzero(np.isin(self.owners, numbers))
+        owners = np.array([np.flatnonzero(numbers == owner)[0] for owner in self.owners[which]], np.int64)
+        runs = (self.starts[which], self.continued[which], self.landings.take(which))
+        return Mapped(self.stages.take(numbers), owners, *runs, self.rtol)
+
+    def joined(self, owners: np.ndarray, starts: np.ndarray, landings: Landings) -> Mapped:
+        """The same with more runs."""
+        together = self.landings.joined(landings)
+        pairs = ((self.owners, owners), (self.starts, starts), (self.continued, np.zeros(len(owners), bool)))
+        joined = Mapped(self.stages, *(np.append(*pair) for pair in pairs), together, self.rtol)
+        if "maps" in vars(self):
+            changed = set(owners.tolist())
+            maps = (joined._map(k) if k in changed else known for k, known in enumerate(self.maps))
+            vars(joined)["maps"] = tuple(maps)
+        return joined
+
+    def begun(self, owners: np.ndarray, starts: np.ndarray, most: int = LANDINGS) -> Mapped:
+        """The same with more runs of the stages `owners`, stuck at first at `starts`, both (runs,)."""
+        return self.joined(owners, starts, _stuck_at(self.stages, owners, starts, most, self.rtol))
+
+    def gone_on(self, runs: np.ndarray, most: int) -> Mapped:
+        """The same with more runs, which go on from where those with some numbers ended, from their last landing."""
+        owners, states = self.owners[runs], self.landings.ends[runs]
+        more = find_landings(self.stages.take(owners), states, most, self.rtol)
+        continued = self.continued.copy()
+        continued[runs] = True
+        before = Mapped(self.stages, self.owners, self.starts, continued, self.landings, self.rtol)
+        vars(before)["maps"] = self.maps
+        return before.joined(owners, np.full(len(runs), np.nan), more)
+
+    def finer(self) -> Mapped:
+        """The same with more runs, where a map is not resolved yet."""
+        wanted = [self._wanted(k) for k in range(self.stages.count)]
+        owners = np.repeat(np.arange(self.stages.count), [len(starts) for starts in wanted])
+        return self.begun(owners, np.concatenate(wanted)) if owners.size else self
+
+    def _wanted(self, stage: int) -> np.ndarray:
+        """Where more runs of a stage begin: those that land between neighbouring points that are too far apart."""
+        landing_map, starts = self.maps[stage], []
+        which = np.flatnonzero((self.owners == stage) & np.isfinite(self.starts))
+        which = which[np.argsort(self.starts[which], kind="stable")]
+        length, symmetric = float(self.stages.length[stage]), bool(self.stages.symmetric[stage])
+        seen = self.landings.distances[which] / length
+        seen = np.abs(seen) if symmetric else seen
+        for place in gaps(landing_map)[:MOST]:
+            start = _start_that_lands(self.starts[which], seen, place)
+            if start is not None and not np.isclose(start, self.starts[which], rtol=1e-6).any():
+                starts.append(start)
+        return np.unique(starts + _beside(self.starts[which], which, unclosed(landing_map)))
+
+
+def map_stages(stages: Ensemble, near: np.ndarray = NEAR, rounds: int = ROUNDS, rtol: float = RTOL) -> Mapped:
+    """The return maps of stages, from runs that begin stuck at distances `near` their reference and farther off."""
+    limited = [LIMITED] if FORCE_LIMIT in stages.flat else []
+    units = np.concatenate([NEAREST, near, FAR, *limited])
+    sides = [(np.arange(stages.count), 1.0), (np.flatnonzero(~stages.symmetric), -1.0)]
+    owners = np.concatenate([np.repeat(which, len(units)) for which, _ in sides])
+    starts = np.concatenate([np.tile(side * units, len(which)) for which, side in sides])
+    mapped = Mapped(stages, owners, starts, np.zeros(len(owners), bool), _stuck_at(stages, owners, starts, LANDINGS, rtol), rtol)
+    for _ in range(rounds):
+        mapped = mapped.finer()
+    return mapped
+
+
+def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: int, rtol: float) -> Landings:
+    """The landings of runs of the stages `owners` that are stuck at first at `starts`, both (runs,)."""
+    several = stages.take(owners)
+    return find_landings(several, stuck(several, starts * several.length), most, rtol)
+
+
+def gaps(landing_map: LandingMap) -> np.ndarray:
+    """Signed distances in the middle of gaps between points that are wider than they may be, the worst first."""
+    places, excess = [], []
+    for side in landing_map.sides:
+        points = landing_map.points(side)
+        before = np.abs(landing_map.before[points])
+        across = np.abs(landing_map.after[points])
+        if len(points) < 2:
+            continue
+        with np.errstate(all="ignore"):
+            u, gain = np.log(before), np.log(across / before)
+            apart = np.diff(u)
+            lower, upper = np.minimum(gain[:-1], gain[1:]), np.maximum(gain[:-1], gain[1:])
+            crosses = (lower < DIAGONAL) & (upper > -DIAGONAL)
+            breaks = ~(np.abs(np.diff(np.log(across))) < JUMP) & (upper > -1.0)
+        limit = np.where(crosses & ~breaks, FINE, np.where(breaks, 2 * FINE, COARSE))
+        limit = np.where(upper < -1.0, np.inf, limit)
+        wide = np.flatnonzero(apart > limit)
+        places += (side * np.exp((u[wide] + u[wide + 1]) / 2)).tolist()
+        excess += (apart[wide] / limit[wide]).tolist()
+    return np.array(places)[np.argsort(-np.array(excess), kind="stable")] if places else np.zeros(0)
+
+
+def unclosed(landing_map: LandingMap) -> list[int]:
+    """The runs of the outermost points of a map that go on about as far: beyond them it is not known what follows."""
+    runs = []
+    for side in landing_map.sides:
+        points = landing_map.points(side)
+        for end in points[-1:], points[landing_map.after[points] != 0][:1]:
+            if end.size and np.log(max(landing_map.gain[end[0]], 1e-300)) > -OUTERMOST:
+                runs.append(int(landing_map.run[end[0]]))
+    return runs
+
+
+def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[float]:
+    """Starts half-way to those next to the starts of some runs; `starts`, ascending, and the `numbers` of their runs."""
+    between = []
+    for run in runs:
+        for k in np.flatnonzero(numbers == run):
+            for other in (k - 1, k + 1):
+                if 0 <= other < len(starts) and starts[k] * starts[other] > 0:
+                    between.append(float(np.sign(starts[k]) * np.sqrt(starts[k] * starts[other])))
+    return between
+
+
+def _start_that_lands(starts: np.ndarray, seen: np.ndarray, place: float) -> float | None:
+    """Where a run begins that lands at a place, between two neighbouring ones that land about it; None if none do.
+    `starts` (runs,), ascending, and landings, shape (runs, landings), the start first."""
+    best, found = np.inf, None
+    for k in range(1, LANDINGS):
+        low, high = seen[:-1, k], seen[1:, k]
+        with np.errstate(all="ignore"):
+            around = np.flatnonzero(((low - place) * (high - place) <= 0) & (low * high > 0))
+            for i in around[starts[around] * starts[around + 1] > 0]:
+                apart = abs(np.log(high[i] / low[i]))
+                if apart < best:
+                    share = np.clip(np.log(place / low[i]) / np.log(high[i] / low[i]), 0.02, 0.98)
+                    found = starts[i] * (starts[i + 1] / starts[i]) ** share
+                    best = apart
+    return None if found is None else float(found)
