@@ -9,42 +9,43 @@ import numpy as np
 
 from benchmarks.return_map.searched import edge_as_data, end_as_data, kick_as_data, motion_as_data
 from friso.engine.allowance import Exhausted, allowance
-from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import cannot_hunt
+from friso.hunting import Ensemble, cannot_hunt
 from friso.hunting.return_map import (
     displacements_by_map,
-    motions_by_map,
     moves_by_map,
+    own_motion_by_map,
     pushes_by_map,
     search_by_maps,
     survey_maps,
 )
-from friso.hunting.verdict import CHANGED, WORK
 from friso.stage import Stage
+
+WORK = 8e8
+"""Work that an answer may take, as a check may."""
 
 
 def mapped(stage: Stage) -> dict[str, Any]:
     """The answer about a stage whose joint is as given, the work of each part, and the CPU time [s]."""
-    start, parts, said = time.process_time(), {}, {"given_up": False, "possible": not cannot_hunt(stage)}
+    start = time.process_time()
+    parts: dict[str, float] = {}
+    said: dict[str, Any] = {"given_up": False, "possible": not cannot_hunt(stage)}
     if not said["possible"]:
         return said
     flat = stage.flat()
-    try:
-        with allowance(WORK) as spent:
+    with allowance(WORK) as spent:
+        try:
             survey = survey_maps(Ensemble.held(flat, 1))
-            (found,), parts["survey"] = survey.mapped.maps, spent.used
+            (landing_map,), parts["survey"] = survey.mapped.maps, spent.used
             said |= {
                 "attracts": bool(survey.attracts[0]),
                 "resolved": bool(survey.resolved[0]),
                 "doubt": str(survey.doubts[0]),
                 "attractors": [motion_as_data(motion) for motion in survey.motions],
-                "scatter": [min(value, 1e9) for value in np.nan_to_num(found.scatter).tolist()],
-                "points": len(found.before),
+                "scatter": [min(value, 1e9) for value in np.nan_to_num(landing_map.scatter).tolist()],
+                "points": len(landing_map.before),
             }
             if survey.attracts[0]:
-                masses = {key: value * CHANGED for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
-                ends, known = motions_by_map({**flat, **masses}, len(CHANGED), survey)
-                said |= {"own_ends": bool(ends[0]), "own_known": bool(known.all() and (ends == ends[0]).all())}
+                said["own_ends"], said["own_known"] = own_motion_by_map(stage, survey)
                 said["kick"] = kick_as_data(displacements_by_map(Ensemble.held(flat, 1), survey))
                 pushes_by_map(Ensemble.held(flat, 1), survey)
                 moves = moves_by_map(stage, survey)
@@ -55,6 +56,6 @@ def mapped(stage: Stage) -> dict[str, Any]:
             said["edge"] = sought.margin and edge_as_data(sought.margin)
             said["windows"] = [[end_as_data(window.low), end_as_data(window.high)] for window in sought.windows]
             said["lower"] = end_as_data(sought.lower)
-    except Exhausted:
-        said["given_up"] = True
+        except Exhausted:
+            said["given_up"] = True
     return said | {"work": spent.used, "parts": parts, "cpu": time.process_time() - start}

@@ -3,51 +3,41 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from typing import Any
 
 from friso.engine.allowance import allowance
-from friso.engine.batch import run_chunks
-from friso.engine.kernel import kernel
-from friso.equations.structure import structure
-from friso.hunting.attractors.survey import Swinging
-from friso.hunting.basin import Kick
-from friso.hunting.cases import LONG_RUN_RTOL, RTOL
-from friso.hunting.margin import Margin
-from friso.hunting.measures import measure_runs, measuring_options
-from friso.hunting.outward import AttractionEnd
-from friso.hunting.verdict import ROOM, Judgement, judge
+from friso.hunting import AttractionEnd, CheckPart, Judgement, Kick, Margin, Swinging, check_given
 from friso.stage import Stage
 
 
 def searched(stage: Stage) -> dict[str, Any]:
     """The answer about a stage whose joint is as given, the work of each part, and the CPU time [s]."""
-    flat, parts, last = stage.flat(), {}, "own run"
+    parts: dict[str, float] = {}
+    last = str(CheckPart.ATTRACTION)
     start = time.process_time()
     with allowance() as spent:
 
-        def begin(part: str) -> None:
+        def ended(_done: int, _total: int, part: str) -> None:
             nonlocal last
-            parts[last], last = spent.used - sum(parts.values()), part
+            parts[last] = parts.get(last, 0.0) + spent.used - sum(parts.values())
+            last = str(part)
 
-        (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(measuring_options(RTOL), room=ROOM))
-        said = judge(stage, measure_runs(flat, runs), LONG_RUN_RTOL, begin)
-        begin("end")
+        said = check_given(stage, progress=ended).judgement
+        ended(1, 1, last)
     return _as_data(said) | {"work": spent.used, "parts": parts, "cpu": time.process_time() - start}
 
 
 def _as_data(said: Judgement) -> dict[str, Any]:
     hunting, edge, kick = said.hunting, said.margin, said.displacement
+    motions = hunting.surveyed.motions if hunting.surveyed else ()
     return {
         "verdict": "runs away" if said.runs_away else said.verdict,
         "certain": hunting.certain,
         "reason": hunting.reason,
         "possible": hunting.possible,
-        "attractors": [
-            motion_as_data(motion) for motion in (hunting.surveyed.motions if hunting.surveyed else ())
-        ],
+        "attractors": [motion_as_data(motion) for motion in motions],
         "edge": edge and edge_as_data(edge),
-        "windows": [[end_as_data(w.low), end_as_data(w.high)] for w in said.windows],
+        "windows": [[end_as_data(window.low), end_as_data(window.high)] for window in said.windows],
         "lower": end_as_data(said.lower),
         "kick": kick and kick_as_data(kick),
         "moves": said.moves and [said.moves.hunting, said.moves.count],
@@ -56,22 +46,21 @@ def _as_data(said: Judgement) -> dict[str, Any]:
 
 
 def edge_as_data(edge: Margin) -> dict[str, Any]:
+    """The edge of hunting: its factor of the bandwidth, and what is known of it."""
     return {"factor": edge.factor, "certain": edge.certain, "quiet": edge.quiet, "reserve": edge.reserve}
 
 
 def end_as_data(end: AttractionEnd | None) -> dict[str, Any] | None:
-    return end and {
-        "factor": end.inside,
-        "certain": end.certain,
-        "quiet": end.outside,
-        "reserve": end.reserve,
-    }
+    """An end of a window, in the same way; None where it lies beyond what was searched."""
+    return end and {"factor": end.inside, "certain": end.certain, "quiet": end.outside, "reserve": end.reserve}
 
 
 def kick_as_data(kick: Kick) -> dict[str, Any]:
+    """Windows of kicks that start hunting."""
     return {"windows": kick.windows, "searched": kick.searched, "unknown": kick.unknown}
 
 
 def motion_as_data(motion: Swinging) -> dict[str, Any]:
+    """A motion that attracts."""
     closed = motion.cycles is not None
     return {"amplitude": motion.amplitude, "period": motion.period, "swings": motion.swings, "closed": closed}

@@ -119,14 +119,14 @@ def page(records: Sequence[Record], tally: dict[str, Any]) -> str:
         "neither right nor wrong was given up for its work, or leaves nothing to try (no friction, or a reference that "
         "never stands still). Code: digests of what checks rest on, and of the adversary.",
         "",
-        *_markdown(head, rows),
+        *markdown(head, rows),
         "",
         f"Certain and wrong: {len(wrong) or 'none'}.",
         *wrong,
         "",
         "## By class of machine",
         "",
-        *_markdown(["class", *COLUMNS.values()], _rows(tally)),
+        *markdown(["class", *COLUMNS.values()], _rows(tally)),
     ]
     return "\n".join(lines) + "\n"
 
@@ -135,7 +135,8 @@ def _rows(tally: dict[str, Any]) -> list[list[Any]]:
     return [[name, *(row[key] for key in COLUMNS)] for name, row in {**tally["classes"], "all": tally["all"]}.items()]
 
 
-def _markdown(head: Sequence[Any], rows: Iterable[Sequence[Any]]) -> list[str]:
+def markdown(head: Sequence[Any], rows: Iterable[Sequence[Any]]) -> list[str]:
+    """The lines of a table in Markdown."""
     return [f"| {' | '.join(map(str, row))} |" for row in (head, ["---"] * len(head), *rows)]
 
 

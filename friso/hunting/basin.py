@@ -249,8 +249,8 @@ def moves_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Mov
 def move_share(
     stage: Stage, hunts: Callable[[Mapping[str, Any], int], tuple[np.ndarray, np.ndarray]]
 ) -> MoveShare | None:
-    """Draw moves about that of the stage's file and find the share of them that `hunts` tells to hunt, of those of which
-    it is known. None for motions that have no acceleration, or if it is known of none."""
+    """Draw moves about that of the stage's file and find the share of them that `hunts`, of those about which it is
+    decided. None for motions that have no acceleration, or if it decides about none."""
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
         return None
@@ -265,8 +265,8 @@ def move_share(
         "motion.acceleration": low + across * (high - low),
         "motion.acceleration_time": shortest + along * (longest - shortest),
     }
-    ends, known = hunts(moved, MOVES)
-    return MoveShare(int(known.sum()), int(ends[known].sum()), accelerations, times) if known.any() else None
+    ends, decided = hunts(moved, MOVES)
+    return MoveShare(int(decided.sum()), int(ends[decided].sum()), accelerations, times) if decided.any() else None
 
 
 def evenly(count: int) -> np.ndarray:

@@ -141,11 +141,12 @@ def _share(stage: Stage) -> float:
     return FREE if free else 1 - FREE
 
 
-def check_given(stage: Stage, rtol: float = RTOL) -> Case:
-    """Check a stage as it is given, its joint as its file has it. Raises InputError for an unusable `rtol`."""
+def check_given(stage: Stage, rtol: float = RTOL, progress: Progress = silent) -> Case:
+    """Check a stage as it is given, its joint as its file has it; `progress` is called as parts of it end. Raises
+    InputError for an unusable `rtol`."""
     checked_rtol(rtol)
     kernels(_needed(stage))
-    return _case(stage, rtol, False, Tally(silent, len(PARTS)), WORK)
+    return _case(stage, rtol, False, Tally(progress, len(PARTS)), WORK)
 
 
 def _needed(stage: Stage) -> set[KernelRequest]:

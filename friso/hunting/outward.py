@@ -155,16 +155,27 @@ class Beyond(Exception):
 
 
 @dataclass(frozen=True)
+class Steps:
+    """How orbits are followed to their ends: at a `pace`, in units of that at which they are drawn, in steps from the
+    `first` (None: as usual) to the `shortest`; and to which steps along the branch flips and folds are found."""
+
+    pace: float = PACE
+    first: float | None = None
+    shortest: float = SHORTEST
+    flip: float = PRECISE
+    fold: float = FLAT
+
+
+@dataclass(frozen=True)
 class Outward:
     """The search for the end of what attracts a stage, given as flat keys, from a bandwidth towards the `farthest` one
-    (factors). Nothing attracts at the one that is `settled`, if any: a window beyond it is another one. Branches are
-    followed at a `pace`, in steps no shorter than the `shortest`."""
+    (factors). Nothing attracts at the one that is `settled`, if any: a window beyond it is another one. Orbits are
+    followed in `steps`."""
 
     flat: Mapping[str, Any]
     farthest: float
     settled: float | None = None
-    shortest: float = SHORTEST
-    pace: float = PACE
+    steps: Steps = Steps()
 
     def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> AttractionEnd:
         """The end of what attracts: these motions do at a factor, nothing does at the one `outside`. Raises Beyond
@@ -188,7 +199,7 @@ class Outward:
                 if not closed and max(place.outside / place.at, place.at / place.outside) < beyond:
                     break
                 continue
-            flip = self._flip(at, self._still_ahead(at, outside)) if self._chatters and _is_simple(orbit) else None
+            flip = self.flip(at, self._still_ahead(at, outside)) if self._chatters and _is_simple(orbit) else None
             if flip:
                 (place.at, reserve), distance, end = flip, orbit.distance, FOUND
             else:
@@ -356,7 +367,11 @@ class Outward:
             return self._stages(at * np.exp(ahead * places))
 
         length = abs(float(np.log(self.farthest / at)))
-        tracer = Tracer(family, cycles.sign, farthest=length, swings=cycles.swings, pace=self.pace, shortest=self.shortest)
+        how = self.steps
+        tracer = Tracer(
+            family, cycles.sign, farthest=length, swings=cycles.swings, pace=how.pace, shortest=how.shortest
+        )
+        tracer.first = how.first or tracer.first
         start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
         farthest, reserve = start, PRECISE
 
@@ -371,7 +386,7 @@ class Outward:
         first, second = ([start, *points])[-2:] if points else (start, start)
         if points and not abs(second.multiplier) < 1 and reason in (REACHED, END_OF_RANGE):
             kind = _kind(first, second)
-            last = last_inside(tracer, first, second, kind, FLAT if kind == "fold" else PRECISE)
+            last = last_inside(tracer, first, second, kind, how.fold if kind == "fold" else how.flip)
             ended = last is not None
             farthest = max(farthest, last or first, key=lambda point: point.place)
             if last is not None and kind == "fold" and self._chatters:
@@ -394,7 +409,7 @@ class Outward:
         return float(at * np.exp(ahead * farthest.place)), orbit_distance(farthest, orbit), end, reserve
 
     @np.errstate(all="ignore")
-    def _flip(self, at: float, outside: float) -> tuple[float, float] | None:
+    def flip(self, at: float, outside: float) -> tuple[float, float] | None:
         """The factor between two at which the simplest cycle begins to repel, and up to what share of it that is known,
         from a curve through its multipliers in between: each of them is rough where a limiter chatters. The curve is
         laid twice, the second time over less; what both differ by, and twice what the multipliers scatter about the

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL
 from friso.hunting.return_map.landing_map import MapAttractor
-from friso.hunting.return_map.mapped import Mapped, map_stages
+from friso.hunting.return_map.mapped import Mapped, map_stages, remembered
 
 TRIES = 4
 """How often attractors of the maps are followed, whose landings join the maps."""
@@ -22,8 +23,9 @@ TRIES = 4
 FOLLOWED = 3
 """Cycles for which an attractor of a map is followed at least."""
 
-ABOUT = 0.05
-"""Share by which landings differ at most from those of a cycle before that is tried to be closed."""
+ABOUT, CLOSELY = 0.05, 0.01
+"""Shares by which landings differ at most from those of a cycle before that is tried to be closed: of the simplest, and
+of others."""
 
 ALIKE = 0.05
 """Share by which the mean distance of landings of an attractor of a map differs at most from that of its orbit."""
@@ -53,14 +55,14 @@ class MapSurvey:
     def doubts(self) -> np.ndarray:
         """Why it is not known what attracts stages, words of shape (count,), "" where it is."""
         why = np.full(self.mapped.stages.count, "", dtype=object)
-        for stage, found in enumerate(self.mapped.maps):
-            scatter, _ = found.scatter
+        for stage, landing_map in enumerate(self.mapped.maps):
+            scatter, _ = landing_map.scatter
             if self.open[stage]:
                 why[stage] = UNCLOSED
-            elif found.lost:
+            elif landing_map.lost:
                 why[stage] = LOST
             elif scatter > SCATTER:
-                why[stage] = SCATTERS
+                why[stage] = f"{SCATTERS} ({remembered(self.mapped, stage)})"
         return why
 
     @property
@@ -104,10 +106,17 @@ def survey_maps(stages: Ensemble, rtol: float = RTOL, mapped: Mapped | None = No
     return MapSurvey(mapped, tuple(motions), tuple(repelling), undecided)
 
 
+def of_stages(motions: Iterable[Swinging], count: int) -> list[tuple[Swinging, ...]]:
+    """Motions by the number of their stage."""
+    motions = tuple(motions)
+    return [tuple(motion for motion in motions if motion.stage == k) for k in range(count)]
+
+
 def _left(mapped: Mapped, motions: list[Swinging], repelling: list[Swinging]) -> list[_Proposal]:
     """The attractors of all maps of which it is not known whether they attract, but those that no run comes to which
     may go on."""
-    return [p for p in _proposals(mapped) if not any(_is(p, motion, mapped.stages) for motion in (*motions, *repelling))]
+    closed = (*motions, *repelling)
+    return [new for new in _proposals(mapped) if not any(_is(new, motion, mapped.stages) for motion in closed)]
 
 
 def _swings(attractor: MapAttractor) -> int:
@@ -116,7 +125,7 @@ def _swings(attractor: MapAttractor) -> int:
 
 def _proposals(mapped: Mapped) -> list[_Proposal]:
     """The attractors of all maps, each with the run in its basin that ended nearest to it."""
-    found = []
+    proposals = []
     for stage, landing_map in enumerate(mapped.maps):
         for attractor in landing_map.attractors:
             basin = attractor.basin
@@ -127,8 +136,8 @@ def _proposals(mapped: Mapped) -> list[_Proposal]:
             with np.errstate(all="ignore"):
                 apart = np.abs(np.log(after[:, None] / attractor.distances[None, :]))
             nearest = ending[int(np.nan_to_num(apart, nan=np.inf).min(axis=1).argmin())]
-            found.append(_Proposal(stage, attractor, int(landing_map.run[nearest])))
-    return found
+            proposals.append(_Proposal(stage, attractor, int(landing_map.run[nearest])))
+    return proposals
 
 
 def _is(proposal: _Proposal, motion: Swinging, stages: Ensemble) -> bool:
@@ -142,17 +151,15 @@ def _is(proposal: _Proposal, motion: Swinging, stages: Ensemble) -> bool:
     return bool(alike and (not proposal.attractor.periodic or motion.swings % len(distances) == 0))
 
 
-def _close(
-    mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging], repelling: list[Swinging]
-) -> None:
+def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging], repelling: list[Swinging]) -> None:
     """Close orbits from runs that repeat themselves: those that attract join the motions, the others what repels."""
     landings, owners = mapped.landings.take(runs), mapped.owners[runs]
     sizes, times, swings = np.zeros(len(runs)), np.zeros(len(runs)), np.zeros(len(runs), np.int64)
     for k, owner in enumerate(owners.tolist()):
         end = 0 if landings.rest[k] or landings.lost[k] else int(landings.count[k]) + 1
         path, when = landings.distances[k, 1:end], landings.times[k, 1:end]
-        known = {motion.swings for motion in repelling if motion.stage == owner}
-        swings[k] = _repeats(path, bool(mapped.stages.symmetric[owner]), known)
+        besides = {motion.swings for motion in repelling if motion.stage == owner}
+        swings[k] = _repeats(path, bool(mapped.stages.symmetric[owner]), besides)
         if swings[k]:
             times[k], sizes[k] = when[-1] - when[-1 - swings[k]], np.ptp(path)
     which = np.flatnonzero(swings)
@@ -162,19 +169,20 @@ def _close(
     pending = Pending(some, landings.ends[which], times[which], np.zeros(which.size), some.symmetric, RUN_RTOL)
     for group, cycles in close_orbits(pending, swings[which], times[which], sizes[which], rtol):
         numbers = owners[which[group]]
-        for found, those in ((motions, cycles.attracting), (repelling, cycles.closed & ~cycles.attracting)):
+        for kind, those in ((motions, cycles.attracting), (repelling, cycles.closed & ~cycles.attracting)):
             for motion in of_cycles(numbers, cycles, mapped.stages.sticking, those):
-                if not any(motion.like(other) for other in found):
-                    found.append(motion)
+                if not any(motion.like(other) for other in kind):
+                    kind.append(motion)
 
 
-def _repeats(path: np.ndarray, symmetric: bool, known: set[int]) -> int:
-    """The least number of swings after which the last landings of a run, (landings,), about repeat themselves, but those
-    of cycles that are `known`, by the swings in their periods; 0 if they do not."""
+def _repeats(path: np.ndarray, symmetric: bool, besides: set[int]) -> int:
+    """The least number of swings after which the last landings of a run, (landings,), about repeat themselves; 0 if
+    they do not, `besides` in cycles with so many swings in their periods."""
     sizes = np.abs(path) if symmetric else path
     for swings in range(1 if symmetric else 2, len(path) // 2 + 1, 1 if symmetric else 2):
         last = min(max(swings, 2), len(path) - swings)
         again = sizes[-last:] / sizes[-last - swings : len(path) - swings]
-        if swings * (1 + swings % 2) not in known and np.all(np.abs(again - 1) < ABOUT):
+        share = ABOUT if swings <= 2 - symmetric else CLOSELY
+        if swings * (1 + swings % 2) not in besides and np.all(np.abs(again - 1) < share):
             return swings
     return 0

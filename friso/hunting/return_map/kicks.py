@@ -18,6 +18,7 @@ from friso.hunting.cycle.rest import pushed
 from friso.hunting.return_map.attracting import MapSurvey
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.landings import RTOL, find_landings
+from friso.hunting.verdict import CHANGED
 from friso.stage import Stage
 
 FIRST, MORE, ROUNDS = 3, 3, 8
@@ -59,6 +60,15 @@ def motions_by_map(flat: Mapping[str, Any], count: int, survey: MapSurvey) -> tu
     return _go_on(Ensemble.held(flat, count), ends, survey.mapped.maps[0])
 
 
+def own_motion_by_map(stage: Stage, survey: MapSurvey) -> tuple[bool, bool]:
+    """Whether the motion of a stage's file ends in what attracts the stage, and whether that is known: with masses that
+    are hardly others, too, it ends alike."""
+    flat = stage.flat()
+    masses = {key: value * CHANGED for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
+    ends, decided = motions_by_map({**flat, **masses}, len(CHANGED), survey)
+    return bool(ends[0]), bool(decided.all() and np.all(ends == ends[0]))
+
+
 def moves_by_map(stage: Stage, survey: MapSurvey) -> MoveShare | None:
     """The share of moves about that of the stage's file that end in what attracts it (see `moves_that_hunt`)."""
     return move_share(stage, lambda moved, count: motions_by_map(moved, count, survey))
@@ -71,19 +81,19 @@ def _least(survey: MapSurvey) -> float:
 def _go_on(stages: Ensemble, starts: np.ndarray, landing_map: LandingMap) -> tuple[np.ndarray, np.ndarray]:
     """Which runs go on for ever, by where they land, and of which that is known, both (runs,)."""
     count = len(starts)
-    ends, known, left = np.zeros(count, bool), np.zeros(count, bool), np.arange(count)
+    ends, decided, left = np.zeros(count, bool), np.zeros(count, bool), np.arange(count)
     states, most = starts, FIRST
     for _ in range(ROUNDS):
-        found = find_landings(stages.take(left), states, most)
+        landed = find_landings(stages.take(left), states, most)
         rows = np.arange(left.size)
-        before, last = (found.distances[rows, at] / stages.length[left] for at in (found.count - 1, found.count))
+        before, last = (landed.distances[rows, at] / stages.length[left] for at in (landed.count - 1, landed.count))
         fates = np.array([landing_map.goes_on(last * share) for share in (1 - UNSURE, 1.0, 1 + UNSURE)])
         foretold = np.abs(landing_map.foretold(before) / last) - 1
-        sure = (fates == fates[1]).all(axis=0) & (np.abs(foretold) < UNSURE) & (found.count == most)
-        sure = found.rest | (sure & ~found.lost)
-        ends[left[sure]], known[left[sure]] = fates[1][sure] & ~found.rest[sure], True
-        on = ~sure & ~found.lost
-        left, states, most = left[on], found.ends[on], MORE
+        sure = (fates == fates[1]).all(axis=0) & (np.abs(foretold) < UNSURE) & (landed.count == most)
+        sure = landed.rest | (sure & ~landed.lost)
+        ends[left[sure]], decided[left[sure]] = fates[1][sure] & ~landed.rest[sure], True
+        on = ~sure & ~landed.lost
+        left, states, most = left[on], landed.ends[on], MORE
         if not left.size:
             break
-    return ends, known
+    return ends, decided

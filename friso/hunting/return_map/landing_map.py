@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from friso.hunting.attractors.rounds import RESOLVED
 from friso.hunting.return_map.landings import Landings
 
 JUMP, STEEPEST = 0.5, 3.0
-"""Where the map breaks off: two neighbouring returns differ in their logarithms by more than this, and so many times the
+"""Where the map breaks off: two neighbouring returns differ in their logarithms by more than this and so many times the
 difference of the logarithms of their distances."""
 
 ITERATIONS, TIMES = 200, 4
@@ -59,8 +61,8 @@ class LandingMap:
     (points,), and of the next ones, `after` (points,), 0 where the stage rests instead, infinite where it runs away.
 
     Distances are in units of the deflection of the loop by the break-away force, without sign where the stage is
-    `symmetric`. `run` (points,) tells in which run each was, `final` (points,) whether that ended with the next landing,
-    so that it may go on. `lost` counts runs that were not completed.
+    `symmetric`. `run` (points,) tells in which run each was, `final` (points,) whether that ended with the next
+    landing, so that it may go on. `lost` counts runs that were not completed.
     """
 
     before: np.ndarray
@@ -77,7 +79,7 @@ class LandingMap:
         distances = landings.distances / length
         ended = np.where(landings.rest, 0.0, np.where(landings.away, np.inf, np.nan))
         distances, count = _without_excursions(np.abs(distances) if symmetric else distances, landings.count)
-        columns: list[tuple[np.ndarray, ...]] = []
+        columns: list[tuple[Any, ...]] = []
         for k in range(distances.shape[1]):
             here = distances[:, k]
             ahead = distances[:, min(k + 1, distances.shape[1] - 1)]
@@ -123,13 +125,16 @@ class LandingMap:
             slopes.append(slope)
 
         def beside(begin: float, at: float, after: float) -> None:
-            goes = np.isfinite(after) and after != 0
-            piece(begin, *((_place(np.array(after)) - at, 1.0) if goes else (REST, 0.0)))
+            if np.isfinite(after) and after != 0:
+                piece(begin, float(_place(np.array(after))) - at, 1.0)
+            else:
+                piece(begin, REST, 0.0)
 
         for side in self.sides:
             points = self.points(side)
             places, after = _place(self.before[points]), self.after[points]
-            for k, (low, high) in enumerate(zip(places[:-1], places[1:], strict=True)):
+            first = len(begins)
+            for k, (low, high) in enumerate(pairwise(places.tolist())):
                 if high <= low:
                     continue
                 one, two = after[k], after[k + 1]
@@ -141,6 +146,8 @@ class LandingMap:
                         continue
                 beside(low, low, one)
                 beside((low + high) / 2, high, two)
+            if len(points) and first < len(begins) and begins[first] == places[0]:  # the same line a little nearer
+                begins[first] -= NEAR
             if len(points):
                 beside(places[-1], places[-1], after[-1] if abs(after[-1]) < abs(self.before[points[-1]]) else 0.0)
             piece(OTHER_SIDE / 2 if side > 0 else np.inf, REST, 0.0)
@@ -165,7 +172,7 @@ class LandingMap:
     def _followed(self, at: np.ndarray) -> np.ndarray:
         """The last of the landings that follow places, shape (points, landings), once the map has come to what attracts
         it."""
-        iterations, before = ITERATIONS, np.full(len(at), np.inf)
+        iterations, before, paths = ITERATIONS, np.full(len(at), np.inf), at[:, None]
         for _ in range(TIMES):
             for _ in range(iterations):
                 at = self.next(at)
@@ -232,7 +239,7 @@ class LandingMap:
                 v = np.log(np.abs(after))
                 share = (u[1:-1] - u[:-2]) / np.maximum(u[2:] - u[:-2], 1e-12)
                 off = np.abs(v[1:-1] - (1 - share) * v[:-2] - share * v[2:])
-            alike = (goes[:-2] == goes[2:]) & ~(np.abs(v[2:] - v[:-2]) > JUMP)
+                alike = (goes[:-2] == goes[2:]) & ~(np.abs(v[2:] - v[:-2]) > JUMP)
             off = np.where(goes[1:-1] & goes[:-2] & goes[2:], off, np.where(goes[:-2] != goes[1:-1], np.inf, 0.0))
             off = np.where(alike & (u[2:] - u[:-2] < NEAR), off, 0.0)
             off[np.fmax(v[1:-1] - u[1:-1], v[2:] - u[2:]) < np.log(0.5)] = 0.0

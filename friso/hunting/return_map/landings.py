@@ -10,7 +10,6 @@ from friso.equations.roles import Role
 from friso.hunting.attractors.rounds import RESOLVED
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.rest import wait
-from friso.hunting.cycle.return_map import FLIGHT, PATIENCE
 
 RTOL = 1e-6
 """Relative tolerance of the runs."""
@@ -26,6 +25,10 @@ RESTS = 0.01
 
 BUDGET = 20_000
 """Steps that a run takes in a round at most: a swing takes a thousand, but where a limiter or a controller chatters."""
+
+PATIENCE, FLIGHT = 2.0, 30.0
+"""How long a round is: in waits for the integrator to wind up to the break-away force where the stage sticks, and in
+units of 1/(natural frequency of mass and loop) for the way across."""
 
 ROUNDS = 3
 """Rounds of runs more than the landings wanted: a stage that stops short of its reference needs two for a swing."""
@@ -74,7 +77,7 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
     states = stages.kernel.with_modes(starts, np.zeros(3), stages.values)
     values, times = starts[:, position, None].copy(), np.zeros((count, 1))
     rest, away, lost = (np.zeros(count, bool) for _ in range(3))
-    passed, left, found = np.zeros(count), np.arange(count), None
+    passed, left, landed = np.zeros(count), np.arange(count), None
     for _ in range(most + ROUNDS):
         some, begun = stages.take(left), states[left]
         sticks = np.abs(begun[:, sticking])
@@ -90,21 +93,21 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
         values, times = np.hstack([values, more]), np.hstack([times, at])
         states[left], passed[left] = results.ends, passed[left] + durations
         away[left], lost[left] = ~fine & (np.abs(results.ends[:, position]) > 1e5 * some.length), ~fine
-        before = np.zeros(left.size, np.int64) if found is None else found.count[left]
+        before = np.zeros(left.size, np.int64) if landed is None else landed.count[left]
         speed = np.abs(results.ends[:, speeds]).max(axis=1)
         stands = speed < STANDS * some.number("rate") * np.maximum(np.abs(results.ends[:, position]), small)
-        found = _landings(values, times, most)
+        landed = _landings(values, times, most)
         ends = np.abs(results.ends[:, sticking])
-        rest[left] = fine & stands & (found.count[left] == before) & (before < most)
+        rest[left] = fine & stands & (landed.count[left] == before) & (before < most)
         rest[left] &= np.abs(ends - sticks) < np.maximum(RESTS * sticks, small)
-        last = np.abs(found.distances[left, found.count[left]])
+        last = np.abs(landed.distances[left, landed.count[left]])
         rest[left] |= fine & stands & (ends < small) & (last < small)
-        unfinished = ~stands & (found.count[left] == most) & (before < most)
-        left = left[fine & ~rest[left] & ((found.count[left] < most) | unfinished)]
+        unfinished = ~stands & (landed.count[left] == most) & (before < most)
+        left = left[fine & ~rest[left] & ((landed.count[left] < most) | unfinished)]
         if not left.size:
             break
-    assert found is not None
-    return Landings(found.distances, found.times, found.count, states, rest, away, lost)
+    assert landed is not None
+    return Landings(landed.distances, landed.times, landed.count, states, rest, away, lost)
 
 
 @dataclass(frozen=True)

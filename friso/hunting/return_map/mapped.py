@@ -13,11 +13,11 @@ from friso.hunting.return_map.landing_map import JUMP, LandingMap
 from friso.hunting.return_map.landings import RTOL, Landings, find_landings
 from friso.stage.controllers import FORCE_LIMIT
 
-NEAR, FAR = np.geomspace(0.01, 3.0, 24), np.geomspace(5.0, 300.0, 6)
+NEAR = np.concatenate([np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 24)])
 """Distances at which stages are stuck at first, in units of the deflection of the loop by the break-away force."""
 
-NEAREST = np.geomspace(0.001, 0.007, 4)
-"""Distances nearer than these, in those units: from there most stages creep home."""
+FAR = np.geomspace(5.0, 300.0, 6)
+"""Distances beyond these, in those units: a stage passes its reference from there without sticking, at first."""
 
 LIMITED = np.geomspace(600.0, 30000.0, 6)
 """Distances beyond these, in those units, of stages with a force limit."""
@@ -43,10 +43,12 @@ ROUNDS = 2
 
 @dataclass(frozen=True)
 class Mapped:
-    """Stages and runs of theirs: `owners` (runs,), the numbers of their stages; where they were stuck at first, `starts`
-    (runs,), signed, in units of the deflection of the loop by the break-away force, NaN where a run goes on from
-    another one; whether a run was `continued` by another one, (runs,); their `landings`; and the relative tolerance
-    `rtol`."""
+    """Stages and runs of them.
+
+    Each run is of the stage with the number `owners` (runs,). It began stuck at `starts` (runs,), signed, in units of
+    the deflection of the loop by the break-away force, NaN where it goes on from another run; such another one was
+    `continued` (runs,). The `landings` are of all runs, which have a relative tolerance, `rtol`.
+    """
 
     stages: Ensemble
     owners: np.ndarray
@@ -69,7 +71,7 @@ class Mapped:
     @property
     def attracts(self) -> np.ndarray:
         """On which maps landings go on for ever, shape (count,)."""
-        return np.array([bool(found.attractors) for found in self.maps], bool)
+        return np.array([bool(landing_map.attractors) for landing_map in self.maps], bool)
 
     def take(self, numbers: np.ndarray) -> Mapped:
         """The stages with these numbers, each once, and their runs."""
@@ -81,11 +83,17 @@ class Mapped:
     def joined(self, owners: np.ndarray, starts: np.ndarray, landings: Landings) -> Mapped:
         """The same with more runs."""
         together = self.landings.joined(landings)
-        pairs = ((self.owners, owners), (self.starts, starts), (self.continued, np.zeros(len(owners), bool)))
-        joined = Mapped(self.stages, *(np.append(*pair) for pair in pairs), together, self.rtol)
+        joined = Mapped(
+            self.stages,
+            np.append(self.owners, owners),
+            np.append(self.starts, starts),
+            np.append(self.continued, np.zeros(len(owners), bool)),
+            together,
+            self.rtol,
+        )
         if "maps" in vars(self):
             changed = set(owners.tolist())
-            maps = (joined._map(k) if k in changed else known for k, known in enumerate(self.maps))
+            maps = (joined._map(k) if k in changed else before for k, before in enumerate(self.maps))
             vars(joined)["maps"] = tuple(maps)
         return joined
 
@@ -124,17 +132,44 @@ class Mapped:
         return np.unique(starts + _beside(self.starts[which], which, unclosed(landing_map)))
 
 
-def map_stages(stages: Ensemble, near: np.ndarray = NEAR, rounds: int = ROUNDS, rtol: float = RTOL) -> Mapped:
-    """The return maps of stages, from runs that begin stuck at distances `near` their reference and farther off."""
+def map_stages(
+    stages: Ensemble, near: np.ndarray = NEAR, rounds: int = ROUNDS, rtol: float = RTOL, sparse: bool = False
+) -> Mapped:
+    """The return maps of stages, from runs that begin stuck at distances `near` their reference and farther off, those
+    in every third place alone where a `sparse` map will do."""
     limited = [LIMITED] if FORCE_LIMIT in stages.flat else []
-    units = np.concatenate([NEAREST, near, FAR, *limited])
+    far = np.concatenate([FAR, *limited])
+    units = np.concatenate([near, far[1::3]] if sparse else [near, far])
     sides = [(np.arange(stages.count), 1.0), (np.flatnonzero(~stages.symmetric), -1.0)]
     owners = np.concatenate([np.repeat(which, len(units)) for which, _ in sides])
     starts = np.concatenate([np.tile(side * units, len(which)) for which, side in sides])
-    mapped = Mapped(stages, owners, starts, np.zeros(len(owners), bool), _stuck_at(stages, owners, starts, LANDINGS, rtol), rtol)
+    landings = _stuck_at(stages, owners, starts, LANDINGS, rtol)
+    mapped = Mapped(stages, owners, starts, np.zeros(len(owners), bool), landings, rtol)
     for _ in range(rounds):
         mapped = mapped.finer()
     return mapped
+
+
+def remembered(mapped: Mapped, stage: int) -> str:
+    """The state in which two runs of a stage differ most that land equally far off, but return differently: what it has
+    not forgotten there, by name; "" where no landings show that."""
+    landing_map = mapped.maps[stage]
+    scatter, place = landing_map.scatter
+    near = (
+        np.flatnonzero(np.abs(np.log(np.abs(landing_map.before / place))) < COARSE)
+        if scatter
+        else np.zeros(0, np.int64)
+    )
+    if near.size < 2:
+        return ""
+    least, most = (
+        int(landing_map.run[near[k]]) for k in (landing_map.after[near].argmin(), landing_map.after[near].argmax())
+    )
+    stages, states = mapped.stages, mapped.landings.ends
+    size = len(stages.kernel.states)
+    apart = np.abs(np.abs(states[least, :size]) - np.abs(states[most, :size])) / stages.scales[stage]
+    apart[[stages.integral, stages.sticking, stages.kernel.position]] = 0.0  # these tell the distance, and the wait
+    return stages.kernel.states[int(apart.argmax())]
 
 
 def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: int, rtol: float) -> Landings:
@@ -178,7 +213,8 @@ def unclosed(landing_map: LandingMap) -> list[int]:
 
 
 def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[float]:
-    """Starts half-way to those next to the starts of some runs; `starts`, ascending, and the `numbers` of their runs."""
+    """Starts half-way from those of some runs to those next to them; `starts`, ascending, and the `numbers` of their
+    runs."""
     between = []
     for run in runs:
         for k in np.flatnonzero(numbers == run):
@@ -191,7 +227,7 @@ def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[fl
 def _start_that_lands(starts: np.ndarray, seen: np.ndarray, place: float) -> float | None:
     """Where a run begins that lands at a place, between two neighbouring ones that land about it; None if none do.
     `starts` (runs,), ascending, and landings, shape (runs, landings), the start first."""
-    best, found = np.inf, None
+    best, start = np.inf, None
     for k in range(1, LANDINGS):
         low, high = seen[:-1, k], seen[1:, k]
         with np.errstate(all="ignore"):
@@ -200,6 +236,6 @@ def _start_that_lands(starts: np.ndarray, seen: np.ndarray, place: float) -> flo
                 apart = abs(np.log(high[i] / low[i]))
                 if apart < best:
                     share = np.clip(np.log(place / low[i]) / np.log(high[i] / low[i]), 0.02, 0.98)
-                    found = starts[i] * (starts[i + 1] / starts[i]) ** share
+                    start = starts[i] * (starts[i + 1] / starts[i]) ** share
                     best = apart
-    return None if found is None else float(found)
+    return None if start is None else float(start)

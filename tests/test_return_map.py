@@ -1,0 +1,146 @@
+"""Hunting by its return map: maps that are known, the rig of the thesis against the search, and what is not a map."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from friso.hunting import Ensemble, StageAttractors, find_attractors, stuck
+from friso.hunting.basin import displacements_that_hunt
+from friso.hunting.cycle.hunting import hunting
+from friso.hunting.return_map import (
+    LandingMap,
+    Landings,
+    MapSurvey,
+    displacements_by_map,
+    find_landings,
+    own_motion_by_map,
+    search_by_maps,
+    survey_maps,
+)
+from friso.hunting.return_map.mapped import gaps
+from friso.stage import Stage
+
+pytestmark = pytest.mark.inner
+
+DISTANCES = np.geomspace(0.01, 3.0, 400)
+
+
+def of_function(after: np.ndarray, before: np.ndarray = DISTANCES) -> LandingMap:
+    """The map of a symmetric stage that lands at `after` from distances `before`."""
+    order = np.argsort(before, kind="stable")
+    numbers = np.arange(len(before))
+    return LandingMap(before[order], after[order], numbers, np.ones(len(before), bool), True, 0)
+
+
+@settings(deadline=None)
+@given(st.floats(0.2, 0.95), st.floats(0.1, 1.0))
+def test_a_map_with_a_slope_below_1_is_drawn_to_its_fixed_point(slope: float, fixed: float) -> None:
+    """From everywhere, whatever the sign of the slope, but from where it lands out of the range that is known."""
+    for sign in (1, -1):
+        after = fixed * (DISTANCES / fixed) ** (sign * slope)
+        (attractor,) = of_function(after).attractors
+        assert attractor.periodic
+        assert attractor.distances == pytest.approx([fixed], rel=1e-3)
+        within = np.flatnonzero((after >= DISTANCES[0]) & (after <= DISTANCES[-1]))
+        assert set(within) <= set(attractor.basin)
+
+
+@settings(deadline=None)
+@given(st.floats(0.05, 0.99))
+def test_a_stage_that_always_lands_nearer_comes_to_rest(gain: float) -> None:
+    assert of_function(gain * DISTANCES).attractors == ()
+
+
+def test_beyond_a_flip_landings_alternate() -> None:
+    """The Ricker map x exp(r - r x): a cycle of 2 for r between 2 and 2.526, of 4 up to 2.656 (May 1974,
+    doi:10.1126/science.186.4164.645); then irregular."""
+    swings = {}
+    for r in (1.9, 2.3, 2.6, 2.9):
+        (attractor,) = of_function(DISTANCES * np.exp(r - r * DISTANCES)).attractors
+        swings[r] = len(attractor.distances) if attractor.periodic else 0
+    assert swings == {1.9: 1, 2.3: 2, 2.6: 4, 2.9: 0}
+
+
+def test_a_map_whose_returns_lie_in_a_narrower_range_than_its_points_is_not_at_rest() -> None:
+    """All landings come to the least of them, which no point is below."""
+    near = np.geomspace(0.0496, 3.0, 60)
+    assert of_function(0.04959 * (near / 0.0496) ** 0.01, near).attractors
+
+
+def test_rest_and_excursions() -> None:
+    """A run that rests ends in 0; landings farther off than a stage sticks are passed over if it comes back."""
+    away = np.array([[0.5, -0.4, 8.0, -4.0, 0.3], [0.5, -0.01, np.nan, np.nan, np.nan]])
+    runs = Landings(
+        away, np.zeros((2, 5)), np.array([4, 1]), np.zeros((2, 1)), np.array([False, True]), *np.zeros((2, 2), bool)
+    )
+    landed = LandingMap.of(runs, 1.0, True, np.ones(2, np.int64))
+    assert [*zip(landed.before.tolist(), landed.after.tolist(), strict=True)] == [(0.01, 0.0), (0.4, 0.3)]
+
+
+def test_landings_that_depend_on_more_than_their_distance_scatter() -> None:
+    smooth = DISTANCES * np.exp(1.5 - 1.5 * DISTANCES)
+    assert of_function(smooth).scatter[0] < 1e-3
+    two_sheets = np.where(np.arange(400) % 2, 1.2, 1.0) * smooth
+    assert of_function(two_sheets).scatter[0] > 0.1
+    between = np.where(np.arange(400) % 5 == 0, 0.0, smooth)  # some rest
+    assert of_function(between).scatter[0] == np.inf
+
+
+def test_gaps_are_looked_for_where_the_map_comes_near_its_diagonal() -> None:
+    sparse = DISTANCES[::20]
+    landed = gaps(of_function(0.5 * (sparse / 0.5) ** -0.5, sparse))
+    assert np.abs(np.log(landed[0] / 0.5)) < 0.5 * np.log(sparse[1] / sparse[0])
+    assert gaps(of_function(0.2 * sparse, sparse)).size == 0
+
+
+@pytest.fixture(scope="module")
+def locked(rig: Stage) -> Stage:
+    return rig.replace({"joint.locked": True})
+
+
+@pytest.fixture(scope="module")
+def survey(locked: Stage) -> MapSurvey:
+    return survey_maps(Ensemble.held(locked.flat(), 1))
+
+
+def test_landings_of_the_rig_alternate_and_come_to_its_cycle(locked: Stage) -> None:
+    stages = Ensemble.held(locked.flat(), 1).take(np.zeros(4, np.int64))
+    starts = np.array([0.2, 0.23, 0.26, 1.5]) * stages.length
+    landed = find_landings(stages, stuck(stages, starts), 100)
+    assert (landed.count == 100).all()
+    assert (landed.distances[:, 1:] * landed.distances[:, :-1] < 0).all()
+    assert (np.diff(landed.times, axis=1) > 0).all()
+    (cycle,) = hunting(locked).attracting
+    assert np.abs(landed.distances[:, -1]) == pytest.approx(cycle.amplitude, rel=1e-3)
+    assert 2 * np.diff(landed.times, axis=1)[:, -1] == pytest.approx(cycle.period, rel=1e-2)
+
+
+def test_the_map_shows_what_attracts_the_rig(rig: Stage, locked: Stage, survey: MapSurvey) -> None:
+    (motion,) = survey.motions
+    (cycle,) = hunting(locked).attracting
+    assert survey.resolved[0]
+    assert motion.amplitude == pytest.approx(cycle.amplitude, rel=1e-6)
+    free = survey_maps(Ensemble.held(rig.replace({"joint.locked": False}).flat(), 1))
+    assert free.resolved[0]
+    assert free.motions == ()
+
+
+def test_kicks_and_the_own_motion_by_the_map_are_those_of_long_runs(locked: Stage, survey: MapSurvey) -> None:
+    target = hunting(locked).target
+    assert target is not None
+    long_runs = displacements_that_hunt(locked, target)
+    by_map = displacements_by_map(Ensemble.held(locked.flat(), 1), survey)
+    assert np.array(by_map.windows) == pytest.approx(np.array(long_runs.windows), rel=0.02)
+    assert own_motion_by_map(locked, survey) == (True, True)
+
+
+def test_the_edge_of_the_locked_rig_by_maps(locked: Stage, survey: MapSurvey) -> None:
+    """9.750 Hz, where its cycle flips."""
+    margin = search_by_maps(locked.flat(), survey.motions).margin
+    assert margin is not None
+    assert margin.crossover == pytest.approx(9.750, rel=2e-3)
+    beyond: StageAttractors = find_attractors({**locked.flat(), "controller.crossover": 1.01 * 9.75}, 1)
+    assert not beyond.attracts[0]
