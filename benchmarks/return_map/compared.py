@@ -51,9 +51,10 @@ def page(records: Sequence[Record]) -> str:
         "attractor was closed as an orbit or left). Of these the table counts verdicts that are the same, certain "
         f"edges within {100 * EDGE:g} % (or what the search leaves open), windows that the map shows, and stages all "
         f"of whose limits of kicks lie within {100 * KICK:g} %; and it has the median of the scatter, and the map's "
-        "work over the search's for verdict, kicks and moves alone. The work in all, and at the median, is that of every case: "
-        "where the map is not resolved, that of its survey and of the whole search. A class *goes* where no verdict "
-        f"differs, {100 * RIGHT:g} % of edges are the same, and the work in all is a third or less.",
+        "work over the search's for verdict, kicks and moves alone. The work in all, and at the median, is that of "
+        "every case: where the map is not resolved, that of its survey and of the whole search. A class *goes* where no "
+        f"verdict differs, {100 * RIGHT:g} % of edges are the same, and the work in all is a third or less; for its "
+        "*verdicts* where no verdict differs, and those and the kicks take a third or less.",
         "",
         *markdown(head, rows),
         "",
@@ -80,6 +81,7 @@ def counted(records: Sequence[Record]) -> dict[str, Any]:
     own = np.array([(_own(r["mapped"], *MAPPED), _own(r["searched"], *SEARCHED)) for r in resolved]).reshape(-1, 2)
     right = [r for r in edges if same_edge(r)]
     goes = len(same) == len(resolved) and len(right) >= RIGHT * len(edges) and ratio <= LESS and len(resolved) > 0
+    verdicts_go = 0 < len(resolved) == len(same) and own[:, 0].sum() <= LESS * own[:, 1].sum()
     scatter = [r["mapped"]["scatter"][0] for r in resolved]
     return {
         "cases": len(records),
@@ -93,6 +95,7 @@ def counted(records: Sequence[Record]) -> dict[str, Any]:
         "work in all": f"{ratio:.2f}",
         "median": f"{np.median(works[:, 0] / works[:, 1]):.2f}" if len(works) else "",
         "goes": "yes" if goes else "no",
+        "verdicts": "go" if verdicts_go else "no",
     }
 
 
