@@ -52,8 +52,8 @@ def page(records: Sequence[Record]) -> str:
         f"edges within {100 * EDGE:g} % (or what the search leaves open), windows that the map shows, and stages all "
         f"of whose limits of kicks lie within {100 * KICK:g} %; and it has the median of the scatter, and the map's "
         "work over the search's for verdict, kicks and moves alone. The work in all, and at the median, is that of "
-        "every case: where the map is not resolved, that of its survey and of the whole search. A class *goes* where no "
-        f"verdict differs, {100 * RIGHT:g} % of edges are the same, and the work in all is a third or less; for its "
+        "every case: where the map is not resolved, that of its survey and of the whole search. A class *goes* where "
+        f"no verdict differs, {100 * RIGHT:g} % of edges are the same, and the work in all is a third or less; for its "
         "*verdicts* where no verdict differs, and those and the kicks take a third or less.",
         "",
         *markdown(head, rows),

@@ -30,7 +30,6 @@ of others."""
 ALIKE = 0.05
 """Share by which the mean distance of landings of an attractor of a map differs at most from that of its orbit."""
 
-
 SCATTER = 0.05
 """Share by which landings may differ from what their neighbours foretell: by more, this is not a map."""
 

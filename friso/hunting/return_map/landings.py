@@ -77,7 +77,8 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
     states = stages.kernel.with_modes(starts, np.zeros(3), stages.values)
     values, times = starts[:, position, None].copy(), np.zeros((count, 1))
     rest, away, lost = (np.zeros(count, bool) for _ in range(3))
-    passed, left, landed = np.zeros(count), np.arange(count), None
+    passed, left, landed = np.zeros(count), np.arange(count), np.zeros(count, np.int64)
+    where, when = values, times
     for _ in range(most + ROUNDS):
         some, begun = stages.take(left), states[left]
         sticks = np.abs(begun[:, sticking])
@@ -93,33 +94,26 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
         values, times = np.hstack([values, more]), np.hstack([times, at])
         states[left], passed[left] = results.ends, passed[left] + durations
         away[left], lost[left] = ~fine & (np.abs(results.ends[:, position]) > 1e5 * some.length), ~fine
-        before = np.zeros(left.size, np.int64) if landed is None else landed.count[left]
+        before = landed[left]
         speed = np.abs(results.ends[:, speeds]).max(axis=1)
         stands = speed < STANDS * some.number("rate") * np.maximum(np.abs(results.ends[:, position]), small)
-        landed = _landings(values, times, most)
+        where, when, landed = _landings(values, times, most)
         ends = np.abs(results.ends[:, sticking])
-        rest[left] = fine & stands & (landed.count[left] == before) & (before < most)
+        rest[left] = fine & stands & (landed[left] == before) & (before < most)
         rest[left] &= np.abs(ends - sticks) < np.maximum(RESTS * sticks, small)
-        last = np.abs(landed.distances[left, landed.count[left]])
+        last = np.abs(where[left, landed[left]])
         rest[left] |= fine & stands & (ends < small) & (last < small)
-        unfinished = ~stands & (landed.count[left] == most) & (before < most)
-        left = left[fine & ~rest[left] & ((landed.count[left] < most) | unfinished)]
+        unfinished = ~stands & (landed[left] == most) & (before < most)
+        left = left[fine & ~rest[left] & ((landed[left] < most) | unfinished)]
         if not left.size:
             break
-    assert landed is not None
-    return Landings(landed.distances, landed.times, landed.count, states, rest, away, lost)
+    return Landings(where, when, landed, states, rest, away, lost)
 
 
-@dataclass(frozen=True)
-class _Found:
-    distances: np.ndarray
-    times: np.ndarray
-    count: np.ndarray
-
-
-def _landings(values: np.ndarray, times: np.ndarray, most: int) -> _Found:
-    """The farthest of the places [m] that runs pass on one side of the reference, one side after the other, and when
-    [s]; places of shape (runs, places), NaN where there is none."""
+def _landings(values: np.ndarray, times: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The farthest of the places [m] that runs pass on one side of the reference, one side after the other, when that
+    is [s], both (runs, landings), the start first, and how many there are without it, (runs,); from places and times of
+    shape (runs, places), NaN where there is none."""
     count = len(values)
     rows = np.arange(count)
     where, when = np.full((count, most + 1), np.nan), np.full((count, most + 1), np.nan)
@@ -133,4 +127,4 @@ def _landings(values: np.ndarray, times: np.ndarray, most: int) -> _Found:
         farther = (crossed | (side * value > side * where[rows, open_])) & (number <= most) & np.isfinite(value)
         farther &= number > 0
         where[rows[farther], open_[farther]], when[rows[farther], open_[farther]] = value[farther], time[farther]
-    return _Found(where, when, np.minimum(number, most))
+    return where, when, np.minimum(number, most)
