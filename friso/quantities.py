@@ -263,6 +263,30 @@ def _split(entry: str) -> tuple[str, str]:
     return match[0], _checked_unit(rest)
 
 
+def in_unit_of(before: Any, entry: Any) -> Any:
+    """A number alone, or one whose unit is only wrong in its capitals, with the unit of the entry that was there
+    `before`; any other entry as it is."""
+    try:
+        _, unit = _split(before) if isinstance(before, str) else ("", "")
+    except _Refused:
+        return entry
+    alone = isinstance(entry, int | float) and not isinstance(entry, bool)
+    text = repr(entry) if alone else entry if isinstance(entry, str) else ""
+    number = _NUMBER.match(text.strip())
+    if not unit or number is None:
+        return entry
+    rest = text.strip()[number.end() :].strip()
+    same = not rest or (rest.lower() == unit.lower() and not _is_unit(rest))  # mHz is not MHz
+    return f"{number[0]} {unit}" if same else entry
+
+
+def _is_unit(text: str) -> bool:
+    try:
+        return bool(_root(text))
+    except _Refused:
+        return False
+
+
 def _why_no_number(text: str) -> str:
     if not text:
         return "empty"

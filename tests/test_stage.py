@@ -366,3 +366,20 @@ def test_other_motions(rig: Stage, key: str) -> None:
 
 def test_zero_stroke_is_legal(rig: Stage) -> None:
     assert rig.replace({"joint.stroke": "0 mm"}).flat()["joint.stroke"] == 0.0
+
+
+@pytest.mark.parametrize("value", [12, 12.0, "12", "12hz", "12 HZ", " 12 Hz "])
+def test_a_changed_number_has_the_unit_in_which_the_key_stands(rig: Stage, value: float | str) -> None:
+    assert rig.replace({"controller.crossover": value}).flat()["controller.crossover"] == 12.0
+
+
+def test_a_changed_number_without_a_unit_beside_it_is_refused(rig: Stage) -> None:
+    """Nor is a unit guessed that differs by more than capitals, or a megahertz taken for a millihertz."""
+    for changes in ({"joint.locked": True, "bias.cart": 1}, {"masses.cart": "1 kgs"}):
+        with pytest.raises(InputError, match="unit"):
+            rig.replace(changes)
+    fast = rig.replace({"controller.crossover": "0.012 kHz"})
+    assert fast.replace({"controller.crossover": "0.013"}).flat()["controller.crossover"] == pytest.approx(13.0)
+    high = rig.replace({"controller.crossover": "0.00001 MHz"})
+    assert high.replace({"controller.crossover": "9000 mHz"}).flat()["controller.crossover"] == pytest.approx(9.0)
+    assert rig.replace({"controller.crossover": "8000 mHz"}).flat()["controller.crossover"] == pytest.approx(8.0)

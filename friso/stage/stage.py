@@ -12,7 +12,7 @@ from pydantic import field_validator, model_validator
 from friso.axis import KINDS, LINEAR, AxisKind, axis_of
 from friso.errors import InputError, StageError
 from friso.intervals import Interval
-from friso.quantities import Number, Quantity, as_toml, exactly, quoted
+from friso.quantities import Number, Quantity, as_toml, exactly, in_unit_of, quoted
 from friso.stage.conditions import Conditions
 from friso.stage.controllers import (
     ANTI_WINDUP,
@@ -460,7 +460,8 @@ def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
 
 
 def _put(tables: dict[str, Any], key: str, value: Any) -> None:
-    """Set or (None) remove a dotted key of nested tables, or set an element of an array. Raises StageError."""
+    """Set or (None) remove a dotted key of nested tables, or set an element of an array; a number alone has the unit of
+    what is there. Raises StageError."""
     *path, last = key.split(".")
     place: Any = tables
     for depth, name in enumerate(path):
@@ -472,11 +473,16 @@ def _put(tables: dict[str, Any], key: str, value: Any) -> None:
         if value is None:
             array = ".".join(path)
             raise StageError(key, "an element to remove", f"the whole array {array} without it")
-        place[number] = value
+        place[number] = in_unit_of(_text(place[number]), value)
     elif value is not None:
-        place[last] = value
+        place[last] = in_unit_of(_text(place.get(last)), value)
     elif place.pop(last, None) is None:
         raise StageError(key, "a key to remove", "a key that the stage has")
+
+
+def _text(entry: Any) -> Any:
+    """How a value of a key was written."""
+    return getattr(entry, "text", entry)
 
 
 def _number(values: list[Any], key: str, depth: int) -> int:
