@@ -215,6 +215,15 @@ def test_usual_stages_raise_no_doubts(path: Path) -> None:
     assert not [*implausible_values(friso.load(path))]
 
 
+@pytest.mark.parametrize("key", ["friction.static", "masses.cart"])
+def test_one_wrong_unit_is_questioned_in_one_sentence(key: str) -> None:
+    """Of the mass, by which friction and gains are judged, or of one friction alone."""
+    value = {"masses.cart": "12 g"}.get(key, "40 kN")
+    (doubt,) = implausible_values(friso.load(EXAMPLES / "emps_axis.toml").replace({key: value}))
+    assert doubt.startswith(f"{key} = {value} ")
+    assert ("was kg meant?" in doubt) == (key == "masses.cart")
+
+
 @pytest.mark.parametrize("empty", [(3,), (9,), (7, 8, 9), (0, 4)])
 def test_empty_cells_of_a_frequency_response_are_refused(tmp_path: Path, empty: tuple[int, ...]) -> None:
     rows = [f"{k + 1};-20;{'' if k in empty else -90}" for k in range(10)]

@@ -91,8 +91,43 @@ def idle_encoder(stage: Stage) -> Iterator[str]:
 
 
 def implausible_values(stage: Stage) -> Iterator[str]:
-    """A sentence on each implausible value: key, value, and the unit that probably was."""
+    """A sentence on each implausible value: key, value, and the unit that probably was meant.
+
+    Friction and gains are judged by the mass: where a mass in another unit would make several of them usual, the mass
+    is named instead.
+    """
     flat = stage.flat()
+    complaints = _complaints(stage, flat)
+    for key in ("masses.cart", "masses.stage"):
+        for unit, factor in _other_units(stage, key):
+            usual = _complaints(stage, {**flat, key: flat[key] * factor})
+            others = [name for name in complaints if name not in usual and name != key]
+            if len(others) > 1:
+                named = ", ".join(others[:-1]) + f" and {others[-1]}"
+                text = (
+                    f"{key} = {_written(stage, key)} makes {named} unusual for a positioning stage: was {unit} meant?"
+                )
+                complaints = {key: text} | {name: complaints[name] for name in usual if name in complaints}
+                break
+    yield from complaints.values()
+
+
+def _other_units(stage: Stage, key: str) -> Iterator[tuple[str, float]]:
+    """The units in which a mass may have been meant, and by what it changes then."""
+    written = _written(stage, key)
+    unit = written.partition(" ")[2].strip()
+    if stage.axis_kind == ROTARY or unit not in _MASS.units:
+        return
+    factors = {other: Quantity("kg", any_sign, "").factor(other) for other in _MASS.units}
+    yield from ((other, factors[other] / factors[unit]) for other in _MASS.units if other != unit)
+
+
+def _complaints(stage: Stage, flat: Mapping[str, Any]) -> dict[str, str]:
+    """A sentence on each implausible value of a stage, given as flat keys, by key."""
+    return dict(_judged(stage, flat))
+
+
+def _judged(stage: Stage, flat: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     usual_values = dict(_ROTARY) if stage.axis_kind == ROTARY else _usual(flat)
     usual_values |= {key: _FREQUENCY for key in flat if _OF_FILTER.fullmatch(key)}
     if stage.controller:
@@ -110,7 +145,7 @@ def implausible_values(stage: Stage) -> Iterator[str]:
             if not (written := _written(stage, key)) and key == MOTOR_MASS:
                 continue  # its inertia is judged
             written = written or f"{value:.6g} {usual.unit}"
-            yield f"{key} = {written} is unusual for a positioning stage{_question(written, usual)}"
+            yield key, f"{key} = {written} is unusual for a positioning stage{_question(written, usual)}"
 
 
 _OF_FILTER = re.compile(r"controller\.filters\.\d+\.(frequency|width)")
