@@ -276,3 +276,6 @@ def test_a_path_with_blanks_that_lacks_its_quotes_is_told(tmp_path: Path) -> Non
     done = friso_inside(tmp_path, "check", "my", "rig.toml")
     assert done.returncode == 2
     assert "needs quotes: 'my rig.toml'" in done.stderr.replace('"', "'")
+    done = friso_inside(tmp_path, "logs", "my", "rig.toml")  # each of them a file that is not there
+    assert done.returncode == 2
+    assert "needs quotes: 'my rig.toml'" in done.stderr.replace('"', "'")

@@ -10,7 +10,6 @@ import io
 import logging
 import os
 import sys
-from collections.abc import Sequence
 from contextvars import copy_context
 from typing import Annotated, Any, NoReturn, TextIO
 
@@ -18,13 +17,13 @@ import typer
 from typer.core import TyperGroup
 
 from friso import interrupts
-from friso.cli.arguments import number_refused, refuse_empty, with_checked_paths
+from friso.cli.arguments import number_refused, parted_path, refuse_empty, with_checked_paths
 from friso.cli.command import COMMANDS, QUESTIONS
 from friso.cli.common import INTERRUPTED, say
 from friso.cli.terminal import SPELLED, escaping
 from friso.errors import InputError, shortened
 from friso.installed import installed_modules
-from friso.system import LIBRARIES, cause_of, path_of, shell_word
+from friso.system import LIBRARIES, cause_of, path_of
 from friso.version import VERSION
 
 
@@ -157,13 +156,13 @@ def _failed(error: BaseException) -> int:
         return 1
     wrong = error if isinstance(error, InputError) else number_refused(error, sys.argv[1:])
     if wrong is not None:
-        say(f"{wrong}{_parted_path(sys.argv[1:])}")
+        say(f"{wrong}{parted_path(sys.argv[1:])}")
         return 2
     usage = getattr(error, "format_message", None)
     if usage is not None:
         context = getattr(error, "ctx", None)
         command = context.command_path if context else "friso"
-        say(f"{shortened(usage())}{_parted_path(sys.argv[1:])}\n  try: {command} --help")
+        say(f"{shortened(usage())}{parted_path(sys.argv[1:])}\n  try: {command} --help")
         return 2
     if _is_of_loading(error):
         say(f"a library could not be loaded ({error}): {LIBRARIES}")
@@ -174,13 +173,6 @@ def _failed(error: BaseException) -> int:
         say(f"the computation could not be completed: {cause}{': ' if path else ''}{path}")
         return 1
     raise error
-
-
-def _parted_path(words: Sequence[str]) -> str:
-    """What to say where words that follow one another are the path of a file with blanks, which lacks its quotes."""
-    paths = (" ".join(words[first : first + count]) for first in range(len(words) - 1) for count in range(2, 7))
-    path = next((path for path in paths if os.path.isfile(path)), "")
-    return f"\n  a path with blanks needs quotes: {shell_word(path)}" if path else ""
 
 
 def _is_of_loading(error: BaseException) -> bool:

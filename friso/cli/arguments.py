@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from inspect import signature
@@ -15,6 +16,7 @@ from typer.models import ArgumentInfo
 from friso import paths
 from friso.cli.command import COMMANDS
 from friso.errors import InputError
+from friso.system import shell_word
 
 
 def refuse_empty(arguments: Iterable[str]) -> None:
@@ -84,3 +86,10 @@ def _value_of(option: str, arguments: Sequence[str]) -> str:
     from friso.quantities import quoted  # its libraries are not needed where nothing is refused
 
     return quoted(values[-1]) if values else "no number"
+
+
+def parted_path(words: Sequence[str]) -> str:
+    """What to say where words that follow one another are the path of a file with blanks, which lacks its quotes."""
+    paths = (" ".join(words[first : first + count]) for first in range(len(words) - 1) for count in range(2, 7))
+    path = next((path for path in paths if os.path.isfile(path)), "")
+    return f"\n  a path with blanks needs quotes: {shell_word(path)}" if path else ""

@@ -3,6 +3,7 @@ first, small tables, what to do next, and details if they are wanted."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from friso.axis import speak_of
+from friso.cli.arguments import parted_path
 from friso.cli.common import print_table, print_wrapped, say
 from friso.cli.output import print_document, print_written
 from friso.cli.progress import ProgressBar
@@ -99,7 +101,7 @@ def show(
             print("more: --details")
     failures = [failure for failure in (answer.failure, unwritten) if failure]
     for failure in failures:
-        say(failure)
+        say(f"{failure}{parted_path(sys.argv[1:])}")
     if answer.interrupted:
         raise KeyboardInterrupt
     if failures:

@@ -7,8 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
+from friso.equations.roles import Steady
+from friso.hunting.attractors.rounds import RESOLVED
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.rest import stuck
+from friso.hunting.cycle.rest import pushed, stuck
 from friso.hunting.return_map.landing_map import JUMP, LandingMap
 from friso.hunting.return_map.landings import RTOL, Landings, find_landings
 from friso.stage.controllers import FORCE_LIMIT
@@ -22,6 +24,13 @@ FAR = np.geomspace(5.0, 300.0, 6)
 LIMITED = np.geomspace(600.0, 30000.0, 6)
 """Distances beyond these, in those units, of stages with a force limit."""
 
+KICKS = np.geomspace(0.3, 30.0, 8)
+"""Distances at which stages are let go, and those to which pushes would take the loop, in those units: landings that
+have another history, which must return alike."""
+
+STUCK, KICKED = 1, 2
+"""The first landing that does not depend any more on how a run began: stuck, or with a kick."""
+
 LANDINGS = 3
 """Landings of a run: what follows the first of them does not depend any more on how the run began."""
 
@@ -33,6 +42,10 @@ DIAGONAL = 0.1
 
 OUTERMOST = 0.3
 """The same beyond which nothing more is looked for outside the outermost points."""
+
+BREAK, WITHIN = 0.02, np.array([0.2, 0.4, 0.6, 0.8])
+"""Logarithm of two starts between which landings break off, up to which that is narrowed down, and the shares of the
+way between them at which more runs begin."""
 
 MOST = 12
 """Runs that are added for a stage at once, at most."""
@@ -46,13 +59,15 @@ class Mapped:
     """Stages and runs of them.
 
     Each run is of the stage with the number `owners` (runs,). It began stuck at `starts` (runs,), signed, in units of
-    the deflection of the loop by the break-away force, NaN where it goes on from another run; such another one was
-    `continued` (runs,). The `landings` are of all runs, which have a relative tolerance, `rtol`.
+    the deflection of the loop by the break-away force, NaN where it was kicked, or goes on from another run; such
+    another one was `continued` (runs,). Landings before the `first` (runs,) of a run depend on how it began. The
+    `landings` are of all runs, which have a relative tolerance, `rtol`.
     """
 
     stages: Ensemble
     owners: np.ndarray
     starts: np.ndarray
+    first: np.ndarray
     continued: np.ndarray
     landings: Landings
     rtol: float = RTOL
@@ -65,8 +80,7 @@ class Mapped:
     def _map(self, stage: int) -> LandingMap:
         which = np.flatnonzero(self.owners == stage)
         length, symmetric = float(self.stages.length[stage]), bool(self.stages.symmetric[stage])
-        first = np.isfinite(self.starts[which]).astype(int)
-        return LandingMap.of(self.landings.take(which), length, symmetric, first).renumbered(which)
+        return LandingMap.of(self.landings.take(which), length, symmetric, self.first[which]).renumbered(which)
 
     @property
     def attracts(self) -> np.ndarray:
@@ -77,16 +91,17 @@ class Mapped:
         """The stages with these numbers, each once, and their runs."""
         which = np.flatnonzero(np.isin(self.owners, numbers))
         owners = np.array([np.flatnonzero(numbers == owner)[0] for owner in self.owners[which]], np.int64)
-        runs = (self.starts[which], self.continued[which], self.landings.take(which))
+        runs = (self.starts[which], self.first[which], self.continued[which], self.landings.take(which))
         return Mapped(self.stages.take(numbers), owners, *runs, self.rtol)
 
-    def joined(self, owners: np.ndarray, starts: np.ndarray, landings: Landings) -> Mapped:
+    def joined(self, owners: np.ndarray, starts: np.ndarray, first: int, landings: Landings) -> Mapped:
         """The same with more runs."""
         together = self.landings.joined(landings)
         joined = Mapped(
             self.stages,
             np.append(self.owners, owners),
             np.append(self.starts, starts),
+            np.append(self.first, np.full(len(owners), first)),
             np.append(self.continued, np.zeros(len(owners), bool)),
             together,
             self.rtol,
@@ -99,7 +114,7 @@ class Mapped:
 
     def begun(self, owners: np.ndarray, starts: np.ndarray, most: int = LANDINGS) -> Mapped:
         """The same with more runs of the stages `owners`, stuck at first at `starts`, both (runs,)."""
-        return self.joined(owners, starts, _stuck_at(self.stages, owners, starts, most, self.rtol))
+        return self.joined(owners, starts, STUCK, _stuck_at(self.stages, owners, starts, most, self.rtol))
 
     def gone_on(self, runs: np.ndarray, most: int) -> Mapped:
         """The same with more runs, which go on from where those with some numbers ended, from their last landing."""
@@ -107,9 +122,20 @@ class Mapped:
         more = find_landings(self.stages.take(owners), states, most, self.rtol)
         continued = self.continued.copy()
         continued[runs] = True
-        before = Mapped(self.stages, self.owners, self.starts, continued, self.landings, self.rtol)
+        before = Mapped(self.stages, self.owners, self.starts, self.first, continued, self.landings, self.rtol)
         vars(before)["maps"] = self.maps
-        return before.joined(owners, np.full(len(runs), np.nan), more)
+        return before.joined(owners, np.full(len(runs), np.nan), 0, more)
+
+    def kicked(self) -> Mapped:
+        """The same with runs of other histories: stages that are let go at distances, and pushed at their reference."""
+        owners = np.repeat(np.arange(self.stages.count), len(KICKS))
+        several = self.stages.take(owners)
+        sizes = np.tile(KICKS, self.stages.count) * several.length
+        mapped = self
+        for states in (several.settled(Steady(0.0, sizes)), pushed(several, sizes * several.number("rate"))):
+            landings = find_landings(several, states, LANDINGS + 1, self.rtol)
+            mapped = mapped.joined(owners, np.full(len(owners), np.nan), KICKED, landings)
+        return mapped
 
     def finer(self) -> Mapped:
         """The same with more runs, where a map is not resolved yet."""
@@ -129,7 +155,8 @@ class Mapped:
             start = _start_that_lands(self.starts[which], seen, place)
             if start is not None and not np.isclose(start, self.starts[which], rtol=1e-6).any():
                 starts.append(start)
-        return np.unique(starts + _beside(self.starts[which], which, unclosed(landing_map)))
+        starts += _beside(self.starts[which], which, unclosed(landing_map))
+        return np.unique(starts + _at_breaks(self.starts[which], seen[:, 1]))
 
 
 def map_stages(
@@ -144,7 +171,9 @@ def map_stages(
     owners = np.concatenate([np.repeat(which, len(units)) for which, _ in sides])
     starts = np.concatenate([np.tile(side * units, len(which)) for which, side in sides])
     landings = _stuck_at(stages, owners, starts, LANDINGS, rtol)
-    mapped = Mapped(stages, owners, starts, np.zeros(len(owners), bool), landings, rtol)
+    first = np.full(len(owners), STUCK)
+    mapped = Mapped(stages, owners, starts, first, np.zeros(len(owners), bool), landings, rtol)
+    mapped = mapped if sparse else mapped.kicked()
     for _ in range(rounds):
         mapped = mapped.finer()
     return mapped
@@ -222,6 +251,19 @@ def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[fl
                 if 0 <= other < len(starts) and starts[k] * starts[other] > 0:
                     between.append(float(np.sign(starts[k]) * np.sqrt(starts[k] * starts[other])))
     return between
+
+
+def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
+    """Starts between neighbouring ones, ascending, of which one lands and the other does not, or far from there: beyond
+    what is known, landings may go on up to the break. `landings`, the first ones, (runs,)."""
+    lands = np.abs(np.nan_to_num(landings)) >= RESOLVED
+    sizes = np.where(lands, np.abs(landings), 1.0)
+    breaks = (lands[:-1] != lands[1:]) | (lands[:-1] & lands[1:] & (np.abs(np.diff(np.log(sizes))) > JUMP))
+    near = np.maximum(np.abs(starts[:-1]), np.abs(starts[1:])) <= NEAR[-1]
+    apart = np.abs(np.diff(np.log(np.abs(starts)))) > BREAK
+    ends = np.flatnonzero(breaks & near & apart & (starts[:-1] * starts[1:] > 0))
+    between = [starts[k] * (starts[k + 1] / starts[k]) ** WITHIN for k in ends]
+    return np.concatenate(between).tolist() if between else []
 
 
 def _start_that_lands(starts: np.ndarray, seen: np.ndarray, place: float) -> float | None:
