@@ -264,19 +264,16 @@ def _split(entry: str) -> tuple[str, str]:
 
 
 def in_unit_of(before: Any, entry: Any) -> Any:
-    """A number alone, or one whose unit is only wrong in its capitals, with the unit of the entry that was there
+    """A number alone, or one whose unit is only wrong in its capitals, with the unit of the text that was there
     `before`; any other entry as it is."""
-    try:
-        _, unit = _split(before) if isinstance(before, str) else ("", "")
-    except _Refused:
+    bare = isinstance(entry, int | float) and not isinstance(entry, bool) and abs(entry) < LARGEST
+    text = repr(entry) if bare else entry.strip() if isinstance(entry, str) else ""
+    number = _NUMBER.match(text) if len(text) <= _LONGEST else None
+    if number is None or not isinstance(before, str):
         return entry
-    alone = isinstance(entry, int | float) and not isinstance(entry, bool)
-    text = repr(entry) if alone else entry if isinstance(entry, str) else ""
-    number = _NUMBER.match(text.strip())
-    if not unit or number is None:
-        return entry
-    rest = text.strip()[number.end() :].strip()
-    same = not rest or (rest.lower() == unit.lower() and not _is_unit(rest))  # mHz is not MHz
+    rest, (_, unit) = text[number.end() :].strip(), _split(before)
+    same_prefix = re.sub("[^mM]", "", rest) == re.sub("[^mM]", "", unit)  # a milli is no mega
+    same = not rest or (rest.lower() == unit.lower() and same_prefix and not _is_unit(rest))
     return f"{number[0]} {unit}" if same else entry
 
 

@@ -457,7 +457,7 @@ def test_no_file_and_folder(tmp_path: Path, refused: Refused) -> None:
 @pytest.mark.parametrize(
     ("changes", "fragments"),
     [
-        ({"joint": {"stiffness": 12}}, ["joint.stiffness\n", "12 (a bare number"]),
+        ({"controller.crossover": 12}, ["controller.crossover\n", "12 (a bare number"]),
         ({"controler.crossover": "12 Hz"}, ["controler\n", "did you mean controller?"]),
         ({"controller.crossovr": "12 Hz"}, ["controller.crossovr\n", "did you mean crossover?"]),
         (

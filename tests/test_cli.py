@@ -193,7 +193,7 @@ def test_version() -> None:
         ["check", RIG, "--rtol", "fine"],
         ["check", RIG, "--set", "controller.crosover=8 Hz"],
         ["check", RIG, "--set", "controller.crossover"],
-        ["check", RIG, "--set", "controller.crossover=8"],
+        ["check", RIG, "--set", "bias.cart=8"],
         ["check", RIG, "--out", RIG],
         ["simulate", RIG, "--sample-time", "1"],
         ["simulate", RIG, "--sample-time", "100 s"],

@@ -224,6 +224,11 @@ def test_one_wrong_unit_is_questioned_in_one_sentence(key: str) -> None:
     assert ("was kg meant?" in doubt) == (key == "masses.cart")
 
 
+def test_two_frictions_in_a_wrong_unit_are_not_blamed_on_the_mass() -> None:
+    heavy = friso.load(EXAMPLES / "emps_axis.toml").replace({"friction.static": "40 kN", "friction.coulomb": "35 kN"})
+    assert [doubt.partition(" ")[0] for doubt in implausible_values(heavy)] == ["friction.static", "friction.coulomb"]
+
+
 @pytest.mark.parametrize("empty", [(3,), (9,), (7, 8, 9), (0, 4)])
 def test_empty_cells_of_a_frequency_response_are_refused(tmp_path: Path, empty: tuple[int, ...]) -> None:
     rows = [f"{k + 1};-20;{'' if k in empty else -90}" for k in range(10)]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tomllib
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,6 +16,7 @@ from friso.hunting.cycle.hunting import hunting
 from friso.hunting.return_map import (
     LandingMap,
     Landings,
+    MapAttractor,
     MapSurvey,
     displacements_by_map,
     find_landings,
@@ -20,6 +24,7 @@ from friso.hunting.return_map import (
     search_by_maps,
     survey_maps,
 )
+from friso.hunting.return_map.attracting import is_motion
 from friso.hunting.return_map.mapped import gaps
 from friso.stage import Stage
 
@@ -76,7 +81,7 @@ def test_rest_and_excursions() -> None:
     runs = Landings(
         away, np.zeros((2, 5)), np.array([4, 1]), np.zeros((2, 1)), np.array([False, True]), *np.zeros((2, 2), bool)
     )
-    landed = LandingMap.of(runs, 1.0, True, np.ones(2, np.int64))
+    landed = LandingMap.of(runs, 1.0, True)
     assert [*zip(landed.before.tolist(), landed.after.tolist(), strict=True)] == [(0.01, 0.0), (0.4, 0.3)]
 
 
@@ -94,6 +99,15 @@ def test_gaps_are_looked_for_where_the_map_comes_near_its_diagonal() -> None:
     landed = gaps(of_function(0.5 * (sparse / 0.5) ** -0.5, sparse))
     assert np.abs(np.log(landed[0] / 0.5)) < 0.5 * np.log(sparse[1] / sparse[0])
     assert gaps(of_function(0.2 * sparse, sparse)).size == 0
+
+
+def test_a_stage_that_hunts_in_a_narrow_range_beside_a_break_of_its_map() -> None:
+    """Nothing lands in that range from distances a fifth apart; the search, long runs and SciPy agree that it hunts."""
+    entries = tomllib.loads(Path(__file__).with_name("hard_stages.toml").read_text(encoding="utf-8"))["stages"]
+    (entry,) = (entry for entry in entries if entry["name"] == "seed 1, number 27, beyond the edge once named")
+    stage = Stage(**{key: value for key, value in entry.items() if isinstance(value, dict)})
+    (motion,) = survey_maps(Ensemble.held(stage.flat(), 1)).motions
+    assert motion.amplitude == pytest.approx(0.0359787, rel=1e-3)
 
 
 @pytest.fixture(scope="module")
@@ -144,3 +158,16 @@ def test_the_edge_of_the_locked_rig_by_maps(locked: Stage, survey: MapSurvey) ->
     assert margin.crossover == pytest.approx(9.750, rel=2e-3)
     beyond: StageAttractors = find_attractors({**locked.flat(), "controller.crossover": 1.01 * 9.75}, 1)
     assert not beyond.attracts[0]
+
+
+def test_a_pair_of_landings_beside_a_cycle_that_repels_is_not_taken_for_it(survey: MapSurvey) -> None:
+    """Just beyond a flip they are a few per cent apart, their mean being the distance of the cycle."""
+    (cycle,) = survey.motions
+    size = cycle.amplitude
+
+    def is_cycle(landings: list[float], periodic: bool = True) -> bool:
+        return is_motion(MapAttractor(np.array(landings), np.arange(3), periodic), cycle, size, exactly=True)
+
+    assert is_cycle([1.0])
+    assert not is_cycle([1.03, 0.97])
+    assert not is_cycle([0.7, 1.3, 0.9, 1.1], periodic=False)

@@ -13,6 +13,7 @@ from systems import posix
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
 from friso import paths
+from friso.answers.inputs import stage_of
 from friso.errors import InputError, StageError
 from friso.quantities import Quantity, Value, any_sign, positive
 from friso.stage import Stage, load, loads, numeric_keys, parse_set, save, violations
@@ -368,18 +369,19 @@ def test_zero_stroke_is_legal(rig: Stage) -> None:
     assert rig.replace({"joint.stroke": "0 mm"}).flat()["joint.stroke"] == 0.0
 
 
-@pytest.mark.parametrize("value", [12, 12.0, "12", "12hz", "12 HZ", " 12 Hz "])
-def test_a_changed_number_has_the_unit_in_which_the_key_stands(rig: Stage, value: float | str) -> None:
-    assert rig.replace({"controller.crossover": value}).flat()["controller.crossover"] == 12.0
+@pytest.mark.parametrize("value", ["12", "12.0", "12hz", "12 HZ", " 12 Hz "])
+def test_a_typed_number_has_the_unit_in_which_the_file_has_the_key(rig: Stage, value: str) -> None:
+    assert stage_of(rig, [f"controller.crossover={value}"]).flat()["controller.crossover"] == 12.0
 
 
-def test_a_changed_number_without_a_unit_beside_it_is_refused(rig: Stage) -> None:
-    """Nor is a unit guessed that differs by more than capitals, or a megahertz taken for a millihertz."""
-    for changes in ({"joint.locked": True, "bias.cart": 1}, {"masses.cart": "1 kgs"}):
+def test_no_unit_is_guessed_that_may_be_another(rig: Stage) -> None:
+    """None where the file has no such key, for numbers in Python, or where other capitals mean another unit."""
+    for wrong in (["bias.cart=1"], ["masses.cart=1 kgs"], {"controller.crossover": 12}, ["controller.crossover=5 mHZ"]):
         with pytest.raises(InputError, match="unit"):
-            rig.replace(changes)
-    fast = rig.replace({"controller.crossover": "0.012 kHz"})
-    assert fast.replace({"controller.crossover": "0.013"}).flat()["controller.crossover"] == pytest.approx(13.0)
-    high = rig.replace({"controller.crossover": "0.00001 MHz"})
-    assert high.replace({"controller.crossover": "9000 mHz"}).flat()["controller.crossover"] == pytest.approx(9.0)
-    assert rig.replace({"controller.crossover": "8000 mHz"}).flat()["controller.crossover"] == pytest.approx(8.0)
+            stage_of(rig, wrong)  # type: ignore[arg-type]
+    mega = rig.replace({"controller.crossover": "0.00001 MHz"})
+    with pytest.raises(InputError, match="unit"):
+        stage_of(mega, ["controller.crossover=5 mHZ"])
+    assert stage_of(mega, ["controller.crossover=9000 mHz"]).flat()["controller.crossover"] == pytest.approx(9.0)
+    assert stage_of(mega, ["controller.crossover=0.00002"]).flat()["controller.crossover"] == pytest.approx(20.0)
+    assert stage_of(rig.replace({"name": "2 axis"}), ["name=3 rows"]).name == "3 rows"

@@ -120,7 +120,7 @@ def same_verdict(record: Record) -> bool:
     search, by_map = record["searched"], record["mapped"]
     if by_map["attracts"] != (search["verdict"] in ("hunts", "bistable")):
         return False
-    return not (by_map["attracts"] and by_map["own_known"]) or by_map["own_ends"] == (search["verdict"] == "hunts")
+    return not (by_map["attracts"] and by_map.get("own_known")) or by_map["own_ends"] == (search["verdict"] == "hunts")
 
 
 def same_edge(record: Record) -> bool:

@@ -38,14 +38,15 @@ def stage_of(source: StageLike, changes: Changes = None) -> Stage:
     wanted = changes_of(changes)
     if isinstance(source, Stage | Mapping):
         stage = source if isinstance(source, Stage) else Stage(**source)
-        return stage.replace(wanted) if wanted else stage
-    try:
-        stage = load(source)
-    except StageError:
-        if not wanted:
-            raise
-        return load_changed(Path(source), wanted)
-    return stage.replace(wanted) if wanted else stage
+    else:
+        try:
+            stage = load(source)
+        except StageError:
+            if not wanted:
+                raise
+            return load_changed(Path(source), wanted)
+    typed = changes is not None and not isinstance(changes, Mapping)
+    return stage.replace(stage.in_own_units(wanted) if typed else wanted) if wanted else stage
 
 
 def tables_of(source: StageLike) -> dict[str, Any]:

@@ -156,10 +156,9 @@ class Beyond(Exception):
 
 @dataclass(frozen=True)
 class Steps:
-    """How orbits are followed to their ends: at a `pace`, in units of that at which they are drawn, in steps from the
-    `first` (None: as usual) to the `shortest`; and to which steps along the branch flips and folds are found."""
+    """How orbits are followed to their ends: in steps along the branch from the `first` (None: as usual) to the
+    `shortest`, flips and folds being found to steps of their own."""
 
-    pace: float = PACE
     first: float | None = None
     shortest: float = SHORTEST
     flip: float = PRECISE
@@ -369,9 +368,14 @@ class Outward:
         length = abs(float(np.log(self.farthest / at)))
         how = self.steps
         tracer = Tracer(
-            family, cycles.sign, farthest=length, swings=cycles.swings, pace=how.pace, shortest=how.shortest
+            family,
+            cycles.sign,
+            farthest=length,
+            swings=cycles.swings,
+            pace=PACE,
+            shortest=how.shortest,
+            first=how.first,
         )
-        tracer.first = how.first or tracer.first
         start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
         farthest, reserve = start, PRECISE
 

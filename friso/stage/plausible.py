@@ -101,8 +101,8 @@ def implausible_values(stage: Stage) -> Iterator[str]:
     for key in ("masses.cart", "masses.stage"):
         for unit, factor in _other_units(stage, key):
             usual = _complaints(stage, {**flat, key: flat[key] * factor})
-            others = [name for name in complaints if name not in usual and name != key]
-            if len(others) > 1:
+            others = [name for name in complaints if name not in usual and not name.startswith("masses.")]
+            if len(others) > 1 and key not in usual and usual.keys() <= complaints.keys():
                 named = ", ".join(others[:-1]) + f" and {others[-1]}"
                 text = (
                     f"{key} = {_written(stage, key)} makes {named} unusual for a positioning stage: was {unit} meant?"

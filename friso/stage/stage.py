@@ -280,6 +280,15 @@ class Stage(Section):
             raise StageError("", quoted(changes), expected, 'stage.replace({"masses.stage": "0.6 kg"})')
         return changed(self.as_written(), changes)
 
+    def in_own_units(self, changes: Mapping[str, Any]) -> dict[str, Any]:
+        """Changes as a person types them next to the stage file: a number alone has the unit in which the file has the
+        key, and a unit that is only wrong in its capitals is put right."""
+        tables, keys = self.as_written(), numeric_keys(self.flat())
+        units = {key for key in changes if getattr(keys.get(key), "unit", "")}
+        return {
+            key: in_unit_of(_under(tables, key), value) if key in units else value for key, value in changes.items()
+        }
+
     def with_numbers(self, numbers: Mapping[str, float], without: Iterable[str] = ()) -> "Stage":
         """The stage with SI numbers for dotted keys, written such that they are read again as the same ones, and
         without some tables. Raises StageError."""
@@ -459,9 +468,16 @@ def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
     return with_material(flat)
 
 
+def _under(tables: Mapping[str, Any], key: str) -> Any:
+    """The value of a dotted key of nested tables; None where there is none."""
+    place: Any = tables
+    for name in key.split("."):
+        place = place.get(name) if isinstance(place, Mapping) else None
+    return place
+
+
 def _put(tables: dict[str, Any], key: str, value: Any) -> None:
-    """Set or (None) remove a dotted key of nested tables, or set an element of an array; a number alone has the unit of
-    what is there. Raises StageError."""
+    """Set or (None) remove a dotted key of nested tables, or set an element of an array. Raises StageError."""
     *path, last = key.split(".")
     place: Any = tables
     for depth, name in enumerate(path):
@@ -473,16 +489,11 @@ def _put(tables: dict[str, Any], key: str, value: Any) -> None:
         if value is None:
             array = ".".join(path)
             raise StageError(key, "an element to remove", f"the whole array {array} without it")
-        place[number] = in_unit_of(_text(place[number]), value)
+        place[number] = value
     elif value is not None:
-        place[last] = in_unit_of(_text(place.get(last)), value)
+        place[last] = value
     elif place.pop(last, None) is None:
         raise StageError(key, "a key to remove", "a key that the stage has")
-
-
-def _text(entry: Any) -> Any:
-    """How a value of a key was written."""
-    return getattr(entry, "text", entry)
 
 
 def _number(values: list[Any], key: str, depth: int) -> int:

@@ -88,8 +88,8 @@ class Branch:
 class Tracer:
     """Follows one cycle along a line of stages (a family of one), from place 0 to the farthest; `sign` and `swings` are
     those of the cycle (the latter only if they are not as few as there may be); `pace` times as fast as a curve is
-    drawn, in steps not shorter than `shortest`, as long as its multiplier is below the `steepest`. At a place, what is
-    varied changes by a hundredth over a length of the line, `hundredth`."""
+    drawn, in steps not shorter than `shortest`, the `first` one as long as is asked, as long as its multiplier is below
+    the `steepest`. At a place, what is varied changes by a hundredth over a length of the line, `hundredth`."""
 
     def __init__(
         self,
@@ -102,9 +102,10 @@ class Tracer:
         shortest: float = SHORTEST,
         hundredth: Callable[[float], float] = lambda _: HUNDREDTH,
         steepest: float = STEEPEST,
+        first: float | None = None,
     ) -> None:
         self.family, self.sign, self.rtol, self.farthest, self.swings = family, sign, rtol, farthest, swings
-        self.first, self.longest, self.smooth = pace * FIRST, pace * LONGEST, pace * SMOOTH
+        self.first, self.longest, self.smooth = first or pace * FIRST, pace * LONGEST, pace * SMOOTH
         self.shortest, self.hundredth, self.steepest = shortest, hundredth, steepest
 
     def solve(

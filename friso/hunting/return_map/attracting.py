@@ -42,13 +42,13 @@ SCATTERS = "landings at equal distances return differently: the stage remembers 
 @dataclass(frozen=True)
 class MapSurvey:
     """What the return maps of stages show: the `mapped` runs; the `motions` that attract; orbits that were closed and
-    repel, `repelling`; and of which stages it is not known, `open`, shape (count,): an attractor of the map was neither
-    closed nor left by the runs that came to it."""
+    repel, `repelling`; and of which stages an attractor of the map was neither closed nor left by the runs that
+    came to it, `undecided`, shape (count,)."""
 
     mapped: Mapped
     motions: tuple[Swinging, ...]
     repelling: tuple[Swinging, ...]
-    open: np.ndarray
+    undecided: np.ndarray
 
     @property
     def doubts(self) -> np.ndarray:
@@ -56,7 +56,7 @@ class MapSurvey:
         why = np.full(self.mapped.stages.count, "", dtype=object)
         for stage, landing_map in enumerate(self.mapped.maps):
             scatter, _ = landing_map.scatter
-            if self.open[stage]:
+            if self.undecided[stage]:
                 why[stage] = UNCLOSED
             elif landing_map.lost:
                 why[stage] = LOST
@@ -112,10 +112,15 @@ def of_stages(motions: Iterable[Swinging], count: int) -> list[tuple[Swinging, .
 
 
 def _left(mapped: Mapped, motions: list[Swinging], repelling: list[Swinging]) -> list[_Proposal]:
-    """The attractors of all maps of which it is not known whether they attract, but those that no run comes to which
-    may go on."""
-    closed = (*motions, *repelling)
-    return [new for new in _proposals(mapped) if not any(_is(new, motion, mapped.stages) for motion in closed)]
+    """The attractors of all maps of which it is not known whether they attract, except those for which no run is left
+    that can be continued."""
+    lengths = mapped.stages.length
+
+    def is_any(new: _Proposal, closed: list[Swinging], exactly: bool) -> bool:
+        own = (motion for motion in closed if motion.stage == new.stage)
+        return any(is_motion(new.attractor, motion, float(lengths[new.stage]), exactly) for motion in own)
+
+    return [new for new in _proposals(mapped) if not is_any(new, motions, False) and not is_any(new, repelling, True)]
 
 
 def _swings(attractor: MapAttractor) -> int:
@@ -139,15 +144,16 @@ def _proposals(mapped: Mapped) -> list[_Proposal]:
     return proposals
 
 
-def _is(proposal: _Proposal, motion: Swinging, stages: Ensemble) -> bool:
-    """Whether an attractor of a map is a motion of the stage."""
-    if motion.stage != proposal.stage:
+def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly: bool = False) -> bool:
+    """Whether an attractor of a map is a closed cycle of its stage: about as large, and `exactly` that if it takes as
+    many landings to return. `length` [m] is the deflection of the loop by the break-away force."""
+    distances = np.abs(attractor.distances) * length
+    if exactly and not (attractor.periodic and motion.cycles and len(distances) == motion.cycles.swings):
         return False
-    distances = np.abs(proposal.attractor.distances) * stages.length[motion.stage]
-    simple = motion.swings == 2 or not proposal.attractor.periodic
+    simple = motion.swings == 2 or not attractor.periodic
     size = distances.mean() if simple else (distances.max() + distances.min()) / 2
     alike = abs(size / motion.amplitude - 1) < ALIKE
-    return bool(alike and (not proposal.attractor.periodic or motion.swings % len(distances) == 0))
+    return bool(alike and (not attractor.periodic or motion.swings % len(distances) == 0))
 
 
 def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging], repelling: list[Swinging]) -> None:
@@ -157,8 +163,9 @@ def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging
     for k, owner in enumerate(owners.tolist()):
         end = 0 if landings.rest[k] or landings.lost[k] else int(landings.count[k]) + 1
         path, when = landings.distances[k, 1:end], landings.times[k, 1:end]
-        besides = {motion.swings for motion in repelling if motion.stage == owner}
-        swings[k] = _repeats(path, bool(mapped.stages.symmetric[owner]), besides)
+        symmetric = bool(mapped.stages.symmetric[owner])
+        simple = any(motion.stage == owner and motion.swings == 2 for motion in repelling)
+        swings[k] = _repeats(path, symmetric, 1 + symmetric if simple else 0)
         if swings[k]:
             times[k], sizes[k] = when[-1] - when[-1 - swings[k]], np.ptp(path)
     which = np.flatnonzero(swings)
@@ -168,20 +175,20 @@ def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging
     pending = Pending(some, landings.ends[which], times[which], np.zeros(which.size), some.symmetric, RUN_RTOL)
     for group, cycles in close_orbits(pending, swings[which], times[which], sizes[which], rtol):
         numbers = owners[which[group]]
-        for kind, those in ((motions, cycles.attracting), (repelling, cycles.closed & ~cycles.attracting)):
-            for motion in of_cycles(numbers, cycles, mapped.stages.sticking, those):
+        for kind, some_cycles in ((motions, cycles.attracting), (repelling, cycles.closed & ~cycles.attracting)):
+            for motion in of_cycles(numbers, cycles, mapped.stages.sticking, some_cycles):
                 if not any(motion.like(other) for other in kind):
                     kind.append(motion)
 
 
-def _repeats(path: np.ndarray, symmetric: bool, besides: set[int]) -> int:
-    """The least number of swings after which the last landings of a run, (landings,), about repeat themselves; 0 if
-    they do not, `besides` in cycles with so many swings in their periods."""
+def _repeats(path: np.ndarray, symmetric: bool, least: int) -> int:
+    """The least number of swings, from the `least`, after which the last landings of a run, (landings,), about repeat
+    themselves; 0 if they do not."""
     sizes = np.abs(path) if symmetric else path
     for swings in range(1 if symmetric else 2, len(path) // 2 + 1, 1 if symmetric else 2):
         last = min(max(swings, 2), len(path) - swings)
         again = sizes[-last:] / sizes[-last - swings : len(path) - swings]
         share = ABOUT if swings <= 2 - symmetric else CLOSELY
-        if swings * (1 + swings % 2) not in besides and np.all(np.abs(again - 1) < share):
+        if swings >= least and np.all(np.abs(again - 1) < share):
             return swings
     return 0

@@ -13,7 +13,7 @@ from friso.equations.motion import last_corner
 from friso.equations.roles import Steady
 from friso.equations.structure import shared_structure
 from friso.hunting.basin import Kick, MoveShare, kick_windows, move_share
-from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.rest import pushed
 from friso.hunting.return_map.attracting import MapSurvey
 from friso.hunting.return_map.landing_map import LandingMap
@@ -29,7 +29,7 @@ UNSURE = 0.02
 
 
 def displacements_by_map(stages: Ensemble, survey: MapSurvey) -> Kick:
-    """The displacements [m] from which one stage that is let go ends in what attracts it."""
+    """The displacements [m] from which one stage that is let go ends in what attracts it; something has to."""
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         several = stages.take(np.zeros(len(kicks), np.int64))
@@ -39,7 +39,7 @@ def displacements_by_map(stages: Ensemble, survey: MapSurvey) -> Kick:
 
 
 def pushes_by_map(stages: Ensemble, survey: MapSurvey) -> Kick:
-    """The velocities [m/s] of all masses from which one stage ends in what attracts it."""
+    """The velocities [m/s] of all masses from which one stage ends in what attracts it; something has to."""
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         several = stages.take(np.zeros(len(kicks), np.int64))
@@ -54,15 +54,16 @@ def motions_by_map(flat: Mapping[str, Any], count: int, survey: MapSurvey) -> tu
     if flat["motion.kind"] not in ("there_and_back", "release", "hold"):
         return np.zeros(count, bool), np.zeros(count, bool)
     long = {**flat, "motion.duration": np.broadcast_to(last_corner(flat) * (1 + 1e-9) + 1e-9, (count,))}
-    ends = np.zeros((count, len(kernel(shared_structure(flat)).full_state)))
+    ends, completed = np.zeros((count, len(kernel(shared_structure(flat)).full_state))), np.zeros(count, bool)
     for runs in run_chunks(kernel(shared_structure(flat)), long, count, RunOptions(rtol=RTOL, least_swing=np.inf)):
-        ends[runs.numbers] = runs.results.ends
-    return _go_on(Ensemble.held(flat, count), ends, survey.mapped.maps[0])
+        ends[runs.numbers], completed[runs.numbers] = runs.results.ends, done(runs.results)
+    hunts, decided = _go_on(Ensemble.held(flat, count), ends, survey.mapped.maps[0])
+    return hunts & completed, decided & completed
 
 
 def own_motion_by_map(stage: Stage, survey: MapSurvey) -> tuple[bool, bool]:
-    """Whether the motion of a stage's file ends in what attracts the stage, and whether that is known: with masses that
-    are hardly others, too, it ends alike."""
+    """Whether the motion of a stage's file ends in what attracts the stage, and whether that is known, as it ends in
+    the same way with slightly other masses."""
     flat = stage.flat()
     masses = {key: value * CHANGED for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
     ends, decided = motions_by_map({**flat, **masses}, len(CHANGED), survey)
@@ -78,6 +79,7 @@ def _least(survey: MapSurvey) -> float:
     return min(motion.amplitude for motion in survey.motions)
 
 
+@np.errstate(all="ignore")  # a stage that never lands is still at its reference
 def _go_on(stages: Ensemble, starts: np.ndarray, landing_map: LandingMap) -> tuple[np.ndarray, np.ndarray]:
     """Which runs go on for ever, by where they land, and of which that is known, both (runs,)."""
     count = len(starts)
@@ -86,7 +88,9 @@ def _go_on(stages: Ensemble, starts: np.ndarray, landing_map: LandingMap) -> tup
     for _ in range(ROUNDS):
         landed = find_landings(stages.take(left), states, most)
         rows = np.arange(left.size)
-        before, last = (landed.distances[rows, at] / stages.length[left] for at in (landed.count - 1, landed.count))
+        before, last = (
+            landed.distances[rows, at] / stages.length[left] for at in (np.maximum(landed.count - 1, 0), landed.count)
+        )
         fates = np.array([landing_map.goes_on(last * share) for share in (1 - UNSURE, 1.0, 1 + UNSURE)])
         foretold = np.abs(landing_map.foretold(before) / last) - 1
         sure = (fates == fates[1]).all(axis=0) & (np.abs(foretold) < UNSURE) & (landed.count == most)

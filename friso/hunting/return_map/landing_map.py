@@ -73,19 +73,19 @@ class LandingMap:
     lost: int
 
     @classmethod
-    def of(cls, landings: Landings, length: float, symmetric: bool, first: np.ndarray) -> LandingMap:
-        """The map from the landings of runs of one stage, but those before the `first` of a run, shape (runs,): these
-        depend on how it began. `length` [m] is the deflection of the loop by the break-away force."""
+    def of(cls, landings: Landings, length: float, symmetric: bool) -> LandingMap:
+        """The map from the landings of runs of one stage, but where they started: what follows that depends on how the
+        run began. `length` [m] is the deflection of the loop by the break-away force."""
         distances = landings.distances / length
         ended = np.where(landings.rest, 0.0, np.where(landings.away, np.inf, np.nan))
         distances, count = _without_excursions(np.abs(distances) if symmetric else distances, landings.count)
         columns: list[tuple[Any, ...]] = []
-        for k in range(distances.shape[1]):
+        for k in range(1, distances.shape[1]):
             here = distances[:, k]
             ahead = distances[:, min(k + 1, distances.shape[1] - 1)]
             following = np.where(k < count, ahead, ended)
             following = np.where(np.abs(following) < RESOLVED, 0.0, following)
-            which = np.flatnonzero((np.abs(here) >= RESOLVED) & ~np.isnan(following) & (k <= count) & (k >= first))
+            which = np.flatnonzero((np.abs(here) >= RESOLVED) & ~np.isnan(following) & (k <= count))
             columns.append((here[which], following[which], which, k + 1 == count[which]))
         before, after, run, final = (np.concatenate(part) for part in zip(*columns, strict=True))
         order = np.argsort(before, kind="stable")
@@ -219,7 +219,7 @@ class LandingMap:
         the distance, attracting or not, of symmetric stages; of others there may be one."""
         for side in self.sides:
             gain = self.gain[self.points(side)]
-            if len(gain) > 1 and not np.any((gain[:-1] > 1) & (gain[1:] <= 1) & (gain[1:] > 0)):
+            if len(gain) < 2 or not np.any((gain[:-1] > 1) & (gain[1:] <= 1) & (gain[1:] > 0)):
                 return False
         return True
 

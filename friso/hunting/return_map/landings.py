@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from friso.equations.roles import Role
-from friso.hunting.attractors.rounds import RESOLVED
+from friso.hunting.attractors.rounds import RESOLVED, TYPICAL
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.rest import wait
 
@@ -67,10 +67,11 @@ class Landings:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float = RTOL) -> Landings:
-    """Follow stages from states in which they stand still, shape (runs, states), to a relative tolerance, each until it
-    has landed `most` times, or rests.
+    """Follow stages from states, shape (runs, states), to a relative tolerance, each until it has landed `most` times,
+    or rests.
 
-    A round of runs is as long as each stage may take to wind up where it sticks and to cross its reference.
+    A round of runs is as long as each stage may take to wind up where it sticks, or where it may stick if it moves, and
+    to cross its reference.
     """
     count, position, sticking = len(starts), stages.kernel.position, stages.sticking
     speeds = stages.kernel.having(Role.VELOCITY)
@@ -83,7 +84,9 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
         some, begun = stages.take(left), states[left]
         sticks = np.abs(begun[:, sticking])
         small = RESOLVED * some.length
-        durations = PATIENCE * wait(some, np.maximum(sticks, small)) + FLIGHT / some.number("rate")
+        moves = np.abs(begun[:, speeds]).max(axis=1) > STANDS * some.number("rate") * some.length
+        from_where = np.maximum(sticks, np.where(moves, TYPICAL * some.length, small))
+        durations = PATIENCE * wait(some, from_where) + FLIGHT / some.number("rate")
         legs = np.maximum(LEG * sticks, small)
         results = some.run(begun, durations, rtol, with_modes=True, least_swing=legs, budget=BUDGET)
         fine, room = done(results), results.turn_values.shape[1]
@@ -107,6 +110,7 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
         left = left[fine & ~rest[left] & ((landed[left] < most) | unfinished)]
         if not left.size:
             break
+    lost[left] = True  # they have not landed as often as asked in so many rounds
     return Landings(where, when, landed, states, rest, away, lost)
 
 

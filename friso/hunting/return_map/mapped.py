@@ -7,10 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from friso.equations.roles import Steady
 from friso.hunting.attractors.rounds import RESOLVED
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.rest import pushed, stuck
+from friso.hunting.cycle.rest import stuck
 from friso.hunting.return_map.landing_map import JUMP, LandingMap
 from friso.hunting.return_map.landings import RTOL, Landings, find_landings
 from friso.stage.controllers import FORCE_LIMIT
@@ -24,13 +23,6 @@ FAR = np.geomspace(5.0, 300.0, 6)
 LIMITED = np.geomspace(600.0, 30000.0, 6)
 """Distances beyond these, in those units, of stages with a force limit."""
 
-KICKS = np.geomspace(0.3, 30.0, 8)
-"""Distances at which stages are let go, and those to which pushes would take the loop, in those units: landings that
-have another history, which must return alike."""
-
-STUCK, KICKED = 1, 2
-"""The first landing that does not depend any more on how a run began: stuck, or with a kick."""
-
 LANDINGS = 3
 """Landings of a run: what follows the first of them does not depend any more on how the run began."""
 
@@ -41,7 +33,7 @@ DIAGONAL = 0.1
 """Logarithm of the gain up to which the map is near its diagonal."""
 
 OUTERMOST = 0.3
-"""The same beyond which nothing more is looked for outside the outermost points."""
+"""Logarithm of the loss below which nothing more is looked for beyond the outermost points of a map."""
 
 BREAK, WITHIN = 0.02, np.array([0.2, 0.4, 0.6, 0.8])
 """Logarithm of two starts between which landings break off, up to which that is narrowed down, and the shares of the
@@ -59,15 +51,13 @@ class Mapped:
     """Stages and runs of them.
 
     Each run is of the stage with the number `owners` (runs,). It began stuck at `starts` (runs,), signed, in units of
-    the deflection of the loop by the break-away force, NaN where it was kicked, or goes on from another run; such
-    another one was `continued` (runs,). Landings before the `first` (runs,) of a run depend on how it began. The
-    `landings` are of all runs, which have a relative tolerance, `rtol`.
+    the deflection of the loop by the break-away force, NaN where it goes on from another run; such another one was
+    `continued` (runs,). The `landings` are of all runs, which have a relative tolerance, `rtol`.
     """
 
     stages: Ensemble
     owners: np.ndarray
     starts: np.ndarray
-    first: np.ndarray
     continued: np.ndarray
     landings: Landings
     rtol: float = RTOL
@@ -80,7 +70,7 @@ class Mapped:
     def _map(self, stage: int) -> LandingMap:
         which = np.flatnonzero(self.owners == stage)
         length, symmetric = float(self.stages.length[stage]), bool(self.stages.symmetric[stage])
-        return LandingMap.of(self.landings.take(which), length, symmetric, self.first[which]).renumbered(which)
+        return LandingMap.of(self.landings.take(which), length, symmetric).renumbered(which)
 
     @property
     def attracts(self) -> np.ndarray:
@@ -91,17 +81,16 @@ class Mapped:
         """The stages with these numbers, each once, and their runs."""
         which = np.flatnonzero(np.isin(self.owners, numbers))
         owners = np.array([np.flatnonzero(numbers == owner)[0] for owner in self.owners[which]], np.int64)
-        runs = (self.starts[which], self.first[which], self.continued[which], self.landings.take(which))
+        runs = (self.starts[which], self.continued[which], self.landings.take(which))
         return Mapped(self.stages.take(numbers), owners, *runs, self.rtol)
 
-    def joined(self, owners: np.ndarray, starts: np.ndarray, first: int, landings: Landings) -> Mapped:
-        """The same with more runs."""
+    def joined(self, owners: np.ndarray, starts: np.ndarray, landings: Landings) -> Mapped:
+        """These stages with more runs of them."""
         together = self.landings.joined(landings)
         joined = Mapped(
             self.stages,
             np.append(self.owners, owners),
             np.append(self.starts, starts),
-            np.append(self.first, np.full(len(owners), first)),
             np.append(self.continued, np.zeros(len(owners), bool)),
             together,
             self.rtol,
@@ -113,32 +102,21 @@ class Mapped:
         return joined
 
     def begun(self, owners: np.ndarray, starts: np.ndarray, most: int = LANDINGS) -> Mapped:
-        """The same with more runs of the stages `owners`, stuck at first at `starts`, both (runs,)."""
-        return self.joined(owners, starts, STUCK, _stuck_at(self.stages, owners, starts, most, self.rtol))
+        """These stages with more runs, of those with the numbers `owners`, stuck at first at `starts`, both (runs,)."""
+        return self.joined(owners, starts, _stuck_at(self.stages, owners, starts, most, self.rtol))
 
     def gone_on(self, runs: np.ndarray, most: int) -> Mapped:
-        """The same with more runs, which go on from where those with some numbers ended, from their last landing."""
+        """These stages with more runs, which go on from the last landings of those with some numbers."""
         owners, states = self.owners[runs], self.landings.ends[runs]
         more = find_landings(self.stages.take(owners), states, most, self.rtol)
         continued = self.continued.copy()
         continued[runs] = True
-        before = Mapped(self.stages, self.owners, self.starts, self.first, continued, self.landings, self.rtol)
+        before = Mapped(self.stages, self.owners, self.starts, continued, self.landings, self.rtol)
         vars(before)["maps"] = self.maps
-        return before.joined(owners, np.full(len(runs), np.nan), 0, more)
-
-    def kicked(self) -> Mapped:
-        """The same with runs of other histories: stages that are let go at distances, and pushed at their reference."""
-        owners = np.repeat(np.arange(self.stages.count), len(KICKS))
-        several = self.stages.take(owners)
-        sizes = np.tile(KICKS, self.stages.count) * several.length
-        mapped = self
-        for states in (several.settled(Steady(0.0, sizes)), pushed(several, sizes * several.number("rate"))):
-            landings = find_landings(several, states, LANDINGS + 1, self.rtol)
-            mapped = mapped.joined(owners, np.full(len(owners), np.nan), KICKED, landings)
-        return mapped
+        return before.joined(owners, np.full(len(runs), np.nan), more)
 
     def finer(self) -> Mapped:
-        """The same with more runs, where a map is not resolved yet."""
+        """These stages with more runs, where a map is not resolved yet."""
         wanted = [self._wanted(k) for k in range(self.stages.count)]
         owners = np.repeat(np.arange(self.stages.count), [len(starts) for starts in wanted])
         return self.begun(owners, np.concatenate(wanted)) if owners.size else self
@@ -171,9 +149,7 @@ def map_stages(
     owners = np.concatenate([np.repeat(which, len(units)) for which, _ in sides])
     starts = np.concatenate([np.tile(side * units, len(which)) for which, side in sides])
     landings = _stuck_at(stages, owners, starts, LANDINGS, rtol)
-    first = np.full(len(owners), STUCK)
-    mapped = Mapped(stages, owners, starts, first, np.zeros(len(owners), bool), landings, rtol)
-    mapped = mapped if sparse else mapped.kicked()
+    mapped = Mapped(stages, owners, starts, np.zeros(len(owners), bool), landings, rtol)
     for _ in range(rounds):
         mapped = mapped.finer()
     return mapped
@@ -183,22 +159,19 @@ def remembered(mapped: Mapped, stage: int) -> str:
     """The state in which two runs of a stage differ most that land equally far off, but return differently: what it has
     not forgotten there, by name; "" where no landings show that."""
     landing_map = mapped.maps[stage]
-    scatter, place = landing_map.scatter
-    near = (
-        np.flatnonzero(np.abs(np.log(np.abs(landing_map.before / place))) < COARSE)
-        if scatter
-        else np.zeros(0, np.int64)
-    )
+    _, place = landing_map.scatter
+    with np.errstate(all="ignore"):
+        apart = np.log(landing_map.before / place)  # NaN on the other side, and where nothing scatters
+    near = np.flatnonzero((np.abs(apart) < COARSE) & landing_map.final & np.isfinite(landing_map.after))
     if near.size < 2:
         return ""
-    least, most = (
-        int(landing_map.run[near[k]]) for k in (landing_map.after[near].argmin(), landing_map.after[near].argmax())
-    )
+    after = np.abs(landing_map.after[near])
+    least, most = (int(landing_map.run[near[k]]) for k in (after.argmin(), after.argmax()))
     stages, states = mapped.stages, mapped.landings.ends
     size = len(stages.kernel.states)
-    apart = np.abs(np.abs(states[least, :size]) - np.abs(states[most, :size])) / stages.scales[stage]
-    apart[[stages.integral, stages.sticking, stages.kernel.position]] = 0.0  # these tell the distance, and the wait
-    return stages.kernel.states[int(apart.argmax())]
+    unlike = np.abs(np.abs(states[least, :size]) - np.abs(states[most, :size])) / stages.scales[stage]
+    unlike[[stages.integral, stages.sticking, stages.kernel.position]] = 0.0  # these tell the distance, and the wait
+    return stages.kernel.states[int(unlike.argmax())]
 
 
 def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: int, rtol: float) -> Landings:
@@ -221,9 +194,10 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
             apart = np.diff(u)
             lower, upper = np.minimum(gain[:-1], gain[1:]), np.maximum(gain[:-1], gain[1:])
             crosses = (lower < DIAGONAL) & (upper > -DIAGONAL)
-            breaks = ~(np.abs(np.diff(np.log(across))) < JUMP) & (upper > -1.0)
+            away = np.isinf(across[:-1]) & np.isinf(across[1:])
+            breaks = ~(np.abs(np.diff(np.log(across))) < JUMP) & (upper > -1.0) & ~away
         limit = np.where(crosses & ~breaks, FINE, np.where(breaks, 2 * FINE, COARSE))
-        limit = np.where(upper < -1.0, np.inf, limit)
+        limit = np.where((upper < -1.0) | away, np.inf, limit)
         wide = np.flatnonzero(apart > limit)
         places += (side * np.exp((u[wide] + u[wide + 1]) / 2)).tolist()
         excess += (apart[wide] / limit[wide]).tolist()

@@ -43,7 +43,7 @@ class MapsOverBandwidth:
     def __init__(
         self, flat: Mapping[str, Any], factors: np.ndarray, decided: Mapping[int, tuple[Swinging, ...]]
     ) -> None:
-        """Look at all factors but those, by number, whose motions that attract are `known`."""
+        """Look at all factors but the `decided` ones, whose motions that attract are given by number."""
         self.flat, self.factors = flat, factors
         self.mapped = self.maps(factors, 1)
         self.attracts = self.mapped.attracts
@@ -87,7 +87,7 @@ class MapsOverBandwidth:
                 beyond = np.append(beyond, np.geomspace(beyond[-1], high, BETWEEN + 2)[1:-1])
             after = survey_maps(Ensemble.held(faster(self.flat, beyond), len(beyond)))
             if not after.attracts.any():
-                return AttractionEnd(end, float(beyond[1]), not after.open.any(), apart)
+                return AttractionEnd(end, float(beyond[1]), bool(after.resolved.all()), apart)
             last = int(np.flatnonzero(after.attracts)[-1])
             low, motions = float(beyond[last]), tuple(m for m in after.motions if m.stage == last)
             high = high if ahead * (high - low) > 0 else low * 1.03**ahead
@@ -138,7 +138,7 @@ def search_by_maps(flat: Mapping[str, Any], own: tuple[Swinging, ...]) -> Search
         end.inside, None if crossover is None else crossover * end.inside, end.certain, end.outside, end.reserve
     )
     home = next((window for window in windows if own and window.holds(1.0)), None)
-    others = tuple(window for window in windows if window is not home and not (end and window.high is end))
+    others = tuple(window for window in windows if end is None or window.high is not end)
     return SearchedBandwidths(margin, (*others, *again), home.low if home else None)
 
 
