@@ -22,6 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when NumPy is loaded
 import numpy as np
 
 import friso
+from benchmarks.return_map.brute_force import decided
 from benchmarks.return_map.compared import page
 from benchmarks.return_map.mapped import mapped
 from benchmarks.return_map.searched import searched
@@ -45,6 +46,11 @@ def main() -> None:
             before = answered.get(_key(record[0]))
             if before is None or arguments.redo:
                 _keep(arguments.kept, _answered(*record, before))
+    if arguments.decide:
+        for record in {_key(record): record for record in _read(arguments.kept)}.values():
+            stage = _stage(*_key(record)[:3])
+            if stage and (words := decided(record, stage.variants()[record["case"]])):
+                _keep(arguments.kept, record | {"decided": words})
     if arguments.table:
         arguments.table.write_text(page([*{_key(record): record for record in _read(arguments.kept)}.values()]))
 
@@ -103,6 +109,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--stages", type=int, default=100)
     parser.add_argument("--first", type=int, default=0, help="number of the first stage")
     parser.add_argument("--every", type=int, default=1, help="one stage in so many")
+    parser.add_argument("--decide", action="store_true", help="follow starts from everywhere where answers differ")
     parser.add_argument("--redo", action="store_true", help="answer by the map again what was answered before")
     parser.add_argument("--kept", type=Path, default=Path("benchmark_results/return_map.jsonl"), help="file of answers")
     parser.add_argument("--table", type=Path, help="write the comparison to this file, in Markdown")

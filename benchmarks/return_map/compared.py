@@ -60,7 +60,9 @@ def page(records: Sequence[Record]) -> str:
         "",
         "## What differs",
         "",
-        *(f"- {_name(record)}: {text}" for record in usable for text in differences(record)),
+        "Where verdicts or edges differ, runs from 72 starts decide, at the stage itself or between both edges.",
+        "",
+        *(f"- {_name(record)}: {text}{_decided(record, text)}" for record in usable for text in differences(record)),
         "",
         "## Why maps are not resolved",
         "",
@@ -171,6 +173,11 @@ def _reasons(records: Sequence[Record]) -> list[list[Any]]:
     doubts = [r["mapped"].get("doubt", "it was given up for its work") for r in records]
     doubts = [re.sub(r" \(.*", "", doubt) for doubt in doubts]
     return [[reason, doubts.count(reason)] for reason in sorted({*doubts} - {""})]
+
+
+def _decided(record: Record, difference: str) -> str:
+    """What brute force says of a difference."""
+    return f"; {record['decided']}" if "decided" in record and not difference.startswith("no window") else ""
 
 
 def _name(record: Record) -> str:
