@@ -271,7 +271,10 @@ def in_unit_of(before: Any, entry: Any) -> Any:
     number = _NUMBER.match(text) if len(text) <= _LONGEST else None
     if number is None or not isinstance(before, str):
         return entry
-    rest, (_, unit) = text[number.end() :].strip(), _split(before)
+    try:
+        rest, (_, unit) = text[number.end() :].strip(), _split(before)
+    except _Refused:  # an uncertain value
+        return entry
     same_prefix = re.sub("[^mM]", "", rest) == re.sub("[^mM]", "", unit)  # a milli is no mega
     same = not rest or (rest.lower() == unit.lower() and same_prefix and not _is_unit(rest))
     return f"{number[0]} {unit}" if same else entry

@@ -384,4 +384,5 @@ def test_no_unit_is_guessed_that_may_be_another(rig: Stage) -> None:
         stage_of(mega, ["controller.crossover=5 mHZ"])
     assert stage_of(mega, ["controller.crossover=9000 mHz"]).flat()["controller.crossover"] == pytest.approx(9.0)
     assert stage_of(mega, ["controller.crossover=0.00002"]).flat()["controller.crossover"] == pytest.approx(20.0)
+    assert stage_of(rig.replace({"masses.cart": "1 kg +/- 1 %"}), ["masses.cart=2 kg"]).flat()["masses.cart"] == 2.0
     assert stage_of(rig.replace({"name": "2 axis"}), ["name=3 rows"]).name == "3 rows"

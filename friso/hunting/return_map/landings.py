@@ -30,8 +30,9 @@ PATIENCE, FLIGHT = 2.0, 30.0
 """How long a round is: in waits for the integrator to wind up to the break-away force where the stage sticks, and in
 units of 1/(natural frequency of mass and loop) for the way across."""
 
-ROUNDS = 3
-"""Rounds of runs more than the landings wanted: a stage that stops short of its reference needs two for a swing."""
+ROUNDS = 10
+"""Rounds of runs more than the landings wanted: a stage that stops short of its reference, creeps, or is driven at the
+limit of its force needs several for a swing."""
 
 
 @dataclass(frozen=True)
