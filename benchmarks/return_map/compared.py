@@ -60,7 +60,8 @@ def page(records: Sequence[Record]) -> str:
         "",
         "## What differs",
         "",
-        "Where verdicts or edges differ, runs from 72 starts decide, at the stage itself or between both edges.",
+        "Behind a difference stands what runs from 72 starts show, at the stage itself or between both edges, where "
+        "they were made (`--decide`).",
         "",
         *(f"- {_name(record)}: {text}{_decided(record, text)}" for record in usable for text in differences(record)),
         "",
