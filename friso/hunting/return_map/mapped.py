@@ -18,16 +18,18 @@ NEAR = np.concatenate([np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 24
 """Distances at which stages are stuck at first, in units of the deflection of the loop by the break-away force."""
 
 FAR = np.geomspace(5.0, 300.0, 6)
-"""Distances beyond these, in those units: a stage passes its reference from there without sticking, at first."""
+"""More distances, in units of the deflection of the loop by the break-away force, from which a stage passes its
+reference without sticking at first."""
 
 LIMITED = np.geomspace(600.0, 30000.0, 6)
-"""Distances beyond these, in those units, of stages with a force limit."""
+"""Still farther distances, in the same units, from which stages with a force limit begin."""
 
 LANDINGS = 3
 """Landings of a run: what follows the first of them does not depend any more on how the run began."""
 
 COARSE, FINE = 0.15, 0.01
-"""Widest gap between neighbouring logarithms of distance, and where the map comes near its diagonal."""
+"""Widest gaps between neighbouring points, as logarithms of distance: anywhere, and where the map comes near its
+diagonal."""
 
 DIAGONAL = 0.1
 """Logarithm of the gain up to which the map is near its diagonal."""
@@ -36,8 +38,8 @@ OUTERMOST = 0.3
 """Logarithm of the loss below which nothing more is looked for beyond the outermost points of a map."""
 
 BREAK, WITHIN = 0.02, np.array([0.2, 0.4, 0.6, 0.8])
-"""Logarithm of two starts between which landings break off, up to which that is narrowed down, and the shares of the
-way between them at which more runs begin."""
+"""How closely a break between the landings of two starts is narrowed down, as a logarithm of their distances, and the
+shares of the way between them at which more runs begin."""
 
 MOST = 12
 """Runs that are added for a stage at once, at most."""
