@@ -73,7 +73,7 @@ def hunts(**changes: Any) -> Judgement:
 
 def settles(**changes: Any) -> Judgement:
     """What is known of it, free."""
-    edge = Margin(0.6998, 5.598, True, 0.7068)
+    edge = Margin(0.6998, 5.598, True, 0.7064)
     result = Judgement("settles", fake_hunting(reason=NO_RETURN), margin=edge, settled_after=0.5123)
     return replace(result, **changes)
 

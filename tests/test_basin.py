@@ -297,10 +297,10 @@ def at(chosen: Stage, factor: float) -> Stage:
 @RIGID
 def test_an_edge_just_before_the_lowest_bandwidth_that_attracts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Within what it is known to: it was searched for among the bandwidths up to it, of which there are none then."""
-    monkeypatch.setattr(Outward, "end", lambda _, at, *others: AttractionEnd(0.9999 * at, 1.01 * at, True, 5e-4))
-    edge = find_margin(rigid(95), attracting=False)
+    monkeypatch.setattr(Outward, "end", lambda _, at, *others: AttractionEnd(0.9999 * at, 1.01 * at, True))
+    edge = find_margin(rigid(38), attracting=False)
     assert edge is not None
-    assert edge.factor == pytest.approx(0.9999 / SEARCH_LIMITS.bandwidth_factor)
+    assert edge.factor == pytest.approx(0.9999 * SEARCH_LIMITS.lowest_bandwidth)
 
 
 @RIGID
@@ -315,9 +315,9 @@ def test_margin_from_above_is_that_from_below() -> None:
 
 @RIGID
 @pytest.mark.parametrize(("crossover", "attracting"), [(0.9, True), (110, False)])
-def test_no_margin_within_a_factor_of_ten(crossover: float, attracting: bool) -> None:
+def test_no_margin_within_the_range_of_the_search(crossover: float, attracting: bool) -> None:
     """The edge at 9.77 Hz is too far off to be looked for."""
-    assert max(9.77 / crossover, crossover / 9.77) > SEARCH_LIMITS.bandwidth_factor
+    assert not SEARCH_LIMITS.lowest_bandwidth < 9.77 / crossover < SEARCH_LIMITS.highest_bandwidth
     assert find_margin(rigid(crossover), attracting) is None
 
 

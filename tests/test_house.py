@@ -14,7 +14,7 @@ import friso
 import friso_thesis
 from friso import hunting
 from friso.cli.app import command_line
-from friso.hunting import criteria, measures, return_map
+from friso.hunting import criteria, measures
 
 PACKAGE, THESIS = (Path(str(package.__file__)).parent for package in (friso, friso_thesis))
 ROOT = Path(__file__).parents[1]
@@ -58,7 +58,7 @@ RECIPES = {
 """What CONTRIBUTING.md tells how to add, and the folder that takes its one file."""
 
 
-INTERFACE = {module.__name__: {*module.__all__} for module in (hunting, criteria, measures, return_map)}
+INTERFACE = {module.__name__: {*module.__all__} for module in (hunting, criteria, measures)}
 """What friso.hunting offers to other floors, to benchmarks, and to tests that are not of its inner modules."""
 
 NARRATORS = {"found", "known", "told", "given", "each", "it"}
@@ -218,7 +218,7 @@ def inner_names(tree: ast.Module) -> set[str]:
     behind: set[str] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("friso.hunting."):
-            offered = INTERFACE.get(node.module or "", set()) | {"criteria", "measures", "return_map"}
+            offered = INTERFACE.get(node.module or "", set()) | {"criteria", "measures"}
             behind |= {alias.asname or alias.name for alias in node.names if alias.name not in offered}
         elif isinstance(node, ast.Import):
             behind |= {alias.name for alias in node.names if is_inner(alias.name)}

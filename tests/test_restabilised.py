@@ -10,10 +10,10 @@ from variants import VARIANTS
 
 from friso.engine.allowance import allowance
 from friso.equations.bandwidth import faster
-from friso.hunting import BandwidthWindow, Ensemble, Margin
+from friso.hunting import BandwidthWindow, Ensemble
 from friso.hunting.cycle.find import symmetric_cycles
 from friso.hunting.cycle.swings import swings
-from friso.hunting.margin import NOT_SOUGHT, SearchedBandwidths, followed_on
+from friso.hunting.margin import NOT_SOUGHT, followed_on, search_bandwidths
 from friso.hunting.restabilised import windows_again
 from friso.stage import Stage
 
@@ -83,18 +83,16 @@ def test_simulations_swing_on_within_it_alone(beside: float) -> None:
     assert share_left(0.99 * low, beside) < 0.1
 
 
-def test_it_is_found_from_the_edge_and_from_a_stage_that_has_none() -> None:
-    """Both ways from a bandwidth where nothing attracts; not where something does, or that is contradicted."""
-    between = TABLE.replace({"controller.crossover": "10 Hz"})
-    window, below = followed_on(between, NOT_SOUGHT, attracting=False).windows
-    assert below.low is None
-    assert below.high is not None
-    assert 10 * below.high.inside == pytest.approx(9.42501, rel=1.1 * below.high.reserve)
-    assert below.high.reserve < 2e-4
-    assert [10 * end for end in ends(window)] == pytest.approx([12 * end for end in ends(window_of_table())], rel=1e-5)
-    assert followed_on(between, NOT_SOUGHT, attracting=True) == NOT_SOUGHT
-    doubted = replace(NOT_SOUGHT, contradicts=True)
-    assert followed_on(between, doubted, attracting=False) == doubted
+@pytest.mark.parametrize(("crossover", "attracting"), [(8.0, True), (10.0, False)])
+def test_it_is_found_from_a_stage_that_hunts_and_from_one_that_does_not(crossover: float, attracting: bool) -> None:
+    stage = TABLE.replace({"controller.crossover": f"{crossover} Hz"})
+    sought = search_bandwidths(stage, attracting)
+    (window,) = followed_on(stage, sought).windows
+    assert [crossover * end for end in ends(window)] == pytest.approx(
+        [12 * e for e in ends(window_of_table())], rel=1e-5
+    )
+    assert sought.margin is not None
+    assert sought.margin.crossover == pytest.approx(9.42501, rel=1e-4)
 
 
 def test_windows_are_told_once() -> None:
@@ -108,9 +106,7 @@ def test_what_no_allowance_suffices_for_is_left_out() -> None:
 
 def test_a_window_narrower_than_bandwidths_are_held() -> None:
     """Of the thesis's rig, locked: 0.0025 % of the bandwidth, at twice the crossover of the rig."""
-    locked = VARIANTS["locked"]
-    sought = SearchedBandwidths(Margin(1.21873, None, True, 1.23092), ())
-    (window,) = followed_on(locked, sought, attracting=True).windows
+    (window,) = followed_on(VARIANTS["locked"], replace(NOT_SOUGHT, last_returns=((1.2309, 10.0),))).windows
     assert window.narrow
     assert window.holds(2.02737)
 

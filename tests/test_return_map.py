@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,22 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from friso.hunting import Ensemble, StageAttractors, find_attractors, stuck
+from friso.hunting import Ensemble, find_margin, stuck
 from friso.hunting.basin import displacements_that_hunt
 from friso.hunting.cycle.hunting import hunting
-from friso.hunting.return_map import (
-    LandingMap,
-    Landings,
-    MapAttractor,
-    MapSurvey,
-    displacements_by_map,
-    find_landings,
-    own_motion_by_map,
-    search_by_maps,
-    survey_maps,
-)
-from friso.hunting.return_map.attracting import is_motion
+from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
+from friso.hunting.return_map.landing_map import LandingMap, MapAttractor
+from friso.hunting.return_map.landings import Landings, find_landings
 from friso.hunting.return_map.mapped import gaps
+from friso.hunting.what_attracts import has_a_map, resolved_map, sketched, what_attracts
 from friso.stage import Stage
 
 pytestmark = pytest.mark.inner
@@ -142,22 +135,38 @@ def test_the_map_shows_what_attracts_the_rig(rig: Stage, locked: Stage, survey: 
     assert free.motions == ()
 
 
-def test_kicks_and_the_own_motion_by_the_map_are_those_of_long_runs(locked: Stage, survey: MapSurvey) -> None:
-    target = hunting(locked).target
+def test_kicks_by_the_map_are_those_of_long_runs(locked: Stage) -> None:
+    target, landing_map = hunting(locked).target, resolved_map(Ensemble.held(locked.flat(), 1))
     assert target is not None
+    assert landing_map is not None
     long_runs = displacements_that_hunt(locked, target)
-    by_map = displacements_by_map(Ensemble.held(locked.flat(), 1), survey)
+    by_map = displacements_that_hunt(locked, target, landing_map=landing_map)
     assert np.array(by_map.windows) == pytest.approx(np.array(long_runs.windows), rel=0.02)
-    assert own_motion_by_map(locked, survey) == (True, True)
 
 
-def test_the_edge_of_the_locked_rig_by_maps(locked: Stage, survey: MapSurvey) -> None:
-    """9.750 Hz, where its cycle flips."""
-    margin = search_by_maps(locked.flat(), survey.motions).margin
+def test_the_edge_of_the_locked_rig_by_maps(locked: Stage) -> None:
+    """9.750 Hz, where its cycle flips; nothing attracts a hundredth beyond."""
+    margin = find_margin(locked, attracting=True)
     assert margin is not None
-    assert margin.crossover == pytest.approx(9.750, rel=2e-3)
-    beyond: StageAttractors = find_attractors({**locked.flat(), "controller.crossover": 1.01 * 9.75}, 1)
-    assert not beyond.attracts[0]
+    assert margin.crossover == pytest.approx(9.750, rel=2e-4)
+    beyond = {**locked.flat(), "controller.crossover": 9.75 * np.array([0.99, 1.01])}
+    answer = what_attracts(Ensemble.held(beyond, 2))
+    assert answer.attracts.tolist() == [True, False]
+    assert answer.decided.all()
+
+
+def test_a_sketch_tells_where_the_locked_rig_hunts_and_where_a_cycle_repels(locked: Stage) -> None:
+    """Below 9.75 Hz, and up to the fold of the cycle at 16.2 Hz."""
+    crossovers = np.array([8.0, 11.0, 14.0, 17.0])
+    sketch = sketched(Ensemble.held({**locked.flat(), "controller.crossover": crossovers}, 4))
+    assert sketch.attracts.tolist() == [True, False, False, False]
+    assert sketch.returns.tolist() == [True, True, True, False]
+    assert sketch.decided.all()
+
+
+def test_a_joint_that_is_free_or_a_dead_band_has_no_map(rig: Stage, locked: Stage) -> None:
+    others = (rig.replace({"joint.locked": False}), locked.replace({"controller.error_deadband": "1 um"}))
+    assert [has_a_map(Ensemble.held(stage.flat(), 1)) for stage in (locked, *others)] == [True, False, False]
 
 
 def test_a_pair_of_landings_beside_a_cycle_that_repels_is_not_taken_for_it(survey: MapSurvey) -> None:
@@ -171,3 +180,13 @@ def test_a_pair_of_landings_beside_a_cycle_that_repels_is_not_taken_for_it(surve
     assert is_cycle([1.0])
     assert not is_cycle([1.03, 0.97])
     assert not is_cycle([0.7, 1.3, 0.9, 1.1], periodic=False)
+
+
+def test_an_orbit_of_many_swings_of_a_leaning_stage_is_known_again(survey: MapSurvey) -> None:
+    """Half of peak to peak is the mean of its farthest landings on either side."""
+    landings = np.array([0.212, -0.219, 0.355, -0.1, 0.469, -0.017, 0.557, -0.38])
+    (cycle,) = survey.motions
+    eight = replace(cycle, swings=8)
+    size = cycle.amplitude / ((0.557 + 0.38) / 2)
+    assert is_motion(MapAttractor(landings, np.arange(3), True), eight, size)
+    assert not is_motion(MapAttractor(1.1 * landings, np.arange(3), True), eight, size)

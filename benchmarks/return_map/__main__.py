@@ -1,8 +1,8 @@
-"""Compares the return map with today's search: `python -m benchmarks.return_map`.
+"""Compares the check with the search alone, which asks no return map: `python -m benchmarks.return_map`.
 
 Draws stages of three series, and takes the hard stages of the suite (`--series hard`) and the rig of the thesis
 (`--series rig`). Both answer each case; answers are kept in a file, a line each, and a run goes on where one was
-stopped. `--table` writes the page [The return map against the search](return-map.md).
+stopped. `--table` writes the page [The check against the search alone](return-map.md).
 """
 
 from __future__ import annotations
@@ -22,14 +22,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when NumPy is loaded
 import numpy as np
 
 import friso
+from benchmarks.return_map.answers import checked
 from benchmarks.return_map.brute_force import decided
 from benchmarks.return_map.compared import page
-from benchmarks.return_map.mapped import mapped
-from benchmarks.return_map.searched import searched
 from benchmarks.truth.classes import classes_of
 from benchmarks.truth.draws import SERIES, draw
 from friso.engine.kernel import kernels
-from friso.hunting import needed_kernels
+from friso.hunting import needed_kernels, search_alone
 from friso.stage import Stage
 
 HARD = Path(__file__).parents[2] / "tests" / "hard_stages.toml"
@@ -81,9 +80,10 @@ def _answered(record: dict[str, Any], stage: Stage, before: dict[str, Any] | Non
     """What both say of a case; what the search said `before` is kept, if it did."""
     kernels(needed_kernels(stage))
     with np.errstate(all="ignore"):
-        by_search = before["searched"] if before else searched(stage)
-        by_map = mapped(stage)
-    print(f"{_key(record)}: {by_search['work'] / 1e6:.0f}e6 and {by_map.get('work', 0.0) / 1e6:.0f}e6", file=sys.stderr)
+        by_map = checked(stage)
+        with search_alone():
+            by_search = before["searched"] if before else checked(stage)
+    print(f"{_key(record)}: {by_search['work'] / 1e6:.0f}e6 and {by_map['work'] / 1e6:.0f}e6", file=sys.stderr)
     day = date.today().isoformat()
     return record | {"classes": classes_of(stage.flat()), "searched": by_search, "mapped": by_map, "day": day}
 

@@ -19,12 +19,12 @@ STARTS = 24, 12, 24, 12
 def decided(record: dict[str, Any], stage: Stage) -> str:
     """What swings on where the answers about a stage differ: at its own bandwidth, or between both edges."""
     search, by_map = record["searched"], record["mapped"]
-    if not by_map.get("resolved") or not search["certain"]:
+    if not by_map["certain"] or not search["certain"]:
         return ""
     if not same_verdict(record):
         return _at(stage, 1.0)
     if search["edge"] and search["edge"]["certain"] and not same_edge(record):
-        other = by_map.get("edge")
+        other = by_map["edge"]
         ends = search["edge"]["factor"], other["factor"] if other else 0.96 * search["edge"]["factor"]
         return _at(stage, float(np.sqrt(ends[0] * ends[1])))
     return ""

@@ -1,33 +1,24 @@
-"""The return map's answers against those of the search: counted by class of machine, as a page of Markdown."""
+"""The check against the search alone: counted by class of machine, as a page of Markdown."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from benchmarks.truth.tally import markdown
+from friso.hunting import SEARCH_LIMITS
 
-EDGE, KICK = 2e-3, 0.02
-"""Shares by which edges, and limits of kicks, may differ that are the same."""
-
-LESS = 1 / 3
-"""Share of the search's work that the map may take."""
-
-RIGHT = 0.95
-"""Share of edges that have to be the same."""
-
-MAPPED, SEARCHED = ("survey", "kicks"), ("what attracts the stage", "kicks and moves")
-"""Parts of an answer that tell the verdict and what starts hunting."""
+KICK = 0.02
+"""Share by which limits of kicks may differ that are the same."""
 
 Record = dict[str, Any]
 
 
 def page(records: Sequence[Record]) -> str:
-    """The comparison: by class, what differs, and which classes go."""
-    usable = [record for record in records if _compared(record)]
+    """The comparison: by class, and what differs."""
+    usable = [record for record in records if record["searched"]["possible"]]
     names = sorted({name for record in usable for name in record["classes"]})
     groups = {name: [record for record in usable if name in record["classes"]] for name in names} | {"all": usable}
     head, rows = [], []
@@ -41,20 +32,17 @@ def page(records: Sequence[Record]) -> str:
     )
     days = sorted({record["day"] for record in records})
     lines = [
-        "# The return map against the search",
+        "# The check against the search alone",
         "",
         f"Written by `python -m benchmarks.return_map --table docs/evidence/return-map.md`; answers of "
         f"{' to '.join(dict.fromkeys((days[0], days[-1])))}, stages of each series and seed: {drawn}.",
         "",
-        "Compared are the cases that may hunt and whose verdict the search calls certain. *Resolved*: the map says "
-        "that it knows what attracts (the scatter of landings is below a threshold, all runs were completed, and every "
-        "attractor was closed as an orbit or left). Of these the table counts verdicts that are the same, certain "
-        f"edges within {100 * EDGE:g} % (or what the search leaves open), windows that the map shows, and stages all "
-        f"of whose limits of kicks lie within {100 * KICK:g} %; and it has the median of the scatter, and the map's "
-        "work over the search's for verdict, kicks and moves alone. The work in all, and at the median, is that of "
-        "every case: where the map is not resolved, that of its survey and of the whole search. A class *goes* where "
-        f"no verdict differs, {100 * RIGHT:g} % of edges are the same, and the work in all is a third or less; for its "
-        "*verdicts* where no verdict differs, and those and the kicks take a third or less.",
+        "Each case that may hunt was answered twice: by the check, which asks return maps where they go, and with "
+        "every bandwidth and kick searched by simulations. Of the cases that both are certain about, the table counts "
+        "verdicts that are the same; certain edges of the search within the interval that the check tells; windows of "
+        "the search in the middle of which the check has one, too; stages all of whose limits of kicks lie within "
+        f"{100 * KICK:g} %. The work of the check stands as a share of the search's, and by itself, in 1e6 units "
+        "(median, 95th percentile, most).",
         "",
         *markdown(head, rows),
         "",
@@ -64,54 +52,43 @@ def page(records: Sequence[Record]) -> str:
         "they were made (`--decide`).",
         "",
         *(f"- {_name(record)}: {text}{_decided(record, text)}" for record in usable for text in differences(record)),
-        "",
-        "## Why maps are not resolved",
-        "",
-        *markdown(["reason", "cases"], _reasons(usable)),
     ]
     return "\n".join(lines) + "\n"
 
 
 def counted(records: Sequence[Record]) -> dict[str, Any]:
     """What the columns of the table hold, of some cases."""
-    resolved = [record for record in records if record["mapped"].get("resolved")]
-    edges = [r for r in resolved if r["searched"]["edge"] and r["searched"]["edge"]["certain"]]
-    windows = [(r, window) for r in resolved for window in r["searched"]["windows"]]
-    kicks = [r for r in resolved if r["mapped"].get("kick") and (r["searched"]["kick"] or {}).get("windows")]
-    same = [r for r in resolved if same_verdict(r)]
-    works = np.array([(_work(r), r["searched"]["work"]) for r in records]).reshape(-1, 2)
-    ratio = works[:, 0].sum() / max(works[:, 1].sum(), 1.0)
-    own = np.array([(_own(r["mapped"], *MAPPED), _own(r["searched"], *SEARCHED)) for r in resolved]).reshape(-1, 2)
-    right = [r for r in edges if same_edge(r)]
-    goes = len(same) == len(resolved) and len(right) >= RIGHT * len(edges) and ratio <= LESS and len(resolved) > 0
-    verdicts_go = 0 < len(resolved) == len(same) and own[:, 0].sum() <= LESS * own[:, 1].sum()
-    scatter = [r["mapped"]["scatter"][0] for r in resolved]
+    both = [record for record in records if _both_certain(record)]
+    edges = [record for record in both if (record["searched"]["edge"] or {}).get("certain")]
+    windows = [(record, window) for record in both for window in record["searched"]["windows"]]
+    kicks = [record for record in both if (record["searched"]["kick"] or {}).get("windows")]
+    works = np.array([(record["mapped"]["work"], record["searched"]["work"]) for record in records]).reshape(-1, 2)
+    own = np.percentile(works[:, 0], [50, 95, 100]) / 1e6 if len(works) else np.zeros(3)
     return {
         "cases": len(records),
-        "resolved": len(resolved),
-        "same verdict": len(same),
-        "edges": f"{len(right)} of {len(edges)}",
-        "windows": f"{sum(has_window(r, window) for r, window in windows)} of {len(windows)}",
+        "certain": f"{sum(r['mapped']['certain'] for r in records)} ({sum(r['searched']['certain'] for r in records)})",
+        "same verdict": f"{sum(map(same_verdict, both))} of {len(both)}",
+        "edges": f"{sum(map(same_edge, edges))} of {len(edges)}",
+        "windows": f"{sum(has_window(record, window) for record, window in windows)} of {len(windows)}",
         "kicks": f"{sum(map(same_kicks, kicks))} of {len(kicks)}",
-        "scatter": f"{np.median(scatter):.1e}" if scatter else "",
-        "of verdict and kicks": f"{own[:, 0].sum() / max(own[:, 1].sum(), 1.0):.2f}",
-        "work in all": f"{ratio:.2f}",
-        "median": f"{np.median(works[:, 0] / works[:, 1]):.2f}" if len(works) else "",
-        "goes": "yes" if goes else "no",
-        "verdicts": "go" if verdicts_go else "no",
+        "given up": f"{sum(_gave_up(r['mapped']) for r in records)} ({sum(_gave_up(r['searched']) for r in records)})",
+        "work": f"{works[:, 0].sum() / max(works[:, 1].sum(), 1.0):.2f}",
+        "by itself": " / ".join(f"{value:.0f}" for value in own),
     }
 
 
 def differences(record: Record) -> Iterator[str]:
-    """In what a map that is resolved differs from the search."""
+    """In what the check differs from the search, where both are certain."""
     search, by_map = record["searched"], record["mapped"]
-    if not by_map.get("resolved"):
+    if not _both_certain(record):
         return
     if not same_verdict(record):
-        yield f"verdict {search['verdict']}, the map: {'attracts' if by_map['attracts'] else 'nothing attracts'}"
+        yield f"verdict {search['verdict']}, the check: {by_map['verdict']}"
     if search["edge"] and search["edge"]["certain"] and not same_edge(record):
-        factor = (by_map.get("edge") or {"factor": float("nan")})["factor"]
-        yield f"edge {search['edge']['factor']:.5g}, the map: {factor:.5g}"
+        factor = (by_map["edge"] or {"factor": float("nan")})["factor"]
+        yield f"edge {search['edge']['factor']:.5g}, the check: {factor:.5g}"
+    if by_map["edge"] and by_map["edge"]["certain"] and not search["edge"]:
+        yield f"no edge, the check: {by_map['edge']['factor']:.5g}"
     for window in search["windows"]:
         if not has_window(record, window):
             ends = [f"{end['factor']:.5g}" if end else "the end of the range" for end in window]
@@ -119,61 +96,48 @@ def differences(record: Record) -> Iterator[str]:
 
 
 def same_verdict(record: Record) -> bool:
-    """Whether something attracts by both, or nothing does, and the stage's own motion ends alike, if the map tells."""
-    search, by_map = record["searched"], record["mapped"]
-    if by_map["attracts"] != (search["verdict"] in ("hunts", "bistable")):
-        return False
-    return not (by_map["attracts"] and by_map.get("own_known")) or by_map["own_ends"] == (search["verdict"] == "hunts")
+    """Whether the verdicts are the same."""
+    return bool(record["mapped"]["verdict"] == record["searched"]["verdict"])
 
 
 def same_edge(record: Record) -> bool:
-    """Whether the edge is the same, up to what the search leaves open."""
+    """Whether the edge of the search lies in an interval that the check tells, up to what the search leaves open."""
     edge, by_map = record["searched"]["edge"], record["mapped"]
-    ends = [by_map.get("edge"), *(high for _, high in by_map.get("windows", ()))]
-    return any(abs(end["factor"] / edge["factor"] - 1) <= max(EDGE, edge["reserve"]) for end in ends if end)
+    ends = [by_map["edge"], *(high for _, high in by_map["windows"])]
+    reserve = edge["reserve"] + 1e-3
+    return any(
+        end["factor"] <= edge["factor"] * (1 + reserve) and edge["factor"] * (1 - reserve) <= end["quiet"]
+        for end in ends
+        if end
+    )
 
 
 def has_window(record: Record, window: Sequence[Any]) -> bool:
-    """Whether the map shows a window at the middle of one of the search."""
-    factors = [end["factor"] if end else limit for end, limit in zip(window, (0.1, 10.0), strict=True)]
+    """Whether the check shows a window at the middle of one of the search."""
+    lowest, highest = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
+    factors = [end["factor"] if end else limit for end, limit in zip(window, (lowest, highest), strict=True)]
     middle = float(np.sqrt(factors[0] * factors[1]))
-    for low, high in record["mapped"].get("windows", ()):
-        above = low is None or low["factor"] <= middle * (1 + EDGE)
-        if above and (high is None or high["factor"] >= middle * (1 - EDGE)):
+    for low, high in record["mapped"]["windows"]:
+        above = low is None or low["factor"] <= middle * (1 + KICK)
+        if above and (high is None or high["factor"] >= middle * (1 - KICK)):
             return True
     return False
 
 
 def same_kicks(record: Record) -> bool:
     """Whether all limits of the displacements that start hunting are the same."""
-    search, by_map = record["searched"]["kick"]["windows"], record["mapped"]["kick"]["windows"]
+    search, by_map = record["searched"]["kick"]["windows"], (record["mapped"]["kick"] or {"windows": ()})["windows"]
     if len(search) != len(by_map):
         return False
     return bool(np.all(np.abs(np.log(np.array(search) / np.array(by_map))) <= KICK))
 
 
-def _compared(record: Record) -> bool:
-    """Whether the search is certain about a case that may hunt."""
-    search = record["searched"]
-    return bool(search["possible"] and search["certain"] and search["verdict"] not in ("failed", "runs away"))
+def _both_certain(record: Record) -> bool:
+    return bool(record["searched"]["certain"] and record["mapped"]["certain"])
 
 
-def _work(record: Record) -> float:
-    """The work of an answer by the map, and of the search where that does not know."""
-    by_map, search = record["mapped"], record["searched"]
-    return float(
-        by_map["work"] if by_map.get("resolved") else by_map["parts"].get("survey", by_map["work"]) + search["work"]
-    )
-
-
-def _own(answer: Record, *parts: str) -> float:
-    return float(sum(answer["parts"].get(part, 0.0) for part in parts))
-
-
-def _reasons(records: Sequence[Record]) -> list[list[Any]]:
-    doubts = [r["mapped"].get("doubt", "it was given up for its work") for r in records]
-    doubts = [re.sub(r" \(.*", "", doubt) for doubt in doubts]
-    return [[reason, doubts.count(reason)] for reason in sorted({*doubts} - {""})]
+def _gave_up(answer: Record) -> bool:
+    return bool(answer["given_up"])
 
 
 def _decided(record: Record, difference: str) -> str:

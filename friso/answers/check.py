@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
@@ -14,6 +14,7 @@ from friso.answers.inputs import (
     Whole,
     correlations_of,
     mention_unstable_loop,
+    mention_verdict,
     read_stage,
     tolerance_of,
     whole_number,
@@ -194,7 +195,7 @@ def check(
 
     kernels(needed_kernels(chosen))
     mention_unstable_loop(chosen)
-    cases = judged(chosen, tolerance, progress=progress)
+    cases = judged(chosen, tolerance, progress=progress, tell=partial(mention_verdict, chosen))
     drawn = across = None
     loose = max(tolerance, LONG_RUN_RTOL)
     if sample is not None:

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from friso.errors import InputError, StageError
 from friso.quantities import Quantity, exactly, positive, quoted
@@ -17,6 +17,9 @@ from friso.stage.correlations import Correlations, correlations_file, read_corre
 from friso.stage.files import load_changed, load_tables
 from friso.stage.plausible import idle_encoder, implausible_values
 from friso.stage.rig import AS_BUILT
+
+if TYPE_CHECKING:
+    from friso.hunting.criteria import Verdict
 
 StageLike: TypeAlias = Stage | str | os.PathLike[str] | Mapping[str, Any]
 """A stage, the path of a stage file, or its tables as a dictionary."""
@@ -102,6 +105,16 @@ def mention_unstable_loop(stage: Stage) -> None:
 
     for sentence in unstable_loop(unstable(stage)):
         LOGGER.warning(sentence.removesuffix("."), extra={"meanwhile": True})
+
+
+def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
+    """Mention (to the logger "friso", as information) the verdict on a case of a stage that is certain already, while
+    its edge, kicks and other cases are still computed."""
+    from friso.views.check.cases import case_labels
+    from friso.views.check.words import IN_SHORT
+
+    if name in (labels := case_labels(stage)):
+        LOGGER.info(f"{labels[name]}: {IN_SHORT[verdict]}", extra={"meanwhile": True})
 
 
 def correlations_of(source: StageLike, stage: Stage) -> Correlations:

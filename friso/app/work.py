@@ -159,6 +159,7 @@ class Workshop:
         """Hand what friso logs to the questions that it is about."""
         log, messages = logging.getLogger("friso"), Messages(self)
         log.addHandler(messages)
+        log.setLevel(logging.INFO)
         try:
             yield
         finally:

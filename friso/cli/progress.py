@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
@@ -45,6 +46,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             self.display = _display(self._to_go)
             self.task = self.display.add_task(one_line(self.label), total=None)
             self.display.start()
+            logging.getLogger("friso").setLevel(logging.INFO)  # who waits is told early what is known
         else:
             self.clock = Thread(target=self._tell, args=(sys.stderr,), daemon=True)
             self.clock.start()

@@ -48,6 +48,7 @@ from friso.hunting.margin import Margin, find_margin
 from friso.hunting.motions import Motions
 from friso.hunting.outward import AttractionEnd, BandwidthWindow
 from friso.hunting.verdict import CheckPart, Judgement
+from friso.hunting.what_attracts import search_alone
 
 __all__ = [
     "CYCLE_RTOL",
@@ -115,6 +116,7 @@ __all__ = [
     "needed_kernels",
     "plane",
     "pushes_that_hunt",
+    "search_alone",
     "stuck",
     "unstable",
     "wait",

@@ -21,6 +21,8 @@ from friso.hunting.cycle.rest import pushed
 from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.measures import swing_of
 from friso.hunting.motions import run_motions, some_of
+from friso.hunting.return_map.fates import motions_go_on
+from friso.hunting.return_map.landing_map import LandingMap
 from friso.shares import share_interval
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
@@ -171,21 +173,35 @@ def _last_swing(
 
 
 def _caught(
-    flat: Mapping[str, Any], count: int, target: Target, widest: float, starts: np.ndarray | None = None
+    flat: Mapping[str, Any],
+    count: int,
+    target: Target,
+    widest: float,
+    landing_map: LandingMap | None,
+    starts: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which runs end in what attracts, and of which that is known: one that swings by more than the `widest` at its
-    end, peak to peak [m], may grow or die out, and one that swings less often than what was observed, too."""
-    ends, completed, swing = ends_in(flat, count, target, starts)
-    return ends, completed & ~(swing > widest) & ~swings_seldom(target, ends, swing)
+    """Which runs end in what attracts, and of which that is known: by the return map, as far as that is sure, or by
+    long runs. One that swings by more than the `widest` at its end, peak to peak [m], may grow or die out, and one that
+    swings less often than what was observed, too."""
+    ends, decided = np.zeros(count, bool), np.zeros(count, bool)
+    if landing_map is not None:
+        ends, decided = motions_go_on(flat, count, landing_map, starts)
+    if (left := np.flatnonzero(~decided)).size:
+        begin = None if starts is None else starts[left]
+        ends[left], completed, swing = ends_in(some_of(flat, left), left.size, target, begin)
+        decided[left] = completed & ~(swing > widest) & ~swings_seldom(target, ends[left], swing)
+    return ends, decided
 
 
-def displacements_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Kick:
+def displacements_that_hunt(
+    stage: Stage, target: Target, widest: float = np.inf, landing_map: LandingMap | None = None
+) -> Kick:
     """Find the displacements [m] from which a stage that is let go ends in its `target`; swings wider than `widest`,
-    peak to peak [m], are counted as unknown."""
+    peak to peak [m], are counted as unknown. A return map that is resolved spares long runs."""
     flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return _caught({**flat, "motion.displacement": kicks}, len(kicks), target, widest)
+        return _caught({**flat, "motion.displacement": kicks}, len(kicks), target, widest, landing_map)
 
     return kick_windows(hunts, target.amplitude)
 
@@ -204,15 +220,17 @@ def displacements_that_run_away(stage: Stage) -> Kick:
     return kick_windows(runs_away, flat[FORCE_LIMIT] / float(stages.number("stiffness")[0]))
 
 
-def pushes_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Kick:
+def pushes_that_hunt(
+    stage: Stage, target: Target, widest: float = np.inf, landing_map: LandingMap | None = None
+) -> Kick:
     """Find the pushes, velocities [m/s] of all masses, after which a stage at rest ends in its `target`; swings wider
-    than `widest`, peak to peak [m], are counted as unknown."""
+    than `widest`, peak to peak [m], are counted as unknown. A return map that is resolved spares long runs."""
     stages = Ensemble.held(stage.flat(), 1)
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         several = stages.take(np.zeros(len(kicks), np.int64))
         released = {**several.flat, "motion.displacement": float(stages.length[0])}
-        return _caught(released, len(kicks), target, widest, pushed(several, kicks))
+        return _caught(released, len(kicks), target, widest, landing_map, pushed(several, kicks))
 
     return kick_windows(hunts, target.amplitude * float(stages.number("rate")[0]))
 
@@ -240,17 +258,12 @@ def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], u
     return Kick(windows, (float(kicks[0]), float(kicks[-1])), unknown)
 
 
-def moves_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> MoveShare | None:
-    """Draw moves about that of the stage's file and find the share of them that ends in its `target`; swings wider than
-    `widest`, peak to peak [m], are left out. None for motions that have no acceleration, or if every run fails."""
-    return move_share(stage, lambda moved, count: _caught(moved, count, target, widest))
-
-
-def move_share(
-    stage: Stage, hunts: Callable[[Mapping[str, Any], int], tuple[np.ndarray, np.ndarray]]
+def moves_that_hunt(
+    stage: Stage, target: Target, widest: float = np.inf, landing_map: LandingMap | None = None
 ) -> MoveShare | None:
-    """Draw moves about that of the stage's file and find the share of them that `hunts`, of those about which it is
-    decided. None for motions that have no acceleration, or if it decides about none."""
+    """Draw moves about that of the stage's file and find the share of them that ends in its `target`; swings wider than
+    `widest`, peak to peak [m], are left out. A return map that is resolved spares long runs. None for motions that have
+    no acceleration, or if every run fails."""
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
         return None
@@ -265,7 +278,7 @@ def move_share(
         "motion.acceleration": low + across * (high - low),
         "motion.acceleration_time": shortest + along * (longest - shortest),
     }
-    ends, decided = hunts(moved, MOVES)
+    ends, decided = _caught(moved, MOVES, target, widest, landing_map)
     return MoveShare(int(decided.sum()), int(ends[decided].sum()), accelerations, times) if decided.any() else None
 
 

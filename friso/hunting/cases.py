@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -109,12 +109,19 @@ LONG_RUN_RTOL = 1e-6
 """Relative tolerance of runs that only tell what becomes of a motion; that of which times are told is finer."""
 
 
-def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Progress = silent) -> dict[str, Case]:
+def check(
+    stage: Stage,
+    rtol: float = RTOL,
+    traces: bool = False,
+    progress: Progress = silent,
+    tell: Callable[[str, Verdict], None] = lambda name, verdict: None,
+) -> dict[str, Case]:
     """Check a stage: what becomes of it as given ("given"), with its joint locked ("locked") and free ("free").
 
     A stage without a joint has the case "given" alone, one whose file does not tell the joint's stiffness no "free".
-    With `traces`, each case has its time response; `progress` is called as work is done, also from worker
-    threads. Raises InputError for an `rtol` that is not usable.
+    With `traces`, each case has its time response. `progress` is called as work is done, and `tell` with the name of a
+    case and its verdict as soon as that is certain, both also from worker threads. Raises InputError for an `rtol` that
+    is not usable.
     """
     checked_rtol(rtol)
     variants = stage.variants()
@@ -124,7 +131,9 @@ def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Prog
     done = Tally(progress, len(different) * len(PARTS))
 
     def judged(variant: Stage) -> Case:
-        return _case(variant, rtol, traces, done, _share(variant) * WORK if len(different) > 1 else WORK)
+        names = [name for name, other in variants.items() if other == variant]
+        share = _share(variant) if len(different) > 1 else 1.0
+        return _case(variant, rtol, traces, done, share * WORK, lambda verdict: tell(names[-1], verdict))
 
     cases = side_by_side([partial(judged, variant) for variant in different])
     return {name: cases[different.index(variant)] for name, variant in variants.items()}
@@ -154,7 +163,14 @@ def _needed(stage: Stage) -> set[KernelRequest]:
     return kernels_to_judge(structure(stage.flat()))
 
 
-def _case(stage: Stage, rtol: float, traces: bool, done: Tally, work: float) -> Case:
+def _case(
+    stage: Stage,
+    rtol: float,
+    traces: bool,
+    done: Tally,
+    work: float,
+    tell: Callable[[Verdict], None] = lambda verdict: None,
+) -> Case:
     flat, ended = stage.flat(), 0
 
     def begin(part: str) -> None:
@@ -165,7 +181,7 @@ def _case(stage: Stage, rtol: float, traces: bool, done: Tally, work: float) -> 
     with allowance() as spent:
         (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(measuring_options(rtol), room=ROOM))
         measures = measure_runs(flat, runs)
-        judgement = judge(stage, measures, max(rtol, LONG_RUN_RTOL), begin, work - spent.used)
+        judgement = judge(stage, measures, max(rtol, LONG_RUN_RTOL), begin, work - spent.used, tell)
     room = measures.turns.shape[1]
     status = Status(int(measures.status[0]))
     fed = None

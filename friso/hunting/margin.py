@@ -8,18 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from friso.engine.allowance import Exhausted
-from friso.equations.bandwidth import bandwidth
+from friso.engine.allowance import Exhausted, allowance
+from friso.equations.bandwidth import bandwidth, faster
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.limits import SEARCH_LIMITS
-from friso.hunting.outward import ALONG, PRECISE, AttractionEnd, BandwidthWindow, Beyond, Outward
+from friso.hunting.outward import AttractionEnd, BandwidthWindow, Beyond, Outward
 from friso.hunting.restabilised import windows_again
+from friso.hunting.what_attracts import sketched, what_attracts
 from friso.stage import Stage
 
-FARTHEST = SEARCH_LIMITS.bandwidth_factor
-"""Factor up to which the bandwidth is changed."""
+LOWEST, HIGHEST = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
+"""Bandwidths between which is searched, in units of that of the stage."""
+
+SIMULATED, AT_ONCE = 1e8, 8
+"""Work that simulations at bandwidths may take whose return maps are not resolved, and how many of these are done
+together."""
 
 
 @dataclass(frozen=True)
@@ -30,36 +35,45 @@ class Margin:
 
     `factor` is the bandwidth at the edge over that of the stage, `crossover` [Hz] the crossover there (None for a
     controller given by its gains, all of whose poles and zeros the factor scales). At `quiet`, a factor just above,
-    simulations settle from everywhere that was tried. The edge is `certain` where a closed orbit was followed to its
-    end there, or was lost while it attracted well, and all simulations beyond it that had to decide were completed;
-    else it lies between the two. It is known up to a share of it, the `reserve`: where an orbit was lost up to the
-    next bandwidth that was tried, and with a limiter that chatters multipliers scatter.
+    nothing attracts any more: the edge lies between both. It is `certain` where a closed orbit was followed to its end,
+    or both are close together, and all that had to decide beyond it was completed.
     """
 
     factor: float
     crossover: float | None
     certain: bool
     quiet: float
-    reserve: float = PRECISE
 
     @property
     def end(self) -> AttractionEnd:
         """The end of what attracts, in factors of the bandwidth."""
-        return AttractionEnd(self.factor, self.quiet, self.certain, self.reserve)
+        return AttractionEnd(self.factor, self.quiet, self.certain)
+
+    @property
+    def reserve(self) -> float:
+        """Up to which share of it the edge is known."""
+        return self.end.reserve
 
 
 @dataclass(frozen=True)
 class SearchedBandwidths:
-    """What a search through the bandwidths showed: the `margin` (None: no such edge); the other `windows` in which
-    something attracts; of a stage that something attracts the end below it of what does, `lower` (None: there is none);
-    whether the search `contradicts` that nothing attracts the stage itself, to which an orbit was followed; and whether
-    something attracts up to the highest bandwidth, so that there is no edge, `to_the_top`."""
+    """What a search through the bandwidths showed.
+
+    The `margin` (None: no such edge); the other `windows` in which something attracts; of a stage that something
+    attracts the end below it of what does, `lower` (None: there is none). Whether the search `contradicts` that nothing
+    attracts the stage itself, to which an orbit was followed; whether something attracts up to the highest bandwidth,
+    so that there is no edge, `to_the_top`; whether no edge was found, but something may attract at a bandwidth for all
+    that is known, `undecided`. The `last_returns`: factors at which a cycle may repel while none does at the next one,
+    each with the end of the range on that side.
+    """
 
     margin: Margin | None
     windows: tuple[BandwidthWindow, ...]
     lower: AttractionEnd | None = None
     contradicts: bool = False
     to_the_top: bool = False
+    undecided: bool = False
+    last_returns: tuple[tuple[float, float], ...] = ()
 
 
 NOT_SOUGHT = SearchedBandwidths(None, ())
@@ -68,19 +82,21 @@ NOT_SOUGHT = SearchedBandwidths(None, ())
 
 def find_margin(stage: Stage, attracting: bool) -> Margin | None:
     """Find the edge of hunting of a stage, whose own motion plays no part: above its bandwidth the last edge, if
-    something is `attracting` it at that, else the next one below. None where there is none within a factor of ten."""
+    something is `attracting` it at that, else the next one below. None where there is none between `LOWEST` and
+    `HIGHEST`."""
     return search_bandwidths(stage, attracting).margin
 
 
 def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None = None) -> SearchedBandwidths:
-    """Where something attracts, over bandwidths from a tenth to ten times that of a stage; `survey` is what
-    attracts the stage itself, if that was surveyed. Where an allowance is used up, ends are where they are known to be
+    """Where something attracts, over bandwidths from `LOWEST` to `HIGHEST`; `survey` is what attracts the stage itself,
+    if that was surveyed. Where an allowance is used up, ends are where they are known to be
     by then, and not certain."""
     flat, crossover = stage.flat(), bandwidth(stage.flat())
     fine, coarse = SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond
-    index, above = (coarse, fine) if attracting else (fine, coarse)
-    below = np.geomspace(1 / FARTHEST, 1.0, index, endpoint=False)
-    factors = np.concatenate([below, np.geomspace(1.0, FARTHEST, above + 1)])
+    to_lower, to_higher = (coarse, fine) if attracting else (fine, coarse)
+    index, above = round(-to_lower * np.log10(LOWEST)), round(to_higher * np.log10(HIGHEST))
+    below = np.geomspace(LOWEST, 1.0, index, endpoint=False)
+    factors = np.concatenate([below, np.geomspace(1.0, HIGHEST, above + 1)])
     survey = survey or attractors(Ensemble.held(flat, 1), thorough=True)
     try:
         grid = _Grid(flat, factors, index if attracting else index // 2)
@@ -94,21 +110,21 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     contradicts = bool(grid.attracts[index]) and not attracting
     if edge is None:
         to_the_top = bool(grid.attracts[index:].all())
-        return SearchedBandwidths(None, grid.windows(index), lower, contradicts, to_the_top)
+        undecided = not grid.decided[grid.lowest :].all()
+        besides = grid.windows(index), lower, contradicts, to_the_top, undecided, grid.last_returns()
+        return SearchedBandwidths(None, *besides)
     at, end, certain = edge
     conclusive = certain and not contradicts
     inside = None if crossover is None else crossover * end.inside
-    outermost = Margin(end.inside, inside, conclusive, end.outside, end.reserve)
-    return SearchedBandwidths(outermost, grid.windows(at), lower, contradicts)
+    outermost = Margin(end.inside, inside, conclusive, end.outside)
+    return SearchedBandwidths(outermost, grid.windows(at), lower, contradicts, last_returns=grid.last_returns())
 
 
-def followed_on(stage: Stage, sought: SearchedBandwidths, attracting: bool) -> SearchedBandwidths:
-    """The same, with the windows in which cycles attract again that repel just beyond the edge, or, without one, repel
-    at the bandwidth of a stage that nothing attracts; as far as an allowance reaches."""
-    nothing = not (attracting or sought.contradicts)
-    starts = [(sought.margin.quiet, FARTHEST)] if sought.margin else [(1.0, FARTHEST), (1.0, 1 / FARTHEST)] * nothing
+def followed_on(stage: Stage, sought: SearchedBandwidths) -> SearchedBandwidths:
+    """What a search through the bandwidths showed, with the windows in which cycles attract again that repel: next to
+    the folds in which these end. As far as an allowance reaches."""
     windows = sought.windows
-    for at, farthest in starts:
+    for at, farthest in sought.last_returns:
         windows += windows_again(stage.flat(), at, farthest, windows)
     return replace(sought, windows=windows)
 
@@ -119,7 +135,7 @@ class _Grid:
     def __init__(self, flat: Mapping[str, Any], factors: np.ndarray, first: int) -> None:
         """Survey the stages at factors from the `first` on, by number. Raises Exhausted."""
         self.flat, self.factors, self.lowest = flat, factors, first
-        self.attracts, self.decided = np.zeros(len(factors), bool), np.zeros(len(factors), bool)
+        self.attracts, self.decided, self.returns = (np.zeros(len(factors), bool) for _ in range(3))
         self.motions: list[list[Swinging]] = [[] for _ in factors]
         self.ends: dict[tuple[int, int], AttractionEnd] = {}
         self.inspected: set[int] = set()
@@ -135,10 +151,26 @@ class _Grid:
         self.lowest = 0
 
     def _survey(self, numbers: np.ndarray) -> None:
-        survey = Outward(self.flat, FARTHEST).surveyed(self.factors[numbers], cycles=False)
-        self.attracts[numbers], self.decided[numbers] = survey.attracts, survey.decided
-        for motion in survey.motions:
-            self.motions[numbers[motion.stage]].append(motion)
+        """Sketch the stages at some factors, by number; those whose maps are not resolved are searched by simulations,
+        the nearest to the stage itself first, as far as so much work suffices. Raises Exhausted."""
+        sketch = sketched(self._stages(numbers))
+        self.attracts[numbers], self.decided[numbers] = sketch.attracts, sketch.decided
+        self.returns[numbers] = sketch.returns
+        left = numbers[~sketch.decided]
+        left = left[np.argsort(np.abs(np.log(self.factors[left])), kind="stable")]
+        at_once, work = (AT_ONCE, SIMULATED) if sketch.decided.any() else (len(left), np.inf)
+        with allowance(work) as simulated:
+            try:
+                for first in range(0, len(left), at_once):
+                    some = left[first : first + at_once]
+                    survey = attractors(self._stages(some), cycles=False)
+                    self.attracts[some], self.decided[some] = survey.attracts, survey.decided
+            except Exhausted:
+                if not simulated.exhausted:
+                    raise
+
+    def _stages(self, numbers: np.ndarray) -> Ensemble:
+        return Ensemble.held(faster(self.flat, self.factors[numbers]), len(numbers))
 
     def record(self, index: int, survey: Attractors) -> None:
         """Take over what a thorough survey of one of the stages shows."""
@@ -181,9 +213,9 @@ class _Grid:
 
     def _followed(self, at: int, ahead: int) -> AttractionEnd | None:
         """The same, of an end that was not followed before. Raises Exhausted."""
-        outward = Outward(self.flat, FARTHEST**ahead, self.settled)
-        if not self.proved(at, outward):
+        if not self.proved(at, ahead):
             return None
+        outward = Outward(self.flat, HIGHEST if ahead > 0 else LOWEST, self.settled)
         try:
             end = outward.end(float(self.factors[at]), tuple(self.motions[at]), float(self.factors[at + ahead]))
         except Beyond:
@@ -196,22 +228,32 @@ class _Grid:
             if not settled.size:
                 self.attracts |= beyond > 0
                 return None
-            end = replace(end, outside=float(self.factors[settled[0]]), certain=False)
+            end = AttractionEnd(end.inside, float(self.factors[settled[0]]), False)
         attracted = np.flatnonzero((ahead * (np.arange(len(self.factors)) - at) > 0) & (beyond <= 0))
         last = int(attracted[-1 if ahead > 0 else 0]) if attracted.size else at  # within its reserve it may lie before
         self.ends[at, ahead] = self.ends[last, ahead] = end
         return end
 
-    def proved(self, at: int, outward: Outward) -> bool:
-        """Whether something attracts at a factor, by number, once orbits were tried to be closed."""
-        motions = self.motions[at]
-        if motions and at not in self.inspected and all(motion.cycles is None for motion in motions):
-            distances = np.outer([motion.distance for motion in motions], ALONG).ravel()
-            survey = outward.surveyed_at_once(self.factors[at : at + 1], distances)
-            self.attracts[at], self.decided[at] = survey.attracts[0], survey.decided[0]
-            self.motions[at] = list(survey.motions)
-        self.inspected.add(at)
+    def proved(self, at: int, ahead: int) -> bool:
+        """Whether something attracts at a factor, by number, once orbits were tried to be closed; if not, that is known
+        of the next ones behind it as well, at which something seemed to attract."""
+        if at not in self.inspected:
+            self._inspect(np.array([at]))
+            if not self.attracts[at]:
+                behind = np.arange(at - ahead, -1 if ahead > 0 else len(self.factors), -ahead)
+                end = np.flatnonzero(~self.attracts[behind])
+                some = [k for k in behind[: end[0] if end.size else None].tolist() if k not in self.inspected]
+                if some:
+                    self._inspect(np.array(some[:AT_ONCE]))
         return bool(self.attracts[at])
+
+    def _inspect(self, numbers: np.ndarray) -> None:
+        """Close orbits at the factors with some numbers."""
+        survey = what_attracts(self._stages(numbers))
+        self.attracts[numbers], self.decided[numbers] = survey.attracts, survey.decided
+        for k, number in enumerate(numbers.tolist()):
+            self.motions[number] = list(survey.take(np.array([k])).motions)
+        self.inspected |= set(numbers.tolist())
 
     def lower_end(self, index: int) -> AttractionEnd | None:
         """The end below of what attracts at a number; None if it attracts as far as the search goes, or if it is not
@@ -224,6 +266,17 @@ class _Grid:
             quiet = np.flatnonzero(self.factors < end.inside)[-2:]
             return end if quiet.size and self.decided[quiet].all() and not self.attracts[quiet].any() else None
         return None
+
+    def last_returns(self) -> tuple[tuple[float, float], ...]:
+        """Factors at which nothing attracts, and cycles that repel end before the next one, each with the end of the
+        range on that side."""
+        ends = []
+        for ahead, farthest in ((1, HIGHEST), (-1, LOWEST)):
+            beyond = np.roll(self.returns, -ahead)
+            last = self.returns & ~beyond & ~self.attracts
+            last[-1 if ahead > 0 else 0] = False
+            ends += [(float(factor), farthest) for factor in self.factors[last]]
+        return tuple(ends)
 
     def windows(self, besides: int) -> tuple[BandwidthWindow, ...]:
         """The windows of factors in which something attracts, besides that of the factor with a number."""

@@ -23,11 +23,14 @@ from friso.hunting.boundary.locate import special_points, towards
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles, families
 from friso.hunting.cycle.shooting import Family
-from friso.hunting.outward import PRECISE, AttractionEnd, BandwidthWindow
+from friso.hunting.outward import AttractionEnd, BandwidthWindow
 
 PACE, SHORTEST, STEEPEST = 8.0, 1e-5, 1000.0
 """How much faster branches are followed than where they are drawn, their shortest step, and the multiplier up to which
 they are."""
+
+LEAST_ERROR = 1e-5
+"""Share of a bandwidth up to which an end of a window is known at best."""
 
 RTOL = 1e-7
 """Relative tolerance of the runs."""
@@ -51,8 +54,8 @@ def windows_again(
         return Ensemble.held(faster(flat, factor(places)), len(places), form=form)
 
     def end(place: float, error: float, outward: float) -> AttractionEnd:
-        inside, reserve = float(factor(place)), max(PRECISE, error)
-        return AttractionEnd(inside, inside * (1 + reserve) ** (ahead * outward), False, reserve)
+        inside = float(factor(place))
+        return AttractionEnd(inside, inside * (1 + max(LEAST_ERROR, error)) ** (ahead * outward), False)
 
     windows: list[BandwidthWindow] = []
     with allowance(), suppress(Exhausted):

@@ -39,6 +39,7 @@ from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths, followe
 from friso.hunting.measures import Measures, measuring_options
 from friso.hunting.motions import Motions, followed_motions, keeps_moving, resting, run_motions
 from friso.hunting.outward import AttractionEnd, BandwidthWindow
+from friso.hunting.what_attracts import resolved_map
 from friso.stage import Stage
 
 MOVING = "the reference never stands still"
@@ -157,9 +158,14 @@ def judge(
     rtol: float,
     begin: Callable[[str], None] = lambda label: None,
     work: float = WORK,
+    tell: Callable[[Verdict], None] = lambda verdict: None,
 ) -> Judgement:
-    """The verdict on a stage whose motion was run and measured at a relative tolerance; `begin` is told what is begun
-    (see `CheckPart`). What cannot be settled by so much `work` (see `friso.engine.allowance`) is not certain."""
+    """The verdict on a stage whose motion was run and measured at a relative tolerance.
+
+    `begin` is told what is begun (see `CheckPart`), and `tell` the verdict itself as soon as it is certain by all that
+    was computed for it: kicks and other bandwidths follow, and a cycle that is followed here from another bandwidth may
+    still contradict it. What cannot be settled by so much `work` (see `friso.engine.allowance`) is not certain.
+    """
     motions = Motions.of(ran)
     begin(CheckPart.ATTRACTION)
     with allowance() as spent:
@@ -168,12 +174,19 @@ def judge(
     if not motions.completed[0]:
         return Judgement("failed", attraction, runs_away=bool(motions.away[0]) and leaves_for_good(stage))
     if attraction.target:
-        return _with_a_target(stage, motions, attraction, attraction.target, begin, work - spent.used)
+        return _with_a_target(stage, motions, attraction, attraction.target, begin, work - spent.used, tell)
     begin(CheckPart.BANDWIDTHS)
-    return _without_a_target(stage, motions, rtol, attraction, work - spent.used)
+    return _without_a_target(stage, motions, rtol, attraction, work - spent.used, tell)
 
 
-def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: Hunting, work: float) -> Judgement:
+def _without_a_target(
+    stage: Stage,
+    motions: Motions,
+    rtol: float,
+    attraction: Hunting,
+    work: float,
+    tell: Callable[[Verdict], None],
+) -> Judgement:
     with allowance(REST * work) as spent:
         rest = followed_motions(
             stage.flat(), motions, 1, replace(measuring_options(rtol), room=ROOM), possible=attraction.possible
@@ -187,6 +200,9 @@ def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: H
     elif doubtful and not runs_away and rest.moving[0] and rest.swing[0] > resting(stage.flat())[0]:
         attraction = replace(attraction, certain=False, reason=STILL_SWINGS)
     observed = bool(rest.steady[0])
+    word = verdicts(motions.completed, rest.steady, rest.steady, rest.rests)[0]
+    if attraction.certain and word != "failed":
+        tell(word)
     sought, given_up = NOT_SOUGHT, ()
     if attraction.possible and not observed:
         sought, given_up = _sought(stage, attraction, work - spent.used)
@@ -194,7 +210,6 @@ def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: H
         attraction = replace(attraction, certain=False, reason=REACHED)
     sought = _as_sure(stage, sought, attraction)
     after = float(rest.after[0]) if np.isfinite(rest.after[0]) else None
-    word = verdicts(motions.completed, rest.steady, rest.steady, rest.rests)[0]
     return Judgement(
         word,
         attraction,
@@ -217,6 +232,7 @@ def _with_a_target(
     target: Target,
     begin: Callable[[str], None],
     work: float,
+    tell: Callable[[Verdict], None],
 ) -> Judgement:
     with allowance() as spent:
         own = own_motion(stage, target, REST * work)
@@ -227,13 +243,16 @@ def _with_a_target(
         doubt = own.doubt or doubt
         if own.ends and own.swing > RUNNING_AWAY * _widest(attraction):
             doubt = RUNS_AWAY
+        word = verdicts(np.ones(1, bool), np.ones(1, bool), np.array([own.ends]), np.zeros(1, bool))[0]
+        if attraction.certain and not doubt:
+            tell(word)
         begin(CheckPart.STARTS)
         starts, started = _starts(stage, attraction, target, KICKS * work)
     begin(CheckPart.BANDWIDTHS)
     sought, given_up = _sought(stage, attraction, work - spent.used)
     sought = _as_sure(stage, sought, attraction)
     return Judgement(
-        verdicts(np.ones(1, bool), np.ones(1, bool), np.array([own.ends]), np.zeros(1, bool))[0],
+        word,
         replace(attraction, certain=False, reason=doubt) if doubt else attraction,
         *starts,
         sought.margin,
@@ -298,10 +317,11 @@ def _starts(
     widest = np.inf if attraction.lower_gains is None else RUNNING_AWAY * _widest(attraction)
     try:
         with allowance(work):
+            landing_map = resolved_map(Ensemble.held(stage.flat(), 1))
             starts = (
-                displacements_that_hunt(stage, target, widest),
-                pushes_that_hunt(stage, target, widest),
-                moves_that_hunt(stage, target, widest),
+                displacements_that_hunt(stage, target, widest, landing_map),
+                pushes_that_hunt(stage, target, widest, landing_map),
+                moves_that_hunt(stage, target, widest, landing_map),
             )
     except Exhausted:
         return starts, (CheckPart.STARTS,)
@@ -332,9 +352,9 @@ def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBan
     with allowance(work) as search:
         sought = search_bandwidths(stage, attracting, attraction.surveyed)
     with allowance(AGAIN):
-        sought = followed_on(stage, sought, attracting)
+        sought = followed_on(stage, sought)
     left = CheckPart.LOWER_BANDWIDTHS if sought.to_the_top else CheckPart.BANDWIDTHS
-    return sought, (left,) if search.exhausted else ()
+    return sought, (left,) if search.exhausted or sought.undecided else ()
 
 
 def _as_sure(stage: Stage, sought: SearchedBandwidths, attraction: Hunting) -> SearchedBandwidths:

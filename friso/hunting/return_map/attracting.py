@@ -150,8 +150,12 @@ def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly:
     distances = np.abs(attractor.distances) * length
     if exactly and not (attractor.periodic and motion.cycles and len(distances) == motion.cycles.swings):
         return False
-    simple = motion.swings == 2 or not attractor.periodic
-    size = distances.mean() if simple else (distances.max() + distances.min()) / 2
+    if not attractor.periodic:
+        size = float(distances.mean())
+    elif len(distances) % 2:  # it lands everywhere on either side
+        size = float(distances.max())
+    else:
+        size = float(distances[::2].max() + distances[1::2].max()) / 2
     alike = abs(size / motion.amplitude - 1) < ALIKE
     return bool(alike and (not attractor.periodic or motion.swings % len(distances) == 0))
 

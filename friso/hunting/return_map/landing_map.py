@@ -22,6 +22,9 @@ ITERATIONS, TIMES = 200, 4
 """Landings after which the map may have come to what attracts it, and how often their number is doubled while it still
 leaves a cycle."""
 
+REST_CHECKED = 10
+"""Landings after which it is looked whether all have come to rest."""
+
 ROUNDING = 1e-6
 """Share up to which landings have come to a cycle."""
 
@@ -31,10 +34,10 @@ SAME = 2e-3
 ALIKE = 0.02
 """Share by which the landings of one attractor of the map differ at most from those of another start."""
 
-FAR = 3.0
+HARDLY_STICKS = 3.0
 """Distance, in units of the deflection of the loop by the break-away force, beyond which a stage hardly sticks."""
 
-NEAR = 0.05
+SCATTER_RANGE = 0.05
 """Range of the logarithm of distance over which points beside each other tell the scatter."""
 
 OTHER_SIDE = 1e3
@@ -147,7 +150,7 @@ class LandingMap:
                 beside(low, low, one)
                 beside((low + high) / 2, high, two)
             if len(points) and first < len(begins) and begins[first] == places[0]:  # the same line a little nearer
-                begins[first] -= NEAR
+                begins[first] -= SCATTER_RANGE
             if len(points):
                 beside(places[-1], places[-1], after[-1] if abs(after[-1]) < abs(self.before[points[-1]]) else 0.0)
             piece(OTHER_SIDE / 2 if side > 0 else np.inf, REST, 0.0)
@@ -174,8 +177,10 @@ class LandingMap:
         it."""
         iterations, before, paths = ITERATIONS, np.full(len(at), np.inf), at[:, None]
         for _ in range(TIMES):
-            for _ in range(iterations):
+            for number in range(iterations):
                 at = self.next(at)
+                if number % REST_CHECKED == 0 and not np.any(at > REST):
+                    break
             orbits = [at]
             for _ in range(2 * MOST_SWINGS):
                 orbits.append(self.next(orbits[-1]))
@@ -188,17 +193,22 @@ class LandingMap:
 
     def foretold(self, distances: np.ndarray) -> np.ndarray:
         """The signed distances of the next landings, shape (count,), 0 where the stage rests."""
-        at = np.abs(distances) if self.symmetric else distances
-        moves = np.isfinite(at) & (np.abs(at) >= RESOLVED)
-        places = np.where(moves, _place(np.where(moves, at, 1.0)), REST)
-        return _distance(self.next(places))
+        return _distance(self.next(self._places(distances)))
 
     def goes_on(self, distances: np.ndarray) -> np.ndarray:
         """Whether landings at signed distances go on for ever, shape (count,)."""
+        return np.all(self._followed(self._places(distances)) > REST, axis=1)
+
+    def followed_from(self, distances: np.ndarray) -> np.ndarray:
+        """The signed distances of the last of the landings that follow those at distances, shape (count, landings),
+        once the map has come to what attracts it; 0 where the stage rests."""
+        return _distance(self._followed(self._places(distances)))
+
+    def _places(self, distances: np.ndarray) -> np.ndarray:
+        """The places of landings at signed distances."""
         at = np.abs(distances) if self.symmetric else distances
         moves = np.isfinite(at) & (np.abs(at) >= RESOLVED)
-        places = np.where(moves, _place(np.where(moves, at, 1.0)), REST)
-        return np.all(self._followed(places) > REST, axis=1)
+        return np.where(moves, _place(np.where(moves, at, 1.0)), REST)
 
     def _told_apart(self, paths: np.ndarray) -> Iterator[MapAttractor]:
         """The attractors that paths of places, shape (points, landings), are on, each once."""
@@ -241,7 +251,7 @@ class LandingMap:
                 off = np.abs(v[1:-1] - (1 - share) * v[:-2] - share * v[2:])
                 alike = (goes[:-2] == goes[2:]) & ~(np.abs(v[2:] - v[:-2]) > JUMP)
             off = np.where(goes[1:-1] & goes[:-2] & goes[2:], off, np.where(goes[:-2] != goes[1:-1], np.inf, 0.0))
-            off = np.where(alike & (u[2:] - u[:-2] < NEAR), off, 0.0)
+            off = np.where(alike & (u[2:] - u[:-2] < SCATTER_RANGE), off, 0.0)
             off[np.fmax(v[1:-1] - u[1:-1], v[2:] - u[2:]) < np.log(0.5)] = 0.0
             if off.max() > worst:
                 k = int(off.argmax())
@@ -261,11 +271,11 @@ def _distance(places: np.ndarray) -> np.ndarray:
 
 
 def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Landings of runs, shape (runs, landings), the start first, without those farther off than `FAR` from which a run
-    comes back, and how many are left without the start: there it passes its reference without sticking, so that
-    distance alone does not tell what follows."""
+    """Landings of runs, shape (runs, landings), the start first, without those farther off than `HARDLY_STICKS` from
+    which a run comes back, and how many are left without the start: there it passes its reference without sticking, so
+    that distance alone does not tell what follows."""
     rows, order = np.arange(len(distances))[:, None], np.arange(distances.shape[1])
-    near = (np.abs(distances) <= FAR) & (order <= count[:, None])
+    near = (np.abs(distances) <= HARDLY_STICKS) & (order <= count[:, None])
     last = np.where(near.any(axis=1), distances.shape[1] - 1 - near[:, ::-1].argmax(axis=1), -1)
     kept = (near | (order > last[:, None]) | (order == 0)) & (order <= count[:, None])
     kept_first = np.argsort(~kept, axis=1, kind="stable")

@@ -14,15 +14,16 @@ from friso.hunting.return_map.landing_map import JUMP, LandingMap
 from friso.hunting.return_map.landings import RTOL, Landings, find_landings
 from friso.stage.controllers import FORCE_LIMIT
 
-NEAR = np.concatenate([np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 24)])
+NEAR_DISTANCES = np.concatenate([np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 24)])
 """Distances at which stages are stuck at first, in units of the deflection of the loop by the break-away force."""
 
-FAR = np.geomspace(5.0, 300.0, 6)
+FAR_DISTANCES = np.geomspace(5.0, 300.0, 6)
 """More distances, in units of the deflection of the loop by the break-away force, from which a stage passes its
 reference without sticking at first."""
 
-LIMITED = np.geomspace(600.0, 30000.0, 6)
-"""Still farther distances, in the same units, from which stages with a force limit begin."""
+LIMITED_DISTANCES = np.geomspace(600.0, 30000.0, 6)
+"""Still farther distances, in units of the deflection of the loop by the break-away force, from which stages with a
+force limit begin."""
 
 LANDINGS = 3
 """Landings of a run: what follows the first of them does not depend any more on how the run began."""
@@ -140,12 +141,12 @@ class Mapped:
 
 
 def map_stages(
-    stages: Ensemble, near: np.ndarray = NEAR, rounds: int = ROUNDS, rtol: float = RTOL, sparse: bool = False
+    stages: Ensemble, near: np.ndarray = NEAR_DISTANCES, rounds: int = ROUNDS, rtol: float = RTOL, sparse: bool = False
 ) -> Mapped:
     """The return maps of stages, from runs that begin stuck at distances `near` their reference and farther off, those
     in every third place alone where a `sparse` map will do."""
-    limited = [LIMITED] if FORCE_LIMIT in stages.flat else []
-    far = np.concatenate([FAR, *limited])
+    limited = [LIMITED_DISTANCES] if FORCE_LIMIT in stages.flat else []
+    far = np.concatenate([FAR_DISTANCES, *limited])
     units = np.concatenate([near, far[1::3]] if sparse else [near, far])
     sides = [(np.arange(stages.count), 1.0), (np.flatnonzero(~stages.symmetric), -1.0)]
     owners = np.concatenate([np.repeat(which, len(units)) for which, _ in sides])
@@ -235,7 +236,7 @@ def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
     lands = np.abs(np.nan_to_num(landings)) >= RESOLVED
     sizes = np.where(lands, np.abs(landings), 1.0)
     breaks = (lands[:-1] != lands[1:]) | (lands[:-1] & lands[1:] & (np.abs(np.diff(np.log(sizes))) > JUMP))
-    near = np.maximum(np.abs(starts[:-1]), np.abs(starts[1:])) <= NEAR[-1]
+    near = np.maximum(np.abs(starts[:-1]), np.abs(starts[1:])) <= NEAR_DISTANCES[-1]
     apart = np.abs(np.diff(np.log(np.abs(starts)))) > BREAK
     ends = np.flatnonzero(breaks & near & apart & (starts[:-1] * starts[1:] > 0))
     between = [starts[k] * (starts[k + 1] / starts[k]) ** WITHIN for k in ends]

@@ -116,7 +116,8 @@ def _edges(laws: VerdictsByLaw, case: str) -> str:
     part = "in part " if any(verdict.edges(case) for verdict in laws.verdicts if verdict.law in unsought) else ""
     missing = f"{part}not determined under {listed(unsought, 'and')}" if unsought else ""
     if not edges:
-        none = f"no edge of hunting within a factor of {SEARCH_LIMITS.bandwidth_factor:g} of its bandwidth"
+        low, high = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
+        none = f"no edge of hunting between {low:g} and {high:g} times its bandwidth"
         return f"its edge of hunting {missing}" if missing else none
     low, high = min(edge[0] for edge in edges), max(edge[1] for edge in edges)
     doubt = "" if all(verdict.edges_certain(case) for verdict in laws.verdicts) else " (not certain)"

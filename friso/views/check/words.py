@@ -25,6 +25,7 @@ from friso.views.loop_words import unstable_where
 
 if TYPE_CHECKING:
     from friso.hunting import AttractionEnd, BandwidthWindow, Case, Kick, Margin
+    from friso.hunting.criteria import Verdict
 
 _MICRON, _TEN_MICRON = BANDS
 
@@ -40,6 +41,14 @@ _UNFINISHED = (
     "that was found."
 )
 """That what a stage does in the end is not known."""
+
+IN_SHORT: Mapping[Verdict, str] = {
+    "hunts": "hunts",
+    "bistable": "settles after this motion, but hunts after others",
+    "transient": "does not hunt",
+    "settles": "does not hunt",
+}
+"""What a case does, before its margin is known."""
 
 ONE_PLACE = 1.01
 """Factor between the ends of a window below which it is told by its middle and its width."""
@@ -254,7 +263,7 @@ def _outlook(case: Case) -> list[str]:
         up_to = "below" if judgement.margin.certain else "up to"
         says.append(f"Hunting is possible {up_to} {edge_text(case, judgement.margin.end)}.")
     elif judgement.hunting.possible and CheckPart.BANDWIDTHS not in judgement.given_up:
-        says.append(f"No hunting was found down to 1/{SEARCH_LIMITS.bandwidth_factor:g} of this bandwidth.")
+        says.append(f"No hunting was found down to {percent(SEARCH_LIMITS.lowest_bandwidth)} of this bandwidth.")
     return [*says, *_windows(case), *_unsearched(case)]
 
 
@@ -279,7 +288,7 @@ def edge_text(case: Case, end: AttractionEnd) -> str:
         return _bandwidth(case, end.inside, up=None, digits=4)
     value = end.inside * (_present_bandwidth(case) or 1.0)
     bound = end.reserve + abs(float(f"{value:.4g}") / value - 1)
-    return f"about {_bandwidth(case, end.inside, up=None, digits=4)} (± {percent(rounded_up(bound, 1), 1)})"
+    return f"{_bandwidth(case, end.inside, up=None, digits=4)} (± {percent(rounded_up(bound, 1), 1)})"
 
 
 def _present_bandwidth(case: Case) -> float | None:
@@ -331,13 +340,14 @@ def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
     for an edge surveys: others may lie between them."""
     if all(case.judgement.margin is None for case in cases.values()):
         return []
-    farthest, steps = SEARCH_LIMITS.bandwidth_factor, (SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond)
-    fine, coarse = (percent(farthest ** (1 / count) - 1) for count in steps)
+    low, high = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
+    steps = SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond
+    fine, coarse = (percent(10 ** (1 / count) - 1) for count in steps)
     return [
         *(f"{item.label}: {sentence}" for item in shown_cases(cases) for sentence in _windows(item.case, narrow=True)),
-        f"Bandwidths up to {farthest:g} times as high and as low were surveyed, {fine} or {coarse} apart, and cycles "
-        "that begin to repel at the edge were followed to where they turn back. Other ranges in which the stage hunts, "
-        "narrower than these steps, may lie between (friso boundary follows cycles from more bandwidths).",
+        f"Bandwidths from {low:g} to {high:g} times this one were surveyed, {fine} or {coarse} apart. Other ranges in "
+        "which the stage hunts, narrower than these steps, may lie between (friso boundary follows cycles from more "
+        "bandwidths).",
     ]
 
 
@@ -356,7 +366,7 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     given_up = CheckPart.LOWER_BANDWIDTHS in judgement.given_up
     lower = [f"{_too_much('Whether it hunts at lower bandwidths')}."] if given_up else []
     still = "is still possible" if judgement.hunting.certain else "was still found"
-    return [f"Hunting {still} at {SEARCH_LIMITS.bandwidth_factor:g} times this bandwidth.", *says, *lower]
+    return [f"Hunting {still} at {SEARCH_LIMITS.highest_bandwidth:g} times this bandwidth.", *says, *lower]
 
 
 def _slower(case: Case, end: AttractionEnd) -> str:
@@ -400,7 +410,7 @@ def _distance(case: Case, edge: Margin) -> float:
         return high is None or high.inside * ONE_PLACE >= min(to, low.inside * ONE_PLACE**2)
 
     again = any(in_the_way(window) for window in case.judgement.windows)
-    return 1.0 if again or to > SEARCH_LIMITS.bandwidth_factor else distance
+    return 1.0 if again or to > SEARCH_LIMITS.highest_bandwidth else distance
 
 
 def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:

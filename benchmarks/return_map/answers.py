@@ -1,4 +1,4 @@
-"""What today's search shows of a stage, as data: what attracts it, the edge and the windows of hunting, and kicks."""
+"""What a check shows of a stage, as data: by the return map where it goes, or by the search alone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from friso.hunting import AttractionEnd, CheckPart, Judgement, Kick, Margin, Swi
 from friso.stage import Stage
 
 
-def searched(stage: Stage) -> dict[str, Any]:
+def checked(stage: Stage) -> dict[str, Any]:
     """The answer about a stage whose joint is as given, the work of each part, and the CPU time [s]."""
     parts: dict[str, float] = {}
     last = str(CheckPart.ATTRACTION)

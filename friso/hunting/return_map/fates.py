@@ -1,0 +1,68 @@
+"""Which motions go on for ever: a run shows where they land, the return map what follows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.kernel import kernel
+from friso.equations.motion import last_corner
+from friso.equations.structure import shared_structure
+from friso.hunting.cycle.ensemble import Ensemble, done
+from friso.hunting.return_map.landing_map import LandingMap
+from friso.hunting.return_map.landings import RTOL, find_landings
+
+FIRST_LANDINGS, MORE_LANDINGS, ROUNDS = 3, 3, 8
+"""Landings of a run before the map is asked, more of one of which it is not sure, and how often."""
+
+UNSURE = 0.02
+"""Share by which a landing may be off: by more, the stage has not forgotten yet how its motion began."""
+
+
+def motions_go_on(
+    flat: Mapping[str, Any], count: int, landing_map: LandingMap, starts: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which motions of one stage go on for ever, and of which that is known, both of shape (count,).
+
+    The stage is given as flat keys to SI numbers or arrays (count,), its motions by these keys, or by the states in
+    which they begin at rest at the reference, `starts` (count, states). Nothing is known of those whose reference does
+    not come back to where it began.
+    """
+    if starts is not None:
+        return _go_on(Ensemble.held(flat, count), starts, landing_map)
+    if flat["motion.kind"] not in ("there_and_back", "release", "hold"):
+        return np.zeros(count, bool), np.zeros(count, bool)
+    shape = kernel(shared_structure(flat))
+    long = {**flat, "motion.duration": np.broadcast_to(last_corner(flat) * (1 + 1e-9) + 1e-9, (count,))}
+    ends, completed = np.zeros((count, len(shape.full_state))), np.zeros(count, bool)
+    for runs in run_chunks(shape, long, count, RunOptions(rtol=RTOL, least_swing=np.inf)):
+        ends[runs.numbers], completed[runs.numbers] = runs.results.ends, done(runs.results)
+    goes_on, decided = _go_on(Ensemble.held(flat, count), ends, landing_map)
+    return goes_on & completed, decided & completed
+
+
+@np.errstate(all="ignore")  # a stage that never lands is still at its reference
+def _go_on(stages: Ensemble, starts: np.ndarray, landing_map: LandingMap) -> tuple[np.ndarray, np.ndarray]:
+    """Which runs from states go on for ever, by where they land, and of which that is known, both (runs,)."""
+    count = len(starts)
+    ends, decided, left = np.zeros(count, bool), np.zeros(count, bool), np.arange(count)
+    states, most = starts, FIRST_LANDINGS
+    for _ in range(ROUNDS):
+        landed = find_landings(stages.take(left), states, most)
+        rows = np.arange(left.size)
+        before, last = (
+            landed.distances[rows, at] / stages.length[left] for at in (np.maximum(landed.count - 1, 0), landed.count)
+        )
+        fates = np.array([landing_map.goes_on(last * share) for share in (1 - UNSURE, 1.0, 1 + UNSURE)])
+        foretold = np.abs(landing_map.foretold(before) / last) - 1
+        sure = (fates == fates[1]).all(axis=0) & (np.abs(foretold) < UNSURE) & (landed.count == most)
+        sure = landed.rest | (sure & ~landed.lost)
+        ends[left[sure]], decided[left[sure]] = fates[1][sure] & ~landed.rest[sure], True
+        on = ~sure & ~landed.lost
+        left, states, most = left[on], landed.ends[on], MORE_LANDINGS
+        if not left.size:
+            break
+    return ends, decided
