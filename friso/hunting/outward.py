@@ -131,7 +131,7 @@ class Outward:
                 return self._bracketed(place)
             end, distance = self.followed(place.at, orbit)
             factors = self._just_beyond(end)
-            survey = self._told(factors, ALONG * distance)
+            survey = self._told(factors, ALONG * distance, confirm=(0,))
             attracts = np.flatnonzero(survey.attracts)
             if not attracts.size:
                 return AttractionEnd(end, float(factors[0]), bool(survey.decided.all()))
@@ -171,10 +171,11 @@ class Outward:
             if end.reserve <= BRACKET:
                 return end
 
-    def _told(self, factors: np.ndarray, distances: np.ndarray) -> Attractors:
-        """What attracts at some factors, where maps do not tell from `distances` [m], shape (n,), too."""
+    def _told(self, factors: np.ndarray, distances: np.ndarray, confirm: tuple[int, ...] = ()) -> Attractors:
+        """What attracts at some factors, where maps do not tell from `distances` [m], shape (n,), too; runs confirm the
+        maps of some of them, by number."""
         begun = np.broadcast_to(distances, (len(factors), len(distances)))
-        return what_attracts(self._stages(factors), distances=begun)
+        return what_attracts(self._stages(factors), distances=begun, confirm=confirm)
 
     def _stages(self, factors: np.ndarray) -> Ensemble:
         return Ensemble.held(faster(self.flat, factors), len(factors))
