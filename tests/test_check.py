@@ -1,5 +1,6 @@
 """The verdict on the thesis rig and other stages, through the Python interface."""
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +49,18 @@ def _hunts_locked_and_settles_free(cases: CheckAnswer) -> None:
     assert free.settling_time[1e-5] < free.settling_time[1e-6] < 5  # type: ignore[operator]
     assert cases["given"] is not locked
     assert cases["given"].solver == free.solver
+
+
+@pytest.mark.usefixtures("own_bandwidth")
+def test_verdicts_are_mentioned_before_kicks_and_other_bandwidths(rig: Stage, caplog: pytest.LogCaptureFixture) -> None:
+    told: list[tuple[str, int]] = []
+    with caplog.at_level(logging.INFO, "friso"):
+        friso.check(rig, progress=lambda done, total, label: told.append((caplog.text, done)))
+    assert {record.getMessage() for record in caplog.records if record.levelno == logging.INFO} >= {
+        "Locked: hunts",
+        "Free (as given): does not hunt",
+    }
+    assert any("Locked: hunts" in text for text, done in told if done <= 3)
 
 
 @pytest.mark.usefixtures("own_bandwidth")

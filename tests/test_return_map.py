@@ -15,6 +15,7 @@ from friso.hunting import Ensemble, find_margin, stuck
 from friso.hunting.basin import displacements_that_hunt
 from friso.hunting.cycle.hunting import hunting
 from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
+from friso.hunting.return_map.confirmed import runs_land_as_foretold
 from friso.hunting.return_map.landing_map import LandingMap, MapAttractor
 from friso.hunting.return_map.landings import Landings, find_landings
 from friso.hunting.return_map.mapped import gaps
@@ -162,6 +163,16 @@ def test_a_sketch_tells_where_the_locked_rig_hunts_and_where_a_cycle_repels(lock
     assert sketch.attracts.tolist() == [True, False, False, False]
     assert sketch.returns.tolist() == [True, True, True, False]
     assert sketch.decided.all()
+
+
+def test_runs_land_where_the_map_of_the_rig_says_and_not_where_another_does(locked: Stage) -> None:
+    """Just beyond its edge; a map that is off by a tenth is noticed."""
+    beyond = survey_maps(Ensemble.held({**locked.flat(), "controller.crossover": 9.85}, 1))
+    assert runs_land_as_foretold(beyond, np.zeros(1, np.int64)).all()
+    (landing_map,) = beyond.mapped.maps
+    off = replace(beyond.mapped)
+    vars(off)["maps"] = (replace(landing_map, after=1.1 * landing_map.after),)
+    assert not runs_land_as_foretold(replace(beyond, mapped=off), np.zeros(1, np.int64)).any()
 
 
 def test_a_joint_that_is_free_or_a_dead_band_has_no_map(rig: Stage, locked: Stage) -> None:

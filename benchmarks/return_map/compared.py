@@ -41,8 +41,9 @@ def page(records: Sequence[Record]) -> str:
         "every bandwidth and kick searched by simulations. Of the cases that both are certain about, the table counts "
         "verdicts that are the same; certain edges of the search within the interval that the check tells; windows of "
         "the search in the middle of which the check has one, too; stages all of whose limits of kicks lie within "
-        f"{100 * KICK:g} %. The work of the check stands as a share of the search's, and by itself, in 1e6 units "
-        "(median, 95th percentile, most).",
+        f"{100 * KICK:g} %. The search may have been asked with earlier code (it was kept), and from a tenth of the "
+        "bandwidth on; what it found below a quarter is left out. The work of the check stands as a share of the "
+        "search's, and by itself, in 1e6 units (median, 95th percentile, most).",
         "",
         *markdown(head, rows),
         "",
@@ -59,8 +60,8 @@ def page(records: Sequence[Record]) -> str:
 def counted(records: Sequence[Record]) -> dict[str, Any]:
     """What the columns of the table hold, of some cases."""
     both = [record for record in records if _both_certain(record)]
-    edges = [record for record in both if (record["searched"]["edge"] or {}).get("certain")]
-    windows = [(record, window) for record in both for window in record["searched"]["windows"]]
+    edges = [record for record in both if _has_edge(record)]
+    windows = [(record, window) for record in both for window in _windows(record)]
     kicks = [record for record in both if (record["searched"]["kick"] or {}).get("windows")]
     works = np.array([(record["mapped"]["work"], record["searched"]["work"]) for record in records]).reshape(-1, 2)
     own = np.percentile(works[:, 0], [50, 95, 100]) / 1e6 if len(works) else np.zeros(3)
@@ -84,12 +85,12 @@ def differences(record: Record) -> Iterator[str]:
         return
     if not same_verdict(record):
         yield f"verdict {search['verdict']}, the check: {by_map['verdict']}"
-    if search["edge"] and search["edge"]["certain"] and not same_edge(record):
+    if _has_edge(record) and not same_edge(record):
         factor = (by_map["edge"] or {"factor": float("nan")})["factor"]
         yield f"edge {search['edge']['factor']:.5g}, the check: {factor:.5g}"
     if by_map["edge"] and by_map["edge"]["certain"] and not search["edge"]:
         yield f"no edge, the check: {by_map['edge']['factor']:.5g}"
-    for window in search["windows"]:
+    for window in _windows(record):
         if not has_window(record, window):
             ends = [f"{end['factor']:.5g}" if end else "the end of the range" for end in window]
             yield f"no window from {ends[0]} to {ends[1]}"
@@ -114,9 +115,7 @@ def same_edge(record: Record) -> bool:
 
 def has_window(record: Record, window: Sequence[Any]) -> bool:
     """Whether the check shows a window at the middle of one of the search."""
-    lowest, highest = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
-    factors = [end["factor"] if end else limit for end, limit in zip(window, (lowest, highest), strict=True)]
-    middle = float(np.sqrt(factors[0] * factors[1]))
+    middle = _middle(window)
     for low, high in record["mapped"]["windows"]:
         above = low is None or low["factor"] <= middle * (1 + KICK)
         if above and (high is None or high["factor"] >= middle * (1 - KICK)):
@@ -130,6 +129,25 @@ def same_kicks(record: Record) -> bool:
     if len(search) != len(by_map):
         return False
     return bool(np.all(np.abs(np.log(np.array(search) / np.array(by_map))) <= KICK))
+
+
+def _has_edge(record: Record) -> bool:
+    """Whether the search has a certain edge among the bandwidths that the check covers: it may have reached farther."""
+    edge = record["searched"]["edge"]
+    return bool(edge and edge["certain"] and edge["factor"] > SEARCH_LIMITS.lowest_bandwidth)
+
+
+def _windows(record: Record) -> list[Sequence[Any]]:
+    """The windows of the search among the bandwidths that the check covers."""
+    lowest, windows = SEARCH_LIMITS.lowest_bandwidth, record["searched"]["windows"]
+    within = [window for window in windows if not window[1] or window[1]["factor"] > lowest]
+    return [window for window in within if _middle(window) > lowest]
+
+
+def _middle(window: Sequence[Any]) -> float:
+    limits = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
+    factors = [end["factor"] if end else limit for end, limit in zip(window, limits, strict=True)]
+    return float(np.sqrt(factors[0] * factors[1]))
 
 
 def _both_certain(record: Record) -> bool:

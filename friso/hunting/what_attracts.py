@@ -16,7 +16,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, families
 from friso.hunting.loop import winds_up_at_a_limit
 from friso.hunting.return_map.attracting import MapSurvey, survey_maps
-from friso.hunting.return_map.confirmed import runs_end_as_foretold
+from friso.hunting.return_map.confirmed import runs_land_as_foretold
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.mapped import map_stages
 from friso.stage.standstill import dead_band
@@ -41,7 +41,7 @@ def what_attracts(
 
     All stages that the maps leave open are searched from many starts, beside cycles that Newton's method closes from
     the map of stages at rest, `suggested` (None: they are closed here), and from `distances` [m], shape (count, n).
-    Of the stages to `confirm`, by number, runs have to end where the map says. Orbits are closed to a relative
+    Of the stages to `confirm`, by number, runs have to land where the map says. Orbits are closed to a relative
     tolerance. Raises Exhausted where an allowance is used up.
     """
     if not has_a_map(stages):
@@ -50,7 +50,7 @@ def what_attracts(
     resolved = survey.resolved | survey.attracts  # a closed orbit that attracts is a proof
     quiet = np.array([number for number in confirm if resolved[number] and not survey.attracts[number]], dtype=np.int64)
     if quiet.size:
-        resolved[quiet] = runs_end_as_foretold(survey, quiet)
+        resolved[quiet] = runs_land_as_foretold(survey, quiet)
     if suggested is None and stages.remember:
         suggested = families(stages, rtol)
     if suggested is not None:
