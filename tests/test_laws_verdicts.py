@@ -11,7 +11,6 @@ from inside import friso_inside
 from refusals import Wording
 from variants import VARIANTS, gains, lugre, release, stage
 
-from friso.hunting import Margin
 from friso.stage import violations
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import convert
@@ -30,9 +29,7 @@ def case(
     """As much of a case as the verdicts across laws look at."""
     cycle = SimpleNamespace(amplitude=5e-4, multiplier=-0.5) if verdict == "hunts" else None
     quiet = None if edge is None else edge / (4 if edge_certain else 3)
-    margin = edge and SimpleNamespace(
-        crossover=edge, factor=edge / 4, certain=edge_certain, quiet=quiet, reserve=Margin.reserve
-    )
+    margin = edge and SimpleNamespace(crossover=edge, factor=edge / 4, certain=edge_certain, quiet=quiet, reserve=1e-5)
     hunting = SimpleNamespace(certain=certain, target=cycle)
     judgement = SimpleNamespace(cycle=cycle, margin=margin, hunting=hunting, given_up=given_up, observed=False)
     return SimpleNamespace(verdict=verdict, judgement=judgement)

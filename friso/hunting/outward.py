@@ -4,19 +4,19 @@ nothing attracts just beyond."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from friso.engine.allowance import Exhausted
 from friso.equations.bandwidth import faster
-from friso.hunting.attractors import Attractors
+from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.boundary.branch import END_OF_RANGE, REACHED, Point, Tracer
 from friso.hunting.boundary.locate import Bifurcation, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.what_attracts import what_attracts
+from friso.hunting.what_attracts import has_a_map, what_attracts
 
 PACE, FIRST_STEP, SHORTEST_STEP = 3.0, 0.03, 5e-4
 """How much faster branches are followed than where they are drawn, and their first and shortest steps, changes of the
@@ -25,6 +25,9 @@ logarithm of the bandwidth."""
 FLIP_STEP, FOLD_STEP = 1e-4, 1e-3
 """Steps along a branch that end the search for a flip or a torus, and for a fold, where the bandwidth changes with the
 square of it."""
+
+ROUGH_STEP = 2e-3
+"""The shortest of all steps where a limiter chatters, which makes multipliers rough."""
 
 BEYOND = 1.0095
 """How far beyond the end of an orbit nothing may attract, as a factor: an edge, rounded to four digits, is known to a
@@ -130,17 +133,29 @@ class Outward:
             if orbit is None:
                 return self._bracketed(place)
             end, distance = self.followed(place.at, orbit)
-            factors = self._just_beyond(end)
-            survey = self._told(factors, ALONG * distance, confirm=(0,))
+            next_to, farther = self._just_beyond(end)
+            beyond, survey = self._proved(next_to, farther, ALONG * distance)
             attracts = np.flatnonzero(survey.attracts)
             if not attracts.size:
-                return AttractionEnd(end, float(factors[0]), bool(survey.decided.all()))
-            place.at, place.motions = float(factors[attracts[-1]]), survey.take(attracts[-1:]).motions
+                return AttractionEnd(end, next_to, bool(survey.decided.all()))
+            place.at, place.motions = float(beyond[attracts[-1]]), survey.take(attracts[-1:]).motions
             place.outside = self._still_ahead(place.at, place.outside)
         return self._bracketed(place)
 
-    def _just_beyond(self, end: float) -> np.ndarray:
-        """Factors just beyond the end of an orbit, at which nothing may attract, the nearest first."""
+    def _proved(self, next_to: float, farther: np.ndarray, distances: np.ndarray) -> tuple[np.ndarray, Attractors]:
+        """The factors at which it is told what attracts, and what: the one next to an end, and those farther off; of
+        stages without a map only those of these at which simulations alone show that something does."""
+        if farther.size and not has_a_map(self._stages(farther)):
+            seen = attractors(self._stages(farther), cycles=False)
+            decided, farther = bool(seen.decided[~seen.attracts].all()), farther[seen.attracts]
+        else:
+            decided = True
+        beyond = np.append(next_to, farther)
+        survey = self._told(beyond, distances, confirm=(0,))
+        return beyond, survey if decided else replace(survey, decided=survey.decided & survey.attracts)
+
+    def _just_beyond(self, end: float) -> tuple[float, np.ndarray]:
+        """The factor next to the end of an orbit, at which nothing may attract, and those farther off."""
         ahead = self._ahead(end)
         next_to, farther = end * BEYOND**ahead, end * FARTHER**ahead
         if ahead * (next_to - self.farthest) > 0:
@@ -148,7 +163,7 @@ class Outward:
         within = ahead * (self.farthest - farther) >= 0
         if self.settled is not None:
             within &= (farther < self.settled) == (end < self.settled)
-        return np.append(next_to, farther[within])
+        return next_to, farther[within]
 
     def _bracketed(self, place: _Place) -> AttractionEnd:
         """The end of what attracts where no orbit can be followed to it, between the last of some factors at which
@@ -199,15 +214,10 @@ class Outward:
             return self._stages(at * np.exp(ahead * places))
 
         length = abs(float(np.log(self.farthest / at)))
-        tracer = Tracer(
-            family,
-            cycles.sign,
-            farthest=length,
-            swings=cycles.swings,
-            pace=PACE,
-            shortest=SHORTEST_STEP,
-            first=FIRST_STEP,
-        )
+        chatters = Ensemble.held(self.flat, 1).chatters
+        shortest, flip = (ROUGH_STEP, ROUGH_STEP) if chatters else (SHORTEST_STEP, FLIP_STEP)
+        steps = {"pace": PACE, "first": FIRST_STEP, "shortest": shortest}
+        tracer = Tracer(family, cycles.sign, farthest=length, swings=cycles.swings, **steps)
         start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
         farthest = start
 
@@ -221,7 +231,7 @@ class Outward:
         if points and not abs(points[-1].multiplier) < 1 and reason in (REACHED, END_OF_RANGE):
             first, second = ([start, *points])[-2:]
             kind = _kind(first, second)
-            last = last_inside(tracer, first, second, kind, FOLD_STEP if kind == "fold" else FLIP_STEP)
+            last = last_inside(tracer, first, second, kind, max(flip, FOLD_STEP) if kind == "fold" else flip)
             farthest = max(farthest, last or first, key=lambda point: point.place)
         elif tracer.reaches(points, reason):
             raise Beyond
