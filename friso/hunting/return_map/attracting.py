@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,12 +102,6 @@ def survey_maps(stages: Ensemble, rtol: float = RTOL, mapped: Mapped | None = No
     undecided = np.zeros(stages.count, bool)
     undecided[[proposal.stage for proposal in _left(mapped, motions, repelling)]] = True
     return MapSurvey(mapped, tuple(motions), tuple(repelling), undecided)
-
-
-def of_stages(motions: Iterable[Swinging], count: int) -> list[tuple[Swinging, ...]]:
-    """Motions by the number of their stage."""
-    motions = tuple(motions)
-    return [tuple(motion for motion in motions if motion.stage == k) for k in range(count)]
 
 
 def _left(mapped: Mapped, motions: list[Swinging], repelling: list[Swinging]) -> list[_Proposal]:
