@@ -194,7 +194,7 @@ def test_an_orbit_that_attracts_to_the_end_of_the_range_has_no_end_in_it() -> No
     assert end.certain
 
 
-@pytest.mark.parametrize("crossover", [12.3332, 12.9, 13.1])
+@pytest.mark.parametrize("crossover", [11.279, 12.3332, 12.9, 13.1, 14.1995])
 def test_the_edge_is_that_of_the_last_attractor(crossover: float) -> None:
     """Beyond its flip at 11.97 Hz the creeping stage has asymmetric cycles, of one period and of many, up to 12.95 Hz,
     where the symmetric one attracts again, until it folds: by brute force between 13.026 and 13.029 Hz."""
@@ -385,6 +385,19 @@ def test_no_window_is_looked_for_beyond_the_range_or_a_stage_that_settles() -> N
     """A stage in the gap below the window was said to be contradicted by an orbit that is followed to it."""
     end = Outward(WINDOWED.flat(), 10.0, 3.06 / 3).end(1.0, what_attracts(held(WINDOWED)).motions, 1.05)
     assert pytest.approx(3 * end.inside, rel=2e-3) == 3.016
+
+
+@pytest.mark.parametrize("decided", [True, False])
+def test_a_window_that_is_neither_proved_nor_refuted_leaves_an_edge_uncertain(
+    decided: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What simulations beyond an end could not decide stays undecided where nothing else attracts."""
+    nothing = attractors(held(VARIANTS["rigid"].replace({"controller.crossover": "12 Hz"})))
+    seen = replace(nothing, decided=np.array([decided]))
+    monkeypatch.setattr("friso.hunting.outward.attractors", lambda *_, **__: seen)
+    monkeypatch.setattr(Outward, "_told", lambda *_, **__: nothing)
+    _, survey = Outward(WINDOWED.flat(), 10.0)._proved(1.01, np.array([1.03]), np.array([1e-3]))
+    assert survey.decided.tolist() == [decided]
 
 
 def test_thorough_starts_are_those_of_single_stages() -> None:

@@ -20,7 +20,7 @@ from friso.hunting.return_map.confirmed import runs_land_as_foretold
 from friso.hunting.return_map.landing_map import LandingMap, MapAttractor
 from friso.hunting.return_map.landings import RTOL, Landings, find_landings
 from friso.hunting.return_map.mapped import FAR_DISTANCES, NEAR_DISTANCES, gaps
-from friso.hunting.what_attracts import has_a_map, resolved_map, sketched, what_attracts
+from friso.hunting.what_attracts import SKETCH_DISTANCES, has_a_map, resolved_map, sketched, what_attracts
 from friso.stage import Stage
 
 pytestmark = pytest.mark.inner
@@ -137,13 +137,28 @@ def test_the_map_shows_what_attracts_the_rig(rig: Stage, locked: Stage, survey: 
     assert free.motions == ()
 
 
+def _map_of(stage: Stage) -> LandingMap | None:
+    surveyed = hunting(stage).surveyed
+    assert surveyed is not None
+    return resolved_map(Ensemble.held(stage.flat(), 1), surveyed.motions)
+
+
 def test_kicks_by_the_map_are_those_of_long_runs(locked: Stage) -> None:
-    target, landing_map = hunting(locked).target, resolved_map(Ensemble.held(locked.flat(), 1))
+    target, landing_map = hunting(locked).target, _map_of(locked)
     assert target is not None
     assert landing_map is not None
     long_runs = displacements_that_hunt(locked, target)
     by_map = displacements_that_hunt(locked, target, landing_map=landing_map)
     assert np.array(by_map.windows) == pytest.approx(np.array(long_runs.windows), rel=0.02)
+
+
+def test_a_map_without_all_that_attracts_tells_nothing_of_kicks(locked: Stage) -> None:
+    surveyed = hunting(locked).surveyed
+    assert surveyed is not None
+    (motion,) = surveyed.motions
+    other = replace(motion, amplitude=2 * motion.amplitude)
+    assert resolved_map(Ensemble.held(locked.flat(), 1), (motion, other)) is None
+    assert resolved_map(Ensemble.held(locked.flat(), 1), ()) is None
 
 
 def test_the_edge_of_the_locked_rig_by_maps(locked: Stage) -> None:
@@ -215,8 +230,9 @@ def test_the_page_says_what_certain_means_with_the_numbers_of_the_code() -> None
         f"from {NEAR_DISTANCES[0]:g} to {FAR_DISTANCES[-1]:g} times",
         f"at most {100 * outward.BRACKET:g} % away",
         f"{beyond} and {100 * (outward.FARTHER[-1] - 1):.3g} % beyond",
-        f"land {confirmed.FOLLOWED_LANDINGS} times where the map says, at {tolerances}",
+        f"land up to {confirmed.FOLLOWED_LANDINGS} times where the map says, at {tolerances}",
         f"from {SEARCH_LIMITS.lowest_bandwidth:g} to {SEARCH_LIMITS.highest_bandwidth:g} times",
         f"({steps[0]} and {steps[1]} %)",
+        f"from {len(SKETCH_DISTANCES) + len(FAR_DISTANCES[1::3])} distances",
     ):
         assert text in section

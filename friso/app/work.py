@@ -159,10 +159,12 @@ class Workshop:
         """Hand what friso logs to the questions that it is about."""
         log, messages = logging.getLogger("friso"), Messages(self)
         log.addHandler(messages)
+        level = log.level
         log.setLevel(logging.INFO)
         try:
             yield
         finally:
+            log.setLevel(level)
             log.removeHandler(messages)
 
     def overtake(self) -> None:

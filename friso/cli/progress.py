@@ -40,13 +40,15 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         self.task: TaskID | None = None
         self.ended, self._turn = Event(), Lock()
         self.clock: Thread | None = None
+        self._log = logging.getLogger("friso")
+        self._level = self._log.level
 
     def __enter__(self) -> Self:
         if sys.stderr.isatty():
             self.display = _display(self._to_go)
             self.task = self.display.add_task(one_line(self.label), total=None)
             self.display.start()
-            logging.getLogger("friso").setLevel(logging.INFO)  # who waits is told early what is known
+            self._log.setLevel(logging.INFO)  # who waits is told early what is certain
         else:
             self.clock = Thread(target=self._tell, args=(sys.stderr,), daemon=True)
             self.clock.start()
@@ -59,6 +61,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         if self.display is not None:
             self.display.stop()
             self.display = None
+            self._log.setLevel(self._level)
 
     def __call__(self, done: int, total: int, label: str, /) -> None:
         with self._turn:

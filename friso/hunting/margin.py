@@ -89,8 +89,8 @@ def find_margin(stage: Stage, attracting: bool) -> Margin | None:
 
 def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None = None) -> SearchedBandwidths:
     """Where something attracts, over bandwidths from `LOWEST` to `HIGHEST`; `survey` is what attracts the stage itself,
-    if that was surveyed. Where an allowance is used up, ends are where they are known to be
-    by then, and not certain."""
+    if that was surveyed. Where an allowance is used up, ends are where they are known to be by then, and not certain.
+    """
     flat, crossover = stage.flat(), bandwidth(stage.flat())
     fine, coarse = SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond
     to_lower, to_higher = (coarse, fine) if attracting else (fine, coarse)
@@ -107,17 +107,16 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     grid.search_below()
     edge = edge or grid.last_edge(index, attracting)
     lower = grid.lower_end(index) if attracting else None
-    contradicts = bool(grid.attracts[index]) and not attracting
+    windows = grid.windows(index if edge is None else edge[0])  # these may be followed to the stage itself
+    contradicts, returns = bool(grid.attracts[index]) and not attracting, grid.last_returns()
     if edge is None:
         to_the_top = bool(grid.attracts[index:].all())
         undecided = not grid.decided[grid.lowest :].all()
-        besides = grid.windows(index), lower, contradicts, to_the_top, undecided, grid.last_returns()
-        return SearchedBandwidths(None, *besides)
-    at, end, certain = edge
-    conclusive = certain and not contradicts
+        return SearchedBandwidths(None, windows, lower, contradicts, to_the_top, undecided, returns)
+    _, end, certain = edge
     inside = None if crossover is None else crossover * end.inside
-    outermost = Margin(end.inside, inside, conclusive, end.outside)
-    return SearchedBandwidths(outermost, grid.windows(at), lower, contradicts, last_returns=grid.last_returns())
+    outermost = Margin(end.inside, inside, certain and not contradicts, end.outside)
+    return SearchedBandwidths(outermost, windows, lower, contradicts, last_returns=returns)
 
 
 def followed_on(stage: Stage, sought: SearchedBandwidths) -> SearchedBandwidths:
@@ -135,7 +134,8 @@ class _Grid:
     def __init__(self, flat: Mapping[str, Any], factors: np.ndarray, first: int) -> None:
         """Survey the stages at factors from the `first` on, by number. Raises Exhausted."""
         self.flat, self.factors, self.lowest = flat, factors, first
-        self.attracts, self.decided, self.returns = (np.zeros(len(factors), bool) for _ in range(3))
+        self.attracts, self.decided, self.passed = (np.zeros(len(factors), bool) for _ in range(3))
+        self.returns, self.resolved = np.zeros(len(factors), bool), np.zeros(len(factors), bool)
         self.motions: list[list[Swinging]] = [[] for _ in factors]
         self.ends: dict[tuple[int, int], AttractionEnd] = {}
         self.inspected: set[int] = set()
@@ -155,7 +155,7 @@ class _Grid:
         the nearest to the stage itself first, as far as so much work suffices. Raises Exhausted."""
         sketch = sketched(self._stages(numbers))
         self.attracts[numbers], self.decided[numbers] = sketch.attracts, sketch.decided
-        self.returns[numbers] = sketch.returns
+        self.returns[numbers], self.resolved[numbers] = sketch.returns, sketch.decided
         left = numbers[~sketch.decided]
         left = left[np.argsort(np.abs(np.log(self.factors[left])), kind="stable")]
         at_once, work = (AT_ONCE, SIMULATED) if sketch.decided.any() else (len(left), np.inf)
@@ -166,7 +166,7 @@ class _Grid:
                     survey = attractors(self._stages(some), cycles=False)
                     self.attracts[some], self.decided[some] = survey.attracts, survey.decided
             except Exhausted:
-                if not simulated.exhausted:
+                if simulated.used < work:
                     raise
 
     def _stages(self, numbers: np.ndarray) -> Ensemble:
@@ -188,6 +188,8 @@ class _Grid:
             falls = np.flatnonzero(self.attracts[:-1] & ~self.attracts[1:])
             falls = falls[falls >= index] if above else falls[falls < index]
             if not falls.size:
+                if above and self.attracts[-1] and not self.proved(len(self.factors) - 1, 1):
+                    continue
                 return None
             at = int(falls[-1])
             end = self.end(at, 1)
@@ -212,27 +214,33 @@ class _Grid:
             return self.ends.setdefault((at, ahead), end)
 
     def _followed(self, at: int, ahead: int) -> AttractionEnd | None:
-        """The same, of an end that was not followed before. Raises Exhausted."""
+        """The end of what attracts at a factor (see `end`), which was not followed before. Raises Exhausted."""
         if not self.proved(at, ahead):
             return None
         outward = Outward(self.flat, HIGHEST if ahead > 0 else LOWEST, self.settled)
         try:
             end = outward.end(float(self.factors[at]), tuple(self.motions[at]), float(self.factors[at + ahead]))
         except Beyond:
-            self.attracts[at + 1 if ahead > 0 else 0 : None if ahead > 0 else at] = True
+            self._pass(ahead * (np.arange(len(self.factors)) - at) > 0)
             return None
         beyond = ahead * np.log(self.factors / end.inside)
-        self.attracts |= (ahead * (np.arange(len(self.factors)) - at) > 0) & (beyond <= 0)
+        self._pass((ahead * (np.arange(len(self.factors)) - at) > 0) & (beyond <= 0))
         if ahead * (end.outside - end.inside) <= 0:  # the search was given up beyond it
             settled = np.flatnonzero((beyond > 0) & ~self.attracts)[::ahead]
             if not settled.size:
-                self.attracts |= beyond > 0
+                self._pass(beyond > 0)
                 return None
             end = AttractionEnd(end.inside, float(self.factors[settled[0]]), False)
         attracted = np.flatnonzero((ahead * (np.arange(len(self.factors)) - at) > 0) & (beyond <= 0))
         last = int(attracted[-1 if ahead > 0 else 0]) if attracted.size else at  # within its reserve it may lie before
         self.ends[at, ahead] = self.ends[last, ahead] = end
         return end
+
+    def _pass(self, where: np.ndarray) -> None:
+        """Take notice of factors, shape (count,), at which an orbit that was followed past them attracts."""
+        self.passed |= where
+        self.attracts |= where
+        self.inspected -= set(np.flatnonzero(where & [not motions for motions in self.motions]).tolist())
 
     def proved(self, at: int, ahead: int) -> bool:
         """Whether something attracts at a factor, by number, once orbits were tried to be closed; if not, that is known
@@ -250,7 +258,8 @@ class _Grid:
     def _inspect(self, numbers: np.ndarray) -> None:
         """Close orbits at the factors with some numbers."""
         survey = what_attracts(self._stages(numbers))
-        self.attracts[numbers], self.decided[numbers] = survey.attracts, survey.decided
+        self.attracts[numbers] = survey.attracts | self.passed[numbers]
+        self.decided[numbers] = survey.decided
         for k, number in enumerate(numbers.tolist()):
             self.motions[number] = list(survey.take(np.array([k])).motions)
         self.inspected |= set(numbers.tolist())
@@ -272,8 +281,8 @@ class _Grid:
         range on that side."""
         ends = []
         for ahead, farthest in ((1, HIGHEST), (-1, LOWEST)):
-            beyond = np.roll(self.returns, -ahead)
-            last = self.returns & ~beyond & ~self.attracts
+            beyond = np.roll(~self.returns & self.resolved, -ahead)
+            last = self.returns & self.resolved & beyond & ~self.attracts
             last[-1 if ahead > 0 else 0] = False
             ends += [(float(factor), farthest) for factor in self.factors[last]]
         return tuple(ends)

@@ -61,9 +61,9 @@ to attract; twice as much each time that it goes on."""
 @dataclass(frozen=True)
 class AttractionEnd:
     """Two factors of the bandwidth: something attracts at `inside`, nothing does at `outside`. It is `certain` where an
-    orbit was followed to its end at `inside`, or something was seen to attract there, and nothing attracts at
-    `outside`, all of which was decided, and both are close together. The end is known up to a share of it, the
-    `reserve`: it lies between both."""
+    orbit was followed to its end at `inside`, or to where it was lost, or something was seen to attract there; nothing
+    attracts at `outside`; all of that was decided; and both are close together. The end is known up to a share of it,
+    the `reserve`: it lies between both."""
 
     inside: float
     outside: float
@@ -133,6 +133,7 @@ class Outward:
             if orbit is None:
                 return self._bracketed(place)
             end, distance = self.followed(place.at, orbit)
+            place.at = end
             next_to, farther = self._just_beyond(end)
             beyond, survey = self._proved(next_to, farther, ALONG * distance)
             attracts = np.flatnonzero(survey.attracts)
@@ -158,6 +159,8 @@ class Outward:
         """The factor next to the end of an orbit, at which nothing may attract, and those farther off."""
         ahead = self._ahead(end)
         next_to, farther = end * BEYOND**ahead, end * FARTHER**ahead
+        if self.settled is not None and ahead * (self.settled - end) > 0:
+            next_to = ahead * min(ahead * next_to, ahead * self.settled)
         if ahead * (next_to - self.farthest) > 0:
             raise Beyond
         within = ahead * (self.farthest - farther) >= 0
@@ -168,7 +171,8 @@ class Outward:
     def _bracketed(self, place: _Place) -> AttractionEnd:
         """The end of what attracts where no orbit can be followed to it, between the last of some factors at which
         something does and the next one; again between these, until both are close together."""
-        reach = REACH
+        reach, ahead = REACH, self._ahead(place.at)
+        place.outside = ahead * min(ahead * place.outside, ahead * self.farthest)
         while True:
             factors = np.geomspace(place.at, place.outside, FINER + 2)[1:]
             survey = self._told(factors, np.outer([motion.distance for motion in place.motions], ALONG).ravel())
@@ -177,9 +181,10 @@ class Outward:
                 place.at, place.motions = float(factors[attracts[-1]]), survey.take(attracts[-1:]).motions
             last = int(attracts[-1]) + 1 if attracts.size else 0
             if last == len(factors):
-                place.outside, reach = float(place.at * np.exp(self._ahead(place.at) * reach)), 2 * reach
-                if self._ahead(place.at) * (place.outside - self.farthest) > 0:
+                if place.at == self.farthest:
                     raise Beyond
+                place.outside = ahead * min(ahead * place.at * np.exp(ahead * reach), ahead * self.farthest)
+                reach = 2 * reach
                 continue
             place.outside = float(factors[last])
             end = AttractionEnd(place.at, place.outside, bool(survey.decided[last:].all()))
@@ -216,8 +221,15 @@ class Outward:
         length = abs(float(np.log(self.farthest / at)))
         chatters = Ensemble.held(self.flat, 1).chatters
         shortest, flip = (ROUGH_STEP, ROUGH_STEP) if chatters else (SHORTEST_STEP, FLIP_STEP)
-        steps = {"pace": PACE, "first": FIRST_STEP, "shortest": shortest}
-        tracer = Tracer(family, cycles.sign, farthest=length, swings=cycles.swings, **steps)
+        tracer = Tracer(
+            family,
+            cycles.sign,
+            farthest=length,
+            swings=cycles.swings,
+            pace=PACE,
+            shortest=shortest,
+            first=FIRST_STEP,
+        )
         start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
         farthest = start
 

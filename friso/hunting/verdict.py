@@ -317,7 +317,8 @@ def _starts(
     widest = np.inf if attraction.lower_gains is None else RUNNING_AWAY * _widest(attraction)
     try:
         with allowance(work):
-            landing_map = resolved_map(Ensemble.held(stage.flat(), 1))
+            surveyed = attraction.surveyed
+            landing_map = resolved_map(Ensemble.held(stage.flat(), 1), surveyed.motions) if surveyed else None
             starts = (
                 displacements_that_hunt(stage, target, widest, landing_map),
                 pushes_that_hunt(stage, target, widest, landing_map),

@@ -6,16 +6,17 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.rounds import typical_period
+from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL, Cycles, families
+from friso.hunting.cycle.find import RTOL, families
+from friso.hunting.cycle.held import held_beside
 from friso.hunting.loop import winds_up_at_a_limit
-from friso.hunting.return_map.attracting import MapSurvey, survey_maps
+from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
 from friso.hunting.return_map.confirmed import runs_land_as_foretold
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.mapped import map_stages
@@ -31,45 +32,74 @@ SKETCH_RTOL = 1e-5
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def what_attracts(
-    stages: Ensemble,
-    rtol: float = RTOL,
-    distances: np.ndarray | None = None,
-    suggested: tuple[Cycles, ...] | None = None,
-    confirm: Sequence[int] = (),
+    stages: Ensemble, rtol: float = RTOL, distances: np.ndarray | None = None, confirm: Sequence[int] = ()
 ) -> Attractors:
     """What attracts stages that may hunt: closed orbits, by their return maps where these are resolved.
 
-    All stages that the maps leave open are searched from many starts, beside cycles that Newton's method closes from
-    the map of stages at rest, `suggested` (None: they are closed here), and from `distances` [m], shape (count, n).
-    Of the stages to `confirm`, by number, runs have to land where the map says. Orbits are closed to a relative
-    tolerance. Raises Exhausted where an allowance is used up.
+    A map shows that nothing attracts if no cycle that Newton's method closes from the map of stages at rest attracts,
+    and none that repels holds motions beside it, within its few per cent; and if, of the stages to `confirm`, by
+    number, runs land where it says. All other stages are searched from many starts, beside these cycles and motions,
+    and from `distances` [m], shape (count, n). Orbits are closed to a relative tolerance. Raises Exhausted where an
+    allowance is used up.
     """
     if not has_a_map(stages):
-        return attractors(stages, False, rtol, distances, suggested=suggested or families(stages, rtol))
+        return _searched(stages, rtol, distances)
     survey = survey_maps(stages, rtol)
     resolved = survey.resolved | survey.attracts  # a closed orbit that attracts is a proof
     quiet = np.array([number for number in confirm if resolved[number] and not survey.attracts[number]], dtype=np.int64)
     if quiet.size:
         resolved[quiet] = runs_land_as_foretold(survey, quiet)
-    if suggested is None and stages.remember:
-        suggested = families(stages, rtol)
-    if suggested is not None:
-        resolved &= survey.attracts | ~np.any([family.attracting for family in suggested], axis=0)
-    answer = _by_map(stages, survey, suggested or (), resolved)
-    if (left := np.flatnonzero(~resolved)).size:
-        some = stages.take(left)
-        cycles = tuple(family.take(left) for family in suggested) if suggested else families(some, rtol)
-        starts = None if distances is None else distances[left]
-        answer = _joined(answer, attractors(some, False, rtol, starts, suggested=cycles), left)
-    return answer
+    nothing = np.zeros(stages.count, bool)
+    motions, columns = list(survey.motions), {"flips": nothing.copy(), "runs_away": nothing.copy()}
+    decided, complete = resolved.copy(), resolved.copy()
+    if (left := np.flatnonzero(~survey.attracts)).size:
+        others = None if distances is None else distances[left]
+        answer, open_ = _beside_cycles(stages.take(left), resolved[left], rtol, others)
+        which = left[open_]
+        motions += [replace(motion, stage=int(which[motion.stage])) for motion in answer.motions] if answer else []
+        for column, name in ((decided, "decided"), (complete, "complete"), *((columns[n], n) for n in columns)):
+            if answer:
+                column[which] = getattr(answer, name)
+    return Attractors(tuple(motions), decided, typical_period(stages), (), complete=complete, **columns)
 
 
-def resolved_map(stages: Ensemble) -> LandingMap | None:
-    """The return map of one stage that something attracts, if it tells what; else None."""
+def _beside_cycles(
+    stages: Ensemble, resolved: np.ndarray, rtol: float, distances: np.ndarray | None
+) -> tuple[Attractors | None, np.ndarray]:
+    """What a search shows of stages whose maps show nothing that attracts (None: it is not needed), and their numbers:
+    those that are not `resolved`, shape (count,), and those that a cycle attracts, or that one holds in motions."""
+    cycles = families(stages, rtol)
+    held = np.hstack([held_beside(stages, family) for family in cycles])
+    attracted = np.any([family.attracting for family in cycles], axis=0)
+    which = np.flatnonzero(~resolved | attracted | np.isfinite(held).any(axis=1))
+    if not which.size:
+        return None, which
+    starts = held[which] if distances is None else np.hstack([held[which], distances[which]])
+    suggested = tuple(family.take(which) for family in cycles)
+    return attractors(stages.take(which), False, rtol, starts, suggested=suggested), which
+
+
+def _searched(stages: Ensemble, rtol: float, distances: np.ndarray | None) -> Attractors:
+    """What attracts stages without a map, by simulations from many starts and beside the cycles that are closed."""
+    cycles = families(stages, rtol)
+    held = [held_beside(stages, family) for family in cycles]
+    starts = np.hstack(held if distances is None else [*held, distances])
+    return attractors(stages, False, rtol, starts, suggested=cycles)
+
+
+def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | None:
+    """The return map of one stage, if it has all the `motions` that attract the stage, and nothing else attracts on it;
+    None if not."""
     if not has_a_map(stages) or stages.remember:
         return None
     survey = survey_maps(stages)
-    return survey.mapped.maps[0] if survey.resolved[0] and survey.attracts[0] else None
+    (landing_map,), length = survey.mapped.maps, float(stages.length[0])
+
+    def on_map(motion: Swinging) -> bool:
+        return any(motion.like(mapped) for mapped in survey.motions)
+
+    attract = [any(is_motion(new, motion, length) for motion in motions) for new in landing_map.attractors]
+    return landing_map if survey.resolved[0] and all(map(on_map, motions)) and all(attract) else None
 
 
 @dataclass(frozen=True)
@@ -116,21 +146,3 @@ def has_a_map(stages: Ensemble) -> bool:
         return False
     stands_anywhere = stages.structure.plays or bool(np.any(dead_band(stages.flat) > 0))
     return not (stages.chatters or stands_anywhere or winds_up_at_a_limit(stages) or stages.outer_integrals)
-
-
-def _by_map(stages: Ensemble, survey: MapSurvey, suggested: tuple[Cycles, ...], resolved: np.ndarray) -> Attractors:
-    """The answer about the stages that are `resolved`, shape (count,); it is not decided what attracts the others."""
-    motions = tuple(motion for motion in survey.motions if resolved[motion.stage])
-    nothing = np.zeros(stages.count, bool)
-    return Attractors(motions, resolved, typical_period(stages), suggested, nothing, resolved, nothing)
-
-
-def _joined(answer: Attractors, other: Attractors, numbers: np.ndarray) -> Attractors:
-    """An answer about stages, with that about those with some numbers in its place."""
-    motions = tuple(replace(motion, stage=int(numbers[motion.stage])) for motion in other.motions)
-    columns: dict[str, Any] = {}
-    for name in ("decided", "flips", "complete", "runs_away"):
-        columns[name] = getattr(answer, name).copy()
-        columns[name][numbers] = getattr(other, name)
-    kept = tuple(motion for motion in answer.motions if motion.stage not in set(numbers.tolist()))
-    return replace(answer, motions=(*kept, *motions), **columns)

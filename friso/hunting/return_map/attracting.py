@@ -85,9 +85,9 @@ class _Proposal:
     run: int
 
 
-def survey_maps(stages: Ensemble, rtol: float = RTOL, mapped: Mapped | None = None) -> MapSurvey:
+def survey_maps(stages: Ensemble, rtol: float = RTOL) -> MapSurvey:
     """What attracts stages, found by their return maps; orbits are closed to a relative tolerance."""
-    mapped = mapped or map_stages(stages)
+    mapped = map_stages(stages)
     motions: list[Swinging] = []
     repelling: list[Swinging] = []
     for _ in range(TRIES):

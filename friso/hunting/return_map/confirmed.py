@@ -1,4 +1,4 @@
-"""Whether runs land where the return maps say: from every basin, and from the widest gap between starts."""
+"""Whether runs land where the return maps say: where a stage rests, where it goes on, and in the widest gap."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from friso.hunting.return_map.landings import RTOL, find_landings
 from friso.hunting.return_map.mapped import NEAR_DISTANCES
 
 PLACES = np.array([1 / 6, 1 / 2, 5 / 6])
-"""Which of the starts in a basin, in order of distance, are followed."""
+"""Which of the starts from which a stage rests, or goes on, in order of distance, are followed."""
 
 FOLLOWED_LANDINGS = 12
 """Landings for which each run is followed."""

@@ -199,11 +199,6 @@ class LandingMap:
         """Whether landings at signed distances go on for ever, shape (count,)."""
         return np.all(self._followed(self._places(distances)) > REST, axis=1)
 
-    def followed_from(self, distances: np.ndarray) -> np.ndarray:
-        """The signed distances of the last of the landings that follow those at distances, shape (count, landings),
-        once the map has come to what attracts it; 0 where the stage rests."""
-        return _distance(self._followed(self._places(distances)))
-
     def _places(self, distances: np.ndarray) -> np.ndarray:
         """The places of landings at signed distances."""
         at = np.abs(distances) if self.symmetric else distances
