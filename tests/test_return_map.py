@@ -11,16 +11,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from friso.engine.allowance import allowance
 from friso.hunting import SEARCH_LIMITS, Ensemble, find_margin, outward, stuck
+from friso.hunting.attractors import attractors
 from friso.hunting.basin import displacements_that_hunt
 from friso.hunting.cycle.hunting import hunting
+from friso.hunting.margin import NOT_SOUGHT, search_bandwidths
 from friso.hunting.return_map import attracting, confirmed
 from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
 from friso.hunting.return_map.confirmed import runs_land_as_foretold
 from friso.hunting.return_map.landing_map import LandingMap, MapAttractor
 from friso.hunting.return_map.landings import RTOL, Landings, find_landings
 from friso.hunting.return_map.mapped import FAR_DISTANCES, NEAR_DISTANCES, gaps
-from friso.hunting.what_attracts import SKETCH_DISTANCES, has_a_map, resolved_map, sketched, what_attracts
+from friso.hunting.what_attracts import SKETCH_DISTANCES, Sketch, has_a_map, resolved_map, sketched, what_attracts
 from friso.stage import Stage
 
 pytestmark = pytest.mark.inner
@@ -189,6 +192,27 @@ def test_runs_land_where_the_map_of_the_rig_says_and_not_where_another_does(lock
     off = replace(beyond.mapped)
     vars(off)["maps"] = (replace(landing_map, after=1.1 * landing_map.after),)
     assert not runs_land_as_foretold(replace(beyond, mapped=off), np.zeros(1, np.int64)).any()
+
+
+def test_what_seems_to_attract_up_to_the_top_is_proved_there(locked: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sketch that says of all bandwidths that something attracts there moves no edge."""
+
+    def everywhere(stages: Ensemble) -> Sketch:
+        yes = np.ones(stages.count, bool)
+        return Sketch(yes, yes, ~yes)
+
+    monkeypatch.setattr("friso.hunting.margin.sketched", everywhere)
+    sought = search_bandwidths(locked, attracting=True)
+    assert not sought.to_the_top
+    assert sought.margin is not None
+    assert sought.margin.crossover == pytest.approx(9.750, rel=2e-4)
+
+
+def test_bandwidths_that_no_work_was_left_for_make_no_edge(rig: Stage) -> None:
+    free = rig.replace({"joint.locked": False})
+    survey = attractors(Ensemble.held(free.flat(), 1), thorough=True)
+    with allowance(1e6):
+        assert search_bandwidths(free, False, survey) == NOT_SOUGHT
 
 
 def test_a_joint_that_is_free_or_a_dead_band_has_no_map(rig: Stage, locked: Stage) -> None:

@@ -108,8 +108,8 @@ def mention_unstable_loop(stage: Stage) -> None:
 
 
 def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
-    """Mention (to the logger "friso", as information) the verdict on a case of a stage, certain by all that was computed
-    so far, while its edge, kicks and other cases are still computed."""
+    """Mention (to the logger "friso", as information) the verdict on a case of a stage, certain by what was computed so
+    far, while its edge, kicks and other cases are still computed."""
     from friso.views.check.cases import case_labels
     from friso.views.check.words import IN_SHORT
 
