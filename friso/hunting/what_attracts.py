@@ -13,7 +13,7 @@ from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.rounds import typical_period
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL, families
+from friso.hunting.cycle.find import RTOL, Cycles, families
 from friso.hunting.cycle.held import held_beside
 from friso.hunting.loop import winds_up_at_a_limit
 from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
@@ -43,48 +43,53 @@ def what_attracts(
     allowance is used up.
     """
     if not has_a_map(stages):
-        return _searched(stages, rtol, distances)
+        return _searched(stages, rtol, distances, _Cycles.of(stages, rtol))
     survey = survey_maps(stages, rtol)
-    resolved = survey.resolved | survey.attracts  # a closed orbit that attracts is a proof
-    quiet = np.array([number for number in confirm if resolved[number] and not survey.attracts[number]], dtype=np.int64)
+    decided = survey.resolved | survey.attracts  # a closed orbit that attracts is a proof
+    quiet = np.array([number for number in confirm if decided[number] and not survey.attracts[number]], dtype=np.int64)
     if quiet.size:
-        resolved[quiet] = runs_land_as_foretold(survey, quiet)
+        decided[quiet] = runs_land_as_foretold(survey, quiet)
+    motions, left = survey.motions, np.flatnonzero(~survey.attracts)
+    if left.size:
+        cycles = _Cycles.of(stages.take(left), rtol)
+        which = np.flatnonzero(~decided[left] | cycles.attract_or_hold)
+        if (open_ := left[which]).size:
+            begun = None if distances is None else distances[open_]
+            answer = _searched(stages.take(open_), rtol, begun, cycles.take(which))
+            motions += tuple(replace(motion, stage=int(open_[motion.stage])) for motion in answer.motions)
+            decided[open_] = answer.decided
     nothing = np.zeros(stages.count, bool)
-    motions, columns = list(survey.motions), {"flips": nothing.copy(), "runs_away": nothing.copy()}
-    decided, complete = resolved.copy(), resolved.copy()
-    if (left := np.flatnonzero(~survey.attracts)).size:
-        others = None if distances is None else distances[left]
-        answer, open_ = _beside_cycles(stages.take(left), resolved[left], rtol, others)
-        which = left[open_]
-        motions += [replace(motion, stage=int(which[motion.stage])) for motion in answer.motions] if answer else []
-        for column, name in ((decided, "decided"), (complete, "complete"), *((columns[n], n) for n in columns)):
-            if answer:
-                column[which] = getattr(answer, name)
-    return Attractors(tuple(motions), decided, typical_period(stages), (), complete=complete, **columns)
+    return Attractors(motions, decided, typical_period(stages), (), nothing, decided, nothing)
 
 
-def _beside_cycles(
-    stages: Ensemble, resolved: np.ndarray, rtol: float, distances: np.ndarray | None
-) -> tuple[Attractors | None, np.ndarray]:
-    """What a search shows of stages whose maps show nothing that attracts (None: it is not needed), and their numbers:
-    those that are not `resolved`, shape (count,), and those that a cycle attracts, or that one holds in motions."""
-    cycles = families(stages, rtol)
-    held = np.hstack([held_beside(stages, family) for family in cycles])
-    attracted = np.any([family.attracting for family in cycles], axis=0)
-    which = np.flatnonzero(~resolved | attracted | np.isfinite(held).any(axis=1))
-    if not which.size:
-        return None, which
-    starts = held[which] if distances is None else np.hstack([held[which], distances[which]])
-    suggested = tuple(family.take(which) for family in cycles)
-    return attractors(stages.take(which), False, rtol, starts, suggested=suggested), which
+@dataclass(frozen=True)
+class _Cycles:
+    """The cycles of stages that Newton's method closes from their maps at rest, and distances [m], shape (count, n), in
+    motions that those hold which repel, NaN where there is none."""
+
+    families: tuple[Cycles, ...]
+    held: np.ndarray
+
+    @classmethod
+    def of(cls, stages: Ensemble, rtol: float) -> _Cycles:
+        """The cycles of stages, closed to a relative tolerance."""
+        cycles = families(stages, rtol)
+        return cls(cycles, np.hstack([held_beside(stages, family) for family in cycles]))
+
+    @property
+    def attract_or_hold(self) -> np.ndarray:
+        """Of which stages a cycle attracts, or holds motions, shape (count,)."""
+        return np.any([family.attracting for family in self.families], axis=0) | np.isfinite(self.held).any(axis=1)
+
+    def take(self, numbers: np.ndarray) -> _Cycles:
+        """The cycles of the stages with these numbers."""
+        return _Cycles(tuple(family.take(numbers) for family in self.families), self.held[numbers])
 
 
-def _searched(stages: Ensemble, rtol: float, distances: np.ndarray | None) -> Attractors:
-    """What attracts stages without a map, by simulations from many starts and beside the cycles that are closed."""
-    cycles = families(stages, rtol)
-    held = [held_beside(stages, family) for family in cycles]
-    starts = np.hstack(held if distances is None else [*held, distances])
-    return attractors(stages, False, rtol, starts, suggested=cycles)
+def _searched(stages: Ensemble, rtol: float, distances: np.ndarray | None, cycles: _Cycles) -> Attractors:
+    """What attracts stages, by simulations from many starts, from distances [m], and beside cycles."""
+    starts = cycles.held if distances is None else np.hstack([cycles.held, distances])
+    return attractors(stages, False, rtol, starts, suggested=cycles.families)
 
 
 def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | None:
