@@ -11,7 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.truth.draws import draw
 from friso.engine.allowance import allowance
+from friso.equations.bandwidth import faster
 from friso.hunting import SEARCH_LIMITS, Ensemble, find_margin, outward, stuck
 from friso.hunting.attractors import attractors
 from friso.hunting.basin import displacements_that_hunt
@@ -213,6 +215,18 @@ def test_bandwidths_that_no_work_was_left_for_make_no_edge(rig: Stage) -> None:
     survey = attractors(Ensemble.held(free.flat(), 1), thorough=True)
     with allowance(1e6):
         assert search_bandwidths(free, False, survey) == NOT_SOUGHT
+
+
+def test_what_a_repelling_orbit_of_the_map_holds_beside_it_is_found() -> None:
+    """An orbit of four swings, 3 % about one of two that repels: points of the map are farther apart there. By
+    the search alone, too, its multiplier is -0.68."""
+    locked = draw(7001, 83, "stages").variants()["locked"]
+    stages = Ensemble.held(faster(locked.flat(), np.array([0.46])), 1)
+    (motion,) = what_attracts(stages).motions
+    assert motion.swings == 4
+    edge = find_margin(locked, attracting=False)
+    assert edge is not None
+    assert edge.factor < 0.46474 < edge.quiet
 
 
 def test_a_joint_that_is_free_or_a_dead_band_has_no_map(rig: Stage, locked: Stage) -> None:

@@ -36,11 +36,11 @@ def what_attracts(
 ) -> Attractors:
     """What attracts stages that may hunt: closed orbits, by their return maps where these are resolved.
 
-    A map shows that nothing attracts if no cycle that Newton's method closes from the map of stages at rest attracts,
-    and none that repels holds motions beside it, within its few per cent; and if, of the stages to `confirm`, by
-    number, runs land where it says. All other stages are searched from many starts, beside these cycles and motions,
-    and from `distances` [m], shape (count, n). Orbits are closed to a relative tolerance. Raises Exhausted where an
-    allowance is used up.
+    A map shows that nothing attracts if no cycle that Newton's method closes from the map of stages at rest attracts;
+    if none of these that repel, nor any that was closed from the map itself, holds motions beside it; and if, of the
+    stages to `confirm`, by number, runs land where it says. All other stages are searched from many starts, beside
+    these cycles and motions, and from `distances` [m], shape (count, n). Orbits are closed to a relative tolerance.
+    Raises Exhausted where an allowance is used up.
     """
     if not has_a_map(stages):
         return _searched(stages, rtol, distances, _Cycles.of(stages, rtol))
@@ -51,7 +51,7 @@ def what_attracts(
         decided[quiet] = runs_land_as_foretold(survey, quiet)
     motions, left = survey.motions, np.flatnonzero(~survey.attracts)
     if left.size:
-        cycles = _Cycles.of(stages.take(left), rtol)
+        cycles = _Cycles.of(stages.take(left), rtol).beside(survey, left)
         which = np.flatnonzero(~decided[left] | cycles.attract_or_hold)
         if (open_ := left[which]).size:
             begun = None if distances is None else distances[open_]
@@ -75,6 +75,18 @@ class _Cycles:
         """The cycles of stages, closed to a relative tolerance."""
         cycles = families(stages, rtol)
         return cls(cycles, np.hstack([held_beside(stages, family) for family in cycles]))
+
+    def beside(self, survey: MapSurvey, numbers: np.ndarray) -> _Cycles:
+        """These cycles of the stages with some numbers, with the motions that the orbits hold which were closed from
+        attractors of their maps, but repel."""
+        more = [np.full((len(numbers), 1), np.nan)]
+        for motion in survey.repelling:
+            if motion.cycles is not None and (rows := np.flatnonzero(numbers == motion.stage)).size:
+                stage = survey.mapped.stages.take(np.array([motion.stage]))
+                holds = held_beside(stage, motion.cycles.take(np.array([motion.number])))
+                more.append(np.full((len(numbers), holds.shape[1]), np.nan))
+                more[-1][rows] = holds
+        return _Cycles(self.families, np.hstack([self.held, *more]))
 
     @property
     def attract_or_hold(self) -> np.ndarray:

@@ -32,7 +32,7 @@ ALIKE = 0.05
 SCATTER = 0.05
 """Share by which landings may differ from what their neighbours foretell: by more, this is not a map."""
 
-UNCLOSED = "an attractor of the map was neither closed as an orbit nor left"
+UNCLOSED = "an attractor of the map was not closed as an orbit that attracts"
 LOST = "runs were not completed"
 SCATTERS = "landings at equal distances return differently: the stage remembers more than its distance"
 """Why it is not known what attracts a stage."""
@@ -41,8 +41,8 @@ SCATTERS = "landings at equal distances return differently: the stage remembers 
 @dataclass(frozen=True)
 class MapSurvey:
     """What the return maps of stages show: the `mapped` runs; the `motions` that attract; orbits that were closed and
-    repel, `repelling`; and of which stages an attractor of the map was neither closed nor left by the runs that
-    came to it, `undecided`, shape (count,)."""
+    repel, `repelling`; and of which stages the map still has an attractor that was not closed as an orbit which
+    attracts, `undecided`, shape (count,)."""
 
     mapped: Mapped
     motions: tuple[Swinging, ...]
@@ -99,8 +99,11 @@ def survey_maps(stages: Ensemble, rtol: float = RTOL) -> MapSurvey:
         before = len(mapped.owners)
         mapped = mapped.gone_on(runs, most)
         _close(mapped, np.arange(before, len(mapped.owners)), rtol, motions, repelling)
-    undecided = np.zeros(stages.count, bool)
-    undecided[[proposal.stage for proposal in _left(mapped, motions, repelling)]] = True
+    lengths, undecided = stages.length, np.zeros(stages.count, bool)
+    for stage, landing_map in enumerate(mapped.maps):
+        own = [motion for motion in motions if motion.stage == stage]
+        for attractor in landing_map.attractors:
+            undecided[stage] |= not any(is_motion(attractor, motion, float(lengths[stage])) for motion in own)
     return MapSurvey(mapped, tuple(motions), tuple(repelling), undecided)
 
 
