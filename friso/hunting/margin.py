@@ -77,7 +77,7 @@ class SearchedBandwidths:
 
 
 NOT_SOUGHT = SearchedBandwidths(None, ())
-"""What is told of a stage that cannot hunt at any bandwidth, or where the allowance does not suffice for a survey."""
+"""What is told of a stage that cannot hunt at any bandwidth."""
 
 
 def find_margin(stage: Stage, attracting: bool) -> Margin | None:
@@ -101,7 +101,7 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     try:
         grid = _Grid(flat, factors, index if attracting else index // 2)
     except Exhausted:
-        return NOT_SOUGHT
+        return replace(NOT_SOUGHT, undecided=True)
     grid.record(index, survey)
     edge = grid.last_edge(index, attracting)
     grid.search_below()
@@ -166,7 +166,7 @@ class _Grid:
                     survey = attractors(self._stages(some), cycles=False)
                     self.attracts[some], self.decided[some] = survey.attracts, survey.decided
             except Exhausted:
-                if simulated.used < work:
+                if simulated.left < work - simulated.used or np.isinf(work):  # there is less left around this search
                     raise
 
     def _stages(self, numbers: np.ndarray) -> Ensemble:
