@@ -196,18 +196,27 @@ def test_runs_land_where_the_map_of_the_rig_says_and_not_where_another_does(lock
     assert not runs_land_as_foretold(replace(beyond, mapped=off), np.zeros(1, np.int64)).any()
 
 
+def _everywhere(stages: Ensemble) -> Sketch:
+    yes = np.ones(stages.count, bool)
+    return Sketch(yes, yes, ~yes)
+
+
 def test_what_seems_to_attract_up_to_the_top_is_proved_there(locked: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     """A sketch that says of all bandwidths that something attracts there moves no edge."""
-
-    def everywhere(stages: Ensemble) -> Sketch:
-        yes = np.ones(stages.count, bool)
-        return Sketch(yes, yes, ~yes)
-
-    monkeypatch.setattr("friso.hunting.margin.sketched", everywhere)
+    monkeypatch.setattr("friso.hunting.margin.sketched", _everywhere)
     sought = search_bandwidths(locked, attracting=True)
     assert not sought.to_the_top
     assert sought.margin is not None
     assert sought.margin.crossover == pytest.approx(9.750, rel=2e-4)
+
+
+def test_a_top_that_no_work_is_left_for_is_undecided(locked: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("friso.hunting.margin.sketched", _everywhere)
+    survey = attractors(Ensemble.held(locked.flat(), 1), thorough=True)
+    with allowance(1e5):
+        sought = search_bandwidths(locked, True, survey)
+    assert sought.undecided
+    assert not sought.to_the_top
 
 
 def test_bandwidths_that_no_work_was_left_for_make_no_edge(rig: Stage) -> None:

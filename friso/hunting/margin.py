@@ -110,7 +110,7 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     windows = grid.windows(index if edge is None else edge[0])  # these may be followed to the stage itself
     contradicts, returns = bool(grid.attracts[index]) and not attracting, grid.last_returns()
     if edge is None:
-        to_the_top = bool(grid.attracts[index:].all())
+        to_the_top = bool((grid.attracts & grid.decided)[index:].all())
         undecided = not grid.decided[grid.lowest :].all()
         return SearchedBandwidths(None, windows, lower, contradicts, to_the_top, undecided, returns)
     _, end, certain = edge
@@ -188,7 +188,7 @@ class _Grid:
             falls = np.flatnonzero(self.attracts[:-1] & ~self.attracts[1:])
             falls = falls[falls >= index] if above else falls[falls < index]
             if not falls.size:
-                if above and self.attracts[-1] and not self.proved(len(self.factors) - 1, 1):
+                if above and self.attracts[-1] and not self._proved_at_the_top():
                     continue
                 return None
             at = int(falls[-1])
@@ -199,6 +199,14 @@ class _Grid:
             hunts = quiet[self.attracts[quiet]]
             upper = quiet[quiet < hunts[0]] if hunts.size else quiet
             return at, end, bool(end.certain and self.decided[upper].all())
+
+    def _proved_at_the_top(self) -> bool:
+        """Whether something attracts at the highest factor, or that is not decided, as the allowance is used up."""
+        try:
+            return self.proved(len(self.factors) - 1, 1)
+        except Exhausted:
+            self.decided[-1] = False
+            return True
 
     def end(self, at: int, ahead: int) -> AttractionEnd | None:
         """The end of what attracts at a factor, by number, while nothing does at the next one, above (`ahead` 1) or
