@@ -189,7 +189,15 @@ class Outward:
             place.outside = float(factors[last])
             end = AttractionEnd(place.at, place.outside, bool(survey.decided[last:].all()))
             if end.reserve <= BRACKET:
-                return end
+                return replace(end, certain=end.certain and self._surely_attracts(place))
+
+    def _surely_attracts(self, place: _Place) -> bool:
+        """Whether something attracts at a place for sure: a closed orbit, or what a thorough survey observes, too."""
+        if any(motion.cycles is not None for motion in place.motions):
+            return True
+        distances = np.outer([motion.distance for motion in place.motions], ALONG).reshape(1, -1)
+        survey = attractors(self._stages(np.array([place.at])), thorough=True, distances=distances)
+        return bool(survey.attracts[0] and survey.decided[0])
 
     def _told(self, factors: np.ndarray, distances: np.ndarray, confirm: tuple[int, ...] = ()) -> Attractors:
         """What attracts at some factors, where maps do not tell from `distances` [m], shape (n,), too; runs confirm the
