@@ -18,7 +18,7 @@ from friso.hunting import SEARCH_LIMITS, Ensemble, find_margin, outward, stuck
 from friso.hunting.attractors import attractors
 from friso.hunting.basin import displacements_that_hunt
 from friso.hunting.cycle.hunting import hunting
-from friso.hunting.margin import NOT_SOUGHT, search_bandwidths
+from friso.hunting.margin import NOT_SOUGHT, _Grid, search_bandwidths
 from friso.hunting.return_map import attracting, confirmed
 from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
 from friso.hunting.return_map.confirmed import runs_land_as_foretold
@@ -244,6 +244,31 @@ def test_simulations_that_take_too_much_leave_bandwidths_open_and_no_more() -> N
     edge = search_bandwidths(touching, attracting=True).margin
     assert edge is not None
     assert edge.factor == pytest.approx(9.5422, rel=1e-3)
+
+
+def test_a_window_that_is_followed_to_the_stage_itself_contradicts_that_nothing_attracts_it(
+    locked: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def followed_home(grid: _Grid, besides: int) -> tuple[()]:
+        grid.attracts[np.argmin(np.abs(grid.factors - 1))] = True
+        return ()
+
+    monkeypatch.setattr(_Grid, "windows", followed_home)
+    quiet = locked.replace({"controller.crossover": "12 Hz"})
+    assert search_bandwidths(quiet, attracting=False).contradicts
+
+
+@pytest.mark.parametrize("attracts", [True, False])
+def test_what_one_survey_observed_makes_no_edge_certain_unless_a_thorough_one_does(
+    locked: Stage, monkeypatch: pytest.MonkeyPatch, attracts: bool
+) -> None:
+    survey = attractors(Ensemble.held(locked.flat(), 1), thorough=True)
+    observed = tuple(replace(motion, cycles=None) for motion in survey.motions)
+    seen = survey if attracts else replace(survey, motions=())
+    monkeypatch.setattr("friso.hunting.outward.attractors", lambda *_, **__: seen)
+    where = outward.Outward(locked.flat(), 10.0)
+    assert where._surely_attracts(outward._Place(1.0, observed, 1.1)) == attracts
+    assert where._surely_attracts(outward._Place(1.0, survey.motions, 1.1))
 
 
 def test_a_joint_that_is_free_or_a_dead_band_has_no_map(rig: Stage, locked: Stage) -> None:

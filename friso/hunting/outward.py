@@ -160,7 +160,7 @@ class Outward:
         ahead = self._ahead(end)
         next_to, farther = end * BEYOND**ahead, end * FARTHER**ahead
         if self.settled is not None and ahead * (self.settled - end) > 0:
-            next_to = ahead * min(ahead * next_to, ahead * self.settled)
+            next_to = _nearer(ahead, next_to, self.settled)
         if ahead * (next_to - self.farthest) > 0:
             raise Beyond
         within = ahead * (self.farthest - farther) >= 0
@@ -172,7 +172,7 @@ class Outward:
         """The end of what attracts where no orbit can be followed to it, between the last of some factors at which
         something does and the next one; again between these, until both are close together."""
         reach, ahead = REACH, self._ahead(place.at)
-        place.outside = ahead * min(ahead * place.outside, ahead * self.farthest)
+        place.outside = _nearer(ahead, place.outside, self.farthest)
         while True:
             factors = np.geomspace(place.at, place.outside, FINER + 2)[1:]
             survey = self._told(factors, np.outer([motion.distance for motion in place.motions], ALONG).ravel())
@@ -183,7 +183,7 @@ class Outward:
             if last == len(factors):
                 if place.at == self.farthest:
                     raise Beyond
-                place.outside = ahead * min(ahead * place.at * np.exp(ahead * reach), ahead * self.farthest)
+                place.outside = _nearer(ahead, place.at * np.exp(ahead * reach), self.farthest)
                 reach = 2 * reach
                 continue
             place.outside = float(factors[last])
@@ -255,12 +255,17 @@ class Outward:
             farthest = max(farthest, last or first, key=lambda point: point.place)
         elif tracer.reaches(points, reason):
             raise Beyond
-        return float(at * np.exp(ahead * farthest.place)), orbit_distance(farthest, orbit)
+        return float(at * np.exp(ahead * farthest.place)), _orbit_distance(farthest, orbit)
 
 
-def orbit_distance(point: Point, orbit: Swinging) -> float:
+def _orbit_distance(point: Point, orbit: Swinging) -> float:
     """The distance [m] at which a stage sticks on an orbit, on the side on which it was followed."""
     return float(np.copysign(np.exp(point.distance), orbit.distance))
+
+
+def _nearer(ahead: float, one: float, other: float) -> float:
+    """The factor that comes first on the way up, `ahead` 1, or down, -1."""
+    return float(min(one, other) if ahead > 0 else max(one, other))
 
 
 def _kind(first: Point, second: Point) -> Bifurcation:

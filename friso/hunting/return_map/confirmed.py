@@ -45,9 +45,8 @@ def _starts(survey: MapSurvey, stage: int) -> np.ndarray:
     starts, landings = mapped.starts[runs], mapped.landings
     last = landings.distances[runs, landings.count[runs]] / mapped.stages.length[stage]
     goes_on = ~landings.rest[runs] & mapped.maps[stage].goes_on(last)
-    chosen = [
-        which[(PLACES * len(which)).astype(int)] for which in map(np.flatnonzero, (goes_on, ~goes_on)) if which.size
-    ]
+    kinds = [which for which in map(np.flatnonzero, (goes_on, ~goes_on)) if which.size]
+    chosen = np.concatenate([which[(PLACES * len(which)).astype(int)] for which in kinds])
     near = np.abs(starts) <= NEAR_DISTANCES[-1]
     gaps = np.flatnonzero(near[:-1] & near[1:] & (starts[:-1] * starts[1:] > 0))
     widest = gaps[np.abs(np.log(starts[gaps + 1] / starts[gaps])).argmax()]
