@@ -86,3 +86,13 @@ def test_what_too_little_work_does_not_settle_is_not_certain(locked: Stage) -> N
     assert half.margin is None or not half.margin.certain
     assert not none.hunting.certain
     assert CheckPart.STARTS in half.given_up
+
+
+def test_who_gave_up_is_told_as_far_out_as_the_work_was_short() -> None:
+    """An allowance within another tells both that runs were given up if the other one's work is what ran out."""
+    with allowance(100.0) as around, allowance(1000.0) as within, pytest.raises(Exhausted):
+        within.exhaust()
+    assert within.exhausted and around.exhausted
+    with allowance(1000.0) as around, allowance(100.0) as within, pytest.raises(Exhausted):
+        within.exhaust()
+    assert within.exhausted and not around.exhausted

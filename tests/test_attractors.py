@@ -907,3 +907,16 @@ def test_a_motion_that_anti_windup_holds_far_out_is_not_said_to_run_away_for_goo
     assert float(case.judgement.hunting.target.amplitude) == pytest.approx(1399, rel=0.01)
     assert (case.verdict, case.judgement.runs_away, case.runs_away) == ("failed", False, False)
     assert check_given(chosen).runs_away
+
+
+def test_a_stage_without_steps_left_is_unknown_and_stops_no_other(rig: Stage) -> None:
+    """Of many stages searched at once one may have used up its steps before another wave of runs begins."""
+    stages = Ensemble.held(rig.variants()["locked"].flat(), 1)
+    so_far, begun = Survey(np.zeros(1, bool), True, 1e-6), starts.Starts(stages)
+    begun.stuck_at(stages.length[:, None])
+    so_far.left[:] = -5.0
+    with allowance() as spent:
+        for runs, owners in begun.waves(at_once=True):
+            so_far.follow(runs, owners)
+    assert so_far.unknown.all()
+    assert not spent.used

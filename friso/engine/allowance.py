@@ -29,8 +29,8 @@ class Exhausted(Exception):
 @dataclass
 class Allowance:
     """The `work` that runs may take together, in steps times what one of their kernel takes (`Kernel.work`; a unit is
-    about 12 ns on a core of 2024), and what of it is `used`; and whether it was `exhausted`: it did not suffice. Work
-    beyond an allowance `around` this one is not allowed either."""
+    about 12 ns on a core of 2024), and what of it is `used`; and whether it was `exhausted`: runs within were given up
+    for want of work, of its own or of an allowance `around` it, which limits it as well."""
 
     work: float
     around: Allowance | None = None
@@ -51,8 +51,12 @@ class Allowance:
         return left / step * min(1 / COUNTED_LANES, FAIR / runs)
 
     def exhaust(self) -> NoReturn:
-        """Tell that the allowance does not suffice: raises Exhausted."""
-        self.exhausted = True
+        """Tell that the allowance, or one around it, does not suffice: raises Exhausted."""
+        left, at = self.left, self
+        at.exhausted = True
+        while at.work - at.used > left and at.around is not None:
+            at = at.around
+            at.exhausted = True
         raise Exhausted
 
     def charge(self, steps: np.ndarray, step: float) -> None:

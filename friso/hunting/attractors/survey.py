@@ -233,7 +233,7 @@ class Survey:
         before, begun = np.full(len(owners), np.nan), np.abs(runs.states[:, runs.stages.sticking])
         for number in range(ROUNDS):
             enough = ENOUGH if self.thorough else 0
-            dropped = self.attracted[owners] & (number >= enough)
+            dropped = (self.attracted[owners] & (number >= enough)) | (self.left[owners] <= 0)
             self.unknown[owners[dropped]] = True
             keep = np.flatnonzero(~dropped)
             if not keep.size:
