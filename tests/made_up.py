@@ -104,6 +104,8 @@ class FakeCase:
     unmoved: bool = False
     runs_away: bool = False
     feeding: Any = None
+    static_friction: Any = None
+    advice_keeps_friction: bool | None = None
 
     @property
     def verdict(self) -> str:

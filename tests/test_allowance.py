@@ -92,7 +92,9 @@ def test_who_gave_up_is_told_as_far_out_as_the_work_was_short() -> None:
     """An allowance within another tells both that runs were given up if the other one's work is what ran out."""
     with allowance(100.0) as around, allowance(1000.0) as within, pytest.raises(Exhausted):
         within.exhaust()
-    assert within.exhausted and around.exhausted
+    assert within.exhausted
+    assert around.exhausted
     with allowance(1000.0) as around, allowance(100.0) as within, pytest.raises(Exhausted):
         within.exhaust()
-    assert within.exhausted and not around.exhausted
+    assert within.exhausted
+    assert not around.exhausted

@@ -29,6 +29,7 @@ from friso.stage.correlations import draw
 from friso.studies.draws import MOST, Draws
 
 if TYPE_CHECKING:
+    from friso.hunting import ParameterMargin
     from friso.remedies.suggestion import Suggestion
     from friso.studies.laws.verdicts import VerdictsByLaw
     from friso.views.drawing.figure import Figure
@@ -102,12 +103,23 @@ class CheckAnswer(Answer):
         return [*tables, behind]
 
     def details(self) -> Sequence[str]:
-        """What the search for the edge may miss, and whether the friction law may give energy back."""
+        """What the search for the edge may miss, how far a joint may be from its design, and whether the friction law
+        may give energy back."""
         from friso.stage.tables import passive_where
+        from friso.views.check.margin_words import joint_sentences
         from friso.views.check.words import between_surveyed
         from friso.views.convert.words import activity_sentences
 
-        return [*between_surveyed(self.result), *activity_sentences(passive_where(self.stage.flat()))]
+        activity = activity_sentences(passive_where(self.stage.flat()))
+        return [*between_surveyed(self.result), *joint_sentences(self.joint_margins), *activity]
+
+    @cached_property
+    def joint_margins(self) -> Mapping[str, ParameterMargin]:
+        """The margins of the case with a free joint in the joint's stroke and stiffness, by key."""
+        from friso.hunting import joint_margins
+
+        case = self.result.get("free", self.result["given"])
+        return joint_margins(case.stage, case.judgement)
 
     @cached_property
     def traced(self) -> Mapping[str, Case]:
@@ -155,7 +167,8 @@ def check(
     set : dict, optional
         Keys to override, ``{"joint.locked": True}``.
     draws : int, optional
-        How many stages to draw from the uncertain keys, to report how many of them hunt.
+        How many stages to draw from the uncertain keys, to report how many of them hunt; default: as many as a fixed
+        work allows, some tens.
     seed : int
         Seed of the draws: the same one gives the same stages.
     laws : bool
@@ -182,11 +195,12 @@ def check(
     >>> print(answer.data["peak_to_peak"].attrs["units"])
     m
     """
-    chosen, tolerance = read_stage(stage, set, uncertain_too=draws is not None), tolerance_of(rtol)
+    chosen, tolerance = read_stage(stage, set, uncertain_too=True), tolerance_of(rtol)
+    loose = max(tolerance, LONG_RUN_RTOL)
+    whole_number(seed, "seed", 0, MOST_SEED, "1000")
     sample = None
     if draws is not None:
         whole_number(draws, "draws", 1, MOST, "1000")
-        whole_number(seed, "seed", 0, MOST_SEED, "1000")
         try:
             sample = draw(chosen, correlations_of(stage, chosen), draws, seed)
         except InputError as error:
@@ -197,7 +211,11 @@ def check(
     mention_unstable_loop(chosen)
     cases = judged(chosen, tolerance, progress=progress, tell=partial(mention_verdict, chosen))
     drawn = across = None
-    loose = max(tolerance, LONG_RUN_RTOL)
+    if sample is None and chosen.uncertain():
+        from friso.studies.draws import affordable
+
+        correlations = correlations_of(stage, chosen)
+        sample = draw(chosen, correlations, affordable(chosen, correlations, seed, loose), seed)
     if sample is not None:
         from friso.studies.draws import fates
 

@@ -47,6 +47,8 @@ from friso.hunting.many_stages import (
 from friso.hunting.margin import Margin, find_margin
 from friso.hunting.motions import Motions
 from friso.hunting.outward import AttractionEnd, BandwidthWindow
+from friso.hunting.parameter_margin import MarginEnd, ParameterMargin
+from friso.hunting.stage_margins import joint_margins
 from friso.hunting.verdict import CheckPart, Judgement
 from friso.hunting.what_attracts import search_alone
 
@@ -78,10 +80,12 @@ __all__ = [
     "LoopState",
     "LowerGains",
     "Margin",
+    "MarginEnd",
     "Motions",
     "MoveShare",
     "Multipliers",
     "Orbits",
+    "ParameterMargin",
     "Plane",
     "Point",
     "ReturnMap",
@@ -107,6 +111,7 @@ __all__ = [
     "find_swings",
     "flow_derivatives",
     "hunting",
+    "joint_margins",
     "judge_many",
     "judge_runs",
     "kernels_to_judge",

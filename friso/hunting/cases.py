@@ -20,9 +20,12 @@ from friso.equations.structure import structure
 from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.feeding import Feeding, feeding
+from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.loop import LoopState, unstable
 from friso.hunting.many_stages import kernels_to_judge
 from friso.hunting.measures import BANDS, measure_runs, measuring_options
+from friso.hunting.parameter_margin import ParameterMargin
+from friso.hunting.stage_margins import friction_margin, keeps_friction_margin
 from friso.hunting.verdict import PARTS, ROOM, WORK, CheckPart, Judgement, judge
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
@@ -59,7 +62,10 @@ class Case:
     sticks, constant forces taken off; a motion that exerts less leaves a stage without a free joint `unmoved`;
     `force_limit` [N] is that of the controller, if that keeps it off its reference (None: it does not); `unstable`
     tells in which of its states the loop is not stable, whatever the friction does (see `friso.hunting.loop`);
-    `feeding`, with a backlash, without what hunting ends (None, too, where that was given up). `trace` holds the time
+    `feeding`, with a backlash, without what hunting ends (None, too, where that was given up). `static_friction` is the
+    margin in that (None: see `friso.hunting.stage_margins`, or it was not asked for), and `advice_keeps_friction`
+    tells whether the bandwidth that advice leads to, a factor beyond the edge of hunting, still does not hunt with that
+    factor more, or less, static friction (None: there is no such advice, or that is not known). `trace` holds the time
     response if asked for."""
 
     stage: Stage
@@ -77,6 +83,8 @@ class Case:
     force_limit: float | None = None
     unstable: tuple[LoopState, ...] = ()
     feeding: Feeding | None = None
+    static_friction: ParameterMargin | None = None
+    advice_keeps_friction: bool | None = None
     trace: xr.Dataset | None = None
 
     @property
@@ -96,6 +104,9 @@ class Case:
         return self.largest_force < self.breakaway and (joint is None or joint.locked)
 
 
+PART_COUNT = len(PARTS) + 1
+"""Parts of a case: those of its verdict, and its margin in static friction."""
+
 AT_LIMIT = 1e-9
 """Share of a limit of the force by which one that stands there may differ from it."""
 
@@ -104,6 +115,10 @@ FREE = 0.58
 
 FED = 0.3
 """Share of the work of a case that the search for what feeds its cycle may use at least."""
+
+FRICTION, ADVICE = 0.25, 0.1
+"""Shares of the work of a case that its margin in static friction may use beside that, and the question whether advice
+keeps one."""
 
 LONG_RUN_RTOL = 1e-6
 """Relative tolerance of runs that only tell what becomes of a motion; that of which times are told is finer."""
@@ -114,26 +129,27 @@ def check(
     rtol: float = RTOL,
     traces: bool = False,
     progress: Progress = silent,
+    margins: bool = True,
     tell: Callable[[str, Verdict], None] = lambda name, verdict: None,
 ) -> dict[str, Case]:
     """Check a stage: what becomes of it as given ("given"), with its joint locked ("locked") and free ("free").
 
     A stage without a joint has the case "given" alone, one whose file does not tell the joint's stiffness no "free".
-    With `traces`, each case has its time response. `progress` is called as work is done, and `tell` with the name of a
-    case and its verdict as soon as that is certain, both also from worker threads. Raises InputError for an `rtol` that
-    is not usable.
+    With `traces`, each case has its time response, and with `margins` its margin in static friction. `progress` is
+    called as work is done, and `tell` with the name of a case and its verdict as soon as that is certain, both also
+    from worker threads. Raises InputError for an `rtol` that is not usable.
     """
     checked_rtol(rtol)
     variants = stage.variants()
     kernels(needed_kernels(stage))
     different: list[Stage] = []
     different += (variant for variant in variants.values() if variant not in different)
-    done = Tally(progress, len(different) * len(PARTS))
+    done = Tally(progress, len(different) * PART_COUNT)
 
     def judged(variant: Stage) -> Case:
         names = [name for name, other in variants.items() if other == variant]
         share = _share(variant) if len(different) > 1 else 1.0
-        return _case(variant, rtol, traces, done, share * WORK, lambda verdict: tell(names[-1], verdict))
+        return _case(variant, rtol, traces, done, share * WORK, lambda verdict: tell(names[-1], verdict), margins)
 
     cases = side_by_side([partial(judged, variant) for variant in different])
     return {name: cases[different.index(variant)] for name, variant in variants.items()}
@@ -155,7 +171,7 @@ def check_given(stage: Stage, rtol: float = RTOL, progress: Progress = silent) -
     InputError for an unusable `rtol`."""
     checked_rtol(rtol)
     kernels(_needed(stage))
-    return _case(stage, rtol, False, Tally(progress, len(PARTS)), WORK)
+    return _case(stage, rtol, False, Tally(progress, PART_COUNT), WORK)
 
 
 def _needed(stage: Stage) -> set[KernelRequest]:
@@ -170,6 +186,7 @@ def _case(
     done: Tally,
     work: float,
     tell: Callable[[Verdict], None] = lambda verdict: None,
+    margins: bool = False,
 ) -> Case:
     flat, ended = stage.flat(), 0
 
@@ -188,8 +205,14 @@ def _case(
     if judgement.swing and structure(flat).plays:
         fed = _fed(stage, max(work - spent.used, FED * work))
         judgement = judgement if fed else replace(judgement, given_up=(*judgement.given_up, CheckPart.FEEDING))
+    static_friction = keeps = None
+    if margins:
+        begin(CheckPart.FRICTION)
+        static_friction, keeps = _friction(stage, judgement, work)
+        if static_friction and static_friction.open_sides:
+            judgement = replace(judgement, given_up=(*judgement.given_up, CheckPart.FRICTION))
     breakaway = _breakaway(flat)
-    done.add(len(PARTS) - ended, PARTS[-1])  # the last, too, where nothing attracts
+    done.add(PART_COUNT - ended, CheckPart.FRICTION)  # the last, too, where nothing attracts
     return Case(
         stage=stage,
         judgement=judgement,
@@ -206,6 +229,8 @@ def _case(
         force_limit=_holding_limit(flat, runs, judgement, breakaway) if status == Status.DONE else None,
         unstable=unstable(stage),
         feeding=fed,
+        static_friction=static_friction,
+        advice_keeps_friction=keeps,
         trace=simulate(stage, rtol) if traces else None,
     )
 
@@ -217,6 +242,20 @@ def _fed(stage: Stage, work: float) -> Feeding | None:
             return feeding(stage)
     except Exhausted:
         return None
+
+
+def _friction(stage: Stage, judgement: Judgement, work: float) -> tuple[ParameterMargin | None, bool | None]:
+    """The margin of a stage in static friction, and whether the bandwidth that advice leads to keeps one, as far as
+    shares of so much work suffice."""
+    with allowance(FRICTION * work):
+        margin = friction_margin(stage, judgement)
+    edge, distance = judgement.margin, SEARCH_LIMITS.edge_distance
+    if margin is None or edge is None or judgement.swing is None:
+        return margin, None
+    to = edge.quiet * distance
+    if to > SEARCH_LIMITS.highest_bandwidth:
+        return margin, None
+    return margin, keeps_friction_margin(stage, to, ADVICE * work)
 
 
 def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, breakaway: float) -> float | None:

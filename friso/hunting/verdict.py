@@ -96,14 +96,15 @@ class CheckPart(StrEnum):
     it would take more work than was allowed.
 
     The first three are computed in this order; without anything that attracts `STARTS` is left out. `LOWER_BANDWIDTHS`
-    is what is given up of `BANDWIDTHS` where something attracts up to the highest one. `FEEDING` is computed behind
-    these, of a stage with a backlash that something attracts.
+    is what is given up of `BANDWIDTHS` where something attracts up to the highest one. `FRICTION` is computed behind
+    these, and `FEEDING`, of a stage with a backlash that something attracts.
     """
 
     ATTRACTION = "what attracts the stage"
     STARTS = "kicks and moves"
     BANDWIDTHS = "other bandwidths"
     LOWER_BANDWIDTHS = "lower bandwidths"
+    FRICTION = "other static friction"
     FEEDING = "what feeds it"
 
 

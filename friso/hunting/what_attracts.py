@@ -141,6 +141,19 @@ def sketched(stages: Ensemble) -> Sketch:
     return Sketch(mapped.attracts, resolved, np.array([landing_map.returns for landing_map in mapped.maps]))
 
 
+@np.errstate(all="ignore")
+def surveyed_roughly(stages: Ensemble) -> tuple[np.ndarray, np.ndarray]:
+    """Which stages that may hunt something seems to attract, and of which that is decided, both of shape (count,): by
+    sketches, and by simulations of stages whose maps these do not resolve. Raises Exhausted where an allowance is used
+    up."""
+    sketch = sketched(stages)
+    attracts, decided = sketch.attracts.copy(), sketch.decided.copy()
+    if (left := np.flatnonzero(~sketch.decided)).size:
+        survey = attractors(stages.take(left), cycles=False)
+        attracts[left], decided[left] = survey.attracts, survey.decided
+    return attracts, decided
+
+
 _SEARCHES_ALONE = ContextVar("searches alone", default=False)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friso.engine.allowance import allowance
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.structure import shared_structure
 from friso.hunting import judge_many, kernels_to_judge, loops_unstable
@@ -14,10 +15,14 @@ from friso.hunting.criteria import ATTRACTED, VERDICTS
 from friso.progress import Progress, Tally, silent
 from friso.shares import Share, share
 from friso.stage import Stage
-from friso.stage.correlations import Sample, laid_over
+from friso.stage.correlations import Correlations, Sample, draw, laid_over
 
 CHUNK = 256
 """Stages whose verdicts are found at once: between chunks progress is reported."""
+
+TRIAL, WORK = 16, 3e8
+"""Draws that tell what a draw takes, and the work (see `friso.engine.allowance`) of the draws of a check for which no
+number was asked."""
 
 MOST = 100_000
 """Draws at most: at the edge of hunting one takes some 50 ms."""
@@ -71,6 +76,13 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
         name: by_variant[next(other for other, same in variants.items() if same == variant)]
         for name, variant in stage.variants().items()
     }
+
+
+def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float) -> int:
+    """How many stages may be drawn for a fixed work, a power of two (Sobol' points are even then)."""
+    with allowance() as spent:
+        fates(stage, draw(stage, correlations, TRIAL, seed), rtol)
+    return 1 << max(TRIAL.bit_length() - 1, int(np.log2(TRIAL * WORK / max(spent.used, 1.0))))
 
 
 @dataclass(frozen=True)

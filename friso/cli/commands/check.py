@@ -16,7 +16,8 @@ DrawsOption = Annotated[
     typer.Option(
         "--draws",
         metavar="N",
-        help='Draw N stages from the uncertain keys ("20 N +/- 1 N", "1 N .. 3 N"), and report how many hunt.',
+        help='Draw N stages from the uncertain keys ("20 N +/- 1 N", "1 N .. 3 N"), and report how many hunt; '
+        "default: some tens.",
     ),
 ]
 SeedOption = Annotated[

@@ -12,7 +12,7 @@ from friso.views.check.words import answer
 from friso.views.documents import plain_json
 
 if TYPE_CHECKING:
-    from friso.hunting import AttractionEnd, Case, Cycle, Feeding, Judgement, Margin, Swing
+    from friso.hunting import AttractionEnd, Case, Cycle, Feeding, Judgement, Margin, MarginEnd, ParameterMargin, Swing
     from friso.remedies.suggestion import Suggestion
     from friso.shares import Share
     from friso.studies.draws import Draws
@@ -83,6 +83,8 @@ def _case(case: Case) -> dict[str, Any]:
         "margin": _margin(judgement.margin) if judgement.margin else None,
         "windows": [{"low": _end(window.low), "high": _end(window.high)} for window in judgement.windows],
         "settles_below": _end(judgement.lower),
+        "static_friction": _parameter_margin(case.static_friction) if case.static_friction else None,
+        "advice_keeps_friction": case.advice_keeps_friction,
         "kick": _kick(judgement),
         "displacements_that_run_away_m": judgement.running_away.windows if judgement.running_away else None,
         "moves": {"drawn": judgement.moves.count, "hunting": judgement.moves.hunting} if judgement.moves else None,
@@ -150,6 +152,22 @@ def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
         "settles_at_factor": end.outside,
         "certain": end.certain,
         "reserve": end.reserve,
+    }
+
+
+def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
+    """At which multiples of a parameter hunting begins, or ends: of the last with which it is as with the parameter
+    itself, and the next with which it is not."""
+
+    def end(one: MarginEnd | None) -> dict[str, Any] | None:
+        return one and {"same_at_factor": one.same, "other_at_factor": one.other, "certain": one.certain}
+
+    return {
+        "hunts": margin.attracts,
+        "below": end(margin.below),
+        "above": end(margin.above),
+        "searched": margin.range,
+        "certain": margin.certain,
     }
 
 

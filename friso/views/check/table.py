@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 from friso.axis import axis_shown
 from friso.hunting import CheckPart
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
-from friso.quantities import percent
+from friso.quantities import percent, plain_factor
 from friso.views.check.cases import BANDS, ShownCase
+from friso.views.check.margin_words import margin_ways
 from friso.views.check.words import at_the_end, edge_text
 from friso.views.drawing.prefixes import (
     NOTHING,
+    listed,
     percent_range,
     plus_minus,
     range_with_unit,
@@ -97,6 +99,17 @@ def _edge(case: Case) -> str:
     return f"{edge_text(case, edge.end)}{'' if edge.certain else ' (not certain)'}"
 
 
+def _static_friction(case: Case) -> str:
+    margin = case.static_friction
+    if margin is None:
+        return NOTHING
+    low, high = (plain_factor(factor) for factor in margin.range)
+    does = "ends" if margin.attracts else "begins"
+    ways = listed(margin_ways(margin), "or")
+    says = f"{does} {ways}" if ways else f"no other from {low} to {high} times yours"
+    return UNKNOWN if margin.open_sides else f"{says}{'' if margin.certain else ' (not certain)'}"
+
+
 def _kicks(case: Case, kick: Kick | None, unit: str) -> str:
     if kick is None:
         return UNKNOWN if CheckPart.STARTS in case.judgement.given_up else NOTHING
@@ -162,6 +175,7 @@ _NUMBERS: dict[str, Callable[[Case], str]] = {
     "Observed in simulations": _observed,
     "Time constant of transients": _of_the_cycle(lambda cycle: with_unit(cycle.time_constant, "s")),
     "Edge of hunting": _edge,
+    "Hunting, by static friction": _static_friction,
     "Displacements that hunt": lambda case: _kicks(case, case.judgement.displacement, "m"),
     "Pushes that hunt": lambda case: _kicks(case, case.judgement.push, "m/s"),
     "Moves that end in hunting": _moves,

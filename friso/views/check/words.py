@@ -12,6 +12,7 @@ from friso.quantities import percent, plain_factor
 from friso.stage.controllers import FORCE_LIMIT
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.check.feeding_words import feeding_sentences
+from friso.views.check.margin_words import friction_sentences, thin_margins
 from friso.views.drawing.prefixes import (
     digits_that_differ,
     length_at_rest,
@@ -71,6 +72,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     feeds = feeding_sentences(case.feeding) if case.feeding else []
     feeds += [f"{_too_much('What feeds it')}."] if CheckPart.FEEDING in case.judgement.given_up else []
     after = _remedy(item, cases) if case.verdict in ATTRACTED else _outlook(case)
+    after += friction_sentences(case)
     return " ".join([*loop, says[case.verdict](case), *feeds, *_doubts(case), *_running_away(case), *after])
 
 
@@ -93,10 +95,16 @@ def conclusion(cases: Mapping[str, Case]) -> str | None:
         return None
     locked, free = (word in ATTRACTED for word in words)
     if not free:
-        return "The free joint stops the hunting." if locked else None
+        return f"The free joint stops the hunting{_reserve(both[1])}." if locked else None
     if words == ["hunts", "bistable"]:
         return "The free joint stops the hunting after this move, but does not rule it out."
     return "The free joint does not stop the hunting." if locked else "The stage hunts only with its joint free."
+
+
+def _reserve(case: Case) -> str:
+    """That a case that settles is closer to hunting than advice should lead, if it is."""
+    thin = thin_margins(case)
+    return f", but with little reserve: {listed(thin, 'or')} brings it back" if thin else ""
 
 
 def at_the_end(case: Case) -> str:
@@ -380,7 +388,7 @@ def _faster(case: Case, edge: Margin) -> str:
     controller, highest = case.stage.controller, _bandwidth(case, edge.factor, up=False, digits=4)
     apart = _distance(case, edge)
     kept = (
-        f", at least {apart:g} times the edge of hunting"
+        f", at least {apart:g} times the edge of hunting{_with_other_friction(case)}"
         if apart > 1
         else ", just above the edge: hunting begins again closely"
     )
@@ -395,6 +403,16 @@ def _faster(case: Case, edge: Margin) -> str:
     powers = controller.speeds_up.items()
     gains = [f"{name} × {factor**power:.3g}" for name, power in powers if getattr(controller, name)]
     return f"make the controller {plain_factor(factor)} times faster{kept} ({', '.join(gains)}){doubt}"
+
+
+def _with_other_friction(case: Case) -> str:
+    """Whether the bandwidth that advice leads to keeps a margin in static friction."""
+    distance = f"{SEARCH_LIMITS.edge_distance:g}"
+    return {
+        None: "",
+        True: f", also with static friction {distance} times as high or as low",
+        False: f"; but hunting returns there with static friction {distance} times as high or as low",
+    }[case.advice_keeps_friction]
 
 
 def _distance(case: Case, edge: Margin) -> float:

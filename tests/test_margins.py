@@ -1,0 +1,112 @@
+"""Margins in static friction, and in a joint's stroke and stiffness."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from made_up import FakeCase, fake_stage, hunts, settles
+from variants import VARIANTS
+
+from friso.equations.scaled_friction import (
+    least_static_factor,
+    static_frictions,
+    with_friction,
+    with_static_friction,
+)
+from friso.hunting import MarginEnd, ParameterMargin, check, find_attractors, joint_margins
+from friso.hunting.parameter_margin import parameter_margin
+from friso.stage import Stage
+from friso.views.check.margin_words import friction_sentences, margin_sentence, thin_margins
+
+
+@pytest.fixture(scope="module")
+def locked(rig: Stage) -> Stage:
+    """The thesis rig, its joint locked."""
+    return rig.variants()["locked"]
+
+
+def attracts(stage: Stage, factor: float) -> bool:
+    """Whether simulations from many starts find that something attracts a stage with so much static friction."""
+    return bool(find_attractors(with_static_friction(stage.flat(), factor), 1).attracts[0])
+
+
+@pytest.mark.inner
+def test_a_margin_ends_where_a_search_from_many_starts_says_so(locked: Stage) -> None:
+    """The locked rig hunts; with half its static friction it does not, nor with half as much again."""
+    flat = locked.flat()
+    with np.errstate(all="ignore"):
+        margin = parameter_margin(lambda k: with_static_friction(flat, k), True, least_static_factor(flat), 3.0)
+    assert margin.certain
+    for end in (margin.below, margin.above):
+        assert end is not None
+        assert attracts(locked, end.same)
+        assert not attracts(locked, end.other)
+        assert abs(np.log(end.other / end.same)) < 0.1
+    assert margin.below is not None
+    assert margin.above is not None
+    assert margin.below.same < 1 < margin.above.same
+
+
+def test_where_hunting_begins_is_told_of_a_stage_that_settles(rig: Stage) -> None:
+    """At half its static friction the locked rig settles, and hunts with a little more: all in the first lines."""
+    case = check(rig.replace({"friction.static": "1.4 N", "joint.locked": True}))["locked"]
+    margin = case.static_friction
+    assert margin is not None
+    assert not margin.attracts
+    assert margin.above is not None
+    assert margin.range == pytest.approx((1 / 1.4, 3.0))
+    assert not attracts(case.stage, margin.above.same)
+    assert attracts(case.stage, margin.above.other)
+    (sentence,) = friction_sentences(case)
+    assert "Coulomb friction held" in sentence
+
+
+def test_static_friction_alone_is_scaled_or_all_of_it() -> None:
+    """Twice all friction leaves every deflection and speed of a law as it is."""
+    for name in ("rigid", "two frictions") if "two frictions" in VARIANTS else ("rigid",):
+        flat = VARIANTS[name].flat()
+        twice = with_friction(flat, 2.0)
+        assert twice["friction.static"] == 2 * flat["friction.static"]
+        assert twice["friction.bristle_stiffness"] == 2 * flat["friction.bristle_stiffness"]
+        assert twice["friction.stribeck_velocity"] == flat["friction.stribeck_velocity"]
+        more = with_static_friction(flat, 2.0)
+        assert {key for key in flat if more[key] != flat[key]} == set(static_frictions(flat))
+        assert least_static_factor(flat) == flat["friction.coulomb"] / flat["friction.static"]
+
+
+def test_the_joint_has_margins_where_it_is_free(rig: Stage) -> None:
+    cases = check(rig)
+    margins = joint_margins(cases["free"].stage, cases["free"].judgement)
+    assert set(margins) == {"joint.stroke", "joint.stiffness"}
+    assert not joint_margins(cases["locked"].stage, cases["locked"].judgement)
+
+
+def made_up_case(margin: ParameterMargin, judgement: Any) -> Any:
+    stage = fake_stage()
+    stage.flat = lambda: {"friction.static": 3.0, "friction.coulomb": 1.0}
+    return FakeCase(stage, None, judgement, static_friction=margin)
+
+
+def test_a_margin_is_told_on_the_safe_side() -> None:
+    """Hunting begins no sooner than is told, and has ended by where it is told to end."""
+    begins = ParameterMargin(False, None, MarginEnd(1.3149, 1.4, True), (1 / 3, 3.0))
+    assert "above 1.31 times" in margin_sentence("static friction", begins)
+    ends = ParameterMargin(True, MarginEnd(0.5, 0.4449, True), MarginEnd(1.3, 1.4411, True), (1 / 3, 3.0))
+    assert "below 0.444 times" in margin_sentence("static friction", ends)
+    assert "above 1.45 times" in margin_sentence("static friction", ends)
+    (sentence,) = friction_sentences(made_up_case(begins, settles()))
+    assert "2.94 N" in sentence  # 3 N * 1.3149 - 1 N
+
+
+def test_little_reserve_is_told_with_what_brings_hunting_back() -> None:
+    near = ParameterMargin(False, None, MarginEnd(1.05, 1.1, True), (1 / 3, 3.0))
+    far = ParameterMargin(False, None, MarginEnd(1.5, 1.6, True), (1 / 3, 3.0))
+    assert any("1.1 times" in text for text in thin_margins(made_up_case(near, settles())))
+    assert not thin_margins(made_up_case(far, settles(margin=None)))
+
+
+def test_a_side_that_was_given_up_is_no_margin() -> None:
+    margin = ParameterMargin(True, None, None, (1 / 3, 3.0), open_sides=(-1,))
+    assert not margin.certain
+    assert "not determined" in margin_sentence("static friction", margin)
+    assert hunts().verdict == "hunts"
