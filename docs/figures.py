@@ -80,8 +80,9 @@ def thesis_loops() -> bytes:
 
 
 def thesis_map() -> bytes:
-    """What runs do over crossover and stroke."""
-    return _first(friso.sweep(rig(), {"controller" + ".crossover": "1 Hz..16 Hz:41", "joint.stroke": "0 m..1 mm:41"}))
+    """Where the locked rig hunts, over the speed of its controller and its friction."""
+    ranges = {"speed": "0.4..2.5:41:log", "friction": "0.3..3:41:log"}
+    return _first(friso.sweep(rig(), ranges, set={"joint.locked": True}))
 
 
 def _first(answer: Answer) -> bytes:

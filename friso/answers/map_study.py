@@ -20,7 +20,7 @@ from friso.progress import Progress, silent
 from friso.quantities import quoted
 from friso.stage import Stage
 from friso.studies.axes import AxisValues
-from friso.studies.cells import BY_ATTRACTORS, CYCLE_UNITS, INFERRED, METRICS, USUAL
+from friso.studies.cells import BY_ATTRACTORS, CYCLE_UNITS, INFERRED, METRICS, USUAL, VERDICTS
 from friso.studies.execute import Crew
 from friso.studies.refine import FINER, SHARE, finer
 from friso.studies.request import Request
@@ -89,7 +89,7 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
     if most is not None and runs > most:
         raise _too_large(runs, request.trial(), crew)
     metrics = (*USUAL, *CYCLE_UNITS) if metric in (*BY_ATTRACTORS, "period") else USUAL
-    metrics = (*metrics, "verdict") if metric == "verdict" else metrics
+    metrics = (*metrics, metric) if metric in VERDICTS else metrics
     study = request.study(metrics)
     return finer(study) if refine else study
 

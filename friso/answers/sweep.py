@@ -34,6 +34,7 @@ from friso.progress import Progress, silent
 from friso.quantities import percent
 from friso.stage import Stage
 from friso.studies.axes import AxisValues
+from friso.studies.cells import SKETCH
 from friso.studies.execute import Crew, local_crew
 from friso.studies.samples import Samples
 from friso.studies.store import Store, check_store, holds_all, in_memory, read_store
@@ -144,6 +145,7 @@ def sweep(
     log: bool = False,
     set: Changes = None,
     metric: str | None = None,
+    confirm: bool = False,
     rtol: float | str | None = None,
     verify: float = 0.0,
     refine: bool = False,
@@ -178,8 +180,11 @@ def sweep(
     set : dict, optional
         Keys to override.
     metric : str, optional
-        What the map shows in colour: "outcome" (default) or another of each run; of the stage, "verdict",
-        "multiplier", "amplitude", "period".
+        What the map shows in colour. Of the stage: "sketch" (default), which tells whether it hunts by coarse return
+        maps, and by closed orbits where these are in doubt; "verdict", "multiplier", "amplitude", "period", by a search
+        of every cell. Of each run: "outcome", "peaks", ...
+    confirm : bool
+        Whether every cell of a map of verdicts is searched: metric "verdict" instead of "sketch".
     rtol : float or "auto", optional
         Relative tolerance, default 1e-6; "auto": the loosest safe one.
     verify : float
@@ -234,7 +239,7 @@ def sweep(
             store = place_of_store(resumed)
             study, metric = stored_study(store, metric, None if yes else LARGE)
         else:
-            metric = metric or "outcome"
+            metric = ("verdict" if confirm else SKETCH) if metric in (None, SKETCH) else metric
             chosen = read_stage(stage, set)
             study = study_for(chosen, varied, metric, refine, None if yes else LARGE, crew)
             study = replace(study, rtol=_chosen_rtol(1e-6 if rtol is None else rtol, study, crew))

@@ -10,7 +10,15 @@ import typer
 AXIS = 'KEY="FIRST..LAST:POINTS"'
 
 SourceArgument = Annotated[Path, typer.Argument(metavar="STAGE.toml|STORE", help="A stage file, or a study to resume.")]
-X = Annotated[str | None, typer.Option("--x", metavar=AXIS, help='Horizontal axis; also a list: KEY="4 Hz, 8 Hz".')]
+X = Annotated[
+    str | None,
+    typer.Option(
+        "--x",
+        metavar=AXIS,
+        help='Horizontal axis; also a list: KEY="4 Hz, 8 Hz". Besides keys: speed (the controller so many times as '
+        "fast) and friction (so many times yours).",
+    ),
+]
 Y = Annotated[str | None, typer.Option("--y", metavar=AXIS, help="Vertical axis.")]
 Axes = Annotated[list[str] | None, typer.Option("--axis", metavar=AXIS, help="A further axis; may be repeated.")]
 Links = Annotated[
@@ -30,10 +38,11 @@ Metric = Annotated[
     typer.Option(
         "--metric",
         metavar="NAME",
-        help="Quantity shown in colour. Of each run: outcome (what it does at its end; default), peaks, ... Of the "
-        "stage: verdict, multiplier, amplitude, period.",
+        help="Quantity shown in colour. Of the stage: sketch (whether it hunts, by coarse return maps; default), "
+        "verdict, multiplier, amplitude, period. Of each run: outcome (what it does at its end), peaks, ...",
     ),
 ]
+Confirm = Annotated[bool, typer.Option("--confirm", help="Search every cell, instead of a sketch: ten times slower.")]
 MapTolerance = Annotated[
     str | None,
     typer.Option("--rtol", metavar="NUMBER|auto", help="Relative tolerance, default 1e-6; auto: the loosest safe one."),

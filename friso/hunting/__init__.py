@@ -43,6 +43,7 @@ from friso.hunting.many_stages import (
     judge_runs,
     kernels_to_judge,
     loops_unstable,
+    sketch_attractors,
 )
 from friso.hunting.margin import Margin, find_margin
 from friso.hunting.motions import Motions
@@ -122,6 +123,7 @@ __all__ = [
     "plane",
     "pushes_that_hunt",
     "search_alone",
+    "sketch_attractors",
     "stuck",
     "unstable",
     "wait",

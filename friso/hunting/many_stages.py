@@ -34,6 +34,7 @@ from friso.hunting.motions import (
     some_of,
 )
 from friso.hunting.verdict import RUNNING_AWAY
+from friso.hunting.what_attracts import surveyed_roughly
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,20 @@ def find_attractors(
     """
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = attractors(stages, rtol=rtol, cycles=close_orbits) if can_hunt(flat) else None
+    return StageAttractors.of(survey, surely_surveyed(stages, survey))
+
+
+@np.errstate(all="ignore")
+def sketch_attractors(
+    flat: Mapping[str, Any], count: int, threads: int | None = None, cancel: np.ndarray | None = None
+) -> StageAttractors:
+    """Sketch what attracts stages of one structure, by their return maps as far as these go: sooner than
+    `find_attractors`, and wrong where something attracts from a narrow range of distances alone.
+
+    `threads` and `cancel` as in `RunOptions`. Raises Exhausted where an allowance is used up.
+    """
+    stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
+    survey = surveyed_roughly(stages) if can_hunt(flat) else None
     return StageAttractors.of(survey, surely_surveyed(stages, survey))
 
 

@@ -16,8 +16,8 @@ STEPS = 8
 """Values that are tried first on either side of the stage's own: as many stages as are run at once on most
 processors."""
 
-FINER = 5
-"""Values between two neighbours of these that are tried next."""
+FINER = 6
+"""Steps into which the one in which what attracts changes is divided next."""
 
 CLOSE = 0.03
 """Widest share between two neighbouring values where what attracts changes."""
@@ -136,25 +136,28 @@ class _Side:
         return None
 
     def _finer(self, first: int) -> np.ndarray:
-        """Factors between the first at which it has changed and the one before it, and one as close beyond it."""
+        """Factors between the first at which it has changed and the one before it, and two as close beyond
+        it."""
         low, high = self.factors[first - 1 : first + 1]
-        steps = (high / low) ** (np.arange(1, FINER + 3) / (FINER + 1))
-        beyond = abs(np.log(low * steps[-1])) < abs(np.log(self.factors[-1]))
-        return low * np.delete(steps, [FINER] if beyond else [FINER, FINER + 1])
+        places = np.arange(1, FINER + 3)
+        factors = low * (high / low) ** (places[places != FINER] / FINER)
+        return factors[np.abs(np.log(factors)) < abs(np.log(self.factors[-1]))]
 
     def _pair(self, first: int) -> np.ndarray:
-        """The numbers of two factors about the first at which it has changed, by a rough survey, which may be wrong
-        next to where hunting ends, and where motions take longest to die out: one step apart from it."""
-        farther = first + 1 < len(self.factors) and self.changed[first + 1]
-        return np.array([max(first - 2, 0), first + farther])
+        """The numbers of two factors about the first at which it has changed, by a survey that is rough next to where
+        hunting ends: a step off where something attracts, and two where nothing does, as motions take long to die out
+        next to that."""
+        inward, outward = (2, 2) if self.attracts else (3, 1)
+        further = self.changed[first : first + outward + 1]
+        return np.array([max(first - inward, 0), first + (len(further) if further.all() else further.argmin()) - 1])
 
     def _try(self, factors: np.ndarray) -> None:
         """Survey more factors roughly."""
-        attracts, decided = surveyed_roughly(self._stages(factors))
+        survey = surveyed_roughly(self._stages(factors), close=False)
         order = np.argsort(np.abs(np.log(np.append(self.factors, factors))), kind="stable")
         self.factors = np.append(self.factors, factors)[order]
-        self.changed = np.append(self.changed, attracts != self.attracts)[order]
-        self.decided = np.append(self.decided, decided)[order]
+        self.changed = np.append(self.changed, survey.attracts != self.attracts)[order]
+        self.decided = np.append(self.decided, survey.decided)[order]
         nothing = np.zeros(len(factors), bool)
         self.searched, self.certain = (np.append(flags, nothing)[order] for flags in (self.searched, self.certain))
 

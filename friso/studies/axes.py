@@ -13,6 +13,7 @@ from friso.axis import AxisKind
 from friso.errors import InputError
 from friso.quantities import Number, Quantity, any_sign, quoted
 from friso.stage import Stage, parse_set
+from friso.studies.scalings import SCALINGS
 
 AxisValues = str | Sequence[Any] | np.ndarray | tuple[Any, str]
 Scale = Literal["linear", "log"]
@@ -28,7 +29,8 @@ _RANGE = re.compile(rf"(?P<first>[^:]*?)\.\.(?P<last>[^:]*?)(?::(?!\s*(?:linear|
 
 @dataclass(frozen=True)
 class SweptAxis:
-    """A swept key or a free name that links use: SI values (or words and booleans), their unit, and their scale."""
+    """A swept key, a scaling, or a free name that links use: SI values (or words and booleans), their unit, and their
+    scale."""
 
     name: str
     values: np.ndarray
@@ -61,12 +63,15 @@ class SweptRange:
 
 
 def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool = False) -> SweptAxis | SweptRange:
-    """An axis of a stage from a text, a list or an array with a unit; a range stays a `SweptRange`.
+    """An axis of a stage, a key or a scaling, from a text, a list or an array with a unit; a range stays a
+    `SweptRange`.
 
     `free`: links use the name, so it need not be a key. With `log` a range that does not say how
     it is spaced is logarithmic. Raises InputError.
     """
     field = stage.numeric_keys().get(name)
+    if name in SCALINGS and not free:
+        field = Number(any_sign, "1.2")
     if field is None and not free:
         return _words(stage, name, values)
     reader = _Reader(field, stage.axis_kind)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from friso.engine.arrays import Status
 from friso.engine.batch import Runs, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import Structure, decisive_keys, structure
-from friso.hunting import Motions, StageAttractors, find_attractors, judge_runs
+from friso.hunting import Motions, StageAttractors, find_attractors, judge_runs, sketch_attractors
 from friso.hunting.criteria import (
     BAND,
     DISTINCT_CRITERION,
@@ -24,6 +24,7 @@ from friso.hunting.criteria import (
 from friso.hunting.measures import BANDS, Measures, measure_runs, measuring_options
 from friso.stage import Stage, violations
 from friso.studies.links import linked
+from friso.studies.scalings import scaled
 
 Columns = dict[str, np.ndarray]
 """Names to arrays of shape (cells,)."""
@@ -53,7 +54,10 @@ CYCLE, SWING, NOTHING, UNKNOWN = "cycle", "swing", "nothing", "unknown"
 could be closed; nothing; or it is not certain, because simulations failed or had not settled when they were stopped, or
 because something may attract beyond them."""
 
-WORDS = {"outcome": "<U9", "verdict": "<U9", "attractor": "<U9", "status": "<U160"}
+SKETCH = "sketch"
+"""The verdict on a stage by a sketch of what attracts it (see `friso.hunting.sketch_attractors`)."""
+
+WORDS = {"outcome": "<U9", "verdict": "<U9", SKETCH: "<U9", "attractor": "<U9", "status": "<U160"}
 """The measures that are words, and how they are stored; a status longer than that is cut."""
 
 ALWAYS = ("outcome", "status")
@@ -64,6 +68,9 @@ USUAL = (*RUN_UNITS, *ALWAYS)
 
 BY_ATTRACTORS = (*CYCLE_UNITS, "attractor", "verdict")
 """What needs a survey of what attracts, and is computed if asked for."""
+
+VERDICTS = ("verdict", SKETCH)
+"""The measures that are verdicts on the stage."""
 
 METRICS = (*RUN_UNITS, *CYCLE_UNITS, *WORDS)
 """Everything that may be known of a cell."""
@@ -76,6 +83,7 @@ OF_ATTRACTORS = (
 CRITERIA = {
     "outcome": OUTCOME_CRITERION,
     "verdict": VERDICT_CRITERION,
+    SKETCH: f"sketch of the {VERDICT_CRITERION}: what attracts from a narrow range of distances may be missed",
     **dict.fromkeys(("attractor", *CYCLE_UNITS), OF_ATTRACTORS),
     "peaks": PEAK_CRITERION,
     "distinct_peaks": DISTINCT_CRITERION,
@@ -105,20 +113,25 @@ def run_cells(
 ) -> Columns:
     """Run one stage per entry of the columns: axis names to SI values, words or booleans, each of shape (cells,).
 
-    The result holds `USUAL`, and of `BY_ATTRACTORS` what is among the metrics, each of shape (cells,). A cell that no
-    stage may have has the outcome (and the verdict) "invalid" and the reason in its status; one that a run did not
-    complete for has "failed". Setting cancel[0] from another thread ends the work early: cells not run by then keep the
-    outcome "".
+    The result holds `USUAL`, and of `BY_ATTRACTORS` and `SKETCH` what is among the metrics, each of shape (cells,). A
+    cell that no stage may have has the outcome (and the verdicts) "invalid" and the reason in its status; one that a
+    run did not complete for has "failed". Setting cancel[0] from another thread ends the work early: cells not run by
+    then keep the outcome "".
     """
-    table = _Table(len(next(iter(columns.values()))), (*USUAL, *(name for name in BY_ATTRACTORS if name in metrics)))
+    more = (name for name in (*BY_ATTRACTORS, SKETCH) if name in metrics)
+    table = _Table(len(next(iter(columns.values()))), (*USUAL, *more))
     parts = list(by_words(stage, links, columns))
     for flat, cells in parts:
         table.invalidate(cells, flat)
     for flat, cells, shape in by_equations(parts, table.valid):
         for runs in run_chunks(kernel(shape), flat, len(cells), measuring_options(rtol, threads, cancel)):
             table.write(cells[runs.numbers], measure_runs(runs.part(flat), runs), runs)
+    if SKETCH in metrics:
+        for flat, cells, attracted in cell_attractors(parts, table.ran, sketch_attractors, threads, cancel):
+            words = judge_runs(flat, table.motions(cells), attracted, rtol, threads, cancel)
+            table.columns[SKETCH][cells] = words
     if any(name in metrics for name in BY_ATTRACTORS):
-        for flat, cells, attracted in cell_attractors(parts, table.ran, threads, cancel):
+        for flat, cells, attracted in cell_attractors(parts, table.ran, find_attractors, threads, cancel):
             table.write_attractors(cells, attracted)
             if "verdict" in metrics:
                 words = judge_runs(flat, table.motions(cells), attracted, rtol, threads, cancel)
@@ -131,18 +144,28 @@ Parts = Iterable[tuple[dict[str, Any], np.ndarray]]
 
 
 def cell_attractors(
-    parts: Parts, chosen: np.ndarray, threads: int | None = None, cancel: np.ndarray | None = None
+    parts: Parts,
+    chosen: np.ndarray,
+    find: Callable[..., StageAttractors] = find_attractors,
+    threads: int | None = None,
+    cancel: np.ndarray | None = None,
 ) -> Iterator[tuple[dict[str, Any], np.ndarray, StageAttractors]]:
     """What attracts the stages of the cells that are chosen, shape (cells,), by the equations they need: their flat SI
-    form, their numbers, and what attracts them.
+    form, their numbers, and what attracts them, by a function as `find_attractors`.
 
     The motion plays no part: of cells that differ in it alone one is surveyed.
     """
     for flat, cells, _ in by_equations(parts, chosen):
-        yield flat, cells, _once(flat, len(cells), threads, cancel)
+        yield flat, cells, _once(flat, len(cells), find, threads, cancel)
 
 
-def _once(flat: Mapping[str, Any], count: int, threads: int | None, cancel: np.ndarray | None) -> StageAttractors:
+def _once(
+    flat: Mapping[str, Any],
+    count: int,
+    find: Callable[..., StageAttractors],
+    threads: int | None,
+    cancel: np.ndarray | None,
+) -> StageAttractors:
     """What attracts stages of one structure, looked for once for all that differ in their motion alone."""
     varied = [np.zeros(count)]
     varied += [value for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")]
@@ -150,7 +173,7 @@ def _once(flat: Mapping[str, Any], count: int, threads: int | None, cancel: np.n
     different = {
         key: value[first] if np.ndim(value) and not key.startswith("motion.") else value for key, value in flat.items()
     }
-    return find_attractors(different, len(first), threads=threads, cancel=cancel).take(again.ravel())
+    return find(different, len(first), threads=threads, cancel=cancel).take(again.ravel())
 
 
 def allowed_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -162,12 +185,11 @@ def allowed_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, 
 
 
 def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """The flat SI form of all cells, links followed; numeric columns only."""
+    """The flat SI form of all cells, links followed, then scalings; numeric columns only."""
     numeric = stage.numeric_keys()
     keys = {name: column for name, column in columns.items() if name in numeric}
-    if not links:
-        return stage.flat(keys)
-    return stage.flat(keys | linked(links, stage.flat(keys) | dict(columns)))
+    keys |= linked(links, stage.flat(keys) | dict(columns)) if links else {}
+    return scaled(stage.flat(keys), columns, links)
 
 
 def by_equations(parts: Parts, chosen: np.ndarray) -> Iterator[tuple[dict[str, Any], np.ndarray, Structure]]:
@@ -220,10 +242,11 @@ _STATUS = np.array([status.text for status in Status], dtype=object)
 
 
 class _Table:
-    """The growing measures, one entry per cell."""
+    """The growing measures, one entry per cell; and when each run has settled within 10 um for good, wherever it is
+    then, `settled` [s], shape (count,)."""
 
     def __init__(self, count: int, names: Iterable[str]) -> None:
-        self.count = count
+        self.count, self.settled = count, np.full(count, np.nan)
         self.columns: Columns = {
             name: np.full(count, "", dtype=object) if name in WORDS else np.full(count, np.nan) for name in names
         }
@@ -232,7 +255,7 @@ class _Table:
         """Mark the cells that no stage may have, each with the first reason found."""
         for broken, why in violations(flat):
             which = cells[np.broadcast_to(broken, cells.shape) & self.valid[cells]]
-            for name in ("outcome", "verdict"):
+            for name in ("outcome", *VERDICTS):
                 if name in self.columns:
                     self.columns[name][which] = "invalid"
             self.columns["status"][which] = f"invalid: {why}"
@@ -249,9 +272,9 @@ class _Table:
 
     def motions(self, cells: np.ndarray) -> Motions:
         """How the motions of the cells went."""
-        columns = (self.columns[name][cells] for name in ("peaks", "peak_to_peak", "settling_time_10um"))
+        peaks, swing = (self.columns[name][cells] for name in ("peaks", "peak_to_peak"))
         away = self.columns["status"][cells] == Status.DIVERGED.text
-        return Motions(self.columns["outcome"][cells] != FAILED, away, *columns)
+        return Motions(self.columns["outcome"][cells] != FAILED, away, peaks, swing, self.settled[cells])
 
     def write(self, which: np.ndarray, measures: Measures, runs: Runs) -> None:
         """Write the measures of the cells that were run."""
@@ -264,6 +287,7 @@ class _Table:
         } | {name: getattr(measures, name) for name in _SAME}
         for name, column in written.items():
             self.columns[name][which[ran]] = column[ran]
+        self.settled[which[ran]] = measures.in_the_end[1][ran]
 
     def write_attractors(self, cells: np.ndarray, attracted: StageAttractors) -> None:
         """Write those measures of what attracts the cells' stages that the table has: of the largest swing of each, as

@@ -19,7 +19,7 @@ import numpy as np
 from friso.errors import InputError
 from friso.hunting.criteria import SWINGS
 from friso.studies.axes import SweptAxis
-from friso.studies.cells import INFERRED, METRICS, UNITS, USUAL, Columns
+from friso.studies.cells import INFERRED, METRICS, UNITS, USUAL, VERDICTS, Columns
 from friso.studies.samples import SAMPLE
 from friso.studies.study import Dimension, Study
 
@@ -104,7 +104,7 @@ class _Grid:
         coarse = math.prod(size // FINER + 1 for size in study.shape)
         self.budget = max(int(SHARE * study.cells), min(3 * coarse // 2, study.cells))
         self.columns: Columns = {}
-        self.words = tuple(name for name in ("outcome", "verdict") if name in study.metrics)
+        self.words = tuple(name for name in ("outcome", *VERDICTS) if name in study.metrics)
         self.computed = np.zeros(study.shape, bool)
         self.runs = 0
 

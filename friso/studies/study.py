@@ -18,6 +18,7 @@ from friso.stage import Stage, loads
 from friso.studies.axes import SweptAxis
 from friso.studies.cells import BY_ATTRACTORS, METRICS, flat_cells
 from friso.studies.samples import SAMPLE
+from friso.studies.scalings import SCALINGS
 from friso.version import VERSION
 
 if TYPE_CHECKING:
@@ -115,7 +116,10 @@ class Study:
         stage = self.stage.replace(words)
         flat = flat_cells(stage, self.links, {name: columns[name] for name in numeric})
         changed = {key for key in (*numeric, *self.links) if key in flat}
-        return stage.with_numbers({key: float(flat[key][0]) for key in sorted(changed)})
+        if scalings := SCALINGS.keys() & numeric:
+            before = flat_cells(stage, self.links, {name: columns[name] for name in numeric.keys() - scalings})
+            changed |= {key for key in flat if np.any(flat[key] != before[key])}
+        return stage.with_numbers({key: float(np.ravel(flat[key])[0]) for key in sorted(changed)})
 
     def at(self, cells: np.ndarray) -> Study:
         """A study of just these cells, side by side."""
@@ -184,7 +188,9 @@ def cells_of(block: CellBlock) -> int:
     return math.prod(part.stop - part.start for part in block)
 
 
-_STUDIES = tuple(f"studies/{name}.py" for name in ("axes", "cells", "links", "refine", "request", "samples"))
+_STUDIES = tuple(
+    f"studies/{name}.py" for name in ("axes", "cells", "links", "refine", "request", "samples", "scalings")
+)
 _DECISIVE = ("quantities.py", "stage", "equations", "engine", "hunting", *_STUDIES)
 """Parts of the package that decide on the numbers of a cell, or on which cells a refined study runs."""
 

@@ -12,6 +12,7 @@ from friso.cli.common import AsJson, Overrides
 from friso.cli.map_options import (
     Axes,
     CheckStore,
+    Confirm,
     ConfirmedOption,
     Exports,
     Latin,
@@ -47,6 +48,7 @@ def map_cells(
     log: Logarithmic = False,
     overrides: Overrides = None,
     metric: Metric = None,
+    confirm: Confirm = False,
     rtol: MapTolerance = None,
     verify: Verify = 0.05,
     refine: Refine = False,
@@ -77,7 +79,14 @@ def map_cells(
     if source.is_dir():
         store, elsewhere = None, output_folder("map", out, overwrite)
     options = {"x": x, "y": y, "axis": axis or (), "link": link, "samples": samples, "latin": latin, "log": log}
-    options |= {"set": overrides, "metric": metric, "rtol": rtol, "verify": verify, "refine": refine}
+    options |= {
+        "set": overrides,
+        "metric": metric,
+        "confirm": confirm,
+        "rtol": rtol,
+        "verify": verify,
+        "refine": refine,
+    }
     options |= {
         "workers": workers,
         "scheduler": scheduler,

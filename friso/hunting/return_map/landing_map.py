@@ -22,8 +22,9 @@ ITERATIONS, TIMES = 200, 4
 """Landings after which the map may have come to what attracts it, and how often their number is doubled while it still
 leaves a cycle."""
 
-REST_CHECKED = 10
-"""Landings after which it is looked whether all have come to rest."""
+CHECKED, EXACT = 10, 1e-9
+"""Landings after which it is looked whether all have come to rest or to a cycle of 1, 2, 5 or 10 landings, by the share
+up to which they are what they were before."""
 
 ROUNDING = 1e-6
 """Share up to which landings have come to a cycle."""
@@ -177,10 +178,15 @@ class LandingMap:
         it."""
         iterations, before, paths = ITERATIONS, np.full(len(at), np.inf), at[:, None]
         for _ in range(TIMES):
+            earlier = np.full(len(at), np.inf)
             for number in range(iterations):
+                if number % CHECKED == 0:
+                    if np.all((np.abs(at - earlier) < EXACT) | (at <= REST)):
+                        break
+                    earlier = at
                 at = self.next(at)
-                if number % REST_CHECKED == 0 and not np.any(at > REST):
-                    break
+            if not np.any(at > REST):
+                return np.tile(at[:, None], 2)
             orbits = [at]
             for _ in range(2 * MOST_SWINGS):
                 orbits.append(self.next(orbits[-1]))
@@ -217,6 +223,14 @@ class LandingMap:
             same[number] = True
             yield MapAttractor(_distance(first[: swings or len(first)]), np.flatnonzero(same), swings > 0)
             left &= ~same
+
+    def slope(self, attractor: MapAttractor) -> float:
+        """By which factor a small deviation from what landings come to grows until they repeat themselves, as far as
+        the map tells, without sign; infinite where they do not."""
+        if not attractor.periodic:
+            return np.inf
+        begins, _, slopes = self._lines
+        return float(np.abs(np.prod(slopes[np.searchsorted(begins, self._places(attractor.distances), "right") - 1])))
 
     @property
     def returns(self) -> bool:

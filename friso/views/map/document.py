@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from friso.studies.cells import SKETCH
 from friso.views.documents import plain_json
 from friso.views.map.findings import headline, loop_first
 from friso.views.map.words import text_counts, word_counts
@@ -37,6 +38,7 @@ def map_document(runs: xr.Dataset, study: Study, store: Path | None, metric: str
         "conclusion": " ".join([*loop_first(study.stage), headline(runs, metric)]),
         "outcomes": word_counts(runs, "outcome"),
         "verdicts": word_counts(runs, "verdict") or None,
+        "sketched_verdicts": word_counts(runs, SKETCH) or None,
         "attractors": text_counts(runs, "attractor") or None,
         "criteria": criteria,
         "verified": verified or None,

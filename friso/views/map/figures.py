@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from friso.hunting.criteria import ATTRACTED
+from friso.studies.cells import VERDICTS
 from friso.views.drawing.drawable import cell_edges
-from friso.views.drawing.figure import BLUE, Axis, Cloud, Figure, Map, Markers, Panel, Series
+from friso.views.drawing.figure import BLUE, INK, Axis, Cloud, Figure, Map, Markers, Panel, Series
 from friso.views.map.cells import SAMPLE, CellAxis, Look, axes_of, cuts, look, pick, plane_first
 from friso.views.map.findings import statement
 from friso.views.map.words import variable
@@ -45,7 +47,7 @@ def map_figure(runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, f
     return Figure(
         name=f"map-{metric}",
         title=variable(metric),
-        caption=caption or ("Every cell is one stage." if metric == "verdict" else "Every cell is one run."),
+        caption=caption or ("Every cell is one stage." if metric in VERDICTS else "Every cell is one run."),
         panels=tuple(panels),
         columns=columns,
         subject=str(runs.attrs.get("name", "")),
@@ -83,10 +85,27 @@ def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float
         title,
         x.axis(_limits(x, [point.x for point in points])),
         y.axis(_limits(y, [point.y for point in points])),
-        (),
+        _edges(x, y, colouring, codes),
         points,
         maps=(Map(x.positions, y.positions, z, *colouring.scale, codes),),
     )
+
+
+def _edges(x: CellAxis, y: CellAxis, colouring: Look, codes: np.ndarray) -> tuple[Series, ...]:
+    """The curve on which hunting begins and ends, half-way between cells of a map of verdicts in which something
+    attracts and those in which nothing does."""
+    attracted = [k for k, kind in enumerate(colouring.categories) if kind.label in ATTRACTED]
+    if min(codes.shape) < 2 or x.words or y.words or not attracted:
+        return ()
+    from contourpy import contour_generator
+
+    columns, rows = (np.log(axis.positions) if axis.log else axis.positions for axis in (x, y))
+    lines: Any = contour_generator(columns, rows, np.isin(codes, attracted).astype(float)).lines(0.5)
+    if not lines:
+        return ()
+    right, up = np.concatenate([np.vstack([line, [np.nan, np.nan]]) for line in lines]).T
+    right, up = (np.exp(places) if axis.log else places for axis, places in ((x, right), (y, up)))
+    return (Series(right, up, "edge of hunting", INK, width=1.8),)
 
 
 def _limits(axis: CellAxis, points: Sequence[np.ndarray]) -> tuple[float, float]:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from friso.axis import axis_shown
-from friso.hunting.criteria import BAND, CREEPS, LASTING, RESTS, SWINGS
+from friso.hunting.criteria import ATTRACTED, BAND, CREEPS, LASTING, RESTS, SWINGS
 from friso.quantities import percent
 from friso.shares import share_interval
-from friso.studies.cells import CYCLE, CYCLE_UNITS, SWING, UNKNOWN
+from friso.studies.cells import CYCLE, CYCLE_UNITS, SWING, UNKNOWN, VERDICTS
+from friso.studies.scalings import SCALINGS
 from friso.views.drawing.prefixes import listed, percentage
 from friso.views.loop_words import unstable_loop
 from friso.views.map.cells import SAMPLE, CellAxis, axes_of, dims_of
@@ -34,6 +35,12 @@ if TYPE_CHECKING:
     from friso.stage import Stage
     from friso.studies.study import Study
 
+_OF_VERDICTS = {
+    "hunts": "a cycle of the stage attracts, and the motion of the stage file ends in it",
+    "bistable": "a cycle attracts, but this motion comes to rest; a kick or another move can start hunting",
+    "transient": "no cycle attracts, but this motion is not at rest by its end",
+    "settles": "no cycle attracts, and this motion comes to rest",
+}
 MEANINGS = {
     "outcome": {
         SWINGS: f"the run still swings at its end: periodically, more than {2e6 * BAND:g} µm peak to peak in the last "
@@ -42,12 +49,7 @@ MEANINGS = {
         "decays",
         RESTS: f"the run comes to rest within {1e6 * BAND:g} µm of its reference",
     },
-    "verdict": {
-        "hunts": "a cycle of the stage attracts, and the motion of the stage file ends in it",
-        "bistable": "a cycle attracts, but this motion comes to rest; a kick or another move can start hunting",
-        "transient": "no cycle attracts, but this motion is not at rest by its end",
-        "settles": "no cycle attracts, and this motion comes to rest",
-    },
+    **dict.fromkeys(VERDICTS, _OF_VERDICTS),
 }
 """What the words of a map mean, by variable."""
 
@@ -74,6 +76,7 @@ class Question:
 
 _HUNTS = Question("verdict", "The stage hunts", ("hunts",))
 _BISTABLE = Question("verdict", "It is bistable (a kick or another move can start hunting)", ("bistable",))
+_QUIET = ("transient", "settles")
 _ATTRACTS = Question("attractor", "A lasting swing attracts the stage", (CYCLE, SWING))
 _SWINGS = Question("outcome", "The run swings at its end", (SWINGS,))
 
@@ -82,9 +85,9 @@ def headline(runs: xr.Dataset, metric: str) -> str:
     """What share of the map swings (of a map of verdicts: hunts, or is bistable; of counts: has counted peaks; of
     measures of what attracts: has a swing that attracts), and where: the ranges of the axes outside of which no cell
     does. Empty where the runs do not say."""
-    if metric == "verdict" and metric in runs:
-        bistable = [_BISTABLE] if text_counts(runs, "verdict").get("bistable") else []
-        return " ".join(_answer(runs, question) for question in [_HUNTS, *bistable])
+    if metric in VERDICTS and metric in runs:
+        bistable = [_BISTABLE] if text_counts(runs, metric).get("bistable") else []
+        return " ".join(_answer(runs, replace(question, variable=metric)) for question in [_HUNTS, *bistable])
     if metric in CYCLE_UNITS and "attractor" in runs:
         unknown = text_counts(runs, "attractor").get(UNKNOWN, 0)
         doubt = f"In {grouped(unknown)} of the cells it is not certain what attracts." if unknown else ""
@@ -100,7 +103,7 @@ def _creeping(runs: xr.Dataset) -> list[str]:
     if not creeping:
         return []
     where = f"in {_percent(creeping, runs['outcome'].size)} of the map"
-    shows = "a longer run, or the verdict of every cell (--metric verdict), shows whether it hunts there"
+    shows = "a longer run, or the verdict of every cell (--metric sketch), shows whether it hunts there"
     return [f"It still creeps at its end {where}: {shows}."]
 
 
@@ -241,7 +244,42 @@ def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
     reasons = [f"{count} cells without a result: {reason}" for reason, count in failures(runs).items()]
     extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}"
     answer = [*loop_first(study.stage), headline(runs, metric)]
-    return [*answer, extent, verification(runs), *caveats(runs, metric), *reasons]
+    return [*answer, *own_place(runs, study, metric), extent, verification(runs), *caveats(runs, metric), *reasons]
+
+
+def own_place(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
+    """How far, along each axis of a map of verdicts, the stage as its file gives it is from the next edge of hunting;
+    none where it is not on the map."""
+    if metric not in VERDICTS or metric not in runs or study.links or SAMPLE in runs.dims:
+        return []
+    axes, flat = axes_of(runs), {**dict.fromkeys(SCALINGS, 1.0), **study.stage.flat()}
+    own = [flat[axis.key] for axis in axes if axis.key in flat and _spans(axis, flat[axis.key])]
+    if len(own) < len(axes):
+        return []
+    words = np.asarray(runs[metric].transpose(*(axis.key for axis in axes)).values).astype(str)
+    words = words[np.ix_(*(axis.places for axis in axes))]
+    at = tuple(int(np.abs(np.log(axis.positions / value)).argmin()) for axis, value in zip(axes, own, strict=True))
+    if words[at] not in (*ATTRACTED, *_QUIET):
+        return []
+    ways = []
+    for k, axis in enumerate(axes):
+        line = np.isin(words[(*at[:k], slice(None), *at[k + 1 :])], ATTRACTED)
+        ways += _changes(axis, line, at[k])
+    does = "begins" if words[at] in _QUIET else "ends"
+    where = f"hunting {does} at {listed(ways, 'or')}" if ways else f"hunting {does} at no other value of one axis alone"
+    return [f"Your stage {words[at]}; on the map {where}."]
+
+
+def _spans(axis: CellAxis, value: float) -> bool:
+    """Whether a value is within the range of an axis of numbers."""
+    return bool(not axis.words and 0 < axis.positions.min() <= value <= axis.positions.max())
+
+
+def _changes(axis: CellAxis, attracted: np.ndarray, at: int) -> list[str]:
+    """Between which cells along an axis it changes whether something attracts, next to a cell on either side."""
+    differ = np.flatnonzero(attracted != attracted[at])
+    ends = [(k, k + 1) for k in differ[differ < at][-1:]] + [(k - 1, k) for k in differ[differ > at][:1]]
+    return [f"{in_sentence(axis.key)} {axis.value(low)} to {axis.value(high)}" for low, high in ends]
 
 
 def loop_first(stage: Stage) -> list[str]:

@@ -11,7 +11,8 @@ import numpy as np
 from friso.axis import axis_shown
 from friso.stage.controllers import CONTROLLER, CONTROLLERS, FORCE_LIMIT
 from friso.stage.tables import friction_laws
-from friso.studies.cells import NOTHING, SWING, UNKNOWN
+from friso.studies.cells import NOTHING, SKETCH, SWING, UNKNOWN, VERDICTS
+from friso.studies.scalings import SCALINGS
 from friso.views.drawing.figure import GREY, INK, ORANGE, PINK, VERMILLION, Category
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ _QUANTITIES = {
 _VARIABLES = {
     "outcome": "What the run does at its end",
     "verdict": "Verdict on the stage",
+    SKETCH: "Verdict on the stage, sketched",
     "peaks": "Counted peaks",
     "distinct_peaks": "Counted peaks, distinct ones",
     "status": "Status",
@@ -52,6 +54,13 @@ INVALID = Category("invalid", "#b4b4b4")
 FAILED = Category("failed", INK)
 NOT_RUN = Category("not run", "#ffffff")
 _NO_RESULT = {"failed": FAILED, "invalid": INVALID, "": NOT_RUN}
+_VERDICTS = {
+    "hunts": Category("hunts", VERMILLION),
+    "bistable": Category("bistable", PINK),
+    "transient": Category("transient", ORANGE),
+    "settles": Category("settles", QUIET),
+    **_NO_RESULT,
+}
 CATEGORIES = {
     "outcome": {
         "swings": Category("swings", VERMILLION),
@@ -59,13 +68,7 @@ CATEGORIES = {
         "rests": Category("rests", QUIET),
         **_NO_RESULT,
     },
-    "verdict": {
-        "hunts": Category("hunts", VERMILLION),
-        "bistable": Category("bistable", PINK),
-        "transient": Category("transient", ORANGE),
-        "settles": Category("settles", QUIET),
-        **_NO_RESULT,
-    },
+    **dict.fromkeys(VERDICTS, _VERDICTS),
 }
 """By variable the words that a cell can have, the worst first, in the colours of every map."""
 # Cells without numbers of their own: paler than the word they are said to have, so that both can stand in a map.
@@ -87,7 +90,8 @@ def quantity(key: Hashable) -> str:
     """An axis in words: "joint.stroke" is "Joint stroke", a free name is itself."""
     name = str(key)
     of_laws = {f"friction.{key}": word for law in friction_laws().values() for key, word in law.words.items()}
-    quantities = _QUANTITIES | of_laws | CONTROLLERS.words
+    scalings = {name: scaling.words for name, scaling in SCALINGS.items()}
+    quantities = _QUANTITIES | of_laws | CONTROLLERS.words | scalings
     if name in quantities:
         return quantities[name]
     for table in (f"{CONTROLLER}.", "friction.", "motion."):

@@ -1,0 +1,44 @@
+"""Axes of a map that multiply several keys at once: how fast the controller is, and how much friction there is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.equations.bandwidth import faster
+from friso.equations.scaled_friction import with_friction
+from friso.errors import InputError
+from friso.stage.controllers import KIND
+from friso.studies.links import names
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """An axis of factors: what is multiplied, in words; how; and the table that a stage needs for that."""
+
+    words: str
+    scaled: Callable[[Mapping[str, Any], Any], dict[str, Any]]
+    needs: str
+
+
+SCALINGS = {
+    "speed": Scaling("Controller speed (times yours)", faster, KIND),
+    "friction": Scaling("Friction (times yours)", with_friction, "friction.model"),
+}
+"""Scalings by the name of their axis. Factors are of all poles and zeros of the controller, and of every friction
+force."""
+
+
+def scaled(flat: Mapping[str, Any], columns: Mapping[str, np.ndarray], links: Mapping[str, str]) -> dict[str, Any]:
+    """Stages, given as flat keys, multiplied by the factors of the scalings among the columns; a name that links use is
+    a free one. Raises InputError where a stage has nothing to scale."""
+    for name, scaling in SCALINGS.items():
+        if name in columns and name not in names(links):
+            if flat.get(scaling.needs, "none") == "none":
+                table = scaling.needs.partition(".")[0]
+                raise InputError(name, f"a stage without [{table}]", "one that has it, or a key of the stage", "--help")
+            flat = scaling.scaled(flat, columns[name])
+    return dict(flat)

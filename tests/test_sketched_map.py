@@ -1,0 +1,102 @@
+"""Maps of verdicts by sketches, and axes that make the controller faster or scale all friction."""
+
+import numpy as np
+import pytest
+from patched import patched
+
+import friso
+from friso.answers.sweep import SweepAnswer
+from friso.equations.bandwidth import faster
+from friso.equations.scaled_friction import with_friction
+from friso.errors import InputError
+from friso.hunting import check, sketch_attractors, what_attracts
+from friso.hunting.criteria import ATTRACTED
+from friso.stage import Stage
+from friso.studies.study import study_of
+from friso.views.map.figures import map_figure
+from friso.views.map.findings import own_place
+
+SPEEDS = np.array([0.6, 0.9, 1.0, 1.3, 1.7])
+
+
+@pytest.fixture(scope="module")
+def locked(rig: Stage) -> Stage:
+    """The thesis rig, its joint locked."""
+    return rig.variants()["locked"]
+
+
+@pytest.fixture(scope="module")
+def sketched(locked: Stage) -> SweepAnswer:
+    """A map of verdicts over both scalings, as `friso map` makes it."""
+    return friso.sweep(locked, {"speed": SPEEDS.tolist(), "friction": [0.5, 1.0, 2.0]})
+
+
+def test_the_default_map_is_a_sketch_of_the_verdicts_that_a_search_gives(locked: Stage, sketched: SweepAnswer) -> None:
+    searched = friso.sweep(locked, {"speed": SPEEDS.tolist(), "friction": [0.5, 1.0, 2.0]}, confirm=True)
+    assert sketched.metric == "sketch"
+    assert searched.metric == "verdict"
+    sketch, verdict = sketched.data["sketch"].values, searched.data["verdict"].values
+    assert {"hunts", "settles"} <= set(verdict.ravel())
+    np.testing.assert_array_equal(sketch, verdict)
+
+
+def test_a_cell_has_the_verdict_that_check_gives(locked: Stage) -> None:
+    """At half its static friction the rig is within 10 um soon at its last place, but not at the one before it."""
+    stage = locked.replace({"friction.static": "1.5 N"})
+    runs = friso.sweep(stage, {"controller.crossover": ["8 Hz", "9 Hz"]}, confirm=True)
+    for k, crossover in enumerate(("8 Hz", "9 Hz")):
+        case = check(stage.replace({"controller.crossover": crossover}), margins=False)["given"]
+        assert runs.data["verdict"].values[k] == case.verdict
+
+
+def test_a_scaled_cell_is_a_stage_with_a_faster_controller_or_more_friction(
+    locked: Stage, sketched: SweepAnswer
+) -> None:
+    flat = locked.flat()
+    for (i, j), expected in {
+        (0, 1): faster(flat, 0.6),
+        (2, 0): with_friction(flat, 0.5),
+        (4, 2): with_friction(faster(flat, 1.7), 2.0),
+    }.items():
+        cell = sketched.cell(i, j).flat()
+        assert cell == pytest.approx({**expected, **{k: v for k, v in cell.items() if isinstance(v, str)}})
+
+
+def test_gains_are_scaled_with_the_speed() -> None:
+    stage = friso.load(friso.example("twincat_cascade"))
+    runs = friso.sweep(stage, {"speed": [1.0, 2.0]}, metric="outcome")
+    assert runs.cell(1).flat() == pytest.approx(
+        {**faster(stage.flat(), 2.0), **{k: v for k, v in stage.flat().items() if isinstance(v, str)}}
+    )
+
+
+def test_a_stage_without_friction_has_none_to_scale(locked: Stage) -> None:
+    with pytest.raises(InputError, match="friction"):
+        friso.sweep(locked.replace({"friction": {"model": "none"}}), {"friction": [0.5, 2.0]}, metric="outcome")
+
+
+def test_the_edge_lies_between_cells_that_hunt_and_cells_that_do_not(sketched: SweepAnswer) -> None:
+    (panel,) = map_figure(sketched.data, "sketch").panels
+    (edge,) = panel.series
+    attracted = np.isin(sketched.data["sketch"].values, ATTRACTED)  # (speed, friction)
+    row = attracted[:, 1]
+    at = int(np.flatnonzero(row[:-1] & ~row[1:])[-1])
+    crossing = edge.x[np.isclose(edge.y, 1.0)]
+    assert np.any((crossing > SPEEDS[at]) & (crossing < SPEEDS[at + 1]))
+    assert not map_figure(sketched.data, "outcome").panels[0].series
+
+
+def test_the_stage_of_the_file_is_told_with_its_distance_to_the_edge(sketched: SweepAnswer) -> None:
+    (sentence,) = own_place(sketched.data, study_of(sketched.data), "sketch")
+    assert "hunts" in sentence
+    assert "1.0 to 1.3" in sentence or "1 to 1.3" in sentence
+    assert not own_place(sketched.data, study_of(sketched.data), "outcome")
+
+
+@pytest.mark.inner
+def test_an_attractor_of_few_points_is_not_trusted(locked: Stage) -> None:
+    """At 1.357 times its speed, with 2.4 % more friction, a coarse map has an attractor that no orbit confirms."""
+    flat = with_friction(faster(locked.flat(), 1.3572), 1.02436)
+    assert not sketch_attractors(flat, 1).attracts[0]
+    with patched({what_attracts: {"FEW": 0}}):
+        assert sketch_attractors(flat, 1).attracts[0]
