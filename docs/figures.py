@@ -79,6 +79,12 @@ def thesis_loops() -> bytes:
     return image(next(figure for figure in figures if "speeds" in figure.name), "png")
 
 
+def return_map() -> bytes:
+    """The return map of the rig, joint locked and free, with the rig's own swings."""
+    figures = friso.check(rig()).figures()
+    return image(next(figure for figure in figures if figure.name == "return-map"), "png")
+
+
 def thesis_map() -> bytes:
     """Where the locked rig hunts, over the speed of its controller and its friction."""
     ranges = {"speed": "0.4..2.5:41:log", "friction": "0.3..3:41:log"}
@@ -95,6 +101,7 @@ FIGURES: Mapping[str, Callable[[], bytes]] = {
     "thesis_rig.png": thesis_rig,
     "thesis_cycles.png": thesis_cycles,
     "thesis_loops.png": thesis_loops,
+    "return_map.png": return_map,
     "thesis_map.png": thesis_map,
 }
 

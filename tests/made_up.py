@@ -93,6 +93,7 @@ class FakeCase:
     peak_times: np.ndarray = field(default_factory=lambda: np.empty(0))
     peak_heights: np.ndarray = field(default_factory=lambda: np.empty(0))
     peak_to_peak: float = 2e-10
+    offset: float = 0.0
     period: float | None = None
     settling_time: dict[float, float | None] = field(default_factory=lambda: {1e-6: 0.8234, 1e-5: 0.5123})
     in_the_end: dict[float, float | None] = field(default_factory=lambda: {1e-6: 0.8234, 1e-5: 0.5123})

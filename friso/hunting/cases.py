@@ -55,18 +55,18 @@ class Case:
     """A stage and what became of it.
 
     `judgement` holds the verdict and what it rests on; `peaks` counts the thesis's peaks, at `peak_times` [s] and of
-    `peak_heights` [m] above the reference; `peak_to_peak` [m] and `period` [s] (None: no cycle) are of the last
-    quarter; `settling_time` maps each band [m] to the time [s] in which the stage settles into it wherever the
-    reference stands (see `friso.hunting.criteria.settling`; None: it does not), `in_the_end` at the last of these
-    places alone; `largest_force` [N] is the actuator's, `breakaway` [N] the least force of it that may move what
-    sticks, constant forces taken off; a motion that exerts less leaves a stage without a free joint `unmoved`;
-    `force_limit` [N] is that of the controller, if that keeps it off its reference (None: it does not); `unstable`
-    tells in which of its states the loop is not stable, whatever the friction does (see `friso.hunting.loop`);
-    `feeding`, with a backlash, without what hunting ends (None, too, where that was given up). `static_friction` is the
-    margin in that (None: see `friso.hunting.stage_margins`, or it was not asked for), and `advice_keeps_friction`
-    tells whether the bandwidth that advice leads to, a factor beyond the edge of hunting, still does not hunt with that
-    factor more, or less, static friction (None: there is no such advice, or that is not known). `trace` holds the time
-    response if asked for."""
+    `peak_heights` [m] above the reference; `peak_to_peak` [m], the `offset` from the reference half-way between both
+    [m], and `period` [s] (None: no cycle) are of the last quarter; `settling_time` maps each band [m] to the time [s]
+    in which the stage settles into it wherever the reference stands (see `friso.hunting.criteria.settling`; None: it
+    does not), `in_the_end` at the last of these places alone; `largest_force` [N] is the actuator's, `breakaway` [N]
+    the least force of it that may move what sticks, constant forces taken off; a motion that exerts less leaves a stage
+    without a free joint `unmoved`; `force_limit` [N] is that of the controller, if that keeps it off its reference
+    (None: it does not); `unstable` tells in which of its states the loop is not stable, whatever the friction does (see
+    `friso.hunting.loop`); `feeding`, with a backlash, without what hunting ends (None, too, where that was given up).
+    `static_friction` is the margin in that (None: see `friso.hunting.stage_margins`, or it was not asked for), and
+    `advice_keeps_friction` tells whether the bandwidth that advice leads to, a factor beyond the edge of hunting, still
+    does not hunt with that factor more, or less, static friction (None: there is no such advice, or that is not known).
+    `trace` holds the time response if asked for."""
 
     stage: Stage
     judgement: Judgement
@@ -74,6 +74,7 @@ class Case:
     peak_times: np.ndarray
     peak_heights: np.ndarray
     peak_to_peak: float
+    offset: float
     period: float | None
     settling_time: dict[float, float | None]
     in_the_end: dict[float, float | None]
@@ -220,6 +221,7 @@ def _case(
         peak_times=runs.results.turn_times[0, :room][measures.turns[0]],
         peak_heights=runs.results.turn_values[0, :room][measures.turns[0]],
         peak_to_peak=float(measures.peak_to_peak[0]),
+        offset=float(runs.statistic("deviation_max")[0] + runs.statistic("deviation_min")[0]) / 2,
         period=_finite(measures.period[0]),
         settling_time={band: _finite(time[0]) for band, time in zip(BANDS, measures.settling_time, strict=True)},
         in_the_end={band: _finite(time[0]) for band, time in zip(BANDS, measures.in_the_end, strict=True)},

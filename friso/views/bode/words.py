@@ -45,22 +45,17 @@ def stability(bode: Bode) -> list[str]:
         margins = bode.settled[1]
         state = f"stable, {_margin(margins)}" if margins.stable else f"not stable: a deviation {growth(margins)}"
         return [f"The loop is {state}."]
-    sentences = [_worst_settled_state(bode)]
-    if bode.stable:
-        worst, margins = bode.worst
-        where = f"{place(worst, bode)}, {_margin(margins)}"
-        return [*sentences, f"It is stable in every state: {_states_checked(bode)}. Worst: {where}."]
-    return [*sentences, f"It is not stable in every state. Unstable: {'; '.join(_where(bode))}.", *_why(bode)]
-
-
-def _worst_settled_state(bode: Bode) -> str:
-    """The worst of the settled states, which is the answer to most questions."""
     member, margins = bode.settled
     states = f"all settled states ({SETTLED})" if has_friction(bode) else "all limit cases"
-    where = place(member, bode)
-    if margins.stable:
-        return f"{_tuned(bode)}, this controller is stable in {states}. Worst: {where}, {_margin(margins)}."
-    return f"{_tuned(bode)}, this controller is not stable in {states}. Worst: {where}, {growth(margins)}."
+    worst = f"Worst: {place(member, bode)}, {_margin(margins) if margins.stable else growth(margins)}."
+    but = f", but not {'; '.join(_where(bode))}" if margins.stable and not bode.stable else ""
+    sentence = f"{_tuned(bode)}, this controller is {'' if margins.stable else 'not '}stable in {states}{but}. {worst}"
+    if bode.stable:
+        anywhere, least = bode.worst
+        where = f"{place(anywhere, bode)}, {_margin(least)}"
+        return [sentence, f"It is stable in every state: {_states_checked(bode)}. Worst: {where}."]
+    unstable = [] if but else [f"Unstable: {'; '.join(_where(bode))}."]
+    return [sentence, *unstable, *_why(bode)]
 
 
 def _tuned(bode: Bode) -> str:

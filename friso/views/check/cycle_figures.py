@@ -9,12 +9,14 @@ import numpy as np
 from friso.equations.motion import last_corner
 from friso.views.check.cases import ShownCase
 from friso.views.check.traces import common_range, samples, subject, trace_of
-from friso.views.drawing.figure import GREY, INK, Array, Axis, Dash, Figure, Markers, Panel, Series
+from friso.views.drawing.figure import GREY, INK, Array, Axis, Band, Dash, Figure, Markers, Panel, Series
 
 if TYPE_CHECKING:
     from friso.hunting import Cycle
 
 _VIEW = 2.2  # reach of a return map's axes, in units of the largest cycle, or swing followed by one as large
+_STARTS, _FOLLOWED = 401, 300  # distances that are followed by a return map, and for how many swings
+_BASIN = "#fbe3d6"  # a pale vermillion, the colour of hunting
 _APART = 0.01  # share of the amplitude from which on the cart is seen to move otherwise than the stage
 _DASHES: dict[bool, Dash] = {True: "solid", False: "dashed"}
 _WORDS = {True: "attracts", False: "repels"}
@@ -27,8 +29,8 @@ def return_map_figure(cases: list[ShownCase]) -> Figure:
         "Each swing of the stage past its target (curve: from the positive side), given by its turning point, against "
         "the previous one. Where the curve crosses the dashed diagonal, every swing reaches as far as the last: a "
         "hunting cycle, which attracts if the curve is less steep there than the diagonal; where it stays below, "
-        "swings die out. The thin line is this motion after its last move. Beyond the ends of the curve the stage "
-        "does not swing past its target."
+        "swings die out. The thin line is this motion after its last move. Shaded are the distances from which swings "
+        "end in hunting, by this curve. Beyond its ends the stage does not swing past its target."
     )
     if any((joint := item.case.stage.joint) and not joint.locked for item in cases):
         caption += (
@@ -54,7 +56,23 @@ def _return_map(item: ShownCase) -> list[Panel]:
     if swings.size > 2:
         series.append(Series(swings[1:-1], swings[2:], "this motion", INK, width=0.8))
     x, y = Axis("This swing", "m", (0.0, reach)), Axis("Next swing", "m", (0.0, reach))
-    return [Panel(item.label, x, y, tuple(series), _fixed_points(hunting.cycles))]
+    mirrored = bool(hunting.cycles) and all(cycle.symmetric for cycle in hunting.cycles)
+    basins = _basins(distances, returns, reach) if hunting.attracting and mirrored else ()
+    return [Panel(item.label, x, y, tuple(series), _fixed_points(hunting.cycles), bands=basins)]
+
+
+def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:
+    """Strips over the distances up to `reach` [m] from which swings go on for ever, by a map that was followed from
+    swing to swing, of a stage that is its own mirror image."""
+    starts = np.linspace(0.0, reach, _STARTS)
+    at = starts
+    for _ in range(_FOLLOWED):
+        at = np.interp(at, distances, np.maximum(returns, 0.0), left=0.0, right=0.0)
+    ends = np.flatnonzero(np.diff((at > 0).astype(int), prepend=0, append=0))
+    floor, top = np.zeros(2), np.full(2, reach)
+    strips = [starts[[first, after - 1]] for first, after in zip(ends[::2], ends[1::2], strict=True)]
+    labels = ["ends in hunting", *[""] * len(strips)]
+    return tuple(Band(strip, floor, top, label, _BASIN) for strip, label in zip(strips, labels, strict=False))
 
 
 def _swings(item: ShownCase) -> Array:

@@ -162,6 +162,10 @@ def _transient(case: Case) -> str:
         return " ".join([says, *_held(case)])
     attracts = "no cycle attracts" if judgement.hunting.certain else "no cycle was found that attracts"
     says = [f"transient: {attracts}, but this motion has not settled at its end ({end}).", *_held(case)]
+    if case.peak_to_peak < _TEN_MICRON and getattr(case.stage.controller, "integral_leak", None):
+        stays = f"; it is still there after {with_unit(judgement.followed, 's')}" if judgement.followed else ""
+        off = f"{length_at_rest(abs(case.offset))} off its reference"
+        return f"does not hunt ({attracts}), but rests {off}: the leak of its integral holds it there{stays}."
     if judgement.cycle:
         says.append(f"Transients decay or grow by a factor of e in {with_unit(judgement.cycle.time_constant, 's')}.")
     if judgement.runs_away:
@@ -336,11 +340,11 @@ def _window(case: Case, window: BandwidthWindow) -> str:
         width = percent(high.inside / low.inside - 1)
         middle = (low.inside + high.inside) / 2
         return f"within a range of {width} about {_bandwidth(case, middle, up=None, digits=5)}"
-    if low and high:
-        return f"from {edge_text(case, low)} to {edge_text(case, high)}"
-    if low:
-        return f"above {edge_text(case, low)}"
-    return f"below {edge_text(case, high)}, but not just above that" if high else "at all bandwidths searched"
+    lowest, highest = (
+        f"{_bandwidth(case, factor, up=None)} (the {name} searched)"
+        for factor, name in ((SEARCH_LIMITS.lowest_bandwidth, "lowest"), (SEARCH_LIMITS.highest_bandwidth, "highest"))
+    )
+    return f"from {edge_text(case, low) if low else lowest} to {edge_text(case, high) if high else highest}"
 
 
 def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
@@ -374,7 +378,8 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     given_up = CheckPart.LOWER_BANDWIDTHS in judgement.given_up
     lower = [f"{_too_much('Whether it hunts at lower bandwidths')}."] if given_up else []
     still = "is still possible" if judgement.hunting.certain else "was still found"
-    return [f"Hunting {still} at {SEARCH_LIMITS.highest_bandwidth:g} times this bandwidth.", *says, *lower]
+    tune = "" if ways else " friso tune looks for other settings."
+    return [f"Hunting {still} at {SEARCH_LIMITS.highest_bandwidth:g} times this bandwidth.{tune}", *says, *lower]
 
 
 def _slower(case: Case, end: AttractionEnd) -> str:
@@ -452,6 +457,7 @@ def _swing(case: Case) -> str:
 def _end(case: Case) -> str:
     """What is left of the motion in its last quarter."""
     if case.peak_to_peak < _TEN_MICRON:
-        return "at rest, but off its reference"
-    every = f" every {with_unit(case.period, 's')}" if case.period else ""
-    return f"still {at_the_end(case)} peak to peak{every}"
+        return f"at rest, but {length_at_rest(abs(case.offset))} off its reference"
+    if not case.period:
+        return f"in its last quarter it still moves by {at_the_end(case)}"
+    return f"still {at_the_end(case)} peak to peak every {with_unit(case.period, 's')}"
