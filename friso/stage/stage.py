@@ -1,6 +1,7 @@
 """The stage: all tables together, and the flat SI mapping that the equations read."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
 from functools import cached_property
@@ -302,11 +303,11 @@ class Stage(Section):
         return self.replace(texts | dict.fromkeys(without))
 
     def variants(self) -> "Mapping[str, Stage]":
-        """The stage as "given" and, if it has a joint, with that "locked" and (if its stiffness is known) "free"."""
+        """The stage as "given" and, if it has a joint, with that "locked" and (if the file tells all of it) "free"."""
         variants: dict[str, Stage | Self] = {"given": self}
         if self.joint:
             variants["locked"] = self.replace({"joint.locked": True})
-            if self.joint.stiffness is not None or self.flexure:
+            with suppress(StageError):  # a joint that is locked in the file may lack stiffness, damping or stroke
                 variants["free"] = self.replace({"joint.locked": False})
         return variants
 
