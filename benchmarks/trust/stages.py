@@ -1,16 +1,24 @@
 """Stages drawn from all that the schema of the stage file allows: tables, kinds and keys at random, with the values of
-its examples. What does not fit together is mended as the error says, or left out."""
+its examples. What does not fit together is mended as the error says, or left out. Every function takes such a stage, or
+refuses it in one clear message; what would be computed is not."""
 
 from __future__ import annotations
 
 import random
 import tomllib
 from collections.abc import Iterator, Mapping
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
 from typing import Any
 
 import friso
+from benchmarks.trust.arguments import CALLS, Computed, assert_clear, nothing_computed
+from benchmarks.trust.inputs import ready
 from friso.axis import ROTARY, AxisKind
+from friso.errors import InputError, StageError
 from friso.stage import Stage
+from friso.studies.rig.experiments import RIG_EXPERIMENTS
 
 ALWAYS = ("masses", "friction", "controller", "motion")
 STEEL = "stainless 1.4310"
@@ -23,12 +31,45 @@ MENDED = 20
 """So many mistakes of a drawn stage are mended at most."""
 
 
-def drawn_stages(seed: int, count: int) -> Iterator[Stage]:
-    """So many stages that friso takes."""
-    schema, drawn = friso.schema()["properties"], random.Random(seed)
-    while count:
+ASKED = [name for name, sound in CALLS.items() if "stage" in sound and name != "save"]
+"""Functions that take a stage."""
+
+
+def stages(rng: random.Random, folder: Path) -> None:
+    """A drawn stage handed to a function, with a range of one of its keys where one is needed."""
+    stage, name = next(drawn_stages(rng)), rng.choice(ASKED)
+    sound = {key: value for key, value in CALLS[name].items() if key != "stage"}
+    if "x" in sound:
+        sound["x"] = _range_of(stage, rng)
+    if name == "rig":
+        sound["experiment"] = rng.choice([*RIG_EXPERIMENTS])
+    what = f"{name}({sound}) of\n{stage.to_toml()}"
+    with ready(folder), nothing_computed(), redirect_stdout(StringIO()):
+        try:
+            getattr(friso, name)(stage=stage, **sound)
+        except InputError as error:
+            assert_clear(what, str(error))
+            if isinstance(error, StageError) and error.actual.startswith("nothing"):
+                raise AssertionError(f"a stage that was taken lacks {error.key}: {what}") from error
+        except Computed:
+            pass
+        except Exception as error:
+            raise AssertionError(f"{type(error).__name__}: {str(error)[:200]}: {what}") from error
+
+
+def _range_of(stage: Stage, rng: random.Random) -> str:
+    """A numeric key of a stage, over a tenth of its value."""
+    flat, fields = stage.flat(), stage.numeric_keys()
+    key = rng.choice([key for key in fields if flat.get(key)])
+    ends = (f"{share * float(flat[key])!r} {fields[key].unit}".strip() for share in (1.0, 1.1))
+    return f"{key}={'..'.join(ends)}:3"
+
+
+def drawn_stages(drawn: random.Random) -> Iterator[Stage]:
+    """Stages that friso takes, without an end."""
+    schema = friso.schema()["properties"]
+    while True:
         if stage := _stage(_tables(schema, drawn)):
-            count -= 1
             yield stage
 
 
