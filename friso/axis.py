@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 AXIS_KIND = "axis.kind"
@@ -19,12 +19,14 @@ LENGTH, FORCE, MASS = "m", "N", "kg"
 
 @dataclass(frozen=True)
 class AxisKind:
-    """A kind of axis: its name, and what stands for metre, newton and kilogram."""
+    """A kind of axis: its name, and what stands for metre, newton and kilogram; of one of which the motor is known,
+    also what an ampere exerts [N, or N m], `per_ampere`, by which forces may be written in amperes."""
 
     name: str
     length: str = LENGTH
     force: str = FORCE
     mass: str = MASS
+    per_ampere: float | None = field(default=None, compare=False)
 
     @property
     def described(self) -> str:

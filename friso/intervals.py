@@ -6,7 +6,7 @@ One grammar for two uses: a specification allows all of a range (`Span`), a key 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, Self
 
 from pydantic import GetCoreSchemaHandler
@@ -181,7 +181,7 @@ def _half_width(centre: float, tolerance: str, of: Quantity | Number) -> float:
     if tolerance.endswith("%"):
         return abs(centre) * _percent(tolerance)
     if isinstance(of, Quantity):
-        return float(Quantity(of.unit, non_negative, of.example).read(tolerance))
+        return float(replace(of, bound=non_negative).read(tolerance))
     return float(Number(non_negative, of.example).read(_bare(tolerance)))
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache, lru_cache
 from importlib.resources import files
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 from pydantic import GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
@@ -124,30 +124,44 @@ class Value(float):
         return type(self), (float(self), self.text)
 
 
+class Motor(NamedTuple):
+    """What an ampere exerts, and the unit of that: N, or N*m."""
+
+    per_ampere: float
+    force: str
+
+
 @dataclass(frozen=True)
 class Quantity:
     """A key that takes number and unit: `stiffness: Annotated[Value, Quantity("N/m", positive, "2.4 N/mm")]`.
 
     `unit` is the SI unit of the values. Where it is "Hz", angle per time (rad/s, rpm) is divided by 2 pi. Keys are
-    declared as on a linear axis; `on` gives them as on another, named in `axis`.
+    declared as on a linear axis; `on` gives them as on another, named in `axis`. Where `motor` is known, a force may
+    be written in amperes.
     """
 
     unit: str
     bound: Bound
     example: str
     axis: str = field(default="", kw_only=True)
+    motor: Motor | None = field(default=None, kw_only=True)
 
     def on(self, kind: AxisKind) -> Self:
         """What the key takes on an axis of that kind."""
+        motor = None if kind.per_ampere is None else Motor(kind.per_ampere, kind.force)
+        motor = None if self.unit.endswith("/A") else motor
         if (unit := kind.unit(self.unit)) == self.unit:
-            return self
+            return self if motor == self.motor else replace(self, motor=motor)
         number, _, written = self.example.partition(" ")
-        return replace(self, unit=unit, example=f"{number} {kind.unit(written)}", axis=kind.described)
+        example = f"{number} {kind.unit(written)}"
+        return replace(self, unit=unit, example=example, axis=kind.described, motor=motor)
 
     @property
     def expected(self) -> str:
         """What the key takes, in words."""
         units = "Hz, rad/s or rpm" if self.unit == "Hz" else self.unit
+        if self.motor and re.match(re.escape(self.motor.force) + r"\b", self.unit):
+            units += f" or {self.unit.replace(self.motor.force, 'A', 1)}"
         axis = f" with {self.axis}" if self.axis else ""
         return f"number and unit in quotes, convertible to {units}{axis}, {self.bound.text}"
 
@@ -159,7 +173,7 @@ class Quantity:
     def factor(self, unit: str) -> float:
         """SI value of 1 `unit`, to convert arrays with. Raises InputError for a unit of another kind."""
         try:
-            return _factor(_checked_unit(unit), self.unit)
+            return _factor(_checked_unit(unit), self.unit, self.motor)
         except _Refused as refused:
             raise InputError("", quoted(unit, str(refused)), f"a unit convertible to {self.unit}") from None
 
@@ -167,7 +181,7 @@ class Quantity:
         """The SI value of a text (or of the text of a Value). Raises InputError."""
         text = getattr(entry, "text", entry)
         try:
-            value = _read(text, self.unit)
+            value = _read(text, self.unit, self.motor)
         except _Refused as refused:
             raise InputError("", quoted(text, str(refused)), self.expected, self.written_example) from None
         if not self.bound.holds(value):
@@ -228,14 +242,14 @@ _UNIT = re.compile(rf"(?:1 ?/ ?)?{_GROUP}(?: ?[*/·. ] ?{_GROUP})*")
 _LONGEST = 100
 
 
-def _read(entry: Any, si_unit: str) -> Value:
+def _read(entry: Any, si_unit: str, motor: Motor | None) -> Value:
     """Number times factor, in exact arithmetic: "30 ms" is the float 0.03. Raises _Refused."""
     if isinstance(entry, int | float) and not isinstance(entry, bool):
         raise _Refused("a bare number without a unit")
     if not isinstance(entry, str):
         raise _Refused("not a text")
     number, unit = _split(entry)
-    factor = _factor(unit, si_unit)
+    factor = _factor(unit, si_unit, motor)
     bare = float(number)
     if bare == 0 and not re.search("[1-9]", re.split("[eE]", number)[0]):
         return Value(0.0, entry)
@@ -352,22 +366,43 @@ def _meant(unit: str) -> str:
 
 
 @lru_cache(maxsize=1024)
-def _factor(unit: str, si_unit: str) -> float:
-    """SI value of 1 `unit`. Raises _Refused if it is not of the kind of `si_unit`."""
+def _factor(unit: str, si_unit: str, motor: Motor | None = None) -> float:
+    """SI value of 1 `unit`, which a `motor` may make of amperes. Raises _Refused if it is of another kind."""
     factor, root, names = _root(unit)
     if si_unit == "Hz":
         return _hertz(factor, root, names)
     if si_unit == "1/s" and any(name.endswith("hertz") for name in names):
         raise _Refused("a frequency, which could mean 2 pi as much")
     si_factor, si_root, _ = _root(si_unit)
+    if forces := [force for force in ("N", "N*m") if _in_amperes(root, si_root, force)]:
+        if motor is None:
+            raise _Refused(f'in amperes: the stage file needs [actuator] motor_constant = "50 {forces[0]}/A"')
+        if motor.force in forces:
+            return float(f"{factor * motor.per_ampere * _root(f'{motor.force}/A')[0] / si_factor:.15g}")
     if root != si_root and not _per_radian(root, si_root):
-        raise _Refused(f"{unit} is not convertible to {si_unit}{_of_rotary_axis(root, si_unit)}")
+        of_motor = "; amperes are per length of the load, not per angle of the motor" if _per_angle(root, motor) else ""
+        raise _Refused(f"{unit} is not convertible to {si_unit}{of_motor or _of_rotary_axis(root, si_unit)}")
     return float(f"{factor / si_factor:.15g}")  # unit factors are short decimals: drop pint's rounding errors
 
 
 def _per_radian(root: dict[str, float], si_root: dict[str, float]) -> bool:
     """Whether a unit is one per angle whose radian was left out: N m for N m/rad."""
     return si_root.get("radian", 0) < 0 and root == {name: p for name, p in si_root.items() if name != "radian"}
+
+
+def _in_amperes(root: dict[str, float], si_root: dict[str, float], force: str) -> bool:
+    """Whether a unit is one of forces with amperes in their place: A/m for N/m; of an inertia, A*s^2/rad."""
+    if root.get("ampere") != 1 or "ampere" in si_root:
+        return False
+    _, per_ampere, _ = _root(f"{force}/A")
+    powers = {name: root.get(name, 0) + per_ampere.get(name, 0) for name in (*root, *per_ampere)}
+    powers = {name: power for name, power in powers.items() if power}
+    return powers == si_root or ("second" not in si_root and powers == {**si_root, "radian": -1})
+
+
+def _per_angle(root: dict[str, float], motor: Motor | None) -> bool:
+    """Whether a unit has amperes per angle, where a `motor` moves a linear axis."""
+    return bool(motor and motor.force == "N" and root.get("ampere") == 1 and root.get("radian", 0) < 0)
 
 
 def _of_rotary_axis(root: dict[str, float], si_unit: str) -> str:

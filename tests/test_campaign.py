@@ -19,6 +19,7 @@ CASES = {
     "app": 25,
     "arguments": 25,
     "options": 12,
+    "drawn-stages": 40,
     **dict.fromkeys(campaign.BINARY_LOGS, 5),
     "logs": 40,
     "stores": 20,

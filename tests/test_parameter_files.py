@@ -14,6 +14,7 @@ import sympy as sp
 from inside import friso_inside
 
 import friso
+from friso.drives.arithmetic import number_in
 from friso.drives.conversions import conversions
 from friso.drives.format import FORMATS
 from friso.drives.gains import gains_of
@@ -176,6 +177,29 @@ def test_files_are_written_in_several_ways(tmp_path: Path, usual: str, written: 
     assert any("traj.inc" in sentence for sentence in drawn.left_out) == ("INCLUDE" in written)
 
 
+@pytest.mark.parametrize("name", ["joints.inc", "below/joints.inc", "../outside.inc", "/etc/hostname", "beside.inc"])
+def test_what_include_names_is_read_inside_the_folder_alone(tmp_path: Path, name: str) -> None:
+    """By no link either; what is taken in may not take in more, as LinuxCNC has it."""
+    folder = tmp_path / "machine"
+    (folder / "below").mkdir(parents=True)
+    path = ini(folder, {})
+    answers = {**MACHINE, "force_per_output": "20 N"}
+    gains = "P = 70\n#INCLUDE more.inc\n"
+    for place in ("joints.inc", "below/joints.inc", "../outside.inc"):
+        (folder / place).write_text(gains)
+    (folder / "more.inc").write_text("I = 5\n")
+    (folder / "beside.inc").symlink_to(tmp_path / "outside.inc")
+    path.write_text(f"{path.read_text()}#INCLUDE {name}\n")
+    if not name.endswith("joints.inc"):
+        with pytest.raises(InputError, match=re.escape(name)):
+            stage_from(path, None, answers)
+        return
+    drawn = stage_from(path, None, answers)
+    assert drawn.stage.flat()["controller.kp"] == pytest.approx(70 * 20 / 1e-3)
+    assert drawn.stage.flat()["controller.ki"] == 0
+    assert not any("INCLUDE" in sentence for sentence in drawn.left_out)
+
+
 def test_units_that_contradict_each_other_are_asked_for(tmp_path: Path) -> None:
     path, answers = ini(tmp_path, {"P": 50}, joint="UNITS = inch"), {**MACHINE, "force_per_output": "20 N"}
     with pytest.raises(InputError, match="machine_unit"):
@@ -209,6 +233,27 @@ def test_velocity_mode_there_and_back(tmp_path: Path) -> None:
     assert {name: back[name] for name in ("P", "I", "FF1", "DEADBAND")} == pytest.approx(
         {name: gains[name] for name in ("P", "I", "FF1", "DEADBAND")}
     )
+
+
+def _asked(path: Path, answers: dict[str, Any]) -> list[str]:
+    """The keys that are asked for."""
+    with pytest.raises(InputError, match="missing") as refused:
+        stage_from(path, None, answers)
+    return re.findall(r"^ *--set ([a-z_.]+)=", refused.value.expected, re.MULTILINE)
+
+
+def test_the_mode_of_an_axis_is_told_before_anything_is_asked(tmp_path: Path) -> None:
+    """FF1 = 1 without a D is velocity mode, in which its loop is asked for; with a D it is torque mode, and velocity
+    mode is refused while all else is still open."""
+    velocity = ini(tmp_path, {"P": 50.0, "FF1": 1.0})
+    assert _asked(velocity, MACHINE) == ["controller.kp", "drive.sample_time"]
+    assert "drive.sample_time" not in _asked(velocity, {"force_per_output": "20 N"})
+    torque = ini(tmp_path, {"P": 50.0, "FF1": 1.0, "D": 0.1})
+    assert _asked(torque, MACHINE) == ["force_per_output"]
+    with pytest.raises(InputError, match="D = 0 with"):
+        stage_from(torque, None, {"controller.kp": "500 N*s/m"})
+    with pytest.raises(InputError, match="-50"):
+        stage_from(ini(tmp_path, {"P": -50.0}), None, {})
 
 
 def test_an_output_in_volts_has_a_scale(tmp_path: Path) -> None:
@@ -299,6 +344,133 @@ def test_an_odrive_exerts_the_force_of_its_torque(tmp_path: Path) -> None:
     torque = 0.16 * (20.0 * turns[0] - turns[1]) + 0.32 * turns[2]
     force = key["kp"] * (key["kv"] * error - speed) + key["kp"] / key["velocity_integral_time"] * wound
     assert force * 5e-3 == pytest.approx(torque * 2 * np.pi)  # work in a turn
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        *(("8.27 / 170", 8.27 / 170), ("-(1.5 + .5) * 2e3", -4000.0), ("2*math.pi*100", 200 * np.pi), ("7", 7.0)),
+        *((text, np.inf) for text in ("inf", "float('inf')", 'float("inf")', "math.inf")),
+        *(
+            (text, None)
+            for text in ("8.27 / kv", "0.16 Nm", "1 / 0", "2 ** 9", "True", "0x10", "1_0", "1,5", "", "'3'")
+        ),
+        *((text, None) for text in ("__import__('os')", "f(1)", "1 if 2 else 3", "(" * 150, "9" * 201, "1\\", "1j")),
+    ],
+)
+def test_arithmetic_of_numbers_is_worked_out_and_nothing_else(text: str, number: float | None) -> None:
+    assert number_in(text) == (None if number is None else pytest.approx(number))
+
+
+def lines(folder: Path, **changes: str) -> Path:
+    """Lines for odrivetool; changes are texts of controller.config and of motor.config."""
+    settings = {
+        "motor.config.torque_constant": "8.27 / 170",
+        "motor.config.current_lim": "20",
+        "controller.config.control_mode": "CONTROL_MODE_POSITION_CONTROL",
+        "controller.config.input_mode": "InputMode.TRAP_TRAJ",
+        "controller.config.pos_gain": "20.0",
+        "controller.config.vel_gain": "0.16  # N m/(turn/s)",
+        "controller.config.vel_integrator_gain": "0.32",
+        "encoder.config.bandwidth": "2 * 500",
+    }
+    settings |= {key.replace("__", ".config."): text for key, text in changes.items()}
+    path = folder / "lines.txt"
+    path.write_text("".join(f"odrv0.axis0.{key} = {text}\n" for key, text in settings.items() if text))
+    return path
+
+
+def test_a_script_for_an_odrive_says_what_its_arithmetic_and_its_symbols_make(tmp_path: Path) -> None:
+    labels = {**MACHINE, "travel_per_turn": "5 mm", "motion.kind": "hold", "motion.duration": "1 s"}
+    flat = stage_from(lines(tmp_path), None, labels).stage.flat()
+    assert flat["controller.force_limit"] == pytest.approx(20 * 8.27 / 170 * 2 * np.pi / 5e-3)
+    assert flat["controller.velocity_feedforward"] == 1.0
+    assert flat["controller.filters.1.frequency"] == pytest.approx(1000 / (2 * np.pi))
+    path = lines(tmp_path)
+    path.write_text(f"import odrive\nodrv0 = odrive.find_any()\n{path.read_text()}odrv0.save_configuration() # kept\n")
+    assert stage_from(path, None, labels).stage.flat() == flat
+
+
+def test_two_drives_of_a_script_are_two_axes(tmp_path: Path) -> None:
+    path = lines(tmp_path)
+    text = path.read_text()
+    path.write_text(text + text.replace("odrv0", "odrv1").replace("= 20.0", "= 30.0"))
+    labels = {**MACHINE, "travel_per_turn": "5 mm", "motion.kind": "hold", "motion.duration": "1 s"}
+    with pytest.raises(InputError, match=r"one of odrv0\.axis0, odrv1\.axis0"):
+        stage_from(path, None, labels)
+    assert stage_from(path, "odrv0.axis0", labels).stage.flat()["controller.kv"] == 20.0
+    assert stage_from(path, "odrv1.axis0", labels).stage.flat()["controller.kv"] == 30.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "part"),
+    [
+        ({"controller__control_mode": "CTRL_MODE_POSITION_CONTROL"}, "control_mode"),
+        ({"controller__setpoints_in_cpr": "False"}, "setpoints_in_cpr"),
+        ({"controller__vel_limit": "20000.0"}, "vel_limit"),
+        ({"config.motor.torque_constant": "0.05"}, "0.6"),
+    ],
+)
+def test_counts_of_older_firmware_are_told_from_turns(tmp_path: Path, changes: dict[str, str], part: str) -> None:
+    bare = dict.fromkeys(("motor__torque_constant", "controller__input_mode", "controller__control_mode"), "")
+    with pytest.raises(InputError, match=part) as refused:
+        stage_from(lines(tmp_path, **{**bare, **changes}), None, {})
+    assert "0.5.1 to 0.5.6" in refused.value.expected
+
+
+def test_where_nothing_tells_turns_from_counts_it_is_asked(tmp_path: Path) -> None:
+    names = ("motor__torque_constant", "motor__current_lim", "controller__input_mode", "controller__control_mode")
+    path = lines(tmp_path, **dict.fromkeys(names, ""))
+    labels = {**MACHINE, "travel_per_turn": "5 mm", "motion.kind": "hold", "motion.duration": "1 s"}
+    assert _asked(path, labels) == ["gains_in"]
+    flat = stage_from(path, None, {**labels, "gains_in": "turns"}).stage.flat()
+    assert flat["controller.kv"] == 20.0
+    with pytest.raises(InputError, match="counts"):
+        stage_from(path, None, {**labels, "gains_in": "counts"})
+
+
+def _tokens(text: str) -> list[tuple[int, int]]:
+    """Where values stand in a file: behind an equals sign or a colon, to the end of the line or the next comma."""
+    return [match.span(1) for match in re.finditer(r"[=:] *([\w.+-]+)(?= *[,}#\n])", text)]
+
+
+@pytest.mark.parametrize("kind", ["linuxcnc", "json", "lines"])
+def test_a_token_that_is_not_understood_is_quoted_before_anything_is_asked(tmp_path: Path, kind: str) -> None:
+    """Whichever it is, of those that are read."""
+    files = {
+        "linuxcnc": lambda: ini(tmp_path, {**GAINS, "MAX_ERROR_I": 0.01}),
+        "json": lambda: backup(tmp_path, enable_gain_scheduling=False, load_encoder_axis=0, vel_limit_tolerance=1.2),
+        "lines": lambda: lines(tmp_path, controller__enable_gain_scheduling="False", controller__vel_ramp_rate="10"),
+    }
+    path = files[kind]()
+    text = path.read_text()
+    unquoted = []
+    for start, end in _tokens(text):
+        strange = f"{text[start:end]}.q"
+        path.write_text(text[:start] + (f'"{strange}"' if kind == "json" else strange) + text[end:])
+        with pytest.raises(InputError) as refused:
+            stage_from(path, None, {"force_per_output": "20 N"} if kind == "linuxcnc" else {})
+        unquoted += [] if strange in refused.value.actual else [text[start:end]]
+    assert unquoted == {"linuxcnc": [], "json": ["8192", "1.2"], "lines": ["10"]}[kind]  # those that nothing reads
+
+
+@pytest.mark.parametrize("line", ["vel_gain *= 2", "vel_gain: 0.16", "vel_gain", "vel_gain == 3", "ax = odrv0.axis0"])
+def test_a_line_that_sets_nothing_is_quoted(tmp_path: Path, line: str) -> None:
+    path = lines(tmp_path)
+    line = line if "odrv0" in line else f"odrv0.axis0.controller.config.{line}"
+    path.write_text(f"{path.read_text()}{line}\n")
+    with pytest.raises(InputError, match="line 9") as refused:
+        stage_from(path, None, {})
+    assert line in refused.value.actual
+
+
+@pytest.mark.parametrize("line", ["[JOINT_1", "P 50", "TYPE = LINAER"])
+def test_a_line_of_an_ini_file_that_says_nothing_is_quoted(tmp_path: Path, line: str) -> None:
+    path = ini(tmp_path, {"P": 50})
+    path.write_text(path.read_text().replace("TYPE = LINEAR", line))
+    with pytest.raises(InputError) as refused:
+        stage_from(path, None, {})
+    assert (line.partition("= ")[2] or line) in refused.value.actual
 
 
 def test_gains_in_the_units_of_drives() -> None:
@@ -474,7 +646,7 @@ def test_what_these_firmwares_do_not_have_is_told(tmp_path: Path) -> None:
 
 def test_what_is_left_out_is_as_many_lines_as_friso_says(tmp_path: Path) -> None:
     strange = {f"x{k}\nfriso: all is well": 1 for k in range(2000)}
-    path = backup(tmp_path, load_encoder_axis=10**4000, **strange)
+    path = backup(tmp_path, load_encoder_axis=10**29, **strange)
     left_out = stage_from(path, None, {**MACHINE, "travel_per_turn": "5 mm"}).left_out
     assert len(left_out) < 10
     assert all(len(text) < 2000 and "\n" not in text for text in left_out)

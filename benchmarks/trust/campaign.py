@@ -22,6 +22,7 @@ from benchmarks.trust.commands import COMMANDS, LeftOut
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.questions import questions
 from benchmarks.trust.readers import BINARY, READERS
+from benchmarks.trust.stages import stages
 from benchmarks.trust.writing import WRITING
 from friso.errors import InputError
 
@@ -32,7 +33,7 @@ Case = Callable[[random.Random, Path], None]
 """One case, which raises what it finds wrong: with its random numbers, in a folder of its own."""
 
 
-CASES: dict[str, Case] = {**ARGUMENTS, "app": questions, **WRITING, **COMMANDS}
+CASES: dict[str, Case] = {**ARGUMENTS, "drawn-stages": stages, "app": questions, **WRITING, **COMMANDS}
 """The campaigns but for those of `READERS`."""
 
 NAMES = (*READERS, *CASES)
@@ -41,8 +42,9 @@ NAMES = (*READERS, *CASES)
 BINARY_LOGS = [f"{kind}-logs" for kind in BINARY]
 """Those of binary logs."""
 
-HEAVY = {**dict.fromkeys(BINARY_LOGS, 8), "arguments": 8, "options": 32, "app": 8, "stores": 16, "store-faults": 32,
-         "store-views": 16, "store-exchanges": 32, "store-versions": 8, **dict.fromkeys(COMMANDS, 500)}  # fmt: skip
+HEAVY = {**dict.fromkeys(BINARY_LOGS, 8), "arguments": 8, "drawn-stages": 8, "options": 32, "app": 8, "stores": 16,
+         "store-faults": 32, "store-views": 16, "store-exchanges": 32, "store-versions": 8,
+         **dict.fromkeys(COMMANDS, 500)}  # fmt: skip
 """By how much fewer the cases of a campaign are whose cases take long."""
 
 

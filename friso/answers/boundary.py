@@ -19,6 +19,7 @@ from friso.answers.inputs import (
     tolerance_of,
     wrong,
 )
+from friso.axis import AxisKind
 from friso.equations.bandwidth import range_example
 from friso.hunting import CYCLE_RTOL, Diagram, KeyRange, Plane
 from friso.progress import Progress, silent
@@ -43,7 +44,8 @@ class BoundaryAnswer(Answer):
     @cached_property
     def keys(self) -> tuple[ShownKey, ...]:
         """The keys, in the units in which their ranges were given."""
-        return tuple(map(_in_its_unit, self.result.space.ranges, self.texts))
+        ranges = zip(self.result.space.ranges, self.texts, strict=True)
+        return tuple(_in_its_unit(swept, text, self.axis_kind) for swept, text in ranges)
 
     def sentences(self) -> Sequence[str]:
         """Where hunting ends, in one sentence."""
@@ -141,10 +143,11 @@ def boundary(
     return BoundaryAnswer(chosen, traced, [*ranges.values()], stem_of(stage))
 
 
-def _in_its_unit(swept: KeyRange, text: str) -> ShownKey:
+def _in_its_unit(swept: KeyRange, text: str, axis: AxisKind) -> ShownKey:
     """A key in the unit in which its range was given, that of the last value."""
     from friso.views.boundary.words import ShownKey
 
     match = re.search(r"\.\.\s*[-+.\deE]*\s*([^:]*)", text)
     unit = match[1].strip() if match else ""
-    return ShownKey(swept.key, unit, Quantity(swept.unit, any_sign, "").factor(unit)) if unit else ShownKey(swept.key)
+    field = Quantity(swept.unit, any_sign, "").on(axis)
+    return ShownKey(swept.key, unit, field.factor(unit)) if unit else ShownKey(swept.key)

@@ -13,7 +13,8 @@ from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.studies.rig.outcome import Outcome
-from friso.virtual_rig.run import SAMPLE_TIME, as_built_keys
+from friso.virtual_rig.run import as_built_keys
+from friso.virtual_rig.task import SAMPLE_TIME
 
 if TYPE_CHECKING:
     from friso.views.drawing.figure import Figure

@@ -74,7 +74,7 @@ def _key(annotation: Any, metadata: Iterable[Any], path: str, described: Mapping
         if isinstance(item, Quantity | Number | Several | Span | OneOrMany):
             return _numeric(item)
     types = [part for part in get_args(annotation) or (annotation,) if part is not NoneType]
-    words = [word for part in types for word in (get_args(part) or (part,)) if isinstance(word, str)]
+    words = [word for part in types for word in (get_args(part) or (part,)) if isinstance(word, str | int)]
     if words:
         return {"enum": [word for word in words if word]}
     return {"type": "boolean"} if bool in types else {"type": "string"}

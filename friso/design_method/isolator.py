@@ -52,4 +52,5 @@ def isolated(stage: Stage, stroke: float = STROKE, young: float = STEEL) -> Stag
         "joint.limiter_stiffness": stop,
         "joint.limiter_damping": 2 * STOP_DAMPING_RATIO * (stop * masses["masses.stage"]) ** 0.5,
     }
-    return stage.with_numbers({key: float(f"{value:.10g}") for key, value in numbers.items()})
+    whole = stage.with_numbers({key: float(f"{value:.10g}") for key, value in numbers.items()})
+    return whole.replace({"joint.locked": False}) if stage.joint else whole

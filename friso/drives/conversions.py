@@ -57,9 +57,9 @@ class Turn:
     per_ampere: float | None
 
     @classmethod
-    def of(cls, flat: Mapping[str, Any], answers: UserAnswers) -> Turn:
-        """As the transmission or the user says. Raises InputError for an answer in another unit, or other than that of
-        the transmission."""
+    def of(cls, flat: Mapping[str, Any], answers: UserAnswers, per_ampere: float | None = None) -> Turn:
+        """As the transmission, the actuator (`per_ampere`) or the user says. Raises InputError for an answer in another
+        unit, or other than that of the stage."""
         kind, travel = axis_of(flat), travel_of(flat)
         if TRAVEL in answers:
             answer = answers.value(TRAVEL, TRAVELS[kind])
@@ -68,21 +68,28 @@ class Turn:
                 expected = f"that of the transmission, {travel:.6g} {unit}, which is enough"
                 raise InputError(TRAVEL, f"{answer:.6g} {unit}", expected)
             travel = answer
-        per_ampere = None
-        if MOTOR_CONSTANT in answers and travel is not None:
-            per_ampere = answers.value(MOTOR_CONSTANT, TORQUE_PER_AMPERE) * 2 * pi / travel
-        elif MOTOR_CONSTANT in answers:
-            per_ampere = answers.value(MOTOR_CONSTANT, FORCE_PER_AMPERE if kind == LINEAR else TORQUE_PER_AMPERE)
-        return cls(travel, per_ampere)
+        if MOTOR_CONSTANT not in answers:
+            return cls(travel, per_ampere)
+        if travel is not None:
+            exerted = answers.value(MOTOR_CONSTANT, TORQUE_PER_AMPERE) * 2 * pi / travel
+        else:
+            exerted = answers.value(MOTOR_CONSTANT, FORCE_PER_AMPERE if kind == LINEAR else TORQUE_PER_AMPERE)
+        if per_ampere is not None and not isclose(exerted, per_ampere, rel_tol=1e-6):
+            unit = kind.unit("N/A")
+            expected = f"that of [actuator], {per_ampere:.6g} {unit} at the load, which is enough"
+            raise InputError(MOTOR_CONSTANT, f"{exerted:.6g} {unit} at the load", expected)
+        return cls(travel, exerted)
 
 
 Convert = Callable[[float, Turn, AxisKind], list[Other]]
 """From a value in SI to what it is in other units."""
 
 
-def conversions(flat: Mapping[str, Any], answers: UserAnswers) -> tuple[Conversion, ...]:
+def conversions(
+    flat: Mapping[str, Any], answers: UserAnswers, per_ampere: float | None = None
+) -> tuple[Conversion, ...]:
     """The gains of a stage given as flat keys, by what is known of motor and screw. Raises InputError."""
-    turn = Turn.of(flat, answers)
+    turn = Turn.of(flat, answers, per_ampere)
     try:
         return tuple(row for row in _rows(flat, turn) if row.finite)
     except (ArithmeticError, ValueError):
@@ -116,7 +123,9 @@ def _length(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
 
 
 def _mass(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-    return [(value * (turn.travel / (2 * pi)) ** 2, "kg*m^2 at the motor")] if turn.travel else []
+    current = [(value / turn.per_ampere, f"A*s^2/{kind.length}")] if turn.per_ampere else []
+    at_motor = [(value * (turn.travel / (2 * pi)) ** 2, "kg*m^2 at the motor")] if turn.travel else []
+    return [*current, *at_motor]
 
 
 def _force(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
@@ -135,10 +144,11 @@ def _per(unit: str, *per: tuple[str, float]) -> Convert:
             values.append((value / turn.per_ampere, shown))
         if turn.travel:
             at_motor = value * (turn.travel / (2 * pi)) ** 2
-            values += [(at_motor * factor, f"N*m{angle}") for angle, factor in per]
+            place = "" if kind == LINEAR else " at the motor"  # the load's gains are per angle too
+            values += [(at_motor * factor, f"N*m{angle}{place}") for angle, factor in per]
             if turn.per_ampere:
                 ampere = turn.per_ampere * turn.travel / (2 * pi)  # torque of an ampere
-                values += [(at_motor * factor / ampere, f"A{angle}") for angle, factor in per]
+                values += [(at_motor * factor / ampere, f"A{angle}{place}") for angle, factor in per]
         return values
 
     return others

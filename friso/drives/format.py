@@ -16,6 +16,10 @@ from friso.registry import Registry
 FlatStage = Mapping[str, Any]
 """A stage as flat keys."""
 
+Beside = Callable[[str], str | None]
+"""The text of another file, by its name relative to the folder of a parameter file; None for one that is not in that
+folder or below it."""
+
 
 @dataclass(frozen=True)
 class AxisParameters:
@@ -30,20 +34,34 @@ class AxisParameters:
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", one_line(self.name))
 
-    def number(self, name: str, default: float | None = None) -> float:
-        """A finite number. Raises InputError where it is something else, or absent without a `default`."""
+    def number(self, name: str, default: float | None = None, symbols: Mapping[str, float] | None = None) -> float:
+        """A finite number, or what one of the `symbols` stands for. Raises InputError where it is something else, or
+        absent without a `default`."""
         entry = self.values.get(name, self.machine.get(name, default))
         if entry is None:
             raise InputError(name, "nothing", "a number", f"{name} = 1.0")
+        if symbols and isinstance(entry, str) and not _NUMBER.fullmatch(entry.strip()):
+            if entry not in symbols:
+                names = [*symbols][: len({*symbols.values()})]  # those written in one way
+                expected = f"a number, or one of {', '.join(names)}"
+                raise InputError(name, quoted(entry), expected, f"{name} = 1")
+            return symbols[entry]
         try:
             if isinstance(entry, bool) or (isinstance(entry, str) and not _NUMBER.fullmatch(entry.strip())):
                 raise TypeError
             value = float(entry)
         except (TypeError, ValueError, OverflowError):
-            raise InputError(name, quoted(str(entry)[:80]), "a number", f"{name} = 1.0") from None
+            raise InputError(name, quoted(str(entry)), "a number", f"{name} = 1.0") from None
         if abs(value) > MOST or value != value:
             raise InputError(name, f"{value:g}", f"a number of at most {MOST:g}", f"{name} = 1.0")
         return value
+
+    def flag(self, name: str, default: bool = False) -> bool:
+        """Whether a switch is on. Raises InputError where it is neither true nor false, 0 nor 1."""
+        entry = self.values.get(name, default)
+        if not isinstance(entry, bool) and entry not in (0, 1):
+            raise InputError(name, quoted(str(entry)), "true or false", f"{name} = true")
+        return bool(entry)
 
     def is_set(self, name: str) -> bool:
         """Whether there is such a parameter, and it is neither 0 nor infinite."""
@@ -84,8 +102,9 @@ class ParameterFormat:
 
     Its `title`; the `firmware` whose formulas are used; the `source` of these; whether a file is of this kind by its
     name and text; its axes (raises InputError); what it leaves open of an axis (raises InputError for an axis that
-    friso cannot describe); the stage of an axis with the answers to that; what the parameters of a stage need to know,
-    these parameters, and how a file holds them.
+    friso cannot describe); the stage of an axis with the answers to that (raises InputError for numbers that it cannot
+    be made of, which are refused before anything is asked); what the parameters of a stage need to know, these
+    parameters, how a file holds them; and its text with other files of its folder taken in (by `Beside`).
     """
 
     title: str
@@ -99,6 +118,7 @@ class ParameterFormat:
     parameters: Callable[[FlatStage, UserAnswers], Parameters]
     text: Callable[[Mapping[str, float]], str]
     suffix: str
+    whole: Callable[[str, Beside], str] = lambda text, beside: text
 
 
 TOLD = ("machine_unit", "force_per_output", "velocity_per_output", "travel_per_turn")

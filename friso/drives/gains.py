@@ -46,11 +46,12 @@ def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None
     for key in user_values:
         if key not in askable:
             raise InputError("--set", quoted(key), f"a key of the stage, or one of {', '.join(sorted(askable))}")
+    rows = conversions(flat, answers, stage.axis_kind.per_ampere)
     if kind is None:
-        return Gains(stage, loop_diagram(flat), conversions(flat, answers))
+        return Gains(stage, loop_diagram(flat), rows)
     refuse_open(kind.questions_back(flat, answers), f"--to {to}")
     back = kind.parameters(flat, answers)
-    return Gains(stage, loop_diagram(flat), conversions(flat, answers), kind, back.values, _not_held(flat, back.held))
+    return Gains(stage, loop_diagram(flat), rows, kind, back.values, _not_held(flat, back.held))
 
 
 def _told(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:

@@ -34,6 +34,10 @@ class UserAnswers:
         self.texts = dict(texts)
         self.wanted: set[str] = set()
 
+    def with_examples(self, questions: Iterable[OpenQuestion]) -> UserAnswers:
+        """These answers, and to the questions that are open the examples."""
+        return UserAnswers({**{question.key: question.example.strip('"') for question in questions}, **self.texts})
+
     def __contains__(self, key: object) -> bool:
         self.wanted.add(str(key))
         return key in self.texts

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from friso.drives.format import FORMATS, TOLD, AsStage, AxisParameters, Paramete
 from friso.drives.questions import UserAnswers, refuse_open
 from friso.errors import InputError, shortened
 from friso.escapes import one_line
+from friso.paths import flaw_of
 from friso.quantities import quoted
 from friso.stage import Stage
 from friso.stage.files import text_of
@@ -41,8 +43,8 @@ def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) ->
     try:
         answers = UserAnswers(user_answers)
         asked = kind.questions(chosen, answers)
+        of_axis = kind.stage(chosen, answers.with_examples(asked) if asked else answers)  # refuses before it is asked
         refuse_open(asked, f"{path}, {chosen.name}")
-        of_axis = kind.stage(chosen, answers)
         answers.refuse_unwanted()
         stage = _with_answers(of_axis, kind, chosen, path, user_answers)
     except InputError as error:
@@ -59,10 +61,19 @@ def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
         kind = FORMATS[name]
         if kind.recognises(path.name, text):
             try:
-                return kind, kind.axes(text)
+                return kind, kind.axes(kind.whole(text, lambda name: _beside(path, name)))
             except InputError as error:
                 raise error.found_in(str(path)) from None
     raise InputError("", "a file of another kind", expected, "", str(path))
+
+
+def _beside(path: Path, name: str) -> str | None:
+    """The text of a file in the folder of another one, or below it; None for a name of nothing there. Raises
+    InputError."""
+    place = None if flaw_of(name) else Path(os.path.realpath(path.parent / name))
+    if place is None or not place.is_relative_to(os.path.realpath(path.parent)) or not os.path.lexists(place):
+        return None
+    return text_of(place, f"a text file, as {one_line(path.name)} names it", latin=True)
 
 
 def _chosen(axes: tuple[AxisParameters, ...], name: str | None, path: Path) -> AxisParameters:

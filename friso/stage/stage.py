@@ -1,6 +1,7 @@
 """The stage: all tables together, and the flat SI mapping that the equations read."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
 from functools import cached_property
@@ -39,6 +40,8 @@ from friso.stage.section import (
 from friso.stage.tables import (
     FRICTION,
     MOTION,
+    MOTOR_CONSTANT,
+    Actuator,
     AxisTable,
     Bias,
     FrictionSection,
@@ -59,6 +62,7 @@ _LOCKED = '[joint] locked = true, limiter_stiffness = "2e7 N/m", limiter_damping
 _FLEXURE = Table(lambda _: Flexure, '[flexure] leaves = 2, length = "70 mm", width = "45 mm" ...')
 _PARASITIC = Table(lambda _: Parasitic, '[parasitic] frequency = "300 Hz" ...')
 _BIAS = Table(lambda _: Bias, '[bias] cart = "0.2 N"')
+_ACTUATOR = Table(lambda _: Actuator, '[actuator] motor_constant = "50 N/A"')
 _CONTROLLER = Table(CONTROLLERS.pick, '[controller] kind = "pid", crossover = "8 Hz", alpha = 0.1, beta = 2')
 _DRIVE = Table(lambda _: Drive, '[drive] sample_time = "50 us"')
 _RAIL = Table(lambda _: Rail, '[rail] seed = 1, static_deviation = 0.2, correlation_length = "5 mm" ...')
@@ -94,6 +98,7 @@ class Stage(Section):
     flexure: Annotated[Flexure | None, _FLEXURE] = None  # type: ignore[valid-type]
     parasitic: Annotated[Parasitic | None, _PARASITIC] = None
     bias: Annotated[Bias | None, _BIAS] = None
+    actuator: Annotated[Actuator | None, _ACTUATOR] = None
     controller: Annotated[ControllerSection, _CONTROLLER]
     drive: Annotated[Drive | None, _DRIVE] = None
     rail: Annotated[Rail | None, _RAIL] = None
@@ -133,8 +138,9 @@ class Stage(Section):
 
     @property
     def axis_kind(self) -> AxisKind:
-        """Linear or rotary, which decides on the units."""
-        return KINDS[self.axis.kind] if self.axis else LINEAR
+        """Linear or rotary, which decides on the units, and what an ampere exerts there."""
+        kind = KINDS[self.axis.kind] if self.axis else LINEAR
+        return replace(kind, per_ampere=float(self.actuator.motor_constant)) if self.actuator else kind
 
     @field_validator("name", "source")
     @classmethod
@@ -255,7 +261,7 @@ class Stage(Section):
 
     @cached_property
     def _numeric_keys(self) -> Mapping[str, Quantity | Number]:
-        return numeric_keys(self._complete)
+        return {key: field.on(self.axis_kind) for key, field in numeric_keys(self._complete).items()}
 
     @cached_property
     def _sweepable(self) -> Mapping[str, Quantity | Number]:
@@ -297,11 +303,11 @@ class Stage(Section):
         return self.replace(texts | dict.fromkeys(without))
 
     def variants(self) -> "Mapping[str, Stage]":
-        """The stage as "given" and, if it has a joint, with that "locked" and (if its stiffness is known) "free"."""
+        """The stage as "given" and, if it has a joint, with that "locked" and (if the file tells all of it) "free"."""
         variants: dict[str, Stage | Self] = {"given": self}
         if self.joint:
             variants["locked"] = self.replace({"joint.locked": True})
-            if self.joint.stiffness is not None or self.flexure:
+            with suppress(StageError):  # a joint that is locked in the file may lack stiffness, damping or stroke
                 variants["free"] = self.replace({"joint.locked": False})
         return variants
 
@@ -334,10 +340,23 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
 
 
 def axis_written(tables: Mapping[str, Any]) -> AxisKind:
-    """The axis that tables of a stage file are of; what is wrong with the table [axis] is found later."""
-    axis = tables.get("axis")
-    name = axis.kind if isinstance(axis, AxisTable) else axis.get("kind") if isinstance(axis, dict) else None
-    return KINDS.get(name, LINEAR) if isinstance(name, str) else LINEAR
+    """The axis that tables of a stage file are of, with what an ampere exerts there; what is wrong with the tables
+    [axis] and [actuator] is found later."""
+    name = _of_table(tables, "axis", "kind")
+    kind = KINDS.get(name, LINEAR) if isinstance(name, str) else LINEAR
+    if tables.get("actuator") is None:
+        return kind
+    try:
+        constant = MOTOR_CONSTANT.on(kind).read(_of_table(tables, "actuator", "motor_constant"))
+        return replace(kind, per_ampere=float(constant))
+    except InputError:  # the one message is to be about that
+        return replace(kind, per_ampere=1.0)
+
+
+def _of_table(tables: Mapping[str, Any], name: str, key: str) -> Any:
+    """What stands at a key of a table, which may be a section or not be one at all; None for nothing."""
+    table = tables.get(name)
+    return table.get(key) if isinstance(table, dict) else getattr(table, key, None)
 
 
 _MOTOR_LAW = f"{MOTOR_FRICTION}.model"

@@ -1,6 +1,7 @@
 """The tables of a stage file: masses, friction, joint, parasitic mode, motion."""
 
 from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 from pydantic import model_validator
@@ -15,13 +16,35 @@ from friso.quantities import (
     non_negative,
     positive,
 )
-from friso.stage.section import Rule, UncertainSection, Variants
+from friso.stage.section import Rule, Section, UncertainSection, Variants
 
 
 class AxisTable(UncertainSection):
     """Which units the stage file is in: on a rotary axis kg m^2, N m and rad stand for kg, N and m."""
 
     kind: Literal["linear", "rotary"] = "linear"
+
+
+@dataclass(frozen=True)
+class MotorConstant(Quantity):
+    """The key that takes a motor's constant, at the load."""
+
+    @property
+    def expected(self) -> str:
+        """What the key takes, in words."""
+        at_load = "at the load: of a motor of 0.5 N*m/A, 2 pi / lead times as much"
+        return f"{super().expected}, {at_load if self.unit == 'N/A' else 'behind any gear'}"
+
+
+MOTOR_CONSTANT = MotorConstant("N/A", positive, "50 N/A")
+
+
+class Actuator(Section):
+    """By what a drive that thinks in amperes moves the machine: forces, also per length or time, may then be written in
+    A, A/mm, A*s/m, ... in every table. How far the true constant is off is drive.motor_constant_ratio."""
+
+    motor_constant: Annotated[Value, MOTOR_CONSTANT]
+    """Force of an ampere at the load: of a motor with a screw, its torque of an ampere times 2 pi / lead."""
 
 
 class Masses(UncertainSection):

@@ -17,10 +17,7 @@ from friso.equations.roles import Role, Steady
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.virtual_rig.surroundings import MARGIN, tables
-from friso.virtual_rig.task import MoveTask
-
-SAMPLE_TIME = 50e-6
-"""Sample time of a drive that states none [s]: that of the thesis (Sec. 3.5.2)."""
+from friso.virtual_rig.task import SAMPLE_TIME, MoveTask
 
 RTOL, METHOD = 1e-4, "Rodas4"
 """Relative tolerance and method: a step is at most a sample long."""

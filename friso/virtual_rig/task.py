@@ -11,6 +11,9 @@ import numpy as np
 from friso.equations import motion
 from friso.stage import Stage
 
+SAMPLE_TIME = 50e-6
+"""Sample time of a drive that states none [s]: that of the thesis (Sec. 3.5.2)."""
+
 
 @dataclass(frozen=True)
 class MoveTask:
@@ -47,7 +50,7 @@ def own_motion(stage: Stage) -> MoveTask:
     pieces, duration = motion.pieces(flat, 1)[0], flat["motion.duration"]
     if pieces[0, 1]:
         pieces = np.vstack([np.zeros(4), pieces])
-        pieces[1:, 0] += flat["drive.sample_time"]
+        pieces[1:, 0] += flat.get("drive.sample_time", SAMPLE_TIME)
     return MoveTask(pieces, duration, displacement=float(motion.initial_displacement(flat)))
 
 

@@ -5,7 +5,7 @@ import { svg } from "./dom.js";
 export const PARTS = [
   { id: "motion", label: "Motion", tables: ["motion"] },
   { id: "controller", label: "Controller", tables: ["controller"] },
-  { id: "actuator", label: "Actuator and drive", tables: ["transmission", "motor_friction", "drive"] },
+  { id: "actuator", label: "Actuator and drive", tables: ["actuator", "transmission", "motor_friction", "drive"] },
   { id: "encoder", label: "Encoder", tables: ["encoder", "drive"] },
   { id: "cart", label: "Cart", tables: ["masses", "bias"] },
   { id: "joint", label: "Joint and limiter", tables: ["joint", "parasitic"] },

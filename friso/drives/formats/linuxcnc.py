@@ -16,7 +16,7 @@ from dataclasses import replace
 from math import isclose
 
 from friso.axis import KINDS, LINEAR, AxisKind, axis_of
-from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks, si
+from friso.drives.format import AsStage, AxisParameters, Beside, FlatStage, ParameterFormat, Parameters, lacks, si
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
 from friso.quantities import Quantity, positive, quoted
@@ -58,15 +58,26 @@ DOCUMENTED = re.compile(
 """Names in the section of a joint that the manual has, and those of what stands between `pid` and the machine."""
 
 MOST_LINES = 100_000
+MOST_INCLUDED = 100
+"""Lines, and files that are taken in, at most."""
 
 _AXIS = r"(?:JOINT|AXIS)_[0-9]{1,3}"
 """The name of a section with the parameters of an axis."""
 
+_CONTINUED = re.compile(r"\\\r?\n")
+"""The end of a line that goes on in the next one."""
+
 _COMMENT = re.compile(r"\s[#;]")
 """How a comment begins behind a value."""
 
-_INCLUDE = re.compile(r"^#INCLUDE[ \t]+(\S{1,200})", re.MULTILINE)
-"""A line that takes in another file."""
+_INCLUDE = re.compile(r"^#INCLUDE[ \t]+(\S{1,200})[ \t]*$", re.MULTILINE)
+"""A line that takes in another file, which may not take in others."""
+
+_HEADING = re.compile(r"\[([^\[\]]*)\][ \t]*(?:[#;].*)?")
+_READ = re.compile(r"(?:JOINT|AXIS)_[0-9]{1,3}|TRAJ|EMCMOT")
+"""How a section begins, and the names of those of which every line has to be understood."""
+
+TYPES = ("LINEAR", "ANGULAR")
 
 INCLUDED = "#INCLUDE"
 REPEATED = "#REPEATED"
@@ -93,6 +104,16 @@ def recognises(name: str, text: str) -> bool:
     return re.search(rf"^[ \t]*\[(?:{_AXIS}|EMC|EMCMOT|TRAJ)\]", text, re.MULTILINE) is not None
 
 
+def whole(text: str, beside: Beside) -> str:
+    """The text with what #INCLUDE names in place of its line, where that is in the folder of the file."""
+
+    def taken_in(line: re.Match[str]) -> str:
+        included = beside(line[1])
+        return line[0] if included is None else _INCLUDE.sub("", included)
+
+    return _INCLUDE.sub(taken_in, text, count=MOST_INCLUDED)
+
+
 def axes(text: str) -> tuple[AxisParameters, ...]:
     """Joints (2.8 and later) or axes with a P. Raises InputError where there is none, or a file is no INI file."""
     sections = _sections(text)
@@ -116,7 +137,7 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
     if not with_gains:
         expected = "an axis whose loop LinuxCNC closes"
         if included:
-            expected += f"; what #INCLUDE names ({machine[INCLUDED]}) is not read and has to stand in the file"
+            expected += f"; what #INCLUDE names ({machine[INCLUDED]}) is not in the folder of the file"
         raise InputError("", "no [JOINT_n] or [AXIS_n] with a P", expected, "P = 50")
     letters = re.sub(r"\s", "", sections.get("TRAJ", {}).get("COORDINATES", "")).upper()
     named = [replace(axis, name=axis.name.strip("[]")) for axis in joints or with_gains]
@@ -138,14 +159,16 @@ def _sections(text: str) -> dict[str, dict[str, str]]:
     section: dict[str, str] = {}
     repeated: dict[tuple[str, str], None] = {}
     title = ""
-    lines = text.splitlines()
+    lines = _CONTINUED.sub(" ", text).splitlines()
     if len(lines) > MOST_LINES:
         raise InputError("", f"{len(lines)} lines", f"at most {MOST_LINES}")
     for line in map(str.strip, lines):
         if not line or line[0] in "#;":
             continue
         if line.startswith("["):
-            title = line[1:].partition("]")[0].strip()
+            if (heading := _HEADING.fullmatch(line)) is None:
+                raise InputError("", quoted(line), "a section's name in brackets", "[JOINT_0]")
+            title = heading[1].strip()
             section = sections.setdefault(title, {})
             continue
         key, equals, value = line.partition("=")
@@ -153,6 +176,8 @@ def _sections(text: str) -> dict[str, dict[str, str]]:
             name, text = key.strip(), _COMMENT.split(value, maxsplit=1)[0].strip()
             if section.setdefault(name, text) != text and title in sections:
                 repeated[title, name] = None
+        elif _READ.fullmatch(title):
+            raise InputError(f"[{title}]", quoted(line), "NAME = VALUE; behind a # what is none", "P = 50")
     for title, name in repeated:
         sections[title][REPEATED] = f"{sections[title][REPEATED]}, {name}" if REPEATED in sections[title] else name
     return sections
@@ -169,25 +194,45 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
         example = '"mm"' if kind == LINEAR else '"deg"'
         meaning = "unit of the gains: [TRAJ] has no LINEAR_UNITS or ANGULAR_UNITS, or the axis has other UNITS"
         asked.append(OpenQuestion(UNIT, meaning, example))
-    in_velocity = "controller.kp" in answers and FORCE not in answers
+    in_velocity = _in_velocity(axis, answers)
     if "SERVO_PERIOD" not in axis.machine:
         thread = "drive.position_sample_time" if in_velocity else "drive.sample_time"
         asked += [] if thread in answers else [OpenQuestion(thread, "period of the servo thread", '"1 ms"')]
-    if in_velocity and "drive.sample_time" not in answers:
-        meaning = "period of the drive's own velocity loop, of which that of the servo thread is a multiple"
-        asked.append(OpenQuestion("drive.sample_time", meaning, '"125 us"'))
-    if in_velocity and VELOCITY not in answers and not _unity(axis):
-        meaning = "velocity that an output of 1 makes: FF1 is not about 1, so it is not one machine unit per second"
-        asked.append(OpenQuestion(VELOCITY, meaning, VELOCITY_FIELD.on(kind).written_example))
-    if FORCE not in answers and "controller.kp" not in answers:
-        meaning = "force that an output of 1 makes (torque mode); in velocity mode, instead, --set controller.kp="
-        gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
-        meaning += (
-            f'{gain}, --set controller.velocity_integral_time="10 ms" and --set drive.sample_time="125 us" of the drive'
-        )
+    if in_velocity:
+        asked += _of_the_velocity_loop(axis, answers, kind)
+    elif FORCE not in answers:
+        meaning = "force that an output of 1 makes (torque mode)"
+        if not axis.is_set("D"):
+            gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
+            meaning += f"; in velocity mode, instead, --set controller.kp={gain} of the drive's velocity loop"
         asked.append(OpenQuestion(FORCE, meaning, FORCE_FIELD.on(kind).written_example))
     moved = axis.is_set("MAX_ACCELERATION") and axis.is_set("MAX_VELOCITY")
     return (*asked, *of_the_machine(answers, kind, moved))
+
+
+def _in_velocity(axis: AxisParameters, answers: UserAnswers) -> bool:
+    """Whether the output is a velocity: as the user says, who gives a gain of the drive's loop or a force; else where
+    the file does, by an FF1 of about 1 and no D."""
+    if FORCE in answers or VELOCITY in answers or "controller.kp" in answers:
+        return FORCE not in answers
+    return _unity(axis) and not axis.is_set("D")
+
+
+def _of_the_velocity_loop(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> list[OpenQuestion]:
+    """What no INI file has of the drive that follows a velocity."""
+    gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
+    meaning = "gain of the drive's velocity loop, whose integral time, if any, is controller.velocity_integral_time"
+    if _unity(axis) and VELOCITY not in answers:
+        force = FORCE_FIELD.on(kind).written_example
+        meaning += f" (FF1 is about 1: velocity mode; in torque mode, instead, --set {FORCE}={force})"
+    asked = [
+        OpenQuestion("controller.kp", meaning, gain),
+        OpenQuestion("drive.sample_time", "period of that loop, of which the servo thread's is a multiple", '"125 us"'),
+    ]
+    if not _unity(axis):
+        meaning = "velocity that an output of 1 makes: FF1 is not about 1, so it is not one machine unit per second"
+        asked.append(OpenQuestion(VELOCITY, meaning, VELOCITY_FIELD.on(kind).written_example))
+    return [question for question in asked if question.key not in answers]
 
 
 def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
@@ -202,8 +247,8 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     if REPEATED in axis.machine:
         left.append(f"the later values of {axis.machine[REPEATED]}, which stand more than once: the first counts")
     if INCLUDED in axis.machine:
-        left.append(f"what #INCLUDE names: {axis.machine[INCLUDED]}")
-    in_torque = FORCE in answers
+        left.append(f"what #INCLUDE names and is not in the folder of the file: {axis.machine[INCLUDED]}")
+    in_torque = not _in_velocity(axis, answers)
     controller, more = (_torque if in_torque else _velocity)(axis, answers, kind, unit)
     if axis.is_set("DEADBAND"):
         controller["error_deadband"] = si(axis.number("DEADBAND") * unit, kind.unit("m"))
@@ -294,7 +339,10 @@ def _unity(axis: AxisParameters) -> bool:
 
 
 def _kind(axis: AxisParameters) -> AxisKind:
-    return ROTARY if str(axis.values.get("TYPE", "")).upper() == "ANGULAR" else LINEAR
+    """Linear or rotary. Raises InputError for a type that is neither."""
+    if (name := str(axis.values.get("TYPE", TYPES[0]))).upper() not in TYPES:
+        raise InputError("TYPE", quoted(name), f"one of {', '.join(TYPES)}", f"TYPE = {TYPES[0]}")
+    return ROTARY if name.upper() == TYPES[1] else LINEAR
 
 
 def _unit_of(axis: AxisParameters) -> str | None:
@@ -400,4 +448,5 @@ FORMAT = ParameterFormat(
     parameters=parameters,
     text=text,
     suffix=".ini",
+    whole=whole,
 )

@@ -2,7 +2,8 @@
 
 Firmware 0.5.1 to 0.5.6, control in position: w = v_ff + pos_gain e; torque = inertia a_ff + vel_gain (w - v) +
 vel_integrator_gain sum(w - v) T, turns for positions, 8000 times a second. v is the estimate of the encoder's
-phase-locked loop, which has a double pole at its bandwidth. Earlier firmware counts in encoder counts and amperes.
+phase-locked loop, which has a double pole at its bandwidth. Firmware up to 0.4 counts in encoder counts and amperes,
+and that from 0.6 on has other names.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from math import inf, pi
 from typing import Any
 
 from friso.axis import LINEAR, AxisKind, axis_of
+from friso.drives.arithmetic import number_in
 from friso.drives.conversions import TRAVEL, TRAVELS, travel_of
 from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks, si
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
@@ -28,12 +30,28 @@ GAINS = ("pos_gain", "vel_gain", "vel_integrator_gain")
 RATE = 8000.0
 """Samples of the controller in a second, of ODrive 3."""
 
-POSITION_CONTROL = 3
-"""Value of control_mode."""
+CONTROL_MODES = ("VOLTAGE_CONTROL", "TORQUE_CONTROL", "VELOCITY_CONTROL", "POSITION_CONTROL")
+POSITION_CONTROL = CONTROL_MODES.index("POSITION_CONTROL")
+"""Value of control_mode, and how the values are called."""
 
-PASSTHROUGH, POSITION_FILTER, TRAJECTORY = 1, 3, 5
+INPUT_MODES = (
+    *("INACTIVE", "PASSTHROUGH", "VEL_RAMP", "POS_FILTER", "MIX_CHANNELS"),
+    *("TRAP_TRAJ", "TORQUE_RAMP", "MIRROR", "TUNING"),
+)
+PASSTHROUGH, POSITION_FILTER, TRAJECTORY = map(INPUT_MODES.index, ("PASSTHROUGH", "POS_FILTER", "TRAP_TRAJ"))
 AHEAD = (POSITION_FILTER, TRAJECTORY)
-"""Values of input_mode; `AHEAD`, those in which the drive feeds its own reference forward."""
+"""Values of input_mode, and how they are called; `AHEAD`, those in which the drive feeds its own reference forward."""
+
+
+def _symbols(modes: tuple[str, ...], *before: str) -> dict[str, float]:
+    """What modes are called in Python, each name behind what may stand before it."""
+    return {f"{start}{name}": number for start in before for number, name in enumerate(modes)}
+
+
+SYMBOLS = {
+    "control_mode": _symbols(CONTROL_MODES, "CONTROL_MODE_", "ControlMode.", "CTRL_MODE_"),
+    "input_mode": _symbols(INPUT_MODES, "INPUT_MODE_", "InputMode."),
+}
 
 MOST_KEYS, LONGEST_KEY = 100_000, 200
 
@@ -79,41 +97,118 @@ FED_FORWARD = frozenset({"velocity_feedforward", "acceleration_feedforward"})
 """Those that they hold where the drive's own trajectories feed them forward: the velocity whole."""
 
 
-_LINE = re.compile(r"^[ \t]*odrv[0-9]{1,3}\.(axis[0-9]{1,3}\.[\w.]{1,180})[ \t]*=[ \t]*([^#\s]{1,200})", re.MULTILINE)
-"""A line for odrivetool that sets a parameter."""
+_LINE = re.compile(r"[ \t]*(odrv[0-9]{1,3})\.([\w.]{1,200})[ \t]*=(?!=)[ \t]*([^#]*)(?:#.*)?")
+"""A line for odrivetool that sets a parameter; of a comment behind it, nothing."""
+
+_OTHER_LINE = re.compile(
+    r"[ \t]*(?:$|#|import |from |odrv[0-9]{1,3}(?:[ \t]*=[ \t]*odrive\.\w+|(?:\.\w+)+)\([^()#]*\)[ \t]*(?:#|$))"
+)
+"""A line that sets none: empty, a comment, an import, or a call such as odrv0.save_configuration()."""
+
+_OF_AXIS = re.compile(r"(?:(odrv[0-9]+)\.)?(axis[0-9]+)\.(.*)")
+"""The place of a parameter: drive, axis, and its name there."""
+
+_MODULE = re.compile(r"^(?:odrive\.)?enums\.")
 
 IN_TURNS = "motor.config.torque_constant"
 """A parameter that firmware has whose gains are in turns and N m."""
 
+OLD = frozenset({"setpoints_in_cpr", "A_per_css", "counts_per_step", "current_ramp_rate", "CTRL_MODE"})
+NEW = frozenset({"torque_lim", "torque_ramp_rate", "turns_per_step", "input_mode", "CONTROL_MODE", "ControlMode"})
+NEWEST = frozenset({"config.motor", "config.encoder_bandwidth", "config.torque_soft_max"})
+"""Names that only firmware up to 0.4 has, whose gains are in counts; only 0.5, in turns; only 0.6, with others."""
+
+FASTEST = 1000.0
+"""Turns per second that no motor makes: a limit above is one in counts."""
+
+TURNS_EXPECTED = "firmware whose gains are in turns and N m: 0.5.1 to 0.5.6"
+IN_TURNS_INSTEAD = (
+    f"vel_gain and vel_integrator_gain times {IN_TURNS} and cpr, vel_limit through cpr (ODrive's migration guide)"
+)
+
+GAINS_IN, TURNS, COUNTS = "gains_in", "turns", "counts"
+"""What the user may say where nothing in a file tells which firmware it is of."""
+
+_RECOGNISED = re.compile(r"^[ \t]*odrv[0-9]{1,3}\.axis[0-9]{1,3}\.[\w.]{1,180}[ \t]*=(?!=)", re.MULTILINE)
+
 
 def recognises(name: str, text: str) -> bool:
     """By being JSON with gains of an axis, or lines for odrivetool."""
-    return (text.lstrip().startswith("{") and '"axis' in text and "vel_integrator_gain" in text) or bool(
-        _LINE.search(text)
-    )
+    in_json = text.lstrip().startswith("{") and '"axis' in text and "vel_integrator_gain" in text
+    return in_json or bool(_RECOGNISED.search(text))
 
 
 def axes(text: str) -> tuple[AxisParameters, ...]:
     """Axes with gains. Raises InputError for what is no JSON and no lines for odrivetool, and for firmware whose units
-    are others."""
+    or names are others."""
     in_lines = not text.lstrip().startswith("{")
-    values = dict(_LINE.findall(text)) if in_lines else _entries(text)
-    held: dict[str, dict[str, Any]] = {}
-    for key, value in values.items():
-        name, _, inside = key.partition(".")
-        held.setdefault(name, {})[inside] = {"True": True, "False": False}.get(value, value) if in_lines else value
+    held: dict[tuple[str, str], dict[str, Any]] = {}
+    for key, value in (_settings(text) if in_lines else _entries(text)).items():
+        if place := _OF_AXIS.fullmatch(key):
+            held.setdefault((place[1] or "", place[2]), {})[place[3]] = value
+    several = len({drive for drive, _ in held}) > 1
     axes = tuple(
-        AxisParameters(name, held[name])
-        for name in sorted(held)
-        if name.startswith("axis") and f"{CONFIG}.pos_gain" in held[name]
+        AxisParameters(f"{drive}.{name}" if several else name, held[drive, name])
+        for drive, name in sorted(held)
+        if f"{CONFIG}.pos_gain" in held[drive, name]
     )
     if not axes:
         raise InputError("", "no axis with a controller.config.pos_gain", "a configuration as odrivetool writes it")
     for axis in axes:
+        _refuse_other_firmware(axis)
         if IN_TURNS not in axis.values and not in_lines:
             actual = f"{axis.name} without a {IN_TURNS}, which firmware 0.5.1 to 0.5.6 has"
-            raise InputError("", actual, "firmware whose gains are in turns and N m: 0.5.1 to 0.5.6")
+            raise InputError("", actual, TURNS_EXPECTED)
     return axes
+
+
+def _settings(text: str) -> dict[str, Any]:
+    """What lines for odrivetool set, the last of a name: numbers (of arithmetic too), true and false, and texts. Raises
+    InputError for a line that is none of theirs."""
+    values: dict[str, Any] = {}
+    lines = text.splitlines()
+    if len(lines) > MOST_KEYS:
+        raise InputError("", f"{len(lines)} lines", f"at most {MOST_KEYS}")
+    for number, line in enumerate(lines, 1):
+        if setting := _LINE.fullmatch(line):
+            drive, key, written = setting[1], setting[2], setting[3].strip()
+            value = {"True": True, "False": False}.get(written, number_in(written))
+            values[f"{drive}.{key}"] = _MODULE.sub("", written) if value is None else value
+        elif not _OTHER_LINE.match(line):
+            expected = "lines that set one parameter each; behind a # what is none"
+            raise InputError(f"line {number}", quoted(line.strip()), expected, f"odrv0.axis0.{CONFIG}.vel_gain = 0.16")
+    return values
+
+
+def _refuse_other_firmware(axis: AxisParameters) -> None:
+    """Raises InputError for firmware whose gains are in counts, or whose names are others."""
+    if IN_TURNS in axis.values:
+        return
+    if name := _sign_of(axis, NEWEST):
+        raise InputError(name, "a name of firmware 0.6", TURNS_EXPECTED)
+    if name := _sign_of(axis, OLD) or _fastest(axis):
+        raise _in_counts(name, str(axis.values[name]))
+
+
+def _in_counts(name: str, value: str) -> InputError:
+    """The refusal of gains that are in counts, as a parameter or the user tells."""
+    actual = f"{quoted(value)}, as in firmware up to 0.4, whose gains are in counts of the encoder and amperes"
+    return InputError(name, actual, TURNS_EXPECTED, IN_TURNS_INSTEAD)
+
+
+def _sign_of(axis: AxisParameters, names: frozenset[str]) -> str:
+    """A parameter that has one of the names, or a symbol that begins with one; "" for none."""
+    for key, value in axis.values.items():
+        symbol = re.match("CTRL_MODE|CONTROL_MODE|ControlMode", value) if isinstance(value, str) else None
+        if names & {key.rpartition(".")[2], ".".join(key.split(".")[:2]), symbol[0] if symbol else ""}:
+            return key
+    return ""
+
+
+def _fastest(axis: AxisParameters) -> str:
+    """A limit of the velocity that no motor reaches in turns per second; "" for none."""
+    limits = (f"{place}.vel_limit" for place in (CONFIG, MOVE))
+    return next((key for key in limits if axis.is_set(key) and axis.number(key) > FASTEST), "")
 
 
 def _entries(text: str) -> dict[str, Any]:
@@ -141,10 +236,16 @@ def _entries(text: str) -> dict[str, Any]:
 
 def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """The machine, and what a turn of the motor moves. Raises InputError for an axis that controls no position."""
-    mode = axis.number(f"{CONFIG}.control_mode", POSITION_CONTROL)
+    mode = _mode(axis, "control_mode", POSITION_CONTROL)
     if mode != POSITION_CONTROL:
         raise InputError(f"{CONFIG}.control_mode", f"{mode:g}", "3, control in position", '"control_mode": 3')
     asked = []
+    if IN_TURNS not in axis.values and not _sign_of(axis, NEW):
+        if GAINS_IN not in answers:
+            what = "that gains are in turns and N m, as firmware 0.5 has them; up to 0.4 they are in counts and A"
+            asked.append(OpenQuestion(GAINS_IN, what, TURNS))
+        elif answers.choice(GAINS_IN, (TURNS, COUNTS)) == COUNTS:
+            raise _in_counts(GAINS_IN, COUNTS)
     kind = LINEAR
     if TRAVEL in answers:
         kind, _ = answers.kind_of(TRAVEL, TRAVELS)
@@ -153,6 +254,11 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
         asked.append(OpenQuestion(TRAVEL, what, '"10 mm"'))
     moved = all(axis.is_set(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit"))
     return (*asked, *of_the_machine(answers, kind, moved))
+
+
+def _mode(axis: AxisParameters, name: str, default: float) -> float:
+    """The number of a mode, which may be written as it is called."""
+    return axis.number(f"{CONFIG}.{name}", default, SYMBOLS[name])
 
 
 def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
@@ -164,7 +270,7 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     for name in ("pos_gain", "vel_gain"):
         if number(name) <= 0:
             raise InputError(f"{CONFIG}.{name}", f"{number(name):g}", "a gain greater than 0", f'"{name}": 20.0')
-    mode = number("input_mode", PASSTHROUGH)
+    mode = _mode(axis, "input_mode", PASSTHROUGH)
     table: dict[str, Any] = {
         "kind": "cascade",
         "kv": si(number("pos_gain"), "1/s"),
@@ -225,13 +331,13 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
         left.append(
             f"the firmware, which no {IN_TURNS} tells: gains in turns and N m are assumed, as 0.5.1 to 0.5.6 has"
         )
-    if axis.values.get(f"{CONFIG}.enable_gain_scheduling"):
+    if axis.flag(f"{CONFIG}.enable_gain_scheduling"):
         width = axis.number(f"{CONFIG}.gain_scheduling_width", 0.0)
         left.append(
             f"enable_gain_scheduling: within {width:g} turns the gains go to 0 with the error, and friso's results for "
             "swings that small do not hold for this axis"
         )
-    if axis.values.get(f"{CONFIG}.enable_vel_limit", True) and axis.is_set(f"{CONFIG}.vel_limit"):
+    if axis.flag(f"{CONFIG}.enable_vel_limit", True) and axis.is_set(f"{CONFIG}.vel_limit"):
         left.append(f"vel_limit = {axis.number(f'{CONFIG}.vel_limit'):g} turn/s, the largest velocity commanded")
     if mode == PASSTHROUGH:
         left.append("input_vel and input_torque of the position source: taken as 0")
@@ -246,17 +352,17 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
         left.append(f"decel_limit = {brakes:g} turn/s^2: friso's move brakes as it accelerates")
     if limited:
         left.append("at the limit of the torque the integral decays by 1 % a sample; here it rests")
-    own, load = axis.name.removeprefix("axis"), axis.values.get(f"{CONFIG}.load_encoder_axis")
-    if isinstance(load, int) and str(load) != own:
+    own = float(axis.name.rpartition("axis")[2])
+    if (load := axis.number(f"{CONFIG}.load_encoder_axis", own)) != own:
         left.append(
-            f"load_encoder_axis = {quoted(load)}: position and velocity come from that axis's encoder; where it is "
+            f"load_encoder_axis = {load:g}: position and velocity come from that axis's encoder; where it is "
             "behind a screw or belt, [transmission] and [encoder] have to be added"
         )
     settings = (key.removeprefix(f"{CONFIG}.") for key in axis.values if key.startswith(f"{CONFIG}."))
     names = dict.fromkeys(key.split(".")[0] for key in settings)
     if strange := [name for name in names if name not in KNOWN]:
         left.append(f"{', '.join(strange)}: these firmwares have no such setting")
-    if axis.values.get(f"{CONFIG}.anticogging.anticogging_enabled"):
+    if axis.flag(f"{CONFIG}.anticogging.anticogging_enabled"):
         left.append("the map against cogging")
     return tuple(left)
 

@@ -45,16 +45,25 @@ class ResponseFit:
         """Bayesian information criterion, scale of the variance unknown (Schwarz 1978, doi:10.1214/aos/1176344136)."""
         return self.count * np.log(self.squares / self.count) + len(self.parameters) * np.log(self.count)
 
+    def _at(self, of: Callable[[np.ndarray], float]) -> tuple[float, float]:
+        """What follows from the parameters, and its deviation to first order; NaN or infinite where one is left open,
+        beside whose value others overflow."""
+        steps = 1e-4 * np.sqrt(np.maximum(np.diag(self.covariance), 1e-30))
+        beside = [_number(of, self.parameters + h) - _number(of, self.parameters - h) for h in np.diag(steps)]
+        with np.errstate(all="ignore"):
+            slopes = np.array(beside) / (2 * steps)
+            variance = slopes @ self.covariance @ slopes
+        return _number(of, self.parameters), float(np.sqrt(np.maximum(variance, 0.0)))
+
     def estimate(
         self, name: str, unit: str, method: str, of: Callable[[np.ndarray], float], positive: bool = False
     ) -> Estimate:
         """What follows from the parameters, with its interval to first order; a `positive` one in the logarithm."""
-        value = of(self.parameters)
+        value, deviation = self._at(of)
         if not np.isfinite(value) or (positive and not value > 0):
             return Estimate.unknown(name, unit, method, "the fitted model does not have it")
-        steps = 1e-4 * np.sqrt(np.maximum(np.diag(self.covariance), 1e-30))
-        slopes = np.array([(of(self.parameters + h) - of(self.parameters - h)) for h in np.diag(steps)]) / (2 * steps)
-        deviation = float(np.sqrt(max(slopes @ self.covariance @ slopes, 0.0)))
+        if not np.isfinite(deviation):
+            return Estimate.unknown(name, unit, method, "the data leave it open")
         plain = Estimate.normal(name, unit, value, deviation, method)
         if not positive:
             return plain
@@ -63,6 +72,15 @@ class ResponseFit:
             reason = f"its interval spans more than a factor of {LOOSE:g} to either side"
             return Estimate.unknown(name, unit, method, reason, 0.0)
         return Estimate(name, unit, value, value / factor, value * factor, method)
+
+
+def _number(of: Callable[[np.ndarray], float], parameters: np.ndarray) -> float:
+    """What follows from parameters; NaN where they are so large that nothing does."""
+    try:
+        with np.errstate(all="ignore"):
+            return float(of(parameters))
+    except np.linalg.LinAlgError:
+        return np.nan
 
 
 def deviations(response: FrequencyResponse) -> np.ndarray:

@@ -15,7 +15,7 @@ from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, as_tuned
 from friso.stage.correlations import Correlations, Sample, draw
 from friso.stage.lists import element_keys
-from friso.virtual_rig.run import SAMPLE_TIME
+from friso.virtual_rig.task import SAMPLE_TIME
 
 LEAST, MOST = 20, 100_000
 """Machines at least, for an interval to tell anything, and at most, which take hours."""

@@ -96,7 +96,9 @@ def options(
     stage = machines.stage
     variants = stage.variants()
     locked, free = variants.get("locked", stage), variants.get("free")
-    left_out: dict[str, str] = {} if free else dict.fromkeys(JOINT, "the stage file has no joint with a stiffness")
+    left_out: dict[str, str] = (
+        {} if free else dict.fromkeys(JOINT, "the stage file has no joint with stiffness, damping and stroke")
+    )
     deadband = DEADBAND * within
     listed = [Option("a", locked), *_faster("b", locked, left_out)]
     if free:

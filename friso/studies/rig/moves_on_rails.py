@@ -18,7 +18,7 @@ from friso.progress import Progress, silent
 from friso.shares import Share, share
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
-from friso.studies.rig.sizes import interval, jointed, pace, quicker
+from friso.studies.rig.sizes import free_stage, interval, locked_stage, pace, quicker
 from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import MoveTask, point_to_point
 
@@ -69,8 +69,8 @@ def released(stage: Stage, displacement: float) -> MoveTask:
 
 
 def with_joint(stage: Stage, locked: bool) -> Stage:
-    """The stage with its joint locked or free. Raises InputError for a stage that has none."""
-    return jointed(stage).replace({"joint.locked": locked})
+    """The stage with its joint locked or free. Raises InputError where it has none that can be so."""
+    return locked_stage(stage) if locked else free_stage(stage)
 
 
 def crossover(stage: Stage) -> float:

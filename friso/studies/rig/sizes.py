@@ -31,6 +31,9 @@ FIXED = 1e9
 """Mass [kg] of a cart that does not move."""
 
 
+_FREE = 'stiffness = "2.4 N/mm", damping = "0.5 N*s/m", stroke = "1 mm"'
+
+
 def jointed(stage: Stage) -> Stage:
     """The stage itself. Raises InputError for one without a joint."""
     if stage.joint is None:
@@ -39,11 +42,22 @@ def jointed(stage: Stage) -> Stage:
 
 
 def freed(stage: Stage) -> Stage:
-    """The stage with its joint free and its limiters far off. Raises InputError where it has no joint, or no stroke."""
-    stroke = jointed(stage).flat()["joint.stroke"]
+    """The stage with its joint free and its limiters far off. Raises InputError where it has no joint that can be free,
+    or no stroke."""
+    free = free_stage(stage)
+    stroke = free.flat()["joint.stroke"]
     if not stroke > 0:
         raise InputError("joint.stroke", f"{stroke:g} m", "a stroke greater than 0", 'stroke = "1 mm"')
-    return stage.with_numbers({"joint.stroke": WIDE * stroke}).replace({"joint.locked": False})
+    return free.with_numbers({"joint.stroke": WIDE * stroke})
+
+
+def free_stage(stage: Stage) -> Stage:
+    """The stage with its joint free. Raises InputError where it has none, or does not tell what that takes."""
+    free = jointed(stage).variants().get("free")
+    if free is None:
+        expected = "a joint with stiffness (or a [flexure]), damping and stroke, which this experiment frees"
+        raise InputError("joint", "a joint of which the file tells that it is locked alone", expected, _FREE)
+    return free
 
 
 def locked_stage(stage: Stage) -> Stage:

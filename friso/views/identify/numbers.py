@@ -128,7 +128,7 @@ def _places(estimate: Estimate, factor: float) -> int:
 
 
 def _written(value: float, factor: float, places: int) -> str:
-    if not -LARGE <= places <= SMALL:
+    if math.isfinite(value) and not -LARGE <= places <= SMALL:
         size = math.floor(math.log10(abs(value * factor))) if value * factor else 0
         return f"{value * factor:.{max(MOST - 1, min(places + size, EXACT))}e}"
     rounded = round(value * factor, places)

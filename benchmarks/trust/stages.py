@@ -1,0 +1,147 @@
+"""Stages drawn from all that the schema of the stage file allows: tables, kinds and keys at random, with the values of
+its examples. What does not fit together is mended as the error says, or left out. Every function takes such a stage, or
+refuses it in one clear message; what would be computed is not."""
+
+from __future__ import annotations
+
+import random
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import friso
+from benchmarks.trust.arguments import CALLS, Computed, assert_clear, nothing_computed
+from benchmarks.trust.inputs import ready
+from friso.axis import ROTARY, AxisKind
+from friso.errors import InputError, StageError
+from friso.stage import Stage
+from friso.studies.rig.experiments import RIG_EXPERIMENTS
+
+ALWAYS = ("masses", "friction", "controller", "motion")
+STEEL = "stainless 1.4310"
+"""The material of leaf springs, the one text that is no choice."""
+
+TABLES, KEYS, OFTEN = 0.2, 0.25, {"joint": 0.5, "transmission": 0.4, "drive": 0.4}
+"""How often a table, and a key, that need not be there is, and some tables more often."""
+
+MENDED = 20
+"""So many mistakes of a drawn stage are mended at most."""
+
+
+ASKED = [name for name, sound in CALLS.items() if "stage" in sound and name != "save"]
+"""Functions that take a stage."""
+
+
+def stages(rng: random.Random, folder: Path) -> None:
+    """A drawn stage handed to a function, with a range of one of its keys where one is needed."""
+    stage, name = next(drawn_stages(rng)), rng.choice(ASKED)
+    sound = {key: value for key, value in CALLS[name].items() if key != "stage"}
+    if "x" in sound:
+        sound["x"] = _range_of(stage, rng)
+    if name == "rig":
+        sound["experiment"] = rng.choice([*RIG_EXPERIMENTS])
+    what = f"{name}({sound}) of\n{stage.to_toml()}"
+    with ready(folder), nothing_computed(), redirect_stdout(StringIO()):
+        try:
+            getattr(friso, name)(stage=stage, **sound)
+        except InputError as error:
+            assert_clear(what, str(error))
+            if isinstance(error, StageError) and error.actual.startswith("nothing"):
+                raise AssertionError(f"a stage that was taken lacks {error.key}: {what}") from error
+        except Computed:
+            pass
+        except Exception as error:
+            raise AssertionError(f"{type(error).__name__}: {str(error)[:200]}: {what}") from error
+
+
+def _range_of(stage: Stage, rng: random.Random) -> str:
+    """A numeric key of a stage, over a tenth of its value."""
+    flat, fields = stage.flat(), stage.numeric_keys()
+    key = rng.choice([key for key in fields if flat.get(key)])
+    ends = (f"{share * float(flat[key])!r} {fields[key].unit}".strip() for share in (1.0, 1.1))
+    return f"{key}={'..'.join(ends)}:3"
+
+
+def drawn_stages(drawn: random.Random) -> Iterator[Stage]:
+    """Stages that friso takes, without an end."""
+    schema = friso.schema()["properties"]
+    while True:
+        if stage := _stage(_tables(schema, drawn)):
+            yield stage
+
+
+def _stage(tables: dict[str, Any]) -> Stage | None:
+    """The stage of tables that are mended where friso refuses them; None where that does not help."""
+    for _ in range(MENDED):
+        try:
+            return Stage(**tables)
+        except friso.InputError as error:
+            if not _mend(tables, error):
+                return None
+    return None
+
+
+def _mend(tables: dict[str, Any], error: friso.InputError) -> bool:
+    """Set what the error's example sets, or else leave out what is wrong; whether there was anything to."""
+    name, _, key = error.key.partition(",")[0].partition(".")
+    table = tables.get(name)
+    if not isinstance(table, dict):
+        return False
+    before = dict(table)
+    table |= _set_in(error.example)
+    if table != before:
+        return True
+    if key.partition(".")[0] in table:
+        del table[key.partition(".")[0]]
+    else:
+        del tables[name]
+    return True
+
+
+def _set_in(example: str) -> dict[str, Any]:
+    """The keys that an error's example sets; none where it is more than that."""
+    try:
+        values = tomllib.loads(example.replace(", ", "\n").partition(" or ")[0])
+    except tomllib.TOMLDecodeError:
+        return {}
+    return {name: value for name, value in values.items() if not isinstance(value, dict)}
+
+
+def _tables(schema: Mapping[str, Any], drawn: random.Random) -> dict[str, Any]:
+    nodes = {name: node for name, node in schema.items() if "properties" in node or "anyOf" in node}
+    tables = {
+        name: _table(node, drawn)
+        for name, node in nodes.items()
+        if name in ALWAYS or drawn.random() < OFTEN.get(name, TABLES)
+    }
+    return _on(ROTARY, tables) if tables.get("axis", {}).get("kind") == ROTARY.name else tables
+
+
+def _on(kind: AxisKind, entry: Any) -> Any:
+    """The values of examples, which are those of a linear axis, in the units of another."""
+    if isinstance(entry, dict):
+        return {key: _on(kind, value) for key, value in entry.items()}
+    if isinstance(entry, list):
+        return [_on(kind, value) for value in entry]
+    number, _, unit = entry.partition(" ") if isinstance(entry, str) else ("", "", "")
+    return f"{number} {kind.unit(unit)}" if number[:1].isdigit() and unit else entry
+
+
+def _table(node: Mapping[str, Any], drawn: random.Random) -> dict[str, Any]:
+    """A table of one of its kinds: what it has to have, and some of what it may."""
+    form = drawn.choice(node["anyOf"]) if "anyOf" in node else node
+    keys = [key for key in form["properties"] if key in form["required"] or drawn.random() < KEYS]
+    return {key: _value(form["properties"][key], drawn) for key in keys}
+
+
+def _value(node: Mapping[str, Any], drawn: random.Random) -> Any:
+    if "enum" in node:
+        return drawn.choice(node["enum"])
+    if node.get("type") == "boolean":
+        return drawn.random() < 0.5
+    if node.get("type") == "array" and "examples" not in node:
+        return [_table(node["items"], drawn) for _ in range(drawn.randint(0, 2))]
+    return drawn.choice(node.get("examples", [STEEL]))

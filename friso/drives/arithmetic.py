@@ -1,0 +1,47 @@
+"""Numbers as scripts for drives have them: written out, or as arithmetic of numbers."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Mapping
+from math import inf, pi
+from operator import add, mul, neg, pos, sub, truediv
+
+LONGEST = 200
+"""Characters of arithmetic at most."""
+
+_NAMED: Mapping[str, float] = {
+    "float('inf')": inf,
+    **{f"{module}{name}": value for name, value in (("pi", pi), ("inf", inf)) for module in ("", "math.", "np.")},
+}
+_PAIRS = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv}
+_SIGNS = {ast.USub: neg, ast.UAdd: pos}
+
+_OTHER = re.compile(r"\d(?!e[+-]?\d)[a-z_]|\\", re.IGNORECASE)
+"""What stands in no arithmetic, and would make Python's parser warn: letters right behind a digit, as in 0x10."""
+
+
+def number_in(text: str) -> float | None:
+    """The number that a text is, or that its arithmetic makes (+, -, *, /, brackets, pi, inf); None for any other."""
+    if len(text) > LONGEST or _OTHER.search(text):
+        return None
+    try:
+        return _worked_out(ast.parse(text.strip(), mode="eval").body)
+    except (SyntaxError, ValueError, ArithmeticError, RecursionError, MemoryError):
+        return None
+
+
+def _worked_out(node: ast.expr) -> float:
+    """The number that an expression makes. Raises ValueError for what is no arithmetic of numbers."""
+    match node:
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            return float(value)
+        case ast.BinOp(left, sign, right) if type(sign) in _PAIRS:
+            return _PAIRS[type(sign)](_worked_out(left), _worked_out(right))
+        case ast.UnaryOp(sign, operand) if type(sign) in _SIGNS:
+            return _SIGNS[type(sign)](_worked_out(operand))
+    name = ast.unparse(node)
+    if name not in _NAMED:
+        raise ValueError(name)
+    return _NAMED[name]
