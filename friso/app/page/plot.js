@@ -34,7 +34,6 @@ export function draw(place, figures, tell = {}, names = figures.map((figure) => 
       box.children[0].textContent = plain(figure.title);
       box.children[1].textContent = plain(figure.caption);
     }
-    box.classList.remove("stale"); // not once it is drawn: the machine may have changed by then
     const plotted = box.querySelector(".plot");
     plotted.style.height = `${figure.layout.height}px`;
     plotted.due = () => {
@@ -100,9 +99,6 @@ function remove(child) {
 export function clear(place) {
   [...place.children].forEach(remove);
 }
-
-/** What is shown is of an earlier machine. */
-export const stale = (place) => place.querySelectorAll(".figure").forEach((box) => box.classList.add("stale"));
 
 /** Those plots again that are drawn otherwise by now. */
 function again(isOther) {

@@ -2,9 +2,6 @@
 import { token } from "./dom.js";
 import { enter, request } from "./entry.js";
 
-/** How long [ms] what is of an earlier machine is shown as if it were of the one that is there: what is newer mostly comes before. */
-export const OLD_AFTER = 300;
-
 const page = token();
 const lanes = new Map();
 let asked = 0;
@@ -36,9 +33,17 @@ export async function ask(question, body, lane = question, part = () => {}) {
     reached(false);
     return null;
   } finally {
-    if (lanes.get(lane) === abort) lanes.delete(lane);
+    if (lanes.get(lane) === abort) {
+      lanes.delete(lane);
+      idle.forEach((listener) => listener(lane));
+    }
   }
 }
+
+const idle = [];
+
+/** Be told of a lane on which nothing is at work any more. */
+export const onIdle = (listener) => idle.push(listener);
 
 /** End what is asked on a lane. */
 export const end = (lane) => lanes.get(lane)?.abort();
