@@ -637,6 +637,34 @@ def test_the_map_shows_the_run_under_the_pointer_and_a_click_sets_the_machine_th
     assert float(page.input_value(FIELD).split()[0]) > 15
 
 
+COVERED = """() => {
+    const plot = document.querySelector('.plot');
+    const boxes = (texts) => [...plot.querySelectorAll(texts)].map((text) => text.getBoundingClientRect());
+    const apart = (one, other) => one.right < other.left || other.right < one.left
+        || one.bottom < other.top || other.bottom < one.top;
+    const entries = boxes('[class^=legend] text');
+    const covered = (title) => !entries.every((entry) => apart(entry, title));
+    return [entries.length, boxes(".xtitle, .xtick").filter(covered).length];
+}"""
+"""How many entries a legend has, and how many titles and numbers of its axis they cover."""
+
+
+def test_places_on_a_map_are_seen_in_the_dark_and_its_legend_covers_nothing_once_resized(browsed: Browsed) -> None:
+    page = browsed.page
+    page.click("#pin")
+    page.click("#tab-map")
+    page.wait_for_function("() => document.querySelector('.plot')?.data?.some((one) => one.z?.length === 41)")
+    for width in (1600, 320, 740, 700, 1600):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_timeout(1000)
+        entries, covered = page.evaluate(COVERED)
+        assert (entries, covered) == (5, 0), width
+    page.emulate_media(color_scheme="dark")
+    marker = "document.querySelector('.plot').data.find((one) => one.name === 'this machine').marker"
+    page.wait_for_function("() => document.querySelector('.plot').layout.font.color !== '#222222'")
+    assert page.evaluate(f"[{marker}.color, {marker}.line.color]") == [INK, "white"]
+
+
 def test_an_answer_that_comes_once_another_machine_is_shown_is_not_taken_for_it(browsed: Browsed) -> None:
     page, held = browsed.page, []
     page.route("**/ask/machine", lambda route: route.continue_() if held else held.append(route))
