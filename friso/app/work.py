@@ -8,7 +8,7 @@ import time
 import traceback
 from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from contextvars import copy_context
 from dataclasses import dataclass, field
 from threading import Lock
@@ -104,7 +104,7 @@ class Messages(logging.Handler):
 
 def _import_libraries() -> None:
     """Import what cannot be imported by two threads at once: its modules import one another."""
-    with _IMPORTING:
+    with _IMPORTING, suppress(ImportError):  # of an extra; xarray imports it where it is installed
         import dask.array  # noqa: F401
 
 
