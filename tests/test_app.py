@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import contextlib
 import errno
 import functools
 import gc
@@ -34,8 +35,9 @@ import uvicorn
 
 import friso
 from friso.answers.schema import stage_schema
-from friso.app import gate, uploads
+from friso.app import connections, gate, uploads
 from friso.app import machine as machines
+from friso.app.connections import Connection
 from friso.app.gate import Access
 from friso.app.ghosts import ghosts_of
 from friso.app.kept import MOST, KeptAnswers
@@ -44,8 +46,10 @@ from friso.app.machine import Machine, machine_on_page
 from friso.app.questions import QUESTIONS
 from friso.app.serve import Server, listening
 from friso.app.server import application
-from friso.app.work import Work, Workshop
+from friso.app.work import Messages, Work, Workshop
 from friso.axis import LINEAR
+from friso.engine import building
+from friso.engine.cache import CodeRequest
 from friso.engine.overtaken import Overtaken, ended_by, go_on, going_first, is_first
 from friso.errors import InputError, LogError
 from friso.identification.logs.mapping import sidecar
@@ -119,7 +123,8 @@ def served() -> Iterator[Served]:
     listener = config.bind_socket()
     access = Access.at("127.0.0.1", listener.getsockname()[1])
     begin = {"name": RIG.name, "text": RIG.read_text(encoding="utf-8"), "asked": True}
-    server = uvicorn.Server(uvicorn.Config(application(access, begin, Workshop()), log_level="warning", ws="none"))
+    app = application(access, begin, Workshop())
+    server = uvicorn.Server(uvicorn.Config(app, log_level="warning", ws="none", http=Connection))
     thread = threading.Thread(target=server.run, args=([listener],))
     thread.start()
     while not server.started:
@@ -131,6 +136,95 @@ def served() -> Iterator[Served]:
 
 
 # ---------------------------------------------------------------- who is let in
+
+HALF = b"POST /ask/machine HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: "
+
+
+def half_sent(port: int, number: int) -> list[socket.socket]:
+    """Connections over which the first half of a request was sent."""
+    held = []
+    for _ in range(number):
+        held.append(socket.create_connection(("127.0.0.1", port), timeout=60))
+        held[-1].sendall(HALF)
+    return held
+
+
+def is_closed(connection: socket.socket) -> bool:
+    """Whether the server closes it before it has answered."""
+    try:
+        return connection.recv(1) == b""
+    except ConnectionResetError:
+        return True
+
+
+def test_half_sent_requests_keep_nobody_out_and_end_soon(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    held = half_sent(served.port, 3 * connections.MOST)
+    try:
+        assert served.request("GET", "/begin")[0] == 200
+        assert all(map(is_closed, held[: 2 * connections.MOST]))  # those that came first made way
+    finally:
+        for one in held:
+            one.close()
+    monkeypatch.setattr(connections, "HEADERS", 0.05)
+    (one,) = half_sent(served.port, 1)
+    with one:
+        for _ in range(3):
+            one.sendall(b"x")  # so that it does not rest
+        assert is_closed(one)
+
+
+def test_whoever_has_no_key_and_reads_slowly_is_cut_off_and_a_question_is_not(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, goes_on = threading.Event(), threading.Event()
+
+    def long(asked: Any, work: Work) -> Iterator[dict[str, Any]]:
+        begun.set()
+        goes_on.wait(60)
+        yield {"kind": "answer"}
+
+    monkeypatch.setitem(QUESTIONS, "machine", long)  # type: ignore[arg-type]
+    monkeypatch.setattr(connections, "HEADERS", 0.05)
+    monkeypatch.setattr(connections, "SENDING", 0.1)
+    with ThreadPoolExecutor(1) as pool, contextlib.ExitStack() as opened:
+        answer = pool.submit(served.ask, "machine", RIG)
+        assert begun.wait(60)
+        slow = opened.enter_context(socket.create_connection(("127.0.0.1", served.port), timeout=60))
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65536)
+        slow.sendall(f"GET /plotly.js HTTP/1.1\r\nHost: 127.0.0.1:{served.port}\r\n\r\n".encode())
+        time.sleep(0.5)
+        assert len(served.request("GET", "/plotly.js")[2]) > 1_000_000
+        size = 0
+        with contextlib.suppress(ConnectionResetError):
+            while chunk := slow.recv(65536):
+                size += len(chunk)
+        assert size < 4_000_000
+        goes_on.set()
+        assert answer.result(60)[-1]["kind"] == "answer"
+
+
+def test_that_there_is_no_room_for_connections_is_said_once(caplog: pytest.LogCaptureFixture) -> None:
+    once, loop = connections.Once(), asyncio.new_event_loop()
+    logging.getLogger("friso.app").addFilter(once)
+    try:
+        for _ in range(100):
+            context = {"message": "socket.accept()", "exception": OSError(errno.EMFILE, "Too many open files")}
+            connections.failed(loop, context)
+    finally:
+        logging.getLogger("friso.app").removeFilter(once)
+        loop.close()
+    assert [record.exc_info for record in caplog.records] == [None]
+    assert "ulimit" in caplog.records[0].getMessage()
+
+
+@pytest.mark.parametrize("path", ["/plotly.js", "/main.js", "/"])
+def test_a_browser_that_has_a_file_is_sent_it_again_only_when_it_is_another(served: Served, path: str) -> None:
+    status, headers, content = served.request("GET", path)
+    assert (status, len(content)) == (200, int(headers["Content-Length"]))
+    status, again, nothing = served.request("GET", path, If_None_Match=headers["ETag"])
+    assert (status, nothing, again["ETag"]) == (304, b"", headers["ETag"])
+    assert served.request("GET", path, If_None_Match='"another"')[2] == content
+    assert served.request("GET", "/begin")[1]["Cache-Control"] == "no-store"
 
 
 def test_the_token_is_exchanged_for_a_key_and_for_no_cookie(served: Served) -> None:
@@ -787,6 +881,36 @@ def test_an_unstable_loop_is_mentioned_while_its_answer_is_computed(served: Serv
 # ---------------------------------------------------------------- overtaken
 
 
+def test_what_is_compiled_is_told_to_those_that_wait_for_it_and_to_nobody_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To each of them once, whoever began; another browser asks for something else meanwhile."""
+    request, built = CodeRequest("shared", "a kernel of both", "no_builder", b"told to whom"), threading.Event()
+    monkeypatch.setattr(building._Job, "_built", lambda job: str(built.wait(60)))
+    monkeypatch.setattr(CodeRequest, "answer", lambda request, name: None)
+
+    def waits(work: Work) -> Iterator[dict[str, Any]]:
+        building._work().finish([request])
+        yield {}
+
+    def does_not(work: Work) -> Iterator[dict[str, Any]]:
+        built.wait(60)
+        yield {}
+
+    said: list[list[dict[str, Any]]] = [[], [], []]
+    works = [Work(lambda part, parts=parts: parts.append(part or {})) for parts in said]
+    monkeypatch.setattr(logging.getLogger("friso"), "handlers", [Messages(logging.INFO)])
+    jobs = zip(works, (waits, waits, does_not), strict=True)
+    threads = [threading.Thread(target=work.run, args=[job]) for work, job in jobs]
+    for thread in threads:
+        thread.start()
+    while not all(said[:2]):  # both wait
+        time.sleep(0.01)
+    built.set()
+    for thread in threads:
+        thread.join()
+    texts = [[part["text"] for part in parts if part.get("kind") == "message"] for parts in said]
+    assert texts == [["compiling, once on this machine, 1 of 1: a kernel of both"]] * 2 + [[]]
+
+
 def test_a_question_that_computes_nothing_does_not_wait_for_those_that_do() -> None:
     async def asked() -> list[bytes]:
         workshop, go = Workshop(), threading.Event()
@@ -855,8 +979,7 @@ def test_a_log_that_is_cut_off_by_the_end_of_the_server_is_no_error(capsys: pyte
             port, workshop = listener.getsockname()[1], Workshop()
             access = Access.at("127.0.0.1", port)
             app = application(access, {}, workshop)
-            config = uvicorn.Config(app, log_level="warning", ws="none", timeout_graceful_shutdown=0)
-            server = Server(config, workshop)
+            server = Server(app, workshop, grace=0)
             served = asyncio.create_task(server.serve([listener]))
             while not server.started:
                 await asyncio.sleep(0.001)

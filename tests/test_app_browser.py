@@ -210,26 +210,32 @@ def test_a_verdict_that_is_of_an_earlier_machine_is_shown_as_one(browsed: Browse
     """Where the new one takes longer than a moment: a kernel may have to be compiled."""
     page, held = browsed.page, []
     page.wait_for_selector("#answer .rest .note")
-    assert page.locator("#answer .case.stale").count() == 0
+    assert page.locator("#answer .old").count() == 0
     page.route("**/ask/check", lambda _: None)
     page.route("**/ask/verdict", lambda route: held.append(route))
     with page.expect_request("**/ask/verdict"):
         browsed.type("controller.crossover", "11 Hz")
-    page.wait_for_selector("#answer .case.stale")
+    page.wait_for_selector("#answer .old .case")
+    page.wait_for_selector("#answer .rest.old[inert]")
+    assert "controller.crossover as opened" in page.inner_text("#answer-part .older")
     held[0].continue_()
-    page.wait_for_selector("#answer .case:not(.stale)")
+    page.wait_for_selector("#answer :not(.old) > .case")
+    assert page.locator("#answer .rest.old[inert]").count() == 1  # the advice is of no check of this machine
+    page.click("#undo")
+    page.wait_for_selector("#answer .rest:not(.old, [inert])")
+    page.wait_for_function("() => document.querySelector('#left .older').innerText === ''")
 
 
 def test_a_picture_that_is_of_an_earlier_machine_is_shown_as_one(browsed: Browsed) -> None:
     """Where the new one takes longer than a moment, or never comes: the server may be gone."""
     page, held = browsed.page, []
-    page.wait_for_selector("#picture .figure:not(.stale)")
+    page.wait_for_selector("#picture .figure:not(.old, [inert])")
     page.route("**/ask/run", lambda route: held.append(route))
     with page.expect_request("**/ask/run"):
         browsed.type("controller.crossover", "11 Hz")
-    page.wait_for_selector("#picture .figure.stale")
+    page.wait_for_selector("#picture .figure.old[inert]")
     held[0].continue_()
-    page.wait_for_selector("#picture .figure:not(.stale)")
+    page.wait_for_selector("#picture .figure:not(.old, [inert])")
 
 
 def test_plots_that_are_drawn_late_do_not_say_that_the_machine_is_still_theirs(browsed: Browsed) -> None:
@@ -237,18 +243,20 @@ def test_plots_that_are_drawn_late_do_not_say_that_the_machine_is_still_theirs(b
     page = browsed.page
     old = page.evaluate(
         """async () => {
-            const { draw, stale } = await import('/plot.js');
+            const { draw } = await import('/plot.js');
+            const { look, mark, now } = await import('/shown.js');
             const layout = { height: 2000 };
             const figure = (name) => ({ name, title: name, caption: '', data: [], bars: [], layout, narrow: layout });
             const place = document.createElement('div');
             document.body.append(place);
             draw(place, ['one', 'two'].map(figure));
-            stale(place);
+            [...place.children].forEach((box) => mark(box, { ...now(), machine: {name: 'another'} }));
+            look();
             const due = () => [...place.querySelectorAll('.plot')].some((plot) => plot.due);
             while (due()) await new Promise((then) => setTimeout(then, 10));
             const boxes = [...place.querySelectorAll('.figure')];
             place.remove();
-            return boxes.map((box) => box.classList.contains('stale'));
+            return boxes.map((box) => box.classList.contains('old'));
         }"""
     )
     assert old == [True, True]
@@ -283,15 +291,20 @@ def test_what_is_said_early_stays_until_the_answer_is_there(browsed: Browsed) ->
     page = browsed.page
     browsed.check("9.5 Hz")
     said = page.inner_text("#answer")
-    show = "async parts => { const { progress } = await import('/answer.js'); parts.forEach(progress); }"
+    show = """async parts => {
+        const { idle, progress } = await import('/answer.js');
+        parts.forEach((part) => progress(part, 'check'));
+        idle('check');
+    }"""
     early = {"kind": "message", "text": "The loop is unstable", "lasts": True}
     page.evaluate(show, [early])
     assert page.inner_text("#answer") == said
     page.route("**/ask/check", lambda _: None)
     page.route("**/ask/verdict", lambda _: None)
     browsed.type("controller.crossover", "11 Hz")
-    page.wait_for_selector("#answer .case.stale")
-    page.evaluate(show, [early, early, {"kind": "progress", "done": 1, "total": 2, "label": "cells"}, None])
+    page.wait_for_selector("#answer .old .case")
+    page.evaluate(show, [early, early, {"kind": "progress", "done": 1, "total": 2, "label": "cells"}])
+    assert page.locator("#answer progress").count() == 0
     assert page.inner_text("#answer").count("The loop is unstable") == 1
     page.unroute_all(behavior="ignoreErrors")
     browsed.type("controller.crossover", "12 Hz")
@@ -624,6 +637,34 @@ def test_the_map_shows_the_run_under_the_pointer_and_a_click_sets_the_machine_th
     assert float(page.input_value(FIELD).split()[0]) > 15
 
 
+COVERED = """() => {
+    const plot = document.querySelector('.plot');
+    const boxes = (texts) => [...plot.querySelectorAll(texts)].map((text) => text.getBoundingClientRect());
+    const apart = (one, other) => one.right < other.left || other.right < one.left
+        || one.bottom < other.top || other.bottom < one.top;
+    const entries = boxes('[class^=legend] text');
+    const covered = (title) => !entries.every((entry) => apart(entry, title));
+    return [entries.length, boxes(".xtitle, .xtick").filter(covered).length];
+}"""
+"""How many entries a legend has, and how many titles and numbers of its axis they cover."""
+
+
+def test_places_on_a_map_are_seen_in_the_dark_and_its_legend_covers_nothing_once_resized(browsed: Browsed) -> None:
+    page = browsed.page
+    page.click("#pin")
+    page.click("#tab-map")
+    page.wait_for_function("() => document.querySelector('.plot')?.data?.some((one) => one.z?.length === 41)")
+    for width in (1600, 320, 740, 700, 1600):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_timeout(1000)
+        entries, covered = page.evaluate(COVERED)
+        assert (entries, covered) == (5, 0), width
+    page.emulate_media(color_scheme="dark")
+    marker = "document.querySelector('.plot').data.find((one) => one.name === 'this machine').marker"
+    page.wait_for_function("() => document.querySelector('.plot').layout.font.color !== '#222222'")
+    assert page.evaluate(f"[{marker}.color, {marker}.line.color]") == [INK, "white"]
+
+
 def test_an_answer_that_comes_once_another_machine_is_shown_is_not_taken_for_it(browsed: Browsed) -> None:
     page, held = browsed.page, []
     page.route("**/ask/machine", lambda route: route.continue_() if held else held.append(route))
@@ -649,6 +690,8 @@ def test_what_stops_it_says_of_which_machine_and_gives_no_other_one_its_command(
     page.click("#out")
     assert "friso tune of the rig" not in page.inner_text("#dialog")
     page.keyboard.press("Escape")
+    assert page.locator("[inert] >> text=Take over").count() == 1
+    page.click("#undo")  # the machine that it is of is shown again
     page.click("text=Take over")
     page.wait_for_selector("#machine-1 >> text=gains_the_least_change")
 
@@ -706,11 +749,11 @@ def test_the_loops_follow_a_slider_and_what_they_allow_is_said_at_its_end(browse
     with page.expect_response(re.compile("ask/loops")):
         page.eval_on_selector(slider, "one => { one.value = 300; one.dispatchEvent(new Event('input')); }")
     page.wait_for_function(f"() => !({said})()")
-    assert page.locator(".figure:not(.stale) .main-svg").count() > 0
+    assert page.locator(".figure:not(.old) .main-svg").count() > 0
     page.eval_on_selector(slider, "one => one.dispatchEvent(new Event('change'))")
     page.wait_for_function(said)
     page.wait_for_timeout(500)  # longer than it takes until a picture is shown as an old one
-    assert page.locator(".figure.stale").count() == 0
+    assert page.locator(".figure.old").count() == 0
     page.click("#undo")
     page.click("#tab-run")
     page.wait_for_selector("#picture .js-plotly-plot .main-svg")
@@ -784,6 +827,81 @@ def test_no_text_from_a_file_steers_the_page(browsed: Browsed, tmp_path: Path) -
     assert escaped(shown) == shown
 
 
+def test_a_log_that_is_refused_can_be_removed(browsed: Browsed, tmp_path: Path) -> None:
+    page = browsed.page
+    page.click("#tab-logs")
+    for other in page.locator("#picture .files button").all():  # of the test before
+        other.click()
+    (tmp_path / "none.csv").write_text("no log at all")
+    page.set_input_files("#log-files", tmp_path / "none.csv")
+    page.wait_for_selector("#picture .wrong")
+    page.set_input_files("#log-files", written(tmp_path))
+    page.wait_for_selector("#picture .files >> text=log.csv")
+    with page.expect_response(lambda response: response.request.method == "DELETE") as gone:
+        page.click("[aria-label='Remove none.csv']")
+    assert gone.value.status == 204
+    page.wait_for_selector("#role-position")
+    page.click("[aria-label='Remove log.csv']")
+    assert page.locator("#picture .files, #role-position").count() == 0
+
+
+def test_out_holds_the_machine_that_is_shown_or_waits_for_it(browsed: Browsed, tmp_path: Path) -> None:
+    """Where the server has not read what was typed last, there is no stage file of it yet."""
+    page, held = browsed.page, []
+    page.route("**/ask/machine", lambda route: held.append(route))
+    with page.expect_request(re.compile("ask/machine")):
+        browsed.type("controller.crossover", "33 Hz")
+    page.click("#out")
+    assert page.is_disabled("#dialog button:text-is('Stage file')")
+    held.pop().continue_()
+    with page.expect_download() as download:
+        page.click("#dialog button:text-is('Stage file')")
+    download.value.save_as(tmp_path / "out.toml")
+    assert friso.load(tmp_path / "out.toml").controller.crossover == pytest.approx(33)
+    page.keyboard.press("Escape")
+    cascade = Path(friso.example("twincat_cascade")).read_text(encoding="utf-8")
+    with page.expect_request(re.compile("ask/machine")):
+        page.evaluate("async text => (await import('/state.js')).add('twincat_cascade.toml', text)", cascade)
+    page.click("#out")
+    assert page.is_disabled("#dialog button:text-is('Stage file')")
+    held.pop().continue_()
+    with page.expect_download() as download:
+        page.click("#dialog button:text-is('Stage file')")
+    download.value.save_as(tmp_path / "twincat_cascade.toml")
+    assert friso.load(tmp_path / "twincat_cascade.toml").flat() == friso.load(friso.example("twincat_cascade")).flat()
+
+
+def test_the_drawing_of_another_machine_switches_nothing(browsed: Browsed) -> None:
+    page, held = browsed.page, []
+    page.route("**/ask/machine", lambda route: held.append(route))
+    with page.expect_request(re.compile("ask/machine")):
+        page.evaluate("async text => (await import('/state.js')).add('b.toml', text)", RIG.read_text() + "\n")
+    assert "thesis_rig" in page.inner_text("#left .older")
+    page.eval_on_selector("#part-lock", "one => one.dispatchEvent(new MouseEvent('click', { bubbles: true }))")
+    assert page.evaluate("document.querySelector('#keys').inert && document.querySelector('#drawing').inert")
+    assert browsed.changes() == {}
+    held.pop().continue_()
+    page.wait_for_function("() => document.querySelector('#left .older').innerText === ''")
+    page.click("#part-lock")
+    assert browsed.changes() == {"joint.locked": True}
+
+
+def test_no_progress_stays_of_what_was_abandoned(browsed: Browsed) -> None:
+    page = browsed.page
+    page.wait_for_selector("#answer .rest .note")
+    page.route("**/ask/map", lambda _: None)
+    page.click("#tab-map")
+    page.wait_for_selector("#picture progress")
+    page.evaluate(
+        """async () => (await import('/answer.js')).progress({ kind: 'progress', done: 1, total: 9, label: 'map' },
+        'picture')"""
+    )
+    assert page.locator("#answer progress").count() == 1
+    browsed.type("controller.crossover", "8 kg")
+    page.wait_for_selector("#keys .wrong")
+    assert page.locator("progress").count() == 0
+
+
 def test_two_logs_dropped_at_once_are_both_taken(browsed: Browsed) -> None:
     page = browsed.page
     page.evaluate("""() => {
@@ -793,7 +911,7 @@ def test_two_logs_dropped_at_once_are_both_taken(browsed: Browsed) -> None:
         for (const name of ["one.csv", "two.csv"]) dropped.items.add(new File([text], name));
         document.dispatchEvent(new DragEvent("drop", { dataTransfer: dropped, cancelable: true }));
     }""")
-    page.wait_for_function("() => document.getElementById('picture').innerText.includes('one.csv, two.csv')")
+    page.wait_for_function("() => document.getElementById('picture').innerText.match(/one.csv[^]*two.csv/)")
     page.wait_for_function("() => document.querySelectorAll('#picture .plot, #picture table').length")
 
 

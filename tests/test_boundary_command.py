@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from inside import friso_inside
+from pages import Page
 from refusals import Refused, Wording
 from snapshots import Snapshots
 
@@ -87,13 +88,22 @@ def test_the_document_of_one_key(single: tuple[dict, Path]) -> None:
 
 def test_the_files_of_one_key(single: tuple[dict, Path]) -> None:
     document, folder = single
-    names = {f"thesis_rig_boundary.{ending}" for ending in ("png", "svg", "pdf", "csv")}
+    names = {f"thesis_rig_boundary.{ending}" for ending in ("html", "png", "svg", "pdf", "csv")}
     assert {path.name for path in folder.iterdir()} == {*names, MARKER}
     table = pd.read_csv(folder / "thesis_rig_boundary.csv")
     special = table[table.kind.notna()].sort_values("controller.crossover [Hz]")
     assert list(special.kind) == [point["kind"] for point in document["points"]]
     assert list(special["controller.crossover [Hz]"]) == pytest.approx([point["value"] for point in document["points"]])
     assert table["error of controller.crossover [Hz]"].notna().sum() == len(special)
+
+
+def test_the_page_has_the_answer_the_figure_and_the_details(single: tuple[dict, Path]) -> None:
+    document, folder = single
+    page = Page((folder / "thesis_rig_boundary.html").read_text(encoding="utf-8"))
+    assert document["conclusion"] in page.text
+    assert page.text.count("were followed over") == len(document["branches"])
+    assert page.tags.count("figure") == 1
+    assert 'crossover = "8 Hz"' in page.text
 
 
 @pytest.mark.thorough

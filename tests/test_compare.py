@@ -528,6 +528,7 @@ def test_command_writes_page_and_figures(
         MARKER, "compare.html", "compare.pdf", "compare.png", "compare.svg",
     }  # fmt: skip
     page = Page((tmp_path / "out" / "compare.html").read_text(encoding="utf-8"))
+    assert [tag for tag in page.tags if tag in ("table", "figure")] == ["table", "figure", "table", "table"]
     snapshots.check("compare", "page", page.lines)
     snapshots.check("compare", "run", friso_inside(tmp_path, "compare", EXAMPLE, "--details").stdout)
 

@@ -60,6 +60,13 @@ def test_the_readme_is_short_and_has_the_two_lines() -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_examples_that_are_named_are_there(page: Path) -> None:
+    """And so in the wheel, which holds all of them."""
+    names = re.findall(r"\bexamples/[\w./]*\w", page.read_text(encoding="utf-8"))
+    assert [name for name in names if not (ROOT / name).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_lead_somewhere(page: Path) -> None:
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     places = re.findall(r"\]\((?!https?:|#)([^)#\s]+)", text)
@@ -146,7 +153,8 @@ def test_the_wheel_works_outside_the_repository(built: Path, tmp_path: Path) -> 
     held = [path for name in ("friso", "friso_thesis") for path in (ROOT / name).rglob("*") if path.is_file()]
     data = {path.relative_to(ROOT).as_posix() for path in held}
     data = {name for name in data if not name.endswith((".py", ".pyc"))}
-    data |= {f"friso/{path.relative_to(ROOT).as_posix()}" for path in (ROOT / "examples").rglob("*.toml")}
+    examples = [path for path in (ROOT / "examples").rglob("*") if path.is_file()]
+    data |= {f"friso/{path.relative_to(ROOT).as_posix()}" for path in examples}
     there = {path.relative_to(tmp_path / "installed").as_posix() for path in (tmp_path / "installed").rglob("*")}
     assert data - there == set()
     code = (

@@ -23,6 +23,7 @@ from pages import NAMESPACES, Page, packed_values
 from scipy.stats import binomtest
 from snapshots import Snapshots
 
+import friso
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.colours import painted, ramp, scale
 from friso.views.drawing.drawable import cell_edges, colour_key, drawable
@@ -31,7 +32,7 @@ from friso.views.map.cells import axes_of, look, pick
 from friso.views.map.data import MOST, NONE
 from friso.views.map.figures import SLICES, map_figure, map_panel
 from friso.views.map.findings import headline, statement, verification
-from friso.views.map.page import map_files, map_html
+from friso.views.map.page import map_files, map_html, marked_figure
 from friso.views.map.words import CATEGORIES, FAILED, INFERRED, INVALID, NOT_RUN, QUIET, quantity
 
 CROSSOVER, STROKE, DAMPING, LOCKED = (
@@ -433,6 +434,25 @@ def page_data(page: str) -> dict[str, Any]:
 
 def unpacked(text: str, kind: str) -> np.ndarray:
     return np.frombuffer(base64.b64decode(text), dtype=kind)
+
+
+def where(runs: xr.Dataset) -> list[float | None]:
+    """Where the machine stands on the axes of a page."""
+    return [axis["machine"] for axis in page_data(map_html(runs, "peaks", RERUN))["axes"]]
+
+
+def test_the_machine_that_was_swept_stands_in_its_map():
+    rig = friso.load(friso.example("thesis_rig"))
+    attrs = {"stage": rig.to_toml()}
+    assert where(plain(**attrs)) == [8, 1]  # Hz, mm
+    assert where(plain(**attrs, links='{"masses.cart": "0.7 * mass"}')) == [None, None]
+    assert where(plain()) == [None, None]  # whose stage is none
+    assert where(plain(stage=rig.replace({CROSSOVER: "17 Hz"}).to_toml())) == [None, 1]  # beyond the end
+    marks = {
+        name: [item.label for item in marked_figure(plain(stage=stage.to_toml()), "peaks").panels[0].markers]
+        for name, stage in {"inside": rig, "outside": rig.replace({CROSSOVER: "27 Hz"})}.items()
+    }
+    assert marks == {"inside": ["this machine"], "outside": []}
 
 
 def test_a_click_finds_every_value_of_its_cell():

@@ -72,10 +72,10 @@ class BoundaryAnswer(Answer):
         return boundary_document(self.result, self.keys)
 
     def files(self) -> Files:
-        """The figure, and the table of its points."""
+        """The page, the figure, and the table of its points."""
         from friso.views.boundary.page import boundary_files
 
-        return boundary_files(self.result, self.keys, self.stage.name, f"{self.name}_boundary")
+        return boundary_files(self.result, self.keys, self.stage, f"{self.name}_boundary")
 
 
 @question

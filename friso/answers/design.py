@@ -13,6 +13,7 @@ from friso.design_method.method import Design
 from friso.design_method.outline import outline
 from friso.design_method.prepare import assumed, by_rules, check_designable
 from friso.design_method.spec import Spec, load_spec, read_spec
+from friso.extras import need
 from friso.progress import Progress, silent
 from friso.stage import Stage, numeric_keys
 from friso.system import shell_word
@@ -117,6 +118,7 @@ def design(
     >>> import friso
     >>> friso.design(friso.example("thesis_rig"), friso.example("specs/thesis"))  # doctest: +SKIP
     """
+    need("design", "friso design")
     chosen = read_stage(stage, set, leaves_out=AS_BUILT[1:])
     check_designable(chosen)
     specification = specification_of(chosen, spec)

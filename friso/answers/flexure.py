@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from friso.answers.answer import Answer, AnswerTable, question
 from friso.answers.inputs import Changes, StageLike, read_stage, text_of, wrong
 from friso.errors import InputError
+from friso.extras import need
 from friso.leaf_springs.both_models import BothModels
 from friso.leaf_springs.mechanism import Mechanism
 from friso.progress import Progress, silent
@@ -107,6 +108,7 @@ def flexure(
     chosen = read_stage(stage, set, leaves_out=())
     mechanism = _mechanism(chosen, "" if isinstance(stage, Stage | Mapping) else str(stage))
     deflection = _stroke(stroke, chosen, mechanism)
+    need("design", "friso flexure")
     progress(0, 0, "bending the leaves")
     from friso.leaf_springs.both_models import both_models
 

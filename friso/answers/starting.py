@@ -24,9 +24,16 @@ def examples_folder() -> Path:
 
 
 def example_names() -> list[str]:
-    """The names of the examples that come with friso: stage files, and specifications after "specs/"."""
+    """The names of the examples that come with friso: stage files, specifications after "specs/", and, with their
+    endings, parameter files of drives after "drives/"."""
+    return sorted(_examples())
+
+
+def _examples() -> dict[str, Path]:
+    """The examples by their names."""
     folder = examples_folder()
-    return sorted(path.relative_to(folder).with_suffix("").as_posix() for path in folder.rglob("*.toml"))
+    named = {path.relative_to(folder): path for path in folder.rglob("*.*") if path.suffix in (".toml", ".ini")}
+    return {(name.with_suffix("") if name.suffix == ".toml" else name).as_posix(): path for name, path in named.items()}
 
 
 @check_arguments
@@ -36,12 +43,13 @@ def example(name: str) -> Path:
     Parameters
     ----------
     name : str
-        Its name, "thesis_rig" or "specs/thesis"; a wrong one is answered with all of them.
+        Its name, "thesis_rig", "specs/thesis" or "drives/linuxcnc_torque_axis.ini"; a wrong one is answered with all
+        of them.
 
     Returns
     -------
     Path
-        A stage file, or the specification of a design.
+        A stage file, the specification of a design, or the parameters of a drive.
 
     Raises
     ------
@@ -55,7 +63,7 @@ def example(name: str) -> Path:
     'Thesis rig'
     """
     stem = name.removesuffix(".toml").removeprefix("examples/")
-    return examples_folder() / f"{choice(stem, 'NAME', example_names(), 'friso example thesis_rig')}.toml"
+    return _examples()[choice(stem, "NAME", example_names(), "friso example thesis_rig")]
 
 
 @check_arguments

@@ -30,6 +30,7 @@ from friso.answers.map_study import (
 from friso.answers.output_folder import check_file, refuse_place, write
 from friso.axis import speak_of
 from friso.errors import InputError, StoreError
+from friso.extras import need
 from friso.progress import Progress, silent
 from friso.quantities import percent
 from friso.stage import Stage
@@ -231,6 +232,8 @@ def sweep(
     exports, share = _checked_exports(export), checked_share(verify)
     varied = Varied.of_texts(axes or {}, x, y, axis, link, samples, latin, log)
     store = None if out is None else place_of_store(out)
+    if scheduler is not None:
+        need("cluster", "scheduler")
     with _crew(workers, scheduler) as crew:
         resumed = Path(stage) if isinstance(stage, str | os.PathLike) and Path(stage).is_dir() else None
         if resumed is not None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from friso.answers.answer import Answer, AnswerTable, question
 from friso.answers.inputs import (
+    LOGGER,
     Changes,
     StageLike,
     Whole,
@@ -23,6 +24,7 @@ from friso.answers.inputs import (
     wrong,
 )
 from friso.errors import InputError
+from friso.extras import install, missing
 from friso.progress import Progress, silent
 from friso.quantities import Bound, Quantity, positive, quoted
 from friso.remedies import Changeable
@@ -180,6 +182,8 @@ def tune(
     goal = _goal(chosen, within, settle, force_limit, bandwidth_limit, margin, only, keep)
     whole_number(seed, "seed", 0, MOST_SEED, "1")
     correlations = correlations_of(stage, chosen)
+    if missing("design"):
+        LOGGER.warning(f"no leaf springs are sized for a joint: that takes {install('design')}")
     from friso.remedies.method import tune as tuned
 
     begins = partial(mention_unstable_loop, chosen)

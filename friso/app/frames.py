@@ -20,9 +20,9 @@ from friso.views.drawing.figure import Figure
 def frame(value: Any) -> bytes:
     """A value of dictionaries, lists, texts, numbers and NumPy arrays, as a frame. What is not finite is null; in
     arrays, NaN."""
-    arrays: list[bytes] = []
+    arrays = _Arrays()
     text = json.dumps(_plain(value, arrays), separators=(",", ":"), allow_nan=False).encode()
-    numbers = b"".join(arrays)
+    numbers = b"".join(arrays.parts)
     return struct.pack("<II", len(text), len(numbers)) + text + numbers
 
 
@@ -37,10 +37,23 @@ def figure_on_page(figure: Figure) -> dict[str, Any]:
     }
 
 
-def _plain(value: Any, arrays: list[bytes]) -> Any:
+class _Arrays:
+    """The numbers of a frame, array by array."""
+
+    def __init__(self) -> None:
+        self.parts: list[bytes] = []
+        self.size = 0
+
+    def add(self, numbers: bytes) -> int:
+        """Add an array; the place of its first byte."""
+        place, self.size = self.size, self.size + len(numbers)
+        self.parts.append(numbers)
+        return place
+
+
+def _plain(value: Any, arrays: _Arrays) -> Any:
     if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size:
-        place = sum(map(len, arrays))
-        arrays.append(np.ascontiguousarray(value, "<f4").tobytes())
+        place = arrays.add(np.ascontiguousarray(value, "<f4").tobytes())
         return {"array": place, "shape": [*value.shape]}
     if isinstance(value, dict):
         return {str(name): _plain(item, arrays) for name, item in value.items()}

@@ -26,7 +26,7 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-"""What goes with every response."""
+"""What goes with every response that says nothing else of the same."""
 
 REFUSED = (
     "friso app answers only the browser that was opened with the address it printed: open that address. "
@@ -51,6 +51,9 @@ ENTRY = "/enter"
 
 TOKEN = "friso-token"
 """The header that has a token."""
+
+LET_IN = "friso.let_in"
+"""Stands in the scope of a request that came with a key."""
 
 BEARER = "Bearer "
 """What stands before a key in the header `Authorization`. Browsers add none of their own accord, as they do with
@@ -134,7 +137,9 @@ class Gate:
 
         async def guarded(message: Message) -> None:
             if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).update(HEADERS)
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers.setdefault(name, value)
             await send(message)
 
         own = self._own(scope) if scope["type"] == "http" else _refused()
@@ -151,7 +156,10 @@ class Gate:
         if path == ENTRY and scope["method"] == "POST":
             session = access.session_of(headers.get(TOKEN, ""), key)
             return JSONResponse({"key": session}) if session else _refused()
-        return None if path in self.public or access.has(key) else _refused()
+        if access.has(key):
+            scope[LET_IN] = True
+            return None
+        return None if path in self.public else _refused()
 
 
 def _refused() -> Response:

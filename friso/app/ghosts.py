@@ -1,16 +1,13 @@
-"""What stands in a figure beside its own: the pinned machine in grey; on maps, machines and the edge of hunting."""
+"""What stands in a figure beside its own: the pinned machine in grey; on maps, the edge of hunting."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from friso.stage import Stage
-from friso.views.drawing.figure import GREY, INK, Figure, Markers, Panel
+from friso.views.drawing.figure import Figure, Panel
 
 if TYPE_CHECKING:
     from friso.answers.answer import Answer
@@ -48,18 +45,6 @@ _OWN = re.compile(r" \(as given\)|, \S+ k?Hz$")
 
 def _subject(panel: Panel) -> tuple[str, str, str]:
     return _OWN.sub("", panel.title), panel.x.label, panel.y.label
-
-
-def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Sequence[str]) -> Figure:
-    """A map over two keys with the places of some stages, by label, that have both."""
-    markers = []
-    for label, stage in stands:
-        right, up = (stage.flat().get(key) for key in keys)
-        if isinstance(right, float) and isinstance(up, float):
-            colour = GREY if label == "pinned" else INK
-            markers.append(Markers(np.array([right]), np.array([up]), label, colour, "target"))
-    panels = tuple(replace(panel, markers=(*panel.markers, *markers)) for panel in figure.panels)
-    return replace(figure, panels=panels)
 
 
 def with_edge(figure: Figure, edge: Answer | None) -> Figure:

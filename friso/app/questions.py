@@ -13,7 +13,7 @@ import friso
 from friso.app import machine as machines
 from friso.app.archive import archive
 from friso.app.frames import figure_on_page
-from friso.app.ghosts import ghosts_of, with_edge, with_places
+from friso.app.ghosts import ghosts_of, with_edge
 from friso.app.kept import KeptAnswers
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine
@@ -26,6 +26,7 @@ from friso.stage import Stage
 from friso.stage.stage import numeric_keys
 from friso.views.check.cases import case_labels
 from friso.views.drawing.figure import Figure
+from friso.views.map.places import SHOWN, with_places
 
 if TYPE_CHECKING:
     from friso.answers.answer import Answer
@@ -470,7 +471,7 @@ def _ghosts(asked: PageRequest, work: Work, function: Callable[..., Answer]) -> 
 def _stands(asked: PageRequest) -> list[tuple[str, Stage]]:
     """The machines whose places a map shows."""
     pinned = [("pinned", asked.pinned.stage)] if asked.pinned else []
-    return [("this machine", asked.machine.stage), *pinned]
+    return [(SHOWN, asked.machine.stage), *pinned]
 
 
 def _given(stage: Stage) -> str:

@@ -14,8 +14,10 @@ from pathlib import Path
 from types import FrameType
 
 import uvicorn
+from starlette.types import ASGIApp
 
 from friso.answers.starting import example
+from friso.app.connections import MOST, Connection, Once, failed
 from friso.app.gate import LOOPBACK, Access
 from friso.app.server import application
 from friso.app.work import Workshop
@@ -29,6 +31,9 @@ PORT = 8741
 GRACE = 2
 """How long [s] the end of questions at work is waited for at most: overtaken, they end within 0.1 s, unless they are in
 the middle of a figure or a solution."""
+
+LOGS = ("uvicorn.error", "asyncio", "friso.app")
+"""Whose messages anybody who reaches the server can bring about."""
 
 TRIES = 20
 """Ports that are tried beyond it, where it is taken."""
@@ -55,8 +60,7 @@ def serve(stage: Path | None, host: str, port: int | None, insecure: bool, brows
         webbrowser.open(f"{address}{access.token_for_once()}")
     workshop = Workshop()
     app = application(access, begin, workshop)
-    config = uvicorn.Config(app, log_level="warning", ws="none", lifespan="on", timeout_graceful_shutdown=GRACE)
-    server = Server(config, workshop)
+    server = Server(app, workshop)
     server.run([listener])
     if server.ended_by:
         signal.raise_signal(server.ended_by)
@@ -66,9 +70,20 @@ class Server(uvicorn.Server):
     """Ends the questions at work before it waits for their answers, and itself in good order for any signal, which is
     the command's own once the server has ended."""
 
-    def __init__(self, config: uvicorn.Config, workshop: Workshop) -> None:
+    def __init__(self, app: ASGIApp, workshop: Workshop, grace: int = GRACE) -> None:
+        config = uvicorn.Config(
+            app,
+            log_level="warning",
+            loop="asyncio",
+            http=Connection,
+            ws="none",
+            lifespan="on",
+            timeout_graceful_shutdown=grace,
+            backlog=MOST,  # so many are taken before those that make way have ended
+        )
         super().__init__(config)
         self.workshop = workshop
+        self.once = Once()
         self.ended_by = 0
 
     @contextmanager
@@ -88,6 +103,13 @@ class Server(uvicorn.Server):
         self.ended_by = self.ended_by or sig
         self.should_exit = True
 
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begin, and from here on say once what goes wrong again and again."""
+        asyncio.get_running_loop().set_exception_handler(failed)
+        for name in LOGS:
+            logging.getLogger(name).addFilter(self.once)
+        await super().startup(sockets)
+
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """End what is asked, and then the connections; a log that is still coming is cut off, which is no error."""
         self.workshop.overtake()
@@ -100,6 +122,8 @@ class Server(uvicorn.Server):
                 await asyncio.wait(cut_off, timeout=GRACE)
         finally:
             errors.setLevel(usual)
+            for name in LOGS:
+                logging.getLogger(name).removeFilter(self.once)
 
 
 def listening(host: str, port: int | None) -> socket.socket:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from functools import partial
+from functools import cache, partial
+from hashlib import sha256
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
@@ -113,19 +114,43 @@ async def _page(request: Request) -> Response:
     name, held = request.path_params.get("file", "index.html"), _page_files()
     if name not in held:
         return _refused("there is no such page", 404)
-    return Response(held[name].read_bytes(), media_type=KINDS[_suffix(name)])
+    return _file(request, held[name].read_bytes(), KINDS[_suffix(name)])
 
 
 async def _plotly(request: Request) -> Response:
     """plotly.js as the package plotly has it."""
-    return Response(files("plotly").joinpath("package_data", "plotly.min.js").read_bytes(), media_type=KINDS[".js"])
+    return _file(request, _plotly_js(), KINDS[".js"])
+
+
+@cache
+def _plotly_js() -> bytes:
+    return files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()
+
+
+CHUNK = 65536
+"""Bytes of a file that wait for a reader who is slow: the rest stays where it is."""
+
+
+def _file(request: Request, content: bytes, kind: str) -> Response:
+    """A file of the page, in chunks, or only that the browser has this very content already."""
+    mark = f'"{sha256(content).hexdigest()}"'
+    headers = {"ETag": mark, "Cache-Control": "no-cache"}  # which is to ask whether it is still the same
+    if mark in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+
+    async def chunks() -> AsyncIterator[bytes]:
+        for start in range(0, len(content), CHUNK):
+            yield content[start : start + CHUNK]
+
+    headers["Content-Length"] = str(len(content))
+    return StreamingResponse(chunks(), headers=headers, media_type=kind)
 
 
 async def _json(request: Request) -> dict[str, Any]:
     """The JSON object in the body of a request. Raises InputError."""
     if request.headers.get("content-type", "").partition(";")[0] != "application/json":
         raise InputError("Content-Type", request.headers.get("content-type", "nothing")[:60], "application/json")
-    body = b""
+    body = bytearray()
     async for chunk in request.stream():
         body += chunk
         if len(body) > MOST_BYTES:

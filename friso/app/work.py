@@ -8,8 +8,8 @@ import time
 import traceback
 from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, nullcontext
-from contextvars import ContextVar, copy_context
+from contextlib import contextmanager, nullcontext, suppress
+from contextvars import copy_context
 from dataclasses import dataclass, field
 from threading import Lock
 from typing import Any
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from friso.app.frames import frame
-from friso.engine.overtaken import Overtaken, ended_by, go_on, going_first
+from friso.engine.overtaken import ASKER, Overtaken, ended_by, go_on, going_first
 from friso.errors import InputError
 
 Job = Callable[["Work"], Iterator[dict[str, Any]]]
@@ -62,7 +62,7 @@ class Work:
 
     def run(self, job: Job) -> None:
         """Do the job, in this thread, and put what comes of it; None is put last."""
-        token = _AT_WORK.set(self)
+        token = ASKER.set(self)
         try:
             with ended_by(self.flag):
                 go_on()
@@ -83,34 +83,28 @@ class Work:
                 traceback.print_exc()
                 self.put({"kind": "failed", "key": "", "text": f"the computation could not be completed: {error}"})
         finally:
-            _AT_WORK.reset(token)
+            ASKER.reset(token)
             self.put(None)
 
 
-_AT_WORK: ContextVar[Work | None] = ContextVar("work", default=None)
-
-
 class Messages(logging.Handler):
-    """Hands what friso logs to the question that is at work: it stands below the answer; what is said in other threads,
-    and of kernels that are compiled, is passing, and is shown in all questions meanwhile."""
-
-    def __init__(self, works: Workshop) -> None:
-        super().__init__(logging.INFO)
-        self.works = works
+    """Hands what friso logs to the question that asked for it, and to no other one: it stands below the answer; what is
+    said of kernels that are compiled is passing."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Hand a message on."""
-        work, text = _AT_WORK.get(), record.getMessage()
-        lasts = work is not None and not record.name.startswith("friso.engine")
-        if work is not None and lasts:
+        work, text = ASKER.get(), record.getMessage()
+        if not isinstance(work, Work):
+            return
+        lasts = not record.name.startswith("friso.engine")
+        if lasts:
             (work.meanwhile if getattr(record, "meanwhile", False) else work.notes).append(text)
-        for listener in [work] if work is not None else [*self.works.lanes.values()]:
-            listener.put({"kind": "message", "text": text, "lasts": lasts})
+        work.put({"kind": "message", "text": text, "lasts": lasts})
 
 
 def _import_libraries() -> None:
     """Import what cannot be imported by two threads at once: its modules import one another."""
-    with _IMPORTING:
+    with _IMPORTING, suppress(ImportError):  # of an extra; xarray imports it where it is installed
         import dask.array  # noqa: F401
 
 
@@ -157,7 +151,7 @@ class Workshop:
     @contextmanager
     def listening(self) -> Iterator[None]:
         """Hand what friso logs to the questions that it is about."""
-        log, messages = logging.getLogger("friso"), Messages(self)
+        log, messages = logging.getLogger("friso"), Messages(logging.INFO)
         log.addHandler(messages)
         level = log.level
         log.setLevel(logging.INFO)

@@ -19,7 +19,7 @@ from threading import Lock, Semaphore, Thread
 from filelock import FileLock, Timeout
 
 from friso.engine.cache import CodeRequest, Compiled, cache_folder, leave_cache, logger
-from friso.engine.overtaken import Overtaken, go_on
+from friso.engine.overtaken import ASKER, Overtaken, go_on
 from friso.engine.prune import prune
 from friso.helper_process import HelperProcess
 from friso.progress import WORK_CLOCK
@@ -134,6 +134,8 @@ def _wait(jobs: list[_Job]) -> None:
     while waiting:
         go_on()
         done, waiting = wait(waiting, _PATIENCE, FIRST_EXCEPTION)
+        for job in jobs:
+            job.announce()
         for met in done:
             met.result()
 
@@ -145,6 +147,7 @@ class _Job:
     def __init__(self, request: CodeRequest, place: str, cores: Semaphore) -> None:
         self.request, self.met, self.waiting = request, Future[None](), 0
         self.builds = self.given_up = False
+        self._announced: set[object] = set()
         self._place, self._cores = place, cores
         self._builder: _Builder | None = None
 
@@ -154,12 +157,18 @@ class _Job:
         if builder := self._builder:
             builder.kill()
 
+    def announce(self) -> None:
+        """Tell whoever waits for it, once, that it is being built."""
+        asker = ASKER.get()
+        if self.builds and asker not in self._announced:
+            self._announced.add(asker)
+            logger.warning("compiling, once on this machine, %s: %s", self._place, self.request.title)
+
     def meet(self) -> None:
         """Meet the request."""
         with self._held(self.request.lock()):
             if self.request.entry() is None:  # no other process has built it meanwhile
                 with self._core():
-                    logger.warning("compiling, once on this machine, %s: %s", self._place, self.request.title)
                     self.request.answer(self._built())
 
     @contextmanager

@@ -23,6 +23,10 @@ class Overtaken(BaseException):
 _FLAG: ContextVar[np.ndarray | None] = ContextVar("flag", default=None)
 
 
+ASKER: ContextVar[object] = ContextVar("asker", default=None)
+"""Who asks for what is computed: a question of the app, which is told of it alone; None on the command line."""
+
+
 def current_flag() -> np.ndarray:
     """The flag, shape (1,), by which runs are cancelled now: that of `ended_by`, or one that nobody sets."""
     flag = _FLAG.get()

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import exudyn
 import numpy as np
 
 from friso.leaf_springs import plate
@@ -37,6 +36,8 @@ class LeafBeams:
 
     def __init__(self, mechanism: Mechanism, elements: int = ELEMENTS) -> None:
         self.count, self.nodes = int(mechanism.leaves), elements + 1
+        import exudyn  # of an extra
+
         self._container: Any = exudyn.SystemContainer()
         self._system: Any = self._container.AddSystem()
         _add_leaf(self._system, mechanism, elements)
@@ -172,6 +173,8 @@ def _section(mechanism: Mechanism, h: float, curl: float, twist: float) -> Any:
     torsion = mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness) / twist
     edgewise, flatwise = (1 / (1 / shear + h**2 / (12 * bending)) for shear, bending in shears)
     bulge = mechanism.area * h**2 / 6
+    import exudyn
+
     section: Any = exudyn.BeamSection()
     section.stiffnessMatrix = np.diag([axial(mechanism), edgewise, flatwise, torsion, weak, strong])
     section.massPerLength = mechanism.density * mechanism.area

@@ -17,6 +17,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import last_corner
 from friso.equations.structure import structure
 from friso.errors import InputError, StageError
+from friso.extras import missing
 from friso.frequency.crossover import Limits, limits
 from friso.hunting import Case
 from friso.progress import Progress, silent
@@ -75,7 +76,7 @@ FAR, FEW = 0.5, 0.2
 share of those that may miss the goal."""
 
 
-Unmade = Literal["rotary", "mode", "none"]
+Unmade = Literal["rotary", "mode", "extra", "none"]
 """Why no leaf springs make a joint: the axis turns; the machine has a parasitic mode of its own, beside which the stage
 cannot have that of leaf springs; or none of the usual sizes bears the stroke."""
 
@@ -269,6 +270,8 @@ class _Session:
             self.unmade[remedy.name] = "rotary"
         elif self.stage.parasitic and not self.stage.joint:
             self.unmade[remedy.name] = "mode"
+        elif missing("design"):
+            self.unmade[remedy.name] = "extra"
         elif (stage := leaves_for_joint(outcome.stage, self.stage)) is None:
             self.unmade[remedy.name] = "none"
         else:

@@ -16,6 +16,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.resources import files
 from pathlib import Path
 
+from friso.extras import EXTRAS, install
 from friso.leftovers import temporary_folder
 from friso.stage import Stage
 from friso.stage.files import loads
@@ -80,10 +81,12 @@ def _packages() -> Iterator[DoctorCheck]:
         except PackageNotFoundError:
             if extra is None:
                 yield DoctorCheck("packages", f"{name} is missing", False, f"pip install {name}")
+            elif extra[1] in EXTRAS:
+                yield DoctorCheck(f"extra {extra[1]}", f"{name} is not installed; for it: {install(extra[1])}")
             elif extra[1] not in DEVELOPMENT:
-                yield DoctorCheck(f"{extra[1]} files", f'not installed; for them: pip install "friso[{extra[1]}]"')
+                yield DoctorCheck(f"{extra[1]} files", f"not installed; for them: {install(extra[1])}")
             continue
-        if extra is None:
+        if extra is None or extra[1] in EXTRAS:
             present.append(installed)
         elif extra[1] not in DEVELOPMENT:
             yield DoctorCheck(f"{extra[1]} files", f"read by {installed}")

@@ -8,6 +8,7 @@ others than were entered is run again.
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import math
 import os
@@ -105,30 +106,39 @@ class Store:
 
     def _fill(self, folder: Path) -> None:
         """Write the store without results into a folder that is not there yet."""
-        import dask.array as da
         import xarray as xr
+        import zarr
         from numcodecs import CRC32
 
-        study = self.study
-        kinds = {name: WORDS.get(name, "f8") for name in study.metrics}
-        # One lazy chunk stands for the whole array, whatever its size; none of it is ever computed.
-        empty = {
-            name: da.full(study.shape, "" if name in WORDS else np.nan, chunks=-1, dtype=kind)
-            for name, kind in kinds.items()
+        study, coordinates = self.study, self.study.coordinates()
+        # Arrays of a single empty cell, which is not written, are then given their size: none of it is ever computed.
+        cells = {
+            name: np.full((1,) * len(study.names), "" if name in WORDS else np.nan, WORDS.get(name, "f8"))
+            for name in study.metrics
         }
         variables = {
-            name: (study.names, array, attributes_of(name, study.stage.axis_kind)) for name, array in empty.items()
+            name: (study.names, cell, attributes_of(name, study.stage.axis_kind)) for name, cell in cells.items()
         }
         checked = {"filters": [CRC32()]}  # for whoever reads a part of it
         encoding: dict[str, dict[str, Any]] = {name: {"chunks": self.blocks, **checked} for name in study.metrics}
-        coordinates = study.coordinates()
-        encoding |= dict.fromkeys(coordinates, checked)
         for name in UNITS:
             if name in encoding:
                 encoding[name]["_FillValue"] = np.nan
-        template = xr.Dataset(variables, coords=coordinates, attrs=study.attributes())
+        own: dict[str, dict[str, Any]] = dict.fromkeys(coordinates, checked)
+        parts = [(xr.Dataset(coords=coordinates), own, "w"), (xr.Dataset(variables), encoding, "a")]
         try:
-            template.to_zarr(folder, mode="w", compute=False, encoding=encoding, zarr_format=_FORMAT, consolidated=True)
+            with zarr.config.set({"array.write_empty_chunks": False}):
+                for part, how, mode in parts:
+                    part = part.assign_attrs(study.attributes())
+                    part.to_zarr(folder, mode=mode, encoding=how, zarr_format=_FORMAT, consolidated=False)  # type: ignore[call-overload]
+            indent = zarr.config.get("json_indent")
+            for name in study.metrics:  # Zarr's own resize would list all chunks that there may be
+                place = folder / name / ".zarray"
+                array = json.loads(place.read_text(encoding="utf-8"))
+                place.write_text(
+                    json.dumps({**array, "shape": study.shape}, indent=indent), encoding="utf-8", newline=""
+                )
+            zarr.consolidate_metadata(str(folder), zarr_format=_FORMAT)
         except OSError:
             _let_zarr_finish()
             raise

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
 from friso.answers.inputs import tolerance_of
+from friso.extras import need
 from friso.progress import Progress, silent
 from friso_thesis.studies.thesis.plausible import DRAWS
 from friso_thesis.studies.thesis.reproduce import POINTS, Reproduction
@@ -136,6 +137,7 @@ def reproduce(
     >>> import friso
     >>> friso.reproduce(["isolator-crossover"], points=21)  # doctest: +SKIP
     """
+    need("design", "friso reproduce")
     from friso_thesis.studies.thesis.kept import Kept
     from friso_thesis.studies.thesis.laws import conclusions_by_law
     from friso_thesis.studies.thesis.reproduce import reproduce as reproduced

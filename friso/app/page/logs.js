@@ -27,8 +27,23 @@ export class Logs {
         problems.push(`${file.name}: ${error.message}.`);
       }
     }
-    this.status.replaceChildren(...paragraphs([this.files.map((file) => file.name).join(", "), ...problems]));
+    this.list(problems);
     if (this.files.length) this.look();
+  }
+
+  /** The files by their names, each of which can be taken away, and what is wrong with others. */
+  list(problems = []) {
+    const item = (file) => el("li", {}, file.name, el("button", { type: "button", class: "plain", "aria-label": `Remove ${file.name}`, onclick: () => this.remove(file) }, "Remove"));
+    this.status.replaceChildren(el("ul", { class: "files" }, ...this.files.map(item)), ...paragraphs(problems));
+  }
+
+  /** A file is taken away, such as one that was refused. */
+  remove(file) {
+    if (this.files.length === 1) return this.forget();
+    this.files.splice(this.files.indexOf(file), 1);
+    drop(file.id);
+    this.list();
+    this.look();
   }
 
   kept(file) {
@@ -70,7 +85,11 @@ export class Logs {
     };
     this.dt = el("input", { type: "text", id: "sample-time", placeholder: "e.g. 1 ms", value: this.dt?.value ?? "", onchange: () => this.look() });
     this.assumed = el("input", { type: "checkbox", id: "assumed", checked: this.assumed?.checked ?? false });
-    const start = () => shownAnswer(this.result, "logs", "identify", () => this.options({ assumed: this.assumed.checked }), this.tell);
+    const start = () => {
+      const assumed = this.assumed.checked;
+      const about = assumed ? `With ${this.sent().machine.name} as what is known:` : "";
+      shownAnswer(this.result, "logs", "identify", () => this.options({ assumed }), this.tell, about);
+    };
     const fields = [
       ...roles.map(choice),
       el("label", {}, "sample time", this.dt),
@@ -99,7 +118,7 @@ export class Logs {
     this.roles.clear();
     this.measures.clear();
     this.input.value = "";
-    this.status.textContent = "";
+    this.status.replaceChildren();
     this.form.replaceChildren();
     this.result.replaceChildren();
   }

@@ -1,36 +1,44 @@
 // A question that takes long, with its progress, an end, its answer, and the machines that it gives.
 import { el } from "./dom.js";
 import { draw } from "./plot.js";
+import { mark, now } from "./shown.js";
 import { paragraphs, table } from "./tables.js";
 import { ask, end } from "./wire.js";
 import { Working } from "./working.js";
 
-/** Ask on a lane, and show progress and answer in a place; resolves to the answer, or null. */
-export async function shownAnswer(place, lane, question, body, tell) {
+/** Ask on a lane, and show progress and answer in a place; resolves to the answer, or null. What is asked is `about` the machine shown,
+ * in these words, or with "" about none. */
+export async function shownAnswer(place, lane, question, body, tell, about = "") {
+  const version = now();
   const working = new Working();
   working.show({ kind: "progress", label: "begun" });
   const stop = el("button", { type: "button", onclick: () => { end(lane); place.replaceChildren(); } }, "Stop");
-  place.replaceChildren(working.place, stop);
-  const asked = body();
-  const answer = await ask(question, asked, lane, (part) => working.show(part));
+  const words = paragraphs([about].filter(Boolean));
+  place.replaceChildren(...words, working.place, stop);
+  const answer = await ask(question, body(), lane, (part) => working.show(part));
+  const failed = (text) => place.replaceChildren(...words, el("p", { class: "wrong note", role: "alert" }, text));
   if (!answer) {
-    if (place.contains(working.place)) place.replaceChildren(el("p", { class: "wrong note", role: "alert" }, "There is no answer: the server was gone. Ask again."));
+    if (place.contains(working.place)) failed("There is no answer: the server was gone. Ask again.");
     return null;
   }
   if (answer.kind !== "answer") {
-    place.replaceChildren(el("p", { class: "wrong note", role: "alert" }, answer.text));
+    failed(answer.text);
     return null;
   }
   const take = ({ name, toml }) => el("button", { type: "button", class: "take", onclick: () => tell.take(name, toml) }, `Take over: ${name}`);
   const plots = el("div", {});
-  place.replaceChildren(
+  const shown = el(
+    "div",
+    {},
     ...paragraphs([...answer.sentences, answer.failure, ...answer.notes].filter(Boolean)),
     el("div", { class: "form" }, ...(answer.ways ?? []).map(take)),
     ...answer.tables.map(table),
     plots,
     ...paragraphs(answer.details),
   );
+  place.replaceChildren(...words, shown);
   draw(plots, answer.figures);
-  if (JSON.stringify(body().machine) === JSON.stringify(asked.machine)) tell.shown(answer, lane);
+  if (about) mark(shown, version);
+  tell.shown(answer, lane, version);
   return answer;
 }

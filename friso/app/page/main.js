@@ -5,17 +5,17 @@ import { drawing } from "./drawing.js";
 import { edit, forgetRanges, keys, refuse, typing, worded } from "./keys.js";
 import { out, save } from "./out.js";
 import { Pictures } from "./pictures.js";
+import { DRAWING, FIELDS, isNow, look, mark, now } from "./shown.js";
 import * as machines from "./state.js";
 import { tour } from "./tour.js";
-import { ask, end, first, Live, OLD_AFTER, onReach } from "./wire.js";
+import { ask, end, first, Live, onIdle, onReach } from "./wire.js";
 
 const CHECKED_AFTER = 500;
 let shown = null; // the machine as the server describes it
+let seen = null; // which version of it that is
 let chosen = "controller";
 let wrong = null;
-let given = new Map(); // the answers about this machine, by the tabs of their pictures
 let timer = 0;
-let aging = 0;
 let held = "";
 let begun = false;
 let late = false; // what is on the left is drawn again once that takes nothing from under the hand
@@ -29,33 +29,20 @@ const pictures = new Pictures(sent, {
   set: (values) => set(values),
   worded: withUnits,
   progress: answers.progress,
-  shown: (part, tab) => given.set(tab, part),
+  shown: (part, tab, version) => version.answers.set(tab, part),
   take: (name, toml) => machines.add(`${name.replaceAll(/\W+/g, "_")}.toml`, toml, true),
-  check: () => (given.has("check") ? pictures.checked(given.get("check")) : check()),
+  check: () => (now().answers.has("check") ? pictures.checked(now().answers.get("check"), now()) : check()),
 });
 
 const form = new Live("machine", "machine", 2000, described);
-const verdict = new Live("verdict", "verdict", 5000, (part, tag) => {
-  if (tag.machine !== machines.current()) return; // another one is shown by now
-  if (part.kind === "message") return answers.progress(part);
-  if (part.kind === "failed") return refused(part.text);
+const verdict = new Live("verdict", "verdict", 5000, (part, version) => {
+  if (version.machine !== machines.current()) return; // another one is shown by now
+  if (part.kind === "message") return answers.progress(part, "verdict");
+  if (part.kind === "failed") return answers.refused(part.text, version);
   if (part.kind !== "answer") return; // what is wrong with the machine is said where it was set
-  answers.quick(part);
-  if (tag.given === machines.changes()) clearTimeout(aging);
-  else age();
-  answers.note(part.verdict, tag, machines.back);
+  answers.quick(part, version);
+  answers.note(part.verdict, version, machines.back);
 });
-
-/** Unless a new answer comes soon, the one that is there is shown as that of an earlier machine. */
-function age() {
-  clearTimeout(aging);
-  aging = setTimeout(answers.earlier, OLD_AFTER);
-}
-
-function refused(text) {
-  clearTimeout(aging);
-  answers.refused(text);
-}
 
 function withUnits(values) {
   const all = shown.tables.flatMap((table) => table.keys);
@@ -74,39 +61,35 @@ function changed(dragged) {
   if (!machine) return;
   clearTimeout(timer);
   end("check");
-  age();
-  given = new Map();
-  answers.progress(null);
-  if (shown && drawn.machine !== machine) {
-    answers.earlier();
-    pictures.earlier();
-  }
+  answers.changed();
+  look();
+  if (drawn.machine !== machine) document.title = plain(`${machine.name}: friso`);
   if (shown && held === machine.text && !wrong) {
     follow(dragged);
     if (dragged) return;
-  }
-  form.ask({ machine: machines.sent() }, machine);
+  } else pictures.halt();
+  form.ask({ machine: machines.sent() }, now());
 }
 
 /** The picture follows the machine, and then the verdict: both at once would be slower. */
 function follow(dragged) {
-  const tag = { machine: machines.current(), given: machines.changes() };
-  const machine = machines.sent();
-  pictures.changed(dragged, () => verdict.ask({ machine }, tag));
+  const version = now();
+  pictures.changed(dragged, () => verdict.ask({ machine: version.sent }, version));
 }
 
 /** The server has read the machine, or refused it. */
-function described(part, machine) {
+function described(part, version) {
+  const { machine } = version;
+  if (part.kind === "answer") version.described = part;
+  if (part.kind !== "message") version.settle(part);
   if (machine !== machines.current()) return; // another one is shown by now, and asked about
   if (part.kind === "refused" || part.kind === "failed") {
     wrong = { keys: part.key.split(", "), text: part.text };
     end("check");
-    answers.progress(null);
-    if (!shown || held !== machine.text) return without(part);
+    if (!shown || held !== machine.text) return without(part, version);
     usable();
     left();
-    if ($("keys").querySelector(".wrong")) answers.earlier();
-    else refused(part.text);
+    if (!$("keys").querySelector(".wrong")) answers.refused(part.text, version);
     return;
   }
   if (part.kind !== "answer") return;
@@ -114,6 +97,7 @@ function described(part, machine) {
   const another = wrong !== null || opened;
   wrong = null;
   shown = part;
+  seen = version;
   usable();
   if (opened) {
     held = machine.text;
@@ -121,8 +105,7 @@ function described(part, machine) {
   }
   document.title = plain(`${part.title || machine.name}: friso`);
   left();
-  pictures.machine = part;
-  pictures.bar();
+  pictures.described(part, version);
   if (opened) pictures.opened();
   if (another) follow(machines.dragging());
   clearTimeout(timer);
@@ -133,8 +116,8 @@ function described(part, machine) {
 const usable = () => ["out", "pin"].forEach((id) => ($(id).disabled = !shown || wrong !== null));
 
 /** A file that holds no machine: nothing of another one stays beside it, and its text can be mended here, unless it was the server that failed. */
-function without(part) {
-  const { name, text: toml } = machines.current();
+function without(part, version) {
+  const { name, text: toml } = version.machine;
   shown = null;
   held = "";
   late = false;
@@ -143,32 +126,35 @@ function without(part) {
   usable();
   document.title = plain(`${name}: friso`);
   $("drawing").replaceChildren();
+  mark($("drawing"), version, DRAWING);
+  mark($("keys"), version, FIELDS);
   const again = part.kind === "failed";
   const onclick = again ? () => changed(false) : () => edit(toml, (mended) => machines.add(name, mended, true));
   $("keys").replaceChildren(el("button", { type: "button", onclick }, again ? "Ask again" : "Edit the file"));
-  refused(part.text);
+  answers.refused(part.text, version);
 }
 
 async function check(draws) {
-  const asked = { machine: machines.current(), given: machines.changes() };
-  const part = await ask("check", pictures.body(draws ? { draws } : {}), "check", (item) => item.kind !== "answer" && answers.progress(item));
-  if (!part) return;
-  answers.progress(null);
-  if (part.kind !== "answer") return refused(part.text);
+  const version = now();
+  const part = await ask("check", pictures.body(draws ? { draws } : {}), "check", (item) => item.kind !== "answer" && answers.progress(item, "check"));
+  if (!part || !isNow(version)) return;
+  if (part.kind !== "answer") return answers.refused(part.text, version);
   verdict.stop();
-  clearTimeout(aging);
-  answers.whole(part, shown.uncertain.length ? check : null);
-  answers.note(part.verdict, asked, machines.back); // it may come before the quick verdict, which is then not asked for
-  given.set("check", part);
-  pictures.checked(part);
+  answers.whole(part, version, shown.uncertain.length ? check : null);
+  answers.note(part.verdict, version, machines.back); // it may come before the quick verdict, which is then not asked for
+  version.answers.set("check", part);
+  pictures.checked(part, version);
 }
 
 function redraw() {
-  const image = drawing(shown, chosen, choose, (locked) => set({ "joint.locked": locked }));
+  const { machine } = seen;
+  const image = drawing(shown, chosen, choose, (locked) => machine === machines.current() && set({ "joint.locked": locked }));
   anew($("drawing"), () => $("drawing").replaceChildren(image));
+  mark($("drawing"), seen, DRAWING);
 }
 
 function left() {
+  if (held !== machines.current().text) return; // what the server described is another machine
   late = pressed && !machines.dragging(); // what is clicked would go before the click
   if (late) return;
   redraw();
@@ -181,8 +167,17 @@ function left() {
     set: (path, value, dragged = false) => machine === machines.current() && set({ [path]: value }, dragged),
     hold: machines.hold,
     release: machines.release,
-    edit: () => edit(shown.toml, (text) => machines.add(machines.current().name, text, true)),
+    edit: editText,
   });
+  mark($("keys"), now(), FIELDS);
+}
+
+/** The text of the machine as it is set now, which the server may not have written yet. */
+async function editText() {
+  const version = now();
+  if (!version.described) await version.read;
+  if (!version.described || !isNow(version) || $("dialog").open) return;
+  edit(version.described.toml, (text) => machines.add(version.machine.name, text, true));
 }
 
 const caughtUp = () => setTimeout(() => late && left());
@@ -253,7 +248,11 @@ function wire() {
   });
   $("file").addEventListener("change", () => opened([...$("file").files]));
   $("tour").addEventListener("click", () => tour());
-  $("out").addEventListener("click", () => out({ machine: { name: machines.current().name, toml: shown.toml }, answer: given.get(pictures.shown) ?? given.get("check"), link: machines.link, files: report }));
+  $("out").addEventListener("click", () => {
+    const version = now();
+    const answer = version.answers.get(pictures.shown) ?? version.answers.get("check");
+    out({ version, answer, link: () => machines.link(version.sent), files: (asked, part) => report(version, asked, part) });
+  });
   document.addEventListener("keydown", (event) => {
     if (event.target.matches?.("input[type=text], textarea, select")) return;
     if ($("dialog").open) return;
@@ -275,6 +274,10 @@ function wire() {
   for (const moment of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) document.addEventListener(moment, pointed, true);
   for (const end of ["pointerup", "pointercancel"]) document.addEventListener(end, machines.release);
   window.addEventListener("hashchange", linked);
+  onIdle((lane) => {
+    answers.idle(lane);
+    pictures.idle(lane);
+  });
   onReach((there, text) => {
     trouble(there ? "" : text);
     if (there && begun) changed(false);
@@ -285,8 +288,8 @@ function wire() {
 }
 
 /** Ask for what a command would write, and save it; resolves to what to say. */
-async function report({ name, options }, part) {
-  const made = await ask(`${name}.zip`, { ...sent(), options }, "report", part);
+async function report({ sent: machine, pinned }, { name, options }, part) {
+  const made = await ask(`${name}.zip`, { machine, pinned, options }, "report", part);
   if (!made || made.kind !== "files") return made?.text;
   save(made.name, Uint8Array.from(atob(made.base64), (letter) => letter.charCodeAt(0)), "application/zip");
   return "Saved.";

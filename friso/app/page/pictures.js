@@ -3,12 +3,15 @@ import { $, el, tabs, words } from "./dom.js";
 import { worded } from "./keys.js";
 import { Beside } from "./beside.js";
 import { Logs } from "./logs.js";
-import { clear, draw, stale } from "./plot.js";
+import { clear, draw } from "./plot.js";
 import { Remedies } from "./remedies.js";
-import { ask, Live, OLD_AFTER } from "./wire.js";
+import { FIELDS, isNow, look, mark, now } from "./shown.js";
+import * as machines from "./state.js";
+import { ask, Live } from "./wire.js";
 import { paragraphs, table } from "./tables.js";
 
 const AT_REST = 250;
+const LANE = "picture";
 
 export class Pictures {
   /** `sent` gives what is asked about, `tell` what is done with answers. */
@@ -32,19 +35,10 @@ export class Pictures {
 
   /** What answers a question again and again while a slider moves. */
   follows(question) {
-    return new Live(question, "picture", 3000, (answer, then) => {
-      this.arrived(answer);
-      if (answer.kind === "message") return;
-      if (then === this.due) clearTimeout(this.old);
-      else this.age(); // a newer one is due
-      if (answer.kind !== "partly") this.goOn(then);
+    return new Live(question, LANE, 3000, (answer, { version, then }) => {
+      this.arrived(answer, version);
+      if (answer.kind !== "message" && answer.kind !== "partly") this.goOn(then);
     });
-  }
-
-  /** Unless a new picture comes soon, the one that is there is shown as that of an earlier machine. */
-  age() {
-    clearTimeout(this.old);
-    this.old = setTimeout(() => stale($("picture")), OLD_AFTER);
   }
 
   has(name) {
@@ -69,17 +63,21 @@ export class Pictures {
   show(id) {
     if (id === this.shown) return;
     this.shown = id;
-    clearTimeout(this.old);
     this.goOn();
-    this.live.stop();
-    this.loops.stop();
-    this.beside.leave();
+    this.halt();
     const place = $("picture");
     if (this.plots) clear(this.plots);
     place.replaceChildren();
     this.bar();
     this.begin(place);
     this.ask();
+  }
+
+  /** The server has described the machine shown. */
+  described(machine, version) {
+    Object.assign(this, { machine, of: version });
+    this.bar();
+    if ($("axes")) mark($("axes"), version, FIELDS);
   }
 
   /** Another machine was opened: the keys and ranges of its maps are others. */
@@ -90,16 +88,24 @@ export class Pictures {
     this.begin($("picture"));
   }
 
-  /** What is shown is of another machine; a log is of none. */
-  earlier() {
-    if (!this.own[this.shown]) stale($("picture"));
+  /** Nothing that is on its way is of the machine as it is set now. */
+  halt() {
+    clearTimeout(this.timer);
+    this.live.stop();
+    this.loops.stop();
+    this.beside.leave();
+  }
+
+  /** Nothing is computed on a lane any more, and nothing there says otherwise. */
+  idle(lane) {
+    if (lane === LANE) this.below?.querySelectorAll("progress").forEach((item) => item.remove());
   }
 
   /** There is no machine, and no tabs. */
   none() {
     this.machine = null;
     this.show("run");
-    this.live.stop();
+    this.halt();
     if (this.plots) clear(this.plots);
     this.below?.replaceChildren();
     this.bar();
@@ -109,7 +115,10 @@ export class Pictures {
   begin(place) {
     this.form = null;
     this.plots = null;
-    if (this.own[this.shown]) return place.append(this.own[this.shown].place);
+    if (this.own[this.shown]) {
+      place.append(this.own[this.shown].place);
+      return look(); // the machine may be another one since it was there
+    }
     if (this.shown === "map" || this.shown === "boundary") this.form = this.axes(place);
     this.plots = el("div", { class: "plots" });
     this.below = el("div", {});
@@ -124,17 +133,11 @@ export class Pictures {
     if (this.own[this.shown]) return;
     if (!this.plots) this.begin($("picture"));
     if (this.shown === "run") {
-      this.due = then;
-      this.age();
-      this.live.ask(this.body(), then);
+      this.live.ask(this.body(), { version: now(), then });
     } else {
       clearTimeout(this.timer);
-      if (dragged && this.shown === "bode") {
-        this.due = null; // none of them is older than what is there
-        return this.loops.ask(this.body(), null);
-      }
-      this.loops.stop(); // what is still on its way is of the machine before
-      stale($("picture"));
+      if (dragged && this.shown === "bode") return this.loops.ask(this.body(), { version: now(), then: null });
+      this.halt();
       if (!dragged) this.timer = setTimeout(() => this.ask(), AT_REST);
     }
   }
@@ -148,49 +151,42 @@ export class Pictures {
 
   async ask() {
     const { shown } = this;
-    if (!this.machine || this.own[shown]) return;
-    if (shown === "run") {
-      this.due = this.then;
-      return this.live.ask(this.body(), this.then);
-    }
+    if (!this.machine || this.own[shown] || this.of.machine.text !== machines.current().text) return; // asked once it is described
+    if (shown === "run") return this.live.ask(this.body(), { version: now(), then: this.then });
     if (shown === "check") return this.tell.check();
     const options = this.form ? this.form() : {};
     if (options === null) return;
     if (!this.plots.children.length) this.below.replaceChildren(el("progress", { "aria-label": "Progress" })); // the line of the answer is the check's, too
-    const part = (answer) => this.shown === shown && (answer.kind === "partly" ? this.arrived(answer) : this.tell.progress(answer));
-    const answer = await ask(shown, this.body(options), "picture", part);
-    if (answer && this.shown === shown) this.arrived(answer);
+    const version = now();
+    const part = (answer) => this.shown === shown && (answer.kind === "partly" ? this.arrived(answer, version) : answer.kind !== "answer" && this.tell.progress(answer, LANE));
+    const answer = await ask(shown, this.body(options), LANE, part);
+    if (answer && this.shown === shown) this.arrived(answer, version);
   }
 
   /** The check is there, whose figures are one of the pictures: what waits would tell less. */
-  checked(answer) {
+  checked(answer, version) {
     this.then = null;
-    if (this.shown === "check") this.arrived(answer);
+    if (this.shown === "check") this.arrived(answer, version);
   }
 
-  arrived(answer) {
-    if (answer.kind === "message" || answer.kind === "progress") return this.tell.progress(answer);
+  /** An answer about a version of the machine is there, or a part of it. */
+  arrived(answer, version) {
+    if (answer.kind === "message" || answer.kind === "progress") return this.tell.progress(answer, LANE);
     if (answer.kind === "refused" || answer.kind === "failed") {
-      this.tell.progress(null);
+      if (this.form) clear(this.plots); // of other options, perhaps
       this.below.replaceChildren(...paragraphs([answer.text]));
-      if (!this.plots.children.length) return;
-      return stale($("picture"));
+      return mark(this.below, version);
     }
-    if (answer.kind !== "partly") this.tell.progress(null);
-    this.answer = answer;
+    Object.assign(this, { answer, version });
     if (answer.figures) draw(this.plots, answer.figures, { clicked: (point) => this.clicked(point), hovered: (point) => this.hovered(point) }, answer.names);
-    clearTimeout(this.aging);
-    if (answer.kind === "partly" && !answer.sentences.length) { // its words follow
-      const others = answer.names === null ? [...this.plots.children].filter((box) => !answer.figures.some((figure) => figure.name === box.dataset.name)) : [];
-      const old = [...this.below.querySelectorAll(".note"), ...others];
-      this.aging = setTimeout(() => old.forEach((item) => item.classList.add("stale")), OLD_AFTER);
-      return this.tell.shown(answer, this.shown);
-    }
+    for (const box of this.plots.children) if (answer.figures?.some((figure) => figure.name === box.dataset.name)) mark(box, version);
+    if (answer.kind === "partly" && !answer.sentences.length) return this.tell.shown(answer, this.shown, version); // its words follow
     const words = this.shown === "check" ? [] : answer.sentences;
     const drawn = (answer.drawings ?? []).map((item) => this.drawn(item));
     const working = answer.kind === "partly" ? [el("progress", { "aria-label": "Progress" })] : [];
     this.below.replaceChildren(...working, ...paragraphs([...words, ...answer.notes]), ...drawn, ...(this.shown === "run" ? [] : answer.tables.map(table)), ...paragraphs(answer.details));
-    this.tell.shown(answer, this.shown);
+    mark(this.below, version);
+    this.tell.shown(answer, this.shown, version);
   }
 
   drawn({ label, svg }) {
@@ -219,6 +215,8 @@ export class Pictures {
     const form = el("div", { class: "form" }, ...fields.map((item) => item.row), el("label", { class: "tick" }, log.box, "Logarithmic"), ...metrics);
     form.addEventListener("change", start);
     place.append(form);
+    form.id = "axes";
+    mark(form, this.of, FIELDS);
     return () => {
       this.kept.set("axes", fields.map((item) => item.key.value));
       const options = Object.fromEntries(fields.map((item, k) => ["xy"[k], `${item.key.value}=${item.low.value}..${item.high.value}`]));
@@ -261,7 +259,7 @@ export class Pictures {
   /** A cell was clicked: the machine is set there. */
   clicked(point) {
     const values = this.cell(point);
-    if (values) this.tell.set(this.tell.worded(values));
+    if (values && isNow(this.version)) this.tell.set(this.tell.worded(values));
   }
 
   /** The pointer is over a cell: its run is shown beside. */

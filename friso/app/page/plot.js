@@ -5,13 +5,25 @@ const dark = matchMedia("(prefers-color-scheme: dark)");
 /** Colours of the figures that a dark page shows otherwise. */
 const DARK = { "#222222": "#e6e7e9", "#e3e3e3": "#2f3338", "#767676": "#9aa0a6", "#0072B2": "#56B4E9", "#c9c9c9": "#5a5f66", "#a9a9a9": "#777d84" };
 const NARROW = 640;
-const CONFIG = { displaylogo: false, responsive: true, modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["resetScale2d"]], showSendToCloud: false, plotlyServerURL: "" };
+const RESIZED = 100; // [ms]
+const CONFIG = { displaylogo: false, modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["resetScale2d"]], showSendToCloud: false, plotlyServerURL: "" };
 
-function themed(value) {
-  if (typeof value === "string") return DARK[value] ?? value;
-  if (value === null || typeof value !== "object" || ArrayBuffer.isView(value)) return value;
-  if (Array.isArray(value)) return value.length && ArrayBuffer.isView(value[0]) ? value : value.map(themed);
-  return Object.fromEntries(Object.entries(value).map(([name, item]) => [name, themed(item)]));
+/** What stands on a map, whose cells are the same on a dark page, is ringed in white, and keeps its colours. */
+const isRinged = (value) => value.line?.color === "white";
+
+/** Lines on a map have a colour that is seen on its cells, and in its legend on a dark page. */
+const ON_MAP = { ...DARK, "#222222": "#0072B2" };
+
+function themedTraces(traces) {
+  const maps = new Set(traces.filter((trace) => trace.type === "heatmap").map((trace) => trace.xaxis));
+  return traces.map((trace) => themed(trace, maps.has(trace.xaxis) ? ON_MAP : DARK));
+}
+
+function themed(value, colours = DARK) {
+  if (typeof value === "string") return colours[value] ?? value;
+  if (value === null || typeof value !== "object" || ArrayBuffer.isView(value) || isRinged(value)) return value;
+  if (Array.isArray(value)) return value.length && ArrayBuffer.isView(value[0]) ? value : value.map((item) => themed(item, colours));
+  return Object.fromEntries(Object.entries(value).map(([name, item]) => [name, themed(item, colours)]));
 }
 
 /**
@@ -34,7 +46,6 @@ export function draw(place, figures, tell = {}, names = figures.map((figure) => 
       box.children[0].textContent = plain(figure.title);
       box.children[1].textContent = plain(figure.caption);
     }
-    box.classList.remove("stale"); // not once it is drawn: the machine may have changed by then
     const plotted = box.querySelector(".plot");
     plotted.style.height = `${figure.layout.height}px`;
     plotted.due = () => {
@@ -82,7 +93,7 @@ function plot(place, figure, tell) {
   const fresh = !place.data;
   place.figure = figure;
   place.style.height = `${layout.height}px`;
-  const [data, shown] = dark.matches ? [themed(given.data), themed(layout)] : [given.data, layout];
+  const [data, shown] = dark.matches ? [themedTraces(given.data), themed(layout)] : [given.data, layout];
   Plotly.react(place, data, shown, CONFIG);
   if (!fresh) return;
   if (tell.clicked) place.on("plotly_click", (event) => tell.clicked(event.points[0]));
@@ -101,13 +112,25 @@ export function clear(place) {
   [...place.children].forEach(remove);
 }
 
-/** What is shown is of an earlier machine. */
-export const stale = (place) => place.querySelectorAll(".figure").forEach((box) => box.classList.add("stale"));
-
 /** Those plots again that are drawn otherwise by now. */
 function again(isOther) {
   for (const place of document.querySelectorAll(".plot")) if (place.figure && isOther(place)) plot(place, place.figure, {});
 }
 
 dark.addEventListener("change", () => again(() => true));
-window.addEventListener("resize", () => again((place) => place.narrow !== narrow(place)));
+
+/** A plot at the width that it has by now, drawn whole: plotly alone leaves legends where they were, over titles. */
+async function fit(place) {
+  if (!place.data || !place.getClientRects().length) return;
+  if (place.narrow !== narrow(place)) plot(place, place.figure, {});
+  await Plotly.Plots.resize(place);
+  if (place.data) await Plotly.redraw(place);
+}
+
+let resized = 0;
+window.addEventListener("resize", () => {
+  clearTimeout(resized);
+  resized = setTimeout(async () => {
+    for (const place of document.querySelectorAll(".plot")) await fit(place);
+  }, RESIZED);
+});

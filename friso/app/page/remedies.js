@@ -9,9 +9,9 @@ export class Remedies {
     this.result = el("div", {});
     const start = async (question, options) => {
       const { name, changes } = sent().machine;
-      const answer = await shownAnswer(this.result, "remedies", question, () => ({ ...sent(), options: options() }), tell);
       const given = Object.entries(changes).map(([path, value]) => `${path} = ${value ?? "nothing"}`);
-      if (answer) this.result.prepend(el("p", { class: "note" }, `Of ${name} ${given.length ? `with ${given.join(", ")}` : "as it was opened"}:`));
+      const about = `Of ${name} ${given.length ? `with ${given.join(", ")}` : "as it was opened"}:`;
+      await shownAnswer(this.result, "remedies", question, () => ({ ...sent(), options: options() }), tell, about);
     };
     const tune = el("button", { type: "button", id: "tune", onclick: () => start("tune", () => ({ within: within.value, only: only.value })) }, "Find the least change");
     const design = el("button", { type: "button", id: "design", onclick: () => start("design", () => ({})) }, "Design an isolator");

@@ -185,8 +185,8 @@ const isChanges = (value) => value !== null && typeof value === "object" && !Arr
 const isMachine = ({ name, text, steps, step }) => typeof name === "string" && typeof text === "string" && steps.every(isChanges) && isChanges(steps[step]);
 
 /** A link that holds the machine: behind #, which browsers send nowhere. */
-export async function link() {
-  const bytes = await through(new CompressionStream("deflate-raw"), new TextEncoder().encode(JSON.stringify(sent())));
+export async function link(of = sent()) {
+  const bytes = await through(new CompressionStream("deflate-raw"), new TextEncoder().encode(JSON.stringify(of)));
   const text = btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
   return `${location.origin}/#${text.replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "")}`;
 }

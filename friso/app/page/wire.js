@@ -2,9 +2,6 @@
 import { token } from "./dom.js";
 import { enter, request } from "./entry.js";
 
-/** How long [ms] what is of an earlier machine is shown as if it were of the one that is there: what is newer mostly comes before. */
-export const OLD_AFTER = 300;
-
 const page = token();
 const lanes = new Map();
 let asked = 0;
@@ -36,9 +33,17 @@ export async function ask(question, body, lane = question, part = () => {}) {
     reached(false);
     return null;
   } finally {
-    if (lanes.get(lane) === abort) lanes.delete(lane);
+    if (lanes.get(lane) === abort) {
+      lanes.delete(lane);
+      idle.forEach((listener) => listener(lane));
+    }
   }
 }
+
+const idle = [];
+
+/** Be told of a lane on which nothing is at work any more. */
+export const onIdle = (listener) => idle.push(listener);
 
 /** End what is asked on a lane. */
 export const end = (lane) => lanes.get(lane)?.abort();
@@ -83,25 +88,42 @@ export async function first() {
   return null;
 }
 
-async function* frames(reader) {
-  let held = new Uint8Array(0);
+/** The values of frames as they come. What has come is joined once a whole frame is there, however many chunks it comes in. */
+export async function* frames(reader) {
+  let chunks = [];
+  let size = 0;
+  let needed = 8;
   for (;;) {
     const { done, value } = await reader.read();
     if (done) return;
-    const joined = new Uint8Array(held.length + value.length);
-    joined.set(held);
-    joined.set(value, held.length);
-    held = joined;
-    while (held.length >= 8) {
+    chunks.push(value);
+    size += value.length;
+    if (size < needed) continue;
+    let held = joined(chunks, size);
+    for (needed = 8; held.length >= needed; needed = 8) {
       const sizes = new DataView(held.buffer, held.byteOffset, 8);
       const [text, numbers] = [sizes.getUint32(0, true), sizes.getUint32(4, true)];
-      if (held.length < 8 + text + numbers) break;
       const begin = 8 + text;
+      needed = begin + numbers;
+      if (held.length < needed) break;
       const json = JSON.parse(new TextDecoder().decode(held.subarray(8, begin)));
-      yield unpacked(json, held.slice(begin, begin + numbers).buffer);
-      held = held.slice(begin + numbers);
+      yield unpacked(json, held.slice(begin, needed).buffer);
+      held = held.subarray(needed);
     }
+    chunks = [held];
+    size = held.length;
   }
+}
+
+function joined(chunks, size) {
+  if (chunks.length === 1) return chunks[0];
+  const all = new Uint8Array(size);
+  let place = 0;
+  for (const chunk of chunks) {
+    all.set(chunk, place);
+    place += chunk.length;
+  }
+  return all;
 }
 
 function unpacked(value, numbers) {

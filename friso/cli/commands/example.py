@@ -1,4 +1,4 @@
-"""`friso example`: the stage files that come with friso."""
+"""`friso example`: the files that come with friso."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def example(
         str | None, typer.Argument(metavar="[NAME]", help="See the list below; left out, it is printed.")
     ] = None,
     path: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="The file to write; default: NAME.toml, here.")
+        Path | None, typer.Argument(metavar="[FILE]", help="The file to write; default: its own name, here.")
     ] = None,
     overwrite: Replace = False,
 ) -> None:
@@ -29,7 +29,7 @@ def example(
 
     if name is None:
         for listed, title in listed_examples():
-            print(f"{listed:<28}{title}")
+            print(f"{listed:<33}{title}")
         return
     source = example_path(name)
     target = path or Path(source.name)
@@ -38,15 +38,21 @@ def example(
 
 
 def listed_examples() -> list[tuple[str, str]]:
-    """The examples, each by the name of its stage."""
+    """The examples, each by the name of its stage, or by what it is for."""
     import tomllib
 
     from friso.answers.starting import example as example_path
     from friso.answers.starting import example_names
 
+    paths = {name: example_path(name) for name in example_names()}
     return [
-        (name, str(tomllib.loads(example_path(name).read_text("utf-8")).get("name", ""))) for name in example_names()
+        (name, str(tomllib.loads(path.read_text("utf-8")).get("name", "")) if path.suffix == ".toml" else PARAMETERS)
+        for name, path in paths.items()
     ]
+
+
+PARAMETERS = "Parameters of a drive, for friso init --from"
+"""What is said of an example that is no stage file."""
 
 
 COMMAND = Command(example, 145, HELP, Choices("Examples", listed_examples))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from friso.errors import LogError
+from friso.extras import install, is_installed
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.confined import content
 
@@ -16,13 +16,9 @@ from friso.identification.logs.confined import content
 def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
     """What a library reads from a file of a kind. Raises LogError, which says how to install the library if it is not
     there."""
-    try:
-        installed = find_spec(library) is not None
-    except ValueError:
-        installed = False
-    if not installed:
+    if not is_installed(library):
         actual = f"a {kind} file, and the library {library} is not installed"
-        raise LogError("log", actual, "the library", f'pip install "friso[{kind.lower()}]"', str(path))
+        raise LogError("log", actual, "the library", install(kind.lower()), str(path))
     return content(kind, path)
 
 

@@ -1,22 +1,39 @@
-"""The files of `friso boundary`: the figure, and the table of its points."""
+"""The files of `friso boundary`: the page, the figure, and the table of its points."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from itertools import repeat
 from pathlib import Path
 
 from friso.hunting import Diagram, Plane
+from friso.stage import Stage
 from friso.studies.boundary_lines import lines
 from friso.views.boundary.figures import boundary_figure
-from friso.views.boundary.words import ShownKey
+from friso.views.boundary.words import ShownKey, sentences
+from friso.views.drawing.figure import Figure
 from friso.views.files import Content, image_files
+from friso.views.map.places import SHOWN, with_places
+from friso.views.pages import Report
 
 
-def boundary_files(traced: Diagram | Plane, keys: tuple[ShownKey, ...], name: str, stem: str) -> dict[str, Content]:
-    """The figure in all formats, and the table of its points."""
-    figure = boundary_figure(traced, keys, name)
-    return {**image_files(figure, stem), f"{stem}.csv": partial(_write_table, traced)}
+def boundary_files(traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: Stage, stem: str) -> dict[str, Content]:
+    """The page, the figure in all formats, and the table of its points."""
+    figure = boundary_figure(traced, keys, stage.name)
+    if isinstance(traced, Plane):
+        figure = with_places(figure, [(SHOWN, stage)], [key.key for key in keys])
+    images = image_files(figure, stem)
+    page = boundary_html(traced, keys, stage, figure)
+    return {f"{stem}.html": page, **images, f"{stem}.csv": partial(_write_table, traced)}
+
+
+def boundary_html(traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: Stage, figure: Figure) -> str:
+    """The whole page of a boundary and its figure."""
+    answer, *details = sentences(traced, keys)
+    return Report.of_stage(
+        "boundary", stage, [replace(figure, note="")], sentences=[answer], details=details, note=figure.note
+    ).html()
 
 
 def _write_table(traced: Diagram | Plane, path: Path) -> None:

@@ -48,7 +48,7 @@ GAP = 0.09  # between two panels of a row, as a fraction of the width
 _BUTTONS = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]]
 _CONFIG = {
     "displaylogo": False,
-    "responsive": True,
+    "responsive": False,  # page.js sees to that
     "modeBarButtons": _BUTTONS,
     "showSendToCloud": False,
     "plotlyServerURL": "",

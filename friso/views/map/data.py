@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import base64
+import json
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from friso.axis import unit_shown
+from friso.errors import InputError
 from friso.hunting.measures import BANDS
+from friso.stage import Stage, loads
 from friso.views.check.traces import common_range
 from friso.views.drawing.colours import scale
 from friso.views.drawing.drawable import colour_prefix
 from friso.views.drawing.figure import Array, Cloud
 from friso.views.drawing.prefixes import choose
 from friso.views.map.cells import SAMPLE, CellAxis, axes_of, look, metrics, pick, plane_first
+from friso.views.map.places import SHOWN
 from friso.views.map.words import CATEGORIES, variable, words_of
 
 if TYPE_CHECKING:
@@ -35,18 +40,30 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
     sampled = SAMPLE in runs.dims
     chosen = picked(runs)
     cells = _Cells(axes, chosen, sampled)
+    flat = stage.flat() if (stage := machine_of(runs)) else {}
     order = list(axes) if sampled or len(axes) == 1 else plane_first(axes)
     return {
         "metric": metric,
         "rerun": rerun,
         "sampled": sampled,
         "indices": [[int(i) for i in places] for places in cells.indices()],
-        "axes": [_axis(axis, positions) for axis, positions in zip(axes, cells.positions(), strict=True)],
+        "axes": [_axis(axis, positions, flat) for axis, positions in zip(axes, cells.positions(), strict=True)],
+        "machine": SHOWN,
         "order": [axes.index(axis) for axis in order],
         "variables": [_coloured(runs, name, cells) for name in metrics(runs)],
         "lines": None if drawn is None else _lines(drawn, runs, cells),
         "texts": [_text(runs, str(name), cells) for name, array in runs.data_vars.items() if array.dtype.kind in "OUT"],
     }
+
+
+def machine_of(runs: xr.Dataset) -> Stage | None:
+    """The machine that was swept, if it is one of the stages swept over: not where keys are tied to others."""
+    if json.loads(runs.attrs.get("links", "{}")):
+        return None
+    try:
+        return loads(runs.attrs.get("stage", ""))
+    except InputError:  # of runs that are no study of friso's
+        return None
 
 
 def picked(runs: xr.Dataset) -> tuple[np.ndarray, ...]:
@@ -100,10 +117,14 @@ def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
     return {"duration": drawn.duration, "unit": unit_shown("m"), "heights": _base64(heights), **ranges}
 
 
-def _axis(axis: CellAxis, positions: np.ndarray) -> dict[str, Any]:
+def _axis(axis: CellAxis, positions: np.ndarray, flat: Mapping[str, Any]) -> dict[str, Any]:
+    """An axis; where the machine with the keys `flat` stands on it is null where that is beyond its ends."""
     values = axis.positions[positions]
     factor, unit = choose(axis.positions, axis.unit, log=axis.log)
+    own = None if axis.words else flat.get(axis.key)
+    inside = isinstance(own, float) and axis.positions.min() <= own <= axis.positions.max()
     return {
+        "machine": _shortened(own * factor) if inside and own is not None else None,
         "key": axis.key,
         "label": axis.axis(None).quantity,
         "unit": unit,

@@ -11,9 +11,10 @@ from friso.views.drawing.images import FORMATS, ON_PAGE, Image, draw_beforehand,
 from friso.views.drawing.packing import packed_json
 from friso.views.files import Content
 from friso.views.map.cells import SAMPLE, axes_of
-from friso.views.map.data import page_data, picked
+from friso.views.map.data import machine_of, page_data, picked
 from friso.views.map.figures import map_figure
 from friso.views.map.findings import caveats, failures, headline, meanings, verification
+from friso.views.map.places import SHOWN, with_places
 from friso.views.map.words import CATEGORIES, grouped, tally, variable
 from friso.views.pages import Report, print_image, script
 
@@ -33,7 +34,7 @@ PRINTED = ON_PAGE._replace(noted=False)
 def map_files(runs: xr.Dataset, metric: str, rerun: str, draw: Callable[[], Traces | None]) -> dict[str, Content]:
     """The figure in all formats and the page of a map, by their suffixes in the order of `FORMS`; `rerun` as in
     `map_html`, and `draw` makes the runs that are `drawn` there, beside which the figure is."""
-    figure = map_figure(runs, metric)
+    figure = marked_figure(runs, metric)
     draw_beforehand([figure], [*map(Image, FORMATS), PRINTED])
     files: dict[str, Content] = {form: partial(save, figure) for form in FORMS[:-1]}
     return {**files, FORMS[-1]: map_html(runs, metric, rerun, draw(), figure)}
@@ -53,7 +54,7 @@ def map_html(
         raise ValueError(
             f"rerun: got {rerun!r}, expected {{indices}} in it, e.g. 'friso simulate --cell x {{indices}}'"
         )
-    figure = figure or map_figure(runs, metric)
+    figure = figure or marked_figure(runs, metric)
     return Report(
         "map",
         runs.attrs.get("name") or "Unnamed stage",
@@ -73,6 +74,13 @@ def map_html(
             "rtol": f"{float(runs.attrs['rtol']):g}",
         },
     ).html()
+
+
+def marked_figure(runs: xr.Dataset, metric: str) -> Figure:
+    """The figure of a map, over two axes with the place of the machine that was swept."""
+    figure, stage = map_figure(runs, metric), machine_of(runs)
+    keys = [] if SAMPLE in runs.dims else [axis.key for axis in axes_of(runs)]
+    return with_places(figure, [(SHOWN, stage)], keys) if stage and len(keys) == 2 else figure
 
 
 def _facts(runs: xr.Dataset, metric: str) -> list[tuple[str, str]]:

@@ -169,6 +169,7 @@
     const layout = { template: "none", margin: { l: 72, r: 14, t: 30, b: 54 }, hovermode: "closest",
       font: { family: "system-ui, sans-serif", size: 12, color: INK }, showlegend: false, hoverlabel: { bgcolor: "#444444", font: { color: "white" } },
       xaxis: plotAxis(data.axes[across]), yaxis: plotAxis(yAxis()), uirevision: "kept" };
+    if (isHere()) traces.push(machine(layout));
     if (selected) traces.push(ring(height));
     const config = { displaylogo: false, responsive: true, showSendToCloud: false, plotlyServerURL: "",
       modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]] };
@@ -182,6 +183,20 @@
     return { label: shown.label, unit: shown.unit, log: shown.log && numbers,
       values: Array.from(shown.numbers).filter((value) => value > 0),
       words: numbers ? [] : shown.kinds.map((kind) => kind.label) };
+  }
+
+  // The machine that was swept: a point over two axes, a line over one; of further axes, in the slice next to it.
+  const isNear = (axis, i) => axis.values.every((value) => Math.abs(axis.values[at[i]] - axis.machine) <= Math.abs(value - axis.machine));
+  const shownAxes = points && !data.sampled ? [across] : [across, up];
+  const isHere = () => shownAxes.every((i) => data.axes[i].machine !== null)
+    && (data.sampled || further.every((i) => data.axes[i].machine === null || isNear(data.axes[i], i)));
+
+  function machine(layout) {
+    const [x, y] = shownAxes.map((i) => data.axes[i].machine);
+    const line = { color: INK, width: 1.4, dash: "dot" };
+    if (y === undefined) layout.shapes = [{ type: "line", x0: x, x1: x, y0: 0, y1: 1, yref: "paper", line }];
+    const marker = { symbol: "circle", size: 12, color: INK, line: { color: "white", width: 2 } };
+    return { type: "scatter", mode: "markers", x: [x], y: [y ?? null], marker, showlegend: false, hoverinfo: "skip" };
   }
 
   function ring(height) {
@@ -203,6 +218,12 @@
       swatch.style.background = kind.colour;
       entry.append(kind.label);
     });
+    if (!isHere()) return;
+    const entry = element("li", key);
+    const mark = element("span", entry);
+    mark.className = "swatch machine";
+    mark.style.background = INK;
+    entry.append(`${data.machine}: ${shownAxes.map((i) => withUnit(data.axes[i].machine, data.axes[i].unit)).join(", ")}`);
   }
 
   // ------------------------------------------------------------------ the selected cell

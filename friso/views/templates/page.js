@@ -29,20 +29,33 @@ const drawer = (place, { data, layout, narrow, bars, config }) => {
   let drawn = null;
   return async () => {
     const isNarrow = place.parentElement.clientWidth < 640;
-    if (drawn === isNarrow) return;
-    drawn = isNarrow;
-    const chosen = isNarrow ? narrow : layout;
-    place.style.height = `${chosen.height}px`;
-    await Plotly.react(place, isNarrow ? data.map((trace, k) => moved(trace, bars[k])) : data, chosen, config);
+    const again = drawn !== null;
+    if (drawn !== isNarrow) {
+      drawn = isNarrow;
+      const chosen = isNarrow ? narrow : layout;
+      place.style.height = `${chosen.height}px`;
+      await Plotly.react(place, isNarrow ? data.map((trace, k) => moved(trace, bars[k])) : data, chosen, config);
+    }
+    if (!again) return;
+    await Plotly.Plots.resize(place);
+    await Plotly.redraw(place); // plotly alone leaves legends where they were, over titles
   };
 };
 (async () => {
   await plotly;
+  const drawers = [];
+  let resized = 0;
+  window.addEventListener("resize", () => {
+    clearTimeout(resized);
+    resized = setTimeout(async () => {
+      for (const draw of drawers) await draw();
+    }, 100);
+  });
   for (const packed of document.querySelectorAll("script.figure")) {
     const parts = JSON.parse(await unpacked(packed), (_, value) => (value?.planes === undefined ? value : numbers(value)));
     const draw = drawer(packed.previousElementSibling, parts);
     await draw();
-    window.addEventListener("resize", draw);
+    drawers.push(draw);
   }
 })().catch((error) => {
   document.documentElement.classList.add("still");

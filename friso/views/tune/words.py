@@ -11,6 +11,7 @@ import numpy as np
 from friso.design_method.geometry import Geometry
 from friso.equations.bandwidth import bandwidth
 from friso.equations.breakaway import breakaway, least_breakaway
+from friso.extras import install
 from friso.frequency.bandwidth import bandwidths_at
 from friso.frequency.crossover import WANTED
 from friso.leaf_springs.joint import first_interfering
@@ -224,6 +225,7 @@ UNMADE = {
         "the stage file states a parasitic mode of the machine, and a stage has no second one for the leaves; friso "
         "design designs without it"
     ),
+    "extra": f"that takes {install('design')}",
     "none": (
         "none of the sizes that friso init --spec begins with has this stiffness and bears this stroke; friso design "
         "takes other sizes"

@@ -13,6 +13,7 @@ from friso.identification.logs.binary import OBJECT, is_hdf5
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.confined import content
 from friso.identification.logs.format import FileHead, LogFormat
+from friso.identification.logs.libraries import content_by
 from friso.identification.logs.units import split_heading
 
 MOST_COLUMNS = 64
@@ -34,7 +35,7 @@ def read_mat(path: Path) -> ChannelTable:
     with path.open("rb") as file:
         newer = is_hdf5(file.read(520))
     walk = _Contents()
-    for name, node in content("MAT", path).items():
+    for name, node in (content_by("h5py", "MAT", path) if newer else content("MAT", path)).items():
         _walk(node, name, walk)
     if walk.objects:
         walk.notes.append(f"left out: objects {', '.join(walk.objects)}: save them as structure with time")

@@ -1,0 +1,94 @@
+"""Who may hold a connection, and for how long: nobody without a key keeps others from the server."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import logging
+from typing import Any
+
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from friso.app.gate import LET_IN
+
+MOST = 64
+"""Connections at most. Browsers have six to a server, and systems allow a process 256 open files or more."""
+
+HEADERS = 10.0
+"""Time [s] within which a request has to be complete up to its body: a browser sends that at once."""
+
+SENDING = 120.0
+"""Time [s] within which whoever has no key has to have read what is handed to anybody, 5 MB."""
+
+LOGGER = logging.getLogger("friso.app")
+
+OUT_OF_FILES = (
+    "this system has no room for more connections to friso app, which goes on as soon as others end: ulimit -n says "
+    "how many files and connections a process may have open"
+)
+
+
+class Connection(H11Protocol):
+    """A connection that is cut off where it rests or is held by somebody without a key for too long, or where a new
+    one needs its place. One at work for somebody with a key stays."""
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Take a place, if need be that of the connection that has rested longest."""
+        super().connection_made(transport)
+        self._since, self._timer = self.loop.time(), self.loop.call_later(HEADERS, self._look)
+        held = [one for one in self.connections if isinstance(one, Connection) and not one.transport.is_closing()]
+        if len(held) > MOST:
+            resting = [one for one in held if not one.is_at_work]
+            min(resting, key=lambda one: one._since).transport.abort()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Give the place back."""
+        self._timer.cancel()
+        super().connection_lost(exc)
+
+    def on_response_complete(self) -> None:
+        """Wait for another request."""
+        self._since = self.loop.time()
+        super().on_response_complete()
+
+    @property
+    def is_at_work(self) -> bool:
+        """Whether somebody with a key is being answered."""
+        return self._is_answering and LET_IN in self.scope
+
+    @property
+    def _is_answering(self) -> bool:
+        return self.cycle is not None and not self.cycle.response_complete
+
+    def _look(self) -> None:
+        """Cut the connection off, or look again when its time is over."""
+        allowed = SENDING if self._is_answering else HEADERS
+        left = HEADERS if self.is_at_work else self._since + allowed - self.loop.time()
+        if left <= 0:
+            self.transport.abort()
+        else:
+            self._timer = self.loop.call_later(left, self._look)
+
+
+class Once(logging.Filter):
+    """Lets each message through once, with its error: whoever can reach the server can repeat what makes it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._said: set[tuple[str, str]] = set()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Whether the message is new."""
+        said = str(record.msg), repr(record.exc_info[1]) if record.exc_info else ""
+        new = said not in self._said
+        self._said.add(said)
+        return new
+
+
+def failed(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Say what failed in the loop of the server; that no connection can be taken, in a sentence."""
+    error = context.get("exception")
+    if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM):
+        LOGGER.warning(OUT_OF_FILES)
+    else:
+        loop.default_exception_handler(context)

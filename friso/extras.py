@@ -1,0 +1,37 @@
+"""Extras of friso: packages that few commands need, and that are installed where these are asked for."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from friso.errors import InputError
+
+EXTRAS = {"cluster": ("dask", "distributed"), "design": ("exudyn", "pymoo")}
+"""The packages of each extra that commands need, by its name in pyproject.toml. Those of log formats are asked for
+with the log (`friso.identification.logs.libraries`)."""
+
+
+def install(extra: str) -> str:
+    """What installs an extra."""
+    return f'pip install "friso[{extra}]"'
+
+
+def is_installed(package: str) -> bool:
+    """Whether a package is there, without importing it."""
+    try:
+        return find_spec(package) is not None
+    except ValueError:  # a module of that name that was made by hand
+        return False
+
+
+def missing(extra: str) -> list[str]:
+    """The packages of an extra that are not there."""
+    return [package for package in EXTRAS[extra] if not is_installed(package)]
+
+
+def need(extra: str, subject: str) -> None:
+    """Refuse a subject, a command or an option, before anything is computed, where its extra is not installed. Raises
+    InputError, which says how to install it."""
+    if packages := missing(extra):
+        actual = f"an installation of friso without {' and '.join(packages)}"
+        raise InputError(subject, actual, f"the extra {extra}", install(extra))
