@@ -28,7 +28,7 @@ def stage(crossover: float) -> Stage:
     """The mass of `orbits.py` as a stage file has it."""
     return Stage(
         name="rigid mass of 1.7 kg",
-        masses={"cart": f"{orbits.MASS} kg"},
+        masses={"cart": "1.2 kg", "stage": f"{orbits.MASS - 1.2:.1f} kg"},
         friction={
             "model": "lugre",
             "static": f"{orbits.STATIC} N",

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.oracles.plain_runs import Plain
+from benchmarks.oracles.plain_runs import Plain, Run
 from benchmarks.truth.by_hand import NotWritten
 from benchmarks.truth.classes import classes_of
 from benchmarks.truth.draws import SERIES, draw
@@ -56,6 +56,9 @@ ROUNDS, PATIENT = (40.0, 250.0, 1500.0), 4
 
 ROUGH, FINE = 1e-6, 1e-7
 """Relative tolerances: of all runs, and of those that confirm a swing."""
+
+BUDGET = 1_500_000
+"""Steps that may be spent on a stage at one bandwidth."""
 
 SMALL = 2e-3
 """Share of the deflection at break-away below which a swing counts as rest."""
@@ -157,26 +160,24 @@ def edge_of(words: Mapping[float, str]) -> list[float] | None:
 
 
 def what_becomes(plain: Plain, amplitude: float = 0.0) -> tuple[str, float]:
-    """Whether a stage swings on from any start, and how far [m]; it is also started about a known `amplitude` [m]."""
-    open_runs: list[np.ndarray] = []
-    for start in _starts(plain, amplitude):
-        word, end, swing = _followed(plain, start, ROUNDS[0], ROUGH, False)
-        if word == SWINGS and _confirmed(plain, end):
-            return SWINGS, swing
-        if word == FAILED:
-            return FAILED, np.nan
-        if word != RESTS:
-            open_runs.append(end)
-    for periods, most in ((ROUNDS[1], len(open_runs)), (ROUNDS[2], PATIENT)):
+    """Whether a stage swings on from any start, and how far [m]; it is also started about a known `amplitude` [m]. What
+    takes more than `BUDGET` steps is not decided."""
+    starts, steps = [*_starts(plain, amplitude)], 0
+    for periods, most in ((ROUNDS[0], len(starts)), (ROUNDS[1], len(starts)), (ROUNDS[2], PATIENT)):
         going = []
-        for end in open_runs[:most]:
-            word, after, swing = _followed(plain, end, periods, ROUGH, periods == ROUNDS[-1])
-            if word == SWINGS and _confirmed(plain, after):
-                return SWINGS, swing
+        for start in starts[:most]:
+            if steps > BUDGET:
+                return UNSURE, np.nan
+            word, run = _followed(plain, start, periods, ROUGH, periods == ROUNDS[-1])
+            steps += run.steps
+            if word == FAILED:
+                return FAILED, np.nan
+            if word == SWINGS and _confirmed(plain, run.state):
+                return SWINGS, run.spread / 2
             if word != RESTS:
-                going.append(after)
-        open_runs = going + open_runs[most:]
-    return (UNSURE if open_runs else RESTS), np.nan
+                going.append(run.state)
+        starts = going + starts[most:]
+    return (UNSURE if starts else RESTS), np.nan
 
 
 def _starts(plain: Plain, amplitude: float) -> Iterator[np.ndarray]:
@@ -187,16 +188,14 @@ def _starts(plain: Plain, amplitude: float) -> Iterator[np.ndarray]:
         yield plain.released(-distance if place % 2 else distance)
 
 
-def _followed(
-    plain: Plain, start: np.ndarray, periods: float, rtol: float, last: bool
-) -> tuple[str, np.ndarray, float]:
-    """What becomes of a run, its last state, and half of what it spreads over [m]."""
+def _followed(plain: Plain, start: np.ndarray, periods: float, rtol: float, last: bool) -> tuple[str, Run]:
+    """What becomes of a run, and the run."""
     end = periods * plain.period
-    times, places, state, spread, done = plain.run(start, end, rtol)
-    word = judge(legs(times, places, end), spread, SMALL * plain.length, last) if done else FAILED
-    return word, state, spread / 2
+    run = plain.run(start, end, rtol)
+    small = SMALL * plain.length
+    return judge(legs(run.times, run.places, end), run.spread, small, last) if run.done else FAILED, run
 
 
 def _confirmed(plain: Plain, state: np.ndarray) -> bool:
     runs = (_followed(plain, factor * state, ROUNDS[0], FINE, True) for factor in CONFIRMED)
-    return all(word == SWINGS for word, _, _ in runs)
+    return all(word == SWINGS for word, _ in runs)

@@ -62,6 +62,19 @@ AWAY = 1e6
 
 
 @dataclass(frozen=True)
+class Run:
+    """Times [s] and places [m] of the turning points of a run, its last state, how far the place spreads in the last
+    quarter [m], the steps, and whether it was completed: with neither too many steps nor leaving for good."""
+
+    times: np.ndarray
+    places: np.ndarray
+    state: np.ndarray
+    spread: float
+    steps: int
+    done: bool
+
+
+@dataclass(frozen=True)
 class Plain:
     """One stage with its reference held at 0: its equations by hand, and the friction at its motor (all 0: none)."""
 
@@ -136,15 +149,13 @@ class Plain:
         y[INTEGRAL] = displacement * self._number("kp") / self._number("ki")
         return y
 
-    def run(self, y: np.ndarray, end: float, rtol: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, bool]:
-        """From a state to the time `end` [s]: times [s] and places [m] of the turning points, the last state, how far
-        the place spreads in the last quarter [m], and whether the run was completed
-        (neither too many steps nor leaving for good)."""
-        measured = self.equations.measured
+    def run(self, y: np.ndarray, end: float, rtol: float) -> Run:
+        """From a state to the time `end` [s]."""
+        measured, far = self.equations.measured, AWAY * self.length
         arrays = self.equations.numbers, self.second, self.scales, self.live
-        far = AWAY * self.length
-        times, places, count, last, spread, done = _followed(y.astype(float), end, rtol, measured, far, *arrays)
-        return times[:count], places[:count], last, spread, done
+        run = _followed(y.astype(float), end, rtol, measured, far, *arrays)
+        times, places, count, state, spread, steps, done = run
+        return Run(times[:count], places[:count], state, spread, steps, done)
 
 
 @njit(cache=True)
@@ -250,7 +261,7 @@ def _followed(y, end, rtol, measured, far, n, second, scales, live):  # type: ig
     while time < end:
         steps += 1
         if steps > MOST_STEPS or not h > 1e-13 * end or abs(y[measured]) > far:
-            return times, places, count, y, high - low, False
+            return times, places, count, y, high - low, steps, False
         h = min(h, end - time, end / 50)
         moved, error = _step(y, h, base, slopes, n, second, live)
         size = 0.0
@@ -270,4 +281,4 @@ def _followed(y, end, rtol, measured, far, n, second, scales, live):  # type: ig
         h *= min(4.0, 0.9 * size ** (-1 / 4)) if size > 0 else 4.0
         base = _all_rates(y, n, second)[live]
         slopes = _slopes(y, base, n, second, scales, live)
-    return times, places, count, y, high - low, True
+    return times, places, count, y, high - low, steps, True
