@@ -66,6 +66,9 @@ SMALL = 2e-3
 CONFIRMED = (0.99, 1.01)
 """Factors of the state on a swing from which, at the finer tolerance, the swing has to be taken up again."""
 
+LONG, KEPT = 8, 0.9
+"""Rounds of the first length for which a swing at an edge is confirmed, and the share of its spread that it keeps."""
+
 Record = dict[str, Any]
 
 
@@ -141,11 +144,16 @@ def _words(plain: Plain) -> dict[float, str]:
 
     for factor in FACTORS:
         attempt(factor)
-    while (edge := edge_of(words)) and edge[1] / edge[0] > BRACKET:
+    if words[1.0] == SWINGS:
+        words[1.0], _ = what_becomes(plain, swings[1.0], lasting=True)
+    while edge := edge_of(words):
         middle = round(float(np.sqrt(edge[0] * edge[1])), 6)
-        if any(edge[0] < factor < edge[1] for factor in words):  # which was not decided
+        if edge[1] / edge[0] > BRACKET and not any(edge[0] < factor < edge[1] for factor in words):
+            attempt(middle)
+            continue
+        words[edge[0]], _ = what_becomes(plain.faster(edge[0]), swings[edge[0]], lasting=True)
+        if words[edge[0]] == SWINGS:
             break
-        attempt(middle)
     return words
 
 
@@ -159,9 +167,10 @@ def edge_of(words: Mapping[float, str]) -> list[float] | None:
     return pairs[-1] if pairs else None
 
 
-def what_becomes(plain: Plain, amplitude: float = 0.0) -> tuple[str, float]:
-    """Whether a stage swings on from any start, and how far [m]; it is also started about a known `amplitude` [m]. What
-    takes more than `BUDGET` steps is not decided."""
+def what_becomes(plain: Plain, amplitude: float = 0.0, lasting: bool = False) -> tuple[str, float]:
+    """Whether a stage swings on from any start, and how far [m]; it is also started about an `amplitude` [m]. Near an
+    edge swings may die out after hundreds of periods: `lasting` follows them longer. What takes more than `BUDGET`
+    steps is not decided."""
     starts, steps = [*_starts(plain, amplitude)], 0
     for periods, most in ((ROUNDS[0], len(starts)), (ROUNDS[1], len(starts)), (ROUNDS[2], PATIENT)):
         going = []
@@ -172,7 +181,7 @@ def what_becomes(plain: Plain, amplitude: float = 0.0) -> tuple[str, float]:
             steps += run.steps
             if word == FAILED:
                 return FAILED, np.nan
-            if word == SWINGS and _confirmed(plain, run.state):
+            if word == SWINGS and _confirmed(plain, run.state, LONG if lasting else 1):
                 return SWINGS, run.spread / 2
             if word != RESTS:
                 going.append(run.state)
@@ -196,6 +205,16 @@ def _followed(plain: Plain, start: np.ndarray, periods: float, rtol: float, last
     return judge(legs(run.times, run.places, end), run.spread, small, last) if run.done else FAILED, run
 
 
-def _confirmed(plain: Plain, state: np.ndarray) -> bool:
-    runs = (_followed(plain, factor * state, ROUNDS[0], FINE, True) for factor in CONFIRMED)
-    return all(word == SWINGS for word, _ in runs)
+def _confirmed(plain: Plain, state: np.ndarray, rounds: int) -> bool:
+    """Whether neighbours of a state on a swing take that up for as many rounds, and keep up `KEPT` of it."""
+    for factor in CONFIRMED:
+        spreads, near = list[float](), factor * state
+        for _ in range(rounds):
+            word, run = _followed(plain, near, ROUNDS[0], FINE, True)
+            if word != SWINGS:
+                return False
+            spreads.append(run.spread)
+            near = run.state
+        if min(spreads) < KEPT * spreads[0]:
+            return False
+    return True

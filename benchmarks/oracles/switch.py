@@ -21,21 +21,23 @@ from scipy.linalg import expm
 from scipy.optimize import root_scalar
 
 from benchmarks.oracles.oracle import Finding, Oracle
-from friso.hunting import Ensemble, find_cycles, hunting
+from friso.hunting import Ensemble, Hunting, find_cycles, find_swings, hunting
 from friso.stage import Stage
 
 MASS, COULOMB, GAP = 1.7, 1.0, 2.0
 """Mass [kg], Coulomb friction and what static friction exceeds it by [N]."""
 
-MANY, ASKED = 300, 6
-"""Drawn controllers that are solved exactly, and those of them that friso is asked about."""
+MANY, ASKED, SHOWN = 300, 24, 6
+"""Drawn controllers that are solved exactly, those of them that friso is asked about, and those that are shown on the
+whole way to the limit."""
 
 DISTANCES = np.geomspace(1e-3, 1e4, 71)
 """Distances at which the mass sticks, in units of the gap over kp."""
 
-SHARPER = (1e-1, 1e-2, 1e-3, 1e-4)
+SHARPER, SHARP = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5), 1e-3
 """Steps to the limit of LuGre: Stribeck velocity in units of the fastest that the gap alone drives the mass, while the
-bristles are as many times stiffer than the loop as its inverse squared, and at least a thousand times."""
+bristles are as many times stiffer than the loop as its inverse squared, and at least a thousand times; and the step at
+which most are asked."""
 
 LONG = 60.0
 """Time for which a slide is followed, in units of that of the loop."""
@@ -156,19 +158,48 @@ def always() -> Iterator[Finding]:
     )
     words = f"{count} of {MANY}; it sticks at both ends in {sticking}"
     yield Finding("drawn PIDs with a limit cycle, by the exact map alone", "-", words, None)
-    for number, (pid, (amplitude, _)) in enumerate(zip(pids[:ASKED], exact, strict=False)):
-        yield towards(f"PID {number}", pid, amplitude)
+    asked = list(zip(pids[:ASKED], (size for size, _ in exact), strict=False))
+    for name, amplitude in (("found by the survey", surveyed), ("closed from the return map", closed)):
+        sizes = [amplitude(stage(pid, SHARP)) / size - 1 for pid, size in asked]
+        near = int(np.sum(np.abs(sizes) < NEAR))
+        what = f"limit cycles {name}, within {100 * NEAR:g} % of the exact ones, at v_s of {SHARP:g}"
+        words = f"{near}; {int(np.sum(np.isnan(sizes)))} without a cycle", f"{ASKED} of {ASKED}"
+        yield Finding(what, *words, near == ASKED)
+    for sharpness in SHARPER[2:]:
+        yield from at_the_limit([hunting(stage(pid, sharpness)) for pid, _ in asked], sharpness)
+    for number, (pid, (size, _)) in enumerate(zip(pids[:SHOWN], exact, strict=False)):
+        yield towards(f"PID {number}", pid, size)
+
+
+def at_the_limit(answers: Sequence[Hunting], sharpness: float) -> Iterator[Finding]:
+    """Stages of which friso is certain that another number of motions attracts than the one cycle of the exact map."""
+    motions = [len(a.surveyed.motions) if a.certain and a.surveyed else 1 for a in answers]
+    for words, wrong in (("nothing", np.equal(motions, 0)), ("more than one motion", np.greater(motions, 1))):
+        which = ", ".join(f"PID {k}" for k in np.flatnonzero(wrong))
+        what = f"stages that {words} attracts, for certain, at v_s of {sharpness:g}"
+        yield Finding(what, f"{wrong.sum()} of {len(motions)}{which and f' ({which})'}", "none", not wrong.any())
 
 
 def towards(name: str, pid: Pid, amplitude: float) -> Finding:
     """What friso says of a PID on the way to the limit, beside the exact limit cycle."""
-    off, words = list[float](), list[str]()
-    for sharpness in SHARPER:
-        cycles = find_cycles(Ensemble.held(stage(pid, sharpness).flat(), 1))
-        off.append(float(cycles.amplitude[0]) / amplitude - 1 if cycles.closed[0] else np.nan)
-        words.append(f"{100 * off[-1]:.2g} %" if np.isfinite(off[-1]) else "no cycle")
-    text = f"cycle off by {', '.join(words)} at v_s of {', '.join(f'{s:g}' for s in SHARPER)}"
+    steps = SHARPER[:4]
+    off = [surveyed(stage(pid, sharpness)) / amplitude - 1 for sharpness in steps]
+    words = [f"{100 * share:.2g} %" if np.isfinite(share) else "no cycle" for share in off]
+    text = f"cycle off by {', '.join(words)} at v_s of {', '.join(f'{s:g}' for s in steps)}"
     return Finding(f"{name}: limit cycle", text, f"±{1e3 * amplitude:.5g} mm", abs(off[-1]) < NEAR)
+
+
+def surveyed(one: Stage) -> float:
+    """Half of peak to peak of what attracts a stage by friso's survey [m]: of the largest closed cycle, or else of the
+    largest swing that was observed; NaN where nothing does."""
+    swings = find_swings(one.flat())
+    cycles = [swing for swing in swings if swing.cycles is not None]
+    return max((swing.amplitude for swing in cycles or swings), default=np.nan)
+
+
+def closed(one: Stage) -> float:
+    """Half of peak to peak of the cycle that friso closes where its return map has a fixed point [m]; NaN without."""
+    return float(find_cycles(Ensemble.held(one.flat(), 1)).amplitude[0])
 
 
 def never() -> Iterator[Finding]:
@@ -176,13 +207,12 @@ def never() -> Iterator[Finding]:
     ratios = np.array([pid.ratio() for pid in pids])
     words = f"{int(np.sum(np.abs(ratios) < 1))} of {MANY}, by {ratios.min():.3g} to {ratios.max():.3g}"
     yield Finding("drawn PIDs that stop nearer every time, by the exact map alone", "-", words, None)
-    for number, pid in enumerate(pids[:ASKED]):
-        for law in ("lugre", "dahl"):
-            answer = hunting(coulomb_stage(pid, law))
-            attracts = [*answer.attracting, *answer.observed]
-            certain = "certain" if answer.certain else "not certain"
-            said = f"{len(attracts)} motions attract ({certain})"
-            yield Finding(f"PID {number}, {law}: what attracts", said, "nothing", not attracts)
+    for law in ("lugre", "dahl"):
+        answers = [hunting(coulomb_stage(pid, law)) for pid in pids[:ASKED]]
+        quiet = sum(not (answer.attracting or answer.observed) for answer in answers)
+        certain = sum(answer.certain for answer in answers)
+        words = f"{quiet} ({certain} certain)", f"{ASKED} of {ASKED}"
+        yield Finding(f"PIDs under which nothing attracts, on bristles of {law}", *words, quiet == ASKED)
 
 
 def coulomb_stage(pid: Pid, law: str) -> Stage:
@@ -206,7 +236,9 @@ ORACLES = (
         "a limit cycle.",
         SOURCES[0],
         "Friso has bristles and a Stribeck velocity. Made stiffer and smaller, its cycle has to come within 1 % of the "
-        "exact one: Stribeck friction and bristles act on less than a thousandth of the swing then.",
+        "exact one: Stribeck friction and bristles act on less than a thousandth of the swing then. The exact map has "
+        "one fixed point, with a slope of less than 1 in magnitude, so one cycle attracts each stage and nothing else. "
+        "At v_s of 1e-5 bristles are 1e10 times as stiff as the loop, which friso calls unusual.",
         always,
     ),
     Oracle(
