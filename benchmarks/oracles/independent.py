@@ -1,0 +1,198 @@
+"""Friso's verdicts and edges beside those of brute force (`edges.py`), class by class."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.code import code_digest
+from benchmarks.oracles.edges import FINE, QUOTAS, ROUNDS, Quota, Record, kept, of_quota
+from benchmarks.oracles.oracle import Finding, Oracle
+from benchmarks.oracles.plain_runs import BRISTLE, Plain
+from benchmarks.return_map.answers import checked
+from benchmarks.truth.by_hand import INTEGRAL, LOW, VC, VP, XC, XP, V, X, Z
+from benchmarks.truth.claims import ATTRACTED
+from benchmarks.truth.draws import draw
+from benchmarks.truth.kept import CHECKED
+from benchmarks.truth.swings import RESTS, SWINGS
+from friso.engine.kernel import kernel, kernels
+from friso.equations.bandwidth import faster
+from friso.equations.structure import structure
+from friso.hunting import Swinging, find_swings, needed_kernels
+
+ANSWERS = Path("benchmark_results/oracles.jsonl")
+"""Friso's answers, a line each, with a digest of the code that gave them: what is there is not asked again."""
+
+CLASSES = ("one friction", "dead band of the error", "backlash", "friction at the motor and at the load")
+"""Names of the classes of `edges.QUOTAS`."""
+
+VERDICT, MISSED = "verdict", "edge; plain runs begun on friso's orbit swing on up to friso's"
+
+JUST_BELOW, LASTING, SAME_SWING = 0.9975, 5, 0.01
+"""Share of friso's edge at which plain runs are begun on its own motion, rounds for which they are followed, and the
+share by which their amplitude may differ."""
+
+PLACES = {
+    **{"position": X, "velocity": V, "cart_position": XC, "cart_velocity": VC, "motor_position": XP},
+    **{"motor_velocity": VP, "parasitic_position": XP, "parasitic_velocity": VP, "bristle_deflection": Z},
+    **{"filtered_error": LOW, "filtered_position": LOW, "integral": INTEGRAL},
+    **{"motor_bristle_deflection": BRISTLE},
+}
+"""Places in plain runs of friso's states."""
+
+SLACK = 1e-3
+"""Share by which an edge may lie outside the bandwidths between which brute force has it: what runs at 1e-6 leave."""
+
+
+def answer(record: Record) -> Record:
+    """What friso says of a stage."""
+    key = {"series": record["series"], "seed": record["seed"], "number": record["number"], "code": code_digest(CHECKED)}
+    lines = ANSWERS.read_text().splitlines() if ANSWERS.exists() else []
+    for said in map(json.loads, lines):
+        if {name: said[name] for name in key} == key:
+            return said
+    stage = draw(record["seed"], record["number"], record["series"])
+    kernels(needed_kernels(stage))
+    with np.errstate(all="ignore"):
+        said = key | checked(stage)
+    ANSWERS.parent.mkdir(parents=True, exist_ok=True)
+    with ANSWERS.open("a") as stream:
+        stream.write(json.dumps(said) + "\n")
+    return said
+
+
+def edges() -> Iterator[Finding]:
+    records, beside = kept(), list[tuple[str, Record, Record]]()
+    for name, quota in zip(CLASSES, QUOTAS, strict=True):
+        own = compared(quota, records)
+        beside += [(name, record, answer(record)) for record in own]
+        yield from by_class(name, [pair[1:] for pair in beside if pair[0] == name])
+    for name, record, said in beside:
+        for what, words in differences(record, said):
+            sure = said["certain"] if what == VERDICT else _sure_edge(said)
+            case = f"{record['series']} {record['seed']}:{record['number']} ({name}), {what}"
+            text = f"{words[0]} ({'certain' if sure else 'not certain'})"
+            yield Finding(case, text, words[1], False if sure and what != MISSED else None)
+
+
+def compared(quota: Quota, records: Sequence[Record]) -> list[Record]:
+    """The stages of a class that have an edge, and as many that have none and are decided at their own bandwidth."""
+    own = [record for record in of_quota(quota, records) if record["words"]["1"] in (SWINGS, RESTS)]
+    with_edge = [record for record in own if record["edge"]]
+    return with_edge + [record for record in own if not record["edge"]][: len(with_edge)]
+
+
+def missed(record: Record, said: Record) -> bool:
+    """Whether brute force missed a swing: its edge lies below friso's, no run swings on above that, and plain runs
+    begun on friso's own motion just below it swing on. Basins near an edge are narrow."""
+    end = said["edge"]
+    if not end or not record["edge"] or record["edge"][1] > end["factor"] or beyond(record, said):
+        return False
+    factor = end["factor"] * JUST_BELOW
+    flat = draw(record["seed"], record["number"], record["series"]).flat()
+    plain, names = Plain.of(flat).faster(factor), [*kernel(structure(faster(flat, factor))).states]
+    return any(_lasts(plain, names, motion) for motion in find_swings(faster(flat, factor)))
+
+
+def _lasts(plain: Plain, names: Sequence[str], motion: Swinging) -> bool:
+    state = motion.seen if motion.cycles is None else motion.cycles.states[motion.number]
+    y = plain.released(0.0)
+    for name, value in zip(names, [] if state is None else state, strict=False):
+        y[PLACES[name]] = value
+    for follower, name in ((XC, "cart_position"), (XP, "motor_position")):
+        if name not in names and (name != "motor_position" or "parasitic_position" not in names):
+            y[follower : follower + 2] = y[:2]
+    for _ in range(LASTING):
+        run = plain.run(y, ROUNDS[0] * plain.period, FINE)
+        if not run.done or abs(run.spread / 2 / motion.amplitude - 1) > SAME_SWING:
+            return False
+        y = run.state
+    return True
+
+
+def by_class(name: str, pairs: Sequence[tuple[Record, Record]]) -> Iterator[Finding]:
+    """Counts of what friso is certain about, and of what of that brute force has, too."""
+    sure = [(record, said) for record, said in pairs if said["certain"]]
+    open_edges = sum(not _sure_edge(said) for record, said in pairs if record["edge"])
+    parts = {
+        "certain verdicts": [same_verdict(*pair) for pair in sure],
+        "certain edges": [
+            same_edge(*pair) or missed(*pair) for pair in sure if pair[0]["edge"] and _sure_edge(pair[1])
+        ],
+        "nothing beyond a certain edge": [not beyond(*pair) for pair in sure if _sure_edge(pair[1])],
+    }
+    for what, agree in parts.items():
+        words = f"{len(agree)}", f"{sum(agree)} the same"
+        yield Finding(f"{name}: {what}", *words, all(agree) if agree else None)
+    words = f"{len(pairs) - len(sure)} verdicts, {open_edges} edges", f"of {len(pairs)} and {_with_edge(pairs)}"
+    yield Finding(f"{name}: left open", *words, None)
+
+
+def differences(record: Record, said: Record) -> Iterator[tuple[str, tuple[str, str]]]:
+    """In what both differ, whether friso is certain or not: what was asked, and both answers."""
+    if not same_verdict(record, said):
+        yield VERDICT, (said["verdict"], record["words"]["1"])
+    if record["edge"] and not same_edge(record, said):
+        low, high = record["edge"]
+        edge = said["edge"]
+        own = f"{edge['factor']:.5g} to {edge['quiet']:.5g}" if edge else "none"
+        name = MISSED if missed(record, said) else "edge"
+        yield name, (own, f"{low:.5g} to {high:.5g}")
+    if places := beyond(record, said):
+        yield "beyond the edge", ("nothing attracts", f"swings at {', '.join(f'{place:.5g}' for place in places)}")
+
+
+def same_verdict(record: Record, said: Record) -> bool:
+    """Whether friso says that something attracts if and only if a run swings on."""
+    return (said["verdict"] in ATTRACTED) == (record["words"]["1"] == SWINGS)
+
+
+def same_edge(record: Record, said: Record) -> bool:
+    """Whether an end that friso tells overlaps the bandwidths between which brute force has the edge."""
+    low, high = record["edge"]
+    ends = [said["edge"], *(end for _, end in said["windows"])]
+    return any(end["factor"] <= high * (1 + SLACK) and end["quiet"] >= low * (1 - SLACK) for end in ends if end)
+
+
+def beyond(record: Record, said: Record) -> list[float]:
+    """Bandwidths at which runs swing on although friso has nothing attract there, beyond its edge."""
+    if not said["edge"]:
+        return []
+    factors = [float(factor) for factor, word in record["words"].items() if word == SWINGS]
+    return [f for f in factors if f > said["edge"]["quiet"] * (1 + SLACK) and not _in_window(f, said["windows"])]
+
+
+def _in_window(factor: float, windows: Any) -> bool:
+    for low, high in windows:
+        above = low is None or factor >= min(low["factor"], low["quiet"]) * (1 - SLACK)
+        if above and (high is None or factor <= max(high["factor"], high["quiet"]) * (1 + SLACK)):
+            return True
+    return False
+
+
+def _sure_edge(said: Record) -> bool:
+    return bool(said["certain"] and said["edge"] and said["edge"]["certain"])
+
+
+def _with_edge(pairs: Sequence[tuple[Record, Record]]) -> int:
+    return sum(record["edge"] is not None for record, _ in pairs)
+
+
+ORACLES = (
+    Oracle(
+        "edges",
+        "Stages drawn at random, dead bands, backlash and two frictions among them, hunt and stop hunting at the "
+        "bandwidths at which plain simulation from many starts has them do so.",
+        "Own brute force (`edges.py`): equations by hand, an integrator that shares nothing with friso "
+        "(doi:10.1145/355993.355994), 24 starts at each of 9 bandwidths and between; kept in edges.jsonl",
+        "Where friso is certain the verdict is the same; the edge overlaps the bracket of brute force (1.5 %, or up to "
+        "6 % where what lies between was not decided), or plain runs begun on friso's own orbit swing on up to it; and "
+        "no run swings on beyond it outside the windows that friso tells. Where friso is not certain, a difference is "
+        "listed and counts for neither.",
+        edges,
+    ),
+)
