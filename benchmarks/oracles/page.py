@@ -26,8 +26,8 @@ def page(written: Mapping[str, str]) -> str:
         "Written by `python -m benchmarks.oracles --table docs/evidence/oracles.md`.",
         "",
         "Facts that nobody here made, and what friso answers. Each section states the fact, its source, and the sense "
-        "in which friso has to agree, which was fixed before both were compared. A dash marks what counts for neither: "
-        "friso leaves it open, or an oracle speaks alone.",
+        "in which friso has to agree; what was changed after a first comparison is said there. A dash "
+        "marks what counts for neither: friso leaves it open, or an oracle speaks alone.",
         "",
         *markdown(["oracle", "agrees", "asked on", "code of friso"], rows),
     ]

@@ -238,7 +238,8 @@ ORACLES = (
         "Friso has bristles and a Stribeck velocity. Made stiffer and smaller, its cycle has to come within 1 % of the "
         "exact one: Stribeck friction and bristles act on less than a thousandth of the swing then. The exact map has "
         "one fixed point, with a slope of less than 1 in magnitude, so one cycle attracts each stage and nothing else. "
-        "At v_s of 1e-5 bristles are 1e10 times as stiff as the loop, which friso calls unusual.",
+        "At v_s of 1e-5 bristles are 1e10 times as stiff as the loop, which friso calls unusual. First "
+        "asked were cycles closed from the return map alone; as these were missing, the survey was asked too.",
         always,
     ),
     Oracle(
