@@ -13,6 +13,7 @@ from friso.axis import unit_shown
 from friso.errors import InputError
 from friso.hunting.measures import BANDS
 from friso.stage import Stage, loads
+from friso.studies.scalings import SCALINGS
 from friso.views.check.traces import common_range
 from friso.views.drawing.colours import scale
 from friso.views.drawing.drawable import colour_prefix
@@ -40,7 +41,7 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
     sampled = SAMPLE in runs.dims
     chosen = picked(runs)
     cells = _Cells(axes, chosen, sampled)
-    flat = stage.flat() if (stage := machine_of(runs)) else {}
+    flat = dict.fromkeys(SCALINGS, 1.0) | stage.flat() if (stage := machine_of(runs)) else {}
     order = list(axes) if sampled or len(axes) == 1 else plane_first(axes)
     return {
         "metric": metric,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.studies.scalings import SCALINGS
 from friso.views.drawing.figure import GREY, INK, Axis, Figure, Markers, Panel
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Seque
     """A figure over two keys with the places of some stages, by label, that have both, where they lie inside of it."""
     places = []
     for label, stage in stands:
-        right, up = (stage.flat().get(key) for key in keys)
+        right, up = ({**dict.fromkeys(SCALINGS, 1.0), **stage.flat()}.get(key) for key in keys)
         if isinstance(right, float) and isinstance(up, float):
             colour = INK if label == SHOWN else GREY
             places.append(Markers(np.array([right]), np.array([up]), label, colour, "target"))
