@@ -657,3 +657,24 @@ def test_a_cycle_that_is_passed_through_several_times_is_closed_as_itself() -> N
         assert (cycles.swings, cycles.sign) == (1, -1.0) or not cycles.closed.any()
         assert cycles.multiplier[cycles.closed] == pytest.approx(cycle.multiplier[0], rel=1e-4)
     assert closed.tolist() == [1.0] * passes.size
+
+
+def test_nothing_is_certain_of_bristles_that_runs_do_not_resolve(rig: Stage) -> None:
+    """1e10 times as stiff as the loop, runs at every tolerance let them break away as if friction did not fall: nothing
+    attracts in them, where the exact map of such a stage has a cycle (`benchmarks.oracles`)."""
+    exact = {
+        "friction.model": "lugre",
+        "friction.static": "1 N",
+        "friction.coulomb": "0.4 N",
+        "friction.viscous": "0 N*s/m",
+    }
+    for stiffness, resolved in (("1e11 N/m", True), ("1e14 N/m", False)):
+        stage = rig.replace({"joint.locked": True, **exact, "friction.bristle_stiffness": stiffness})
+        survey = hunting(stage.replace({"controller.crossover": "60 Hz"}))
+        assert not survey.attracting
+        assert survey.certain == resolved
+
+
+def test_a_stage_without_integral_action_has_no_swings(rig: Stage) -> None:
+    still = {"kind": "pid", "kp": "3e3 N/m", "ki": "0 N/(m*s)", "kd": "200 N*s/m", "tau": "1 ms"}
+    assert find_swings(rig.replace({"controller": still, "joint.locked": True}).flat()) == ()

@@ -131,7 +131,7 @@ def find_swings(flat: Mapping[str, Any]) -> tuple[Swinging, ...]:
 
     The stage's own motion plays no part. Where an allowance is used up, what was found until then is returned.
     """
-    return attractors(Ensemble.held(flat, 1), thorough=True).motions
+    return () if why_not(shared_structure(flat)) else attractors(Ensemble.held(flat, 1), thorough=True).motions
 
 
 def loops_unstable(flat: Mapping[str, Any], count: int) -> np.ndarray:

@@ -16,6 +16,7 @@ from friso.engine.tolerance import checked_rtol
 from friso.equations.roles import Role
 from friso.equations.structure import Structure, structure
 from friso.hunting.attractors import Attractors, Target, attractors
+from friso.hunting.attractors.rounds import TIGHT
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of, slopes
@@ -99,6 +100,14 @@ SMALL_CYCLES = (
 
 NARROW_PLAY = "the backlash is so narrow that cycles of its size may be smaller than the search covers"
 """The same of swings within a backlash."""
+
+STIFF_BRISTLES = "bristles give way by so little that runs do not resolve how friction falls as they break away"
+"""The same of stages whose bristles hardly bend."""
+
+RESOLVED_BRISTLES = 10 * TIGHT
+"""Deflection of bristles, in units of that of the loop, below which runs do not resolve it, even at the tightest
+tolerance of a survey: with 9e-10 nothing attracts in friso's runs where the exact map of a stage has a cycle, with 1e-8
+and more the cycle is there (`benchmarks.oracles`, always)."""
 
 AT_ONCE = 64
 """Stages whose friction is looked at together, at hundreds of speeds each."""
@@ -285,6 +294,8 @@ def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
     else:
         why = np.where(small_cycles_possible(stages), SMALL_CYCLES, "").astype(object)
         why[(stages.backlash > 0) & (stages.backlash < SMALL_SWING * stages.length)] = NARROW_PLAY
+    if bristles := stages.kernel.having(Role.BRISTLE):
+        why[stages.scales[:, bristles].min(axis=1) < RESOLVED_BRISTLES * stages.length] = STIFF_BRISTLES
     why[(dead_band(stages.flat) >= WIDE_BAND * stages.length) & (stages.length > 0)] = MOSTLY_WITHIN
     why[farther] = FARTHER_KICKS
     return why
