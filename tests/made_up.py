@@ -217,8 +217,13 @@ def small_figure() -> Figure:
     return Figure("small", "Small", "A caption.", (upper, lower), columns=2, subject="Rig")
 
 
+def _without_bands(figure: Figure) -> Figure:
+    """The figure without areas, which each renderer makes of its own kind of polygon."""
+    return replace(figure, panels=tuple(replace(panel, bands=()) for panel in figure.panels))
+
+
 def mpl_arrays(figure: Figure) -> list[list[np.ndarray]]:
-    axes = [a for a in matplotlib_renderer.render(figure).axes if a.get_label() != "<colorbar>"]
+    axes = [a for a in matplotlib_renderer.render(_without_bands(figure)).axes if a.get_label() != "<colorbar>"]
     drawn = []
     for panel in axes:
         meshes = [np.asarray(mesh.get_array().filled(np.nan)) for mesh in panel.collections]
@@ -229,7 +234,7 @@ def mpl_arrays(figure: Figure) -> list[list[np.ndarray]]:
 
 def plotly_arrays(figure: Figure) -> list[list[np.ndarray]]:
     drawn: dict[str, list[np.ndarray]] = {f"x{i or ''}": [] for i in (0, *range(2, len(figure.panels) + 1))}
-    for trace in plotly_renderer.render(figure).data:
+    for trace in plotly_renderer.render(_without_bands(figure)).data:
         parts = (trace.z,) if trace.type == "heatmap" else (trace.x, trace.y)
         drawn[trace.xaxis] += [np.asarray(part, float) for part in parts]
     return list(drawn.values())

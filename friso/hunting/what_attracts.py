@@ -179,9 +179,14 @@ def surveyed_roughly(stages: Ensemble, rtol: float = RTOL, close: bool = True) -
 
 
 def _hardly_attracts(landing_map: LandingMap) -> bool:
-    """Whether no attractor of a map attracts so strongly, and from so many of its points, that a coarse map is to be
-    trusted."""
-    return all(one.basin.size < FEW or landing_map.slope(one) > HARDLY for one in landing_map.attractors)
+    """Whether no attractor of a map is as simple, attracts as strongly, and from as many of its points, that a coarse
+    map is to be trusted: where the next landing is about as far off as the last one, straight pieces between points
+    come to cycles of several landings that the stage does not have."""
+    swings = 1 if landing_map.symmetric else 2
+    return not any(
+        len(one.distances) == swings and one.basin.size >= FEW and landing_map.slope(one) <= HARDLY
+        for one in landing_map.attractors
+    )
 
 
 def _seen_on_map(mapped: Mapped, stage: int) -> Iterator[Swinging]:

@@ -54,8 +54,8 @@ def stability(bode: Bode) -> list[str]:
         anywhere, least = bode.worst
         where = f"{place(anywhere, bode)}, {_margin(least)}"
         return [sentence, f"It is stable in every state: {_states_checked(bode)}. Worst: {where}."]
-    unstable = [] if but else [f"Unstable: {'; '.join(_where(bode))}."]
-    return [sentence, *unstable, *_why(bode)]
+    elsewhere = [] if but else [f"Unstable: {'; '.join(_where(bode))}."]
+    return [sentence, *elsewhere, *_why(bode)]
 
 
 def _tuned(bode: Bode) -> str:
