@@ -100,3 +100,30 @@ def test_an_attractor_of_few_points_is_not_trusted(locked: Stage) -> None:
     assert not sketch_attractors(flat, 1).attracts[0]
     with patched({what_attracts: {"FEW": 0}}):
         assert sketch_attractors(flat, 1).attracts[0]
+
+
+def test_cells_without_a_verdict_are_on_no_side_of_an_edge(locked: Stage) -> None:
+    """Static friction below Coulomb friction is no stage: neither curve nor sentence says hunting ends there."""
+    runs = friso.sweep(locked, {"friction.static": ["0.5 N", "0.9 N", "3 N", "3.3 N"], "speed": [0.9, 1.0, 1.1]})
+    assert not map_figure(runs.data, "sketch").panels[0].series
+    (sentence,) = own_place(runs.data, study_of(runs.data), "sketch")
+    assert "ends" not in sentence
+
+
+def test_the_nearest_cell_is_not_called_the_stage(locked: Stage) -> None:
+    runs = friso.sweep(locked, {"controller.crossover": ["5 Hz", "9.9 Hz", "14 Hz"]})
+    (sentence,) = own_place(runs.data, study_of(runs.data), "sketch")
+    assert "nearest" in sentence
+    assert "is transient" in sentence
+
+
+def test_factors_are_above_zero_and_a_name_that_links_use_is_free(locked: Stage) -> None:
+    with pytest.raises(InputError, match="above 0"):
+        friso.sweep(locked, {"speed": "-1,0,1"})
+    linked = friso.sweep(locked, {"speed": [0.5, 1.0]}, link={"controller.crossover": "8*speed"}, metric="outcome")
+    assert linked.cell(0).controller.crossover == pytest.approx(4.0)
+
+
+def test_confirming_what_is_no_verdict_is_refused(locked: Stage) -> None:
+    with pytest.raises(InputError, match="confirm"):
+        friso.sweep(locked, {"speed": [0.5, 1.0]}, metric="outcome", confirm=True)

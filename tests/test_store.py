@@ -160,7 +160,7 @@ def test_a_full_disk_stops_the_study_and_a_later_run_ends_it(
     with pytest.raises(OSError, match="No space left"), local_crew(2) as crew:
         run_in_store(study, path, crew)
     with pytest.raises(StoreError, match=r"No space left on device; \d+ of 192 cells are stored\n"):
-        friso_api.sweep(rig, AXES, out=path)
+        friso_api.sweep(rig, AXES, metric="outcome", out=path)
     monkeypatch.undo()
     with Store.opened(path, study) as store:
         assert 0 < len(list(store.missing())) < len(list(study.blocks(store.blocks)))
@@ -914,3 +914,10 @@ def test_where_what_attracts_is_surveyed_blocks_are_small(rig: Stage, tmp_path: 
     axes = {"controller.crossover": "4 Hz..16 Hz:41", "joint.stroke": "0 m..1 mm:41"}
     store = Store(tmp_path / "a.zarr", Request(rig, axes).study(["verdict"]))
     assert np.prod(store.blocks) <= storing.SURVEYED_BLOCK
+
+
+def test_a_store_of_samples_has_their_values_as_coordinates(rig: Stage, tmp_path: Path) -> None:
+    samples = Samples({"controller.crossover": "4 Hz..12 Hz", "joint.stroke": "0.1 mm..1 mm"}, 4)
+    stored = sweep(rig, {}, samples, store=tmp_path / "a.zarr")
+    assert {"controller.crossover", "joint.stroke"} <= set(stored.coords)
+    same(stored, sweep(rig, {}, samples))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
 from friso.answers.inputs import (
+    LOGGER,
     Changes,
     StageLike,
     Whole,
@@ -25,7 +26,7 @@ from friso.errors import InputError
 from friso.hunting import LONG_RUN_RTOL, Case, needed_kernels
 from friso.progress import Progress, silent
 from friso.stage import Stage
-from friso.stage.correlations import draw
+from friso.stage.correlations import Correlations, draw
 from friso.studies.draws import MOST, Draws
 
 if TYPE_CHECKING:
@@ -198,24 +199,25 @@ def check(
     chosen, tolerance = read_stage(stage, set, uncertain_too=True), tolerance_of(rtol)
     loose = max(tolerance, LONG_RUN_RTOL)
     whole_number(seed, "seed", 0, MOST_SEED, "1000")
-    sample = None
+    sample = uncertain = None
     if draws is not None:
         whole_number(draws, "draws", 1, MOST, "1000")
         try:
             sample = draw(chosen, correlations_of(stage, chosen), draws, seed)
         except InputError as error:
             raise error if error.origin else error.found_in("draws") from None
+    elif chosen.uncertain():
+        uncertain = _drawable(chosen, correlations_of(stage, chosen), seed)
     from friso.hunting import check as judged
 
     kernels(needed_kernels(chosen))
     mention_unstable_loop(chosen)
     cases = judged(chosen, tolerance, progress=progress, tell=partial(mention_verdict, chosen))
     drawn = across = None
-    if sample is None and chosen.uncertain():
+    if uncertain is not None:
         from friso.studies.draws import affordable
 
-        correlations = correlations_of(stage, chosen)
-        sample = draw(chosen, correlations, affordable(chosen, correlations, seed, loose), seed)
+        sample = draw(chosen, uncertain, affordable(chosen, uncertain, seed, loose), seed)
     if sample is not None:
         from friso.studies.draws import fates
 
@@ -225,3 +227,16 @@ def check(
 
         across = verdicts_by_law(chosen, loose, progress=progress)
     return CheckAnswer(chosen, cases, drawn, across)
+
+
+def _drawable(stage: Stage, correlations: Correlations, seed: int) -> Correlations | None:
+    """The correlations of a stage that is uncertain, if stages can be drawn from it; None if hardly any draw is
+    allowed, which is mentioned."""
+    from friso.studies.draws import TRIAL
+
+    try:
+        draw(stage, correlations, TRIAL, seed)
+    except InputError as error:
+        LOGGER.warning(f"no machines were drawn from the uncertain keys ({error.actual}); their centres are used")
+        return None
+    return correlations

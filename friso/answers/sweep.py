@@ -230,6 +230,8 @@ def sweep(
     3
     """
     exports, share = _checked_exports(export), checked_share(verify)
+    if confirm and metric not in (None, SKETCH, "verdict"):
+        raise InputError("confirm", f"--confirm and --metric {metric}", "one of the two: it searches for verdicts", "")
     varied = Varied.of_texts(axes or {}, x, y, axis, link, samples, latin, log)
     store = None if out is None else place_of_store(out)
     if scheduler is not None:
@@ -237,7 +239,7 @@ def sweep(
     with _crew(workers, scheduler) as crew:
         resumed = Path(stage) if isinstance(stage, str | os.PathLike) and Path(stage).is_dir() else None
         if resumed is not None:
-            if varied != Varied() or set or rtol or refine or out:
+            if varied != Varied() or set or rtol or refine or out or confirm:
                 raise _another_study(resumed)
             store = place_of_store(resumed)
             study, metric = stored_study(store, metric, None if yes else LARGE)

@@ -88,7 +88,9 @@ def show(
             print_wrapped(sentence)
         for block in answer.blocks():
             print(f"\n{block}\n")
-        tables, more = answer.tables(), answer.details()
+        tables = answer.tables()
+        behind = any(table.behind for table in tables)
+        more = answer.details() if details or not behind else ()  # they may take work
         for table in tables:
             if details or not table.behind:
                 print_table(table.title, table.columns, [(label, [*cells]) for label, cells in table.rows])
@@ -97,7 +99,7 @@ def show(
         print_written(written)
         for command in answer.next_steps(written):
             print(f"next: {command}")
-        if not details and (more or any(table.behind for table in tables)):
+        if not details and (more or behind):
             print("more: --details")
     failures = [failure for failure in (answer.failure, unwritten) if failure]
     for failure in failures:

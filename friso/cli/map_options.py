@@ -42,7 +42,10 @@ Metric = Annotated[
         "verdict, multiplier, amplitude, period. Of each run: outcome (what it does at its end), peaks, ...",
     ),
 ]
-Confirm = Annotated[bool, typer.Option("--confirm", help="Search every cell, instead of a sketch: ten times slower.")]
+Confirm = Annotated[
+    bool,
+    typer.Option("--confirm", help="Search every cell, instead of a sketch, which takes up to five times as long."),
+]
 MapTolerance = Annotated[
     str | None,
     typer.Option("--rtol", metavar="NUMBER|auto", help="Relative tolerance, default 1e-6; auto: the loosest safe one."),

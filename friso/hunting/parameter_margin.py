@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from friso.engine.allowance import Exhausted
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.what_attracts import surveyed_roughly, what_attracts
 
-STEPS = 8
-"""Values that are tried first on either side of the stage's own: as many stages as are run at once on most
-processors."""
+SHARES = np.array([0.04, 0.08, 0.13, 0.19, 0.28, 0.42, 0.65, 1.0])
+"""Values that are tried first on either side of the stage's own, as shares of the logarithm of the farthest factor:
+closest together where a machine may well be, and as many as are run at once on most processors."""
 
-FINER = 6
+FINER = 5
 """Steps into which the one in which what attracts changes is divided next."""
+
+OFF, SAME = (0.02, 0.06), 1e-6
+"""How far from where hunting seems to end the values lie that are searched thoroughly, where something attracts and
+where nothing does, and by how much two values differ that are the same, all as logarithms of factors."""
 
 CLOSE = 0.03
 """Widest share between two neighbouring values where what attracts changes."""
@@ -25,9 +30,9 @@ CLOSE = 0.03
 PROOFS = 6
 """How often both ends are searched thoroughly at most, once for every end at which a rough survey was wrong."""
 
-NEAREST = np.array([1, 2])
+WITHIN = np.array([2, 4])
 """Numbers of the values, from the stage's own outward, that are searched thoroughly where a rough survey finds no
-change: the nearest two."""
+change: for a farthest factor of three 9 and 23 % off."""
 
 
 class Undecided(Exception):
@@ -53,8 +58,8 @@ class MarginEnd:
 @dataclass(frozen=True)
 class ParameterMargin:
     """Where hunting begins, of a stage that nothing attracts, or ends, of one that something `attracts`: the nearest
-    values of a parameter `below` and `above` its own, in units of that (None: none between it and the end of the
-    `range` that was searched). Of a side in `open_sides`, -1 or 1, it is not known."""
+    values of a parameter `below` and `above` its own, in units of that (None: none of those tried between it and the
+    end of the `range`). Of a side in `open_sides`, -1 or 1, it is not known."""
 
     attracts: bool
     below: MarginEnd | None
@@ -64,7 +69,8 @@ class ParameterMargin:
 
     @property
     def certain(self) -> bool:
-        """Whether both ends, where there are any, are certain, and both sides were searched."""
+        """Whether both ends, where there are any, are certain, and no side is open; of what lies between the values
+        that were tried it tells nothing."""
         return not self.open_sides and all(end.certain for end in (self.below, self.above) if end)
 
     def end(self, side: int) -> MarginEnd | None:
@@ -75,8 +81,9 @@ class ParameterMargin:
 def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: float) -> ParameterMargin:
     """The margin of a stage in a parameter, searched from the factor `lowest` to the `highest` one.
 
-    What holds at the stage itself is known: whether something `attracts`. Both sides are surveyed roughly, at values a
-    few per cent to a quarter apart, then more closely where that changes; both ends are searched thoroughly. So ranges
+    What holds at the stage itself is known: whether something `attracts`. Both sides are surveyed roughly, at values
+    that lie farther apart the farther off they are, then more closely where that changes; both ends are searched
+    thoroughly. So ranges
     narrower than these steps may be missed. Where an allowance is used up, or that does not decide, a side is open.
     """
     ends: dict[int, MarginEnd | None] = {-1: None, 1: None}
@@ -88,7 +95,8 @@ def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: flo
             ends[side] = _Side(scaled, attracts, farthest).end()
         except (Exhausted, Undecided):
             open_sides.append(side)
-    return ParameterMargin(attracts, ends[-1], ends[1], (min(lowest, 1.0), max(highest, 1.0)), tuple(open_sides))
+    searched = lowest if lowest < 1 - CLOSE else 1.0, highest if highest > 1 + CLOSE else 1.0
+    return ParameterMargin(attracts, ends[-1], ends[1], searched, tuple(open_sides))
 
 
 class _Side:
@@ -100,14 +108,13 @@ class _Side:
         self.scaled, self.attracts = scaled, attracts
         self.factors, self.changed = np.ones(1), np.zeros(1, bool)
         self.decided, self.searched, self.certain = (np.ones(1, bool) for _ in range(3))
-        self._try(farthest ** (np.arange(1, STEPS + 1) / STEPS))
+        self._try(farthest**SHARES)
 
     def end(self) -> MarginEnd | None:
         """Where what attracts changes first; None if it does nowhere. Raises Exhausted, and Undecided."""
-        end = None
         for _ in range(PROOFS):
             first = self._bracketed()
-            pair = NEAREST if first is None else self._pair(first)
+            pair = WITHIN if first is None else self._pair(first)
             self._search(pair[~self.searched[pair]])
             if first is None and not self.changed.any():
                 if not self.decided.all():
@@ -116,14 +123,11 @@ class _Side:
             if first is None:
                 continue
             certain = self.certain[pair].all() and self.decided[: pair[1]].all()
-            end = MarginEnd(*self.factors[pair].tolist(), certain=bool(certain))
             if not self.changed[pair[0]] and self.changed[pair[1]]:
-                return end
+                return MarginEnd(*self.factors[pair].tolist(), certain=bool(certain))
             if not self.changed[pair[1]]:
-                self.changed[: pair[1]] = False
-        if end is None:
-            raise Undecided
-        return replace(end, certain=False)
+                self.changed[: pair[1]] &= self.searched[: pair[1]]
+        raise Undecided
 
     def _bracketed(self) -> int | None:
         """The number of the first factor at which it has changed, once others close to it were tried; None if it has
@@ -136,20 +140,20 @@ class _Side:
         return None
 
     def _finer(self, first: int) -> np.ndarray:
-        """Factors between the first at which it has changed and the one before it, and two as close beyond
-        it."""
-        low, high = self.factors[first - 1 : first + 1]
-        places = np.arange(1, FINER + 3)
-        factors = low * (high / low) ** (places[places != FINER] / FINER)
-        return factors[np.abs(np.log(factors)) < abs(np.log(self.factors[-1]))]
+        """Factors between the first at which it has changed and the one before it."""
+        return np.geomspace(self.factors[first - 1], self.factors[first], FINER + 1)[1:-1]
 
     def _pair(self, first: int) -> np.ndarray:
-        """The numbers of two factors about the first at which it has changed, by a survey that is rough next to where
-        hunting ends: a step off where something attracts, and two where nothing does, as motions take long to die out
-        next to that."""
-        inward, outward = (2, 2) if self.attracts else (3, 1)
-        further = self.changed[first : first + outward + 1]
-        return np.array([max(first - inward, 0), first + (len(further) if further.all() else further.argmin()) - 1])
+        """The numbers of two factors about the first at which it has changed, `OFF` where hunting seems to end: there
+        motions take long to die out, and a rough survey may be wrong. What they show is surveyed roughly at first."""
+        inward, outward = OFF if self.attracts else OFF[::-1]
+        places, farthest = np.abs(np.log(self.factors)), abs(np.log(self.factors[-1]))
+        wanted = np.clip([places[first - 1] - inward, places[first] + outward], 0.0, farthest)
+        new = [place for place in wanted if np.abs(places - place).min() > SAME]
+        if new:
+            self._try(np.exp(np.sign(np.log(self.factors[-1])) * np.array(new)))
+        places = np.abs(np.log(self.factors))
+        return np.array([np.abs(places - place).argmin() for place in wanted])
 
     def _try(self, factors: np.ndarray) -> None:
         """Survey more factors roughly."""
@@ -163,12 +167,13 @@ class _Side:
 
     def _search(self, numbers: np.ndarray) -> None:
         """Search factors thoroughly, by number."""
-        survey = what_attracts(self._stages(self.factors[numbers]))
+        stages = self._stages(self.factors[numbers])
+        survey = what_attracts(stages)
         closed = np.zeros(len(numbers), bool)
         closed[[motion.stage for motion in survey.motions if motion.cycles is not None]] = True
         self.changed[numbers], self.searched[numbers] = survey.attracts != self.attracts, True
-        self.decided[numbers] = survey.decided
-        self.certain[numbers] = np.where(survey.attracts, closed, survey.decided)
+        self.decided[numbers] = surely = surely_surveyed(stages, survey)
+        self.certain[numbers] = np.where(survey.attracts, closed, surely)
 
     def _stages(self, factors: np.ndarray) -> Ensemble:
         return Ensemble.held(self.scaled(factors), len(factors))

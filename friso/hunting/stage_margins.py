@@ -8,6 +8,7 @@ from friso.engine.allowance import Exhausted, allowance
 from friso.equations.bandwidth import faster
 from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.parameter_margin import ParameterMargin, Scaled, parameter_margin
 from friso.hunting.verdict import Judgement
@@ -16,6 +17,9 @@ from friso.stage import Stage
 
 JOINT_KEYS = "joint.stroke", "joint.stiffness"
 """What of a joint's design hunting depends on."""
+
+JOINT_WORK = 2e8
+"""Work (see `friso.engine.allowance`) that the margins in a joint may take together."""
 
 
 def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | None:
@@ -31,7 +35,8 @@ def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | Non
 
 def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMargin]:
     """The margins of a stage with a free joint in the joint's stroke and stiffness, by their keys, within so many times
-    their values as `SEARCH_LIMITS` tell; none where a stage has no margin in static friction either."""
+    their values as `SEARCH_LIMITS` tell; none of a stage that cannot hunt, or of which it is not known what attracts
+    it."""
     flat = stage.flat()
     if stage.joint is None or stage.joint.locked or not _is_known(judgement):
         return {}
@@ -40,7 +45,8 @@ def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMarg
         return lambda factors: {**flat, key: flat[key] * factors}
 
     keys = [key for key in JOINT_KEYS if flat.get(key)]
-    return {key: _margin(scaled(key), judgement, 1 / SEARCH_LIMITS.most_friction) for key in keys}
+    with allowance(JOINT_WORK):
+        return {key: _margin(scaled(key), judgement, 1 / SEARCH_LIMITS.most_friction) for key in keys}
 
 
 def _is_known(judgement: Judgement) -> bool:
@@ -66,9 +72,10 @@ def keeps_friction_margin(stage: Stage, factor: float, work: float) -> bool | No
     try:
         with allowance(work):
             changed = with_static_friction(faster(flat, factor), factors)
-            survey = what_attracts(Ensemble.held(changed, len(factors)))
+            stages = Ensemble.held(changed, len(factors))
+            survey = what_attracts(stages)
     except Exhausted:
         return None
     if survey.attracts.any():
         return False
-    return True if survey.decided.all() else None
+    return True if surely_surveyed(stages, survey).all() else None

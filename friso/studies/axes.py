@@ -69,16 +69,19 @@ def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool
     `free`: links use the name, so it need not be a key. With `log` a range that does not say how
     it is spaced is logarithmic. Raises InputError.
     """
-    field = stage.numeric_keys().get(name)
-    if name in SCALINGS and not free:
-        field = Number(any_sign, "1.2")
-    if field is None and not free:
+    field, scales = stage.numeric_keys().get(name), name in SCALINGS and not free
+    if field is None and not free and not scales:
         return _words(stage, name, values)
-    reader = _Reader(field, stage.axis_kind)
+    reader = _Reader(Number(any_sign, "1.2") if scales else field, stage.axis_kind)
     try:
+        axis: SweptAxis | SweptRange
         if isinstance(values, str) and ".." in values:
-            return _range(name, values, reader, log)
-        return _axis_of_values(name, values, reader)
+            axis = _range(name, values, reader, log)
+        else:
+            axis = _axis_of_values(name, values, reader)
+        if scales and (axis.first if isinstance(axis, SweptRange) else axis.values.min()) <= 0:
+            raise InputError("", quoted(values), "factors above 0", '"0.4..2.5:41:log"')
+        return axis
     except InputError as error:
         raise error.under(name) from None
 

@@ -20,9 +20,9 @@ from friso.stage.correlations import Correlations, Sample, draw, laid_over
 CHUNK = 256
 """Stages whose verdicts are found at once: between chunks progress is reported."""
 
-TRIAL, WORK = 16, 3e8
-"""Draws that tell what a draw takes, and the work (see `friso.engine.allowance`) of the draws of a check for which no
-number was asked."""
+TRIAL, AT_MOST, WORK = 16, 256, 3e8
+"""Draws that tell what a draw takes; and, for a check for which no number was asked, the most draws and their work (see
+`friso.engine.allowance`)."""
 
 MOST = 100_000
 """Draws at most: at the edge of hunting one takes some 50 ms."""
@@ -82,7 +82,8 @@ def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float)
     """How many stages may be drawn for a fixed work, a power of two (Sobol' points are even then)."""
     with allowance() as spent:
         fates(stage, draw(stage, correlations, TRIAL, seed), rtol)
-    return 1 << max(TRIAL.bit_length() - 1, int(np.log2(TRIAL * WORK / max(spent.used, 1.0))))
+    most = min(TRIAL * WORK / max(spent.used, 1.0), AT_MOST)
+    return 1 << max(TRIAL.bit_length() - 1, int(np.log2(most)))
 
 
 @dataclass(frozen=True)

@@ -61,6 +61,9 @@ logger = logging.getLogger("friso")
 _FORMAT = 2
 """Version of the Zarr format: the one that every reader knows, and in which fixed-length texts are specified."""
 
+COORDINATES = "coordinates"
+"""The attribute in which xarray notes the coordinates of no variable alone."""
+
 
 class Store:
     """The results of a study in a folder, locked by this process while it is open."""
@@ -125,11 +128,15 @@ class Store:
             if name in encoding:
                 encoding[name]["_FillValue"] = np.nan
         own: dict[str, dict[str, Any]] = dict.fromkeys(coordinates, checked)
-        parts = [(xr.Dataset(coords=coordinates), own, "w"), (xr.Dataset(variables), encoding, "a")]
+        beside = " ".join(name for name, (dimension, *_) in coordinates.items() if name != dimension)
+        attributes = study.attributes() | ({COORDINATES: beside} if beside else {})
+        parts = [
+            (xr.Dataset(coords=coordinates, attrs=study.attributes()), own, "w"),
+            (xr.Dataset(variables, attrs=attributes), encoding, "a"),
+        ]
         try:
             with zarr.config.set({"array.write_empty_chunks": False}):
                 for part, how, mode in parts:
-                    part = part.assign_attrs(study.attributes())
                     part.to_zarr(folder, mode=mode, encoding=how, zarr_format=_FORMAT, consolidated=False)  # type: ignore[call-overload]
             indent = zarr.config.get("json_indent")
             for name in study.metrics:  # Zarr's own resize would list all chunks that there may be
@@ -262,7 +269,7 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
         if metadata.damaged_axes(Path(path)):
             raise ValueError("other axes than were written")
         runs = xr.open_zarr(SealedStore.at(Path(path), metadata), chunks=None, zarr_format=_FORMAT)
-        runs.attrs = metadata.attributes
+        runs.attrs = {name: value for name, value in metadata.attributes.items() if name != COORDINATES}
         runs = runs.assign_coords({name: axis.load() for name, axis in runs.coords.items()})
         runs.encoding["source"] = os.path.abspath(path)
         study = study_of(runs)

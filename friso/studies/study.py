@@ -17,6 +17,7 @@ from friso.engine.tolerance import checked_rtol
 from friso.stage import Stage, loads
 from friso.studies.axes import SweptAxis
 from friso.studies.cells import BY_ATTRACTORS, METRICS, flat_cells
+from friso.studies.links import names as linked_names
 from friso.studies.samples import SAMPLE
 from friso.studies.scalings import SCALINGS
 from friso.version import VERSION
@@ -116,7 +117,7 @@ class Study:
         stage = self.stage.replace(words)
         flat = flat_cells(stage, self.links, {name: columns[name] for name in numeric})
         changed = {key for key in (*numeric, *self.links) if key in flat}
-        if scalings := SCALINGS.keys() & numeric:
+        if scalings := (SCALINGS.keys() & numeric.keys()) - linked_names(self.links):
             before = flat_cells(stage, self.links, {name: columns[name] for name in numeric.keys() - scalings})
             changed |= {key for key in flat if np.any(flat[key] != before[key])}
         return stage.with_numbers({key: float(np.ravel(flat[key])[0]) for key in sorted(changed)})

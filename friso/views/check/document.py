@@ -167,7 +167,7 @@ def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
         "below": end(margin.below),
         "above": end(margin.above),
         "searched": margin.range,
-        "certain": margin.certain,
+        "not_determined": [{-1: "below", 1: "above"}[side] for side in margin.open_sides],
     }
 
 

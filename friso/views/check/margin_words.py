@@ -28,10 +28,11 @@ def margin_sentence(name: str, margin: ParameterMargin, remark: str = "", lowest
     """Where hunting begins, or ends, in a parameter with a name; with a remark, and what the parameter is at the
     `lowest` value searched, if that has a name."""
     does, starts = ("ends", "ends") if margin.attracts else ("begins", "starts")
-    doubt = "" if margin.certain else "; this is not certain"
+    sure = all(end.certain for end in (margin.below, margin.above) if end)
+    doubt = "" if sure else "; this is not certain"
     left = listed([_side(side) for side in margin.open_sides], "and")
     if left:
-        doubt = f"; {left} yours that was not determined"
+        doubt += f"; {left} yours it was not determined"
     if ways := margin_ways(margin):
         return f"Hunting {does} with {name} {listed(ways, 'or')}{remark}{doubt}."
     if left:

@@ -107,7 +107,7 @@ def _static_friction(case: Case) -> str:
     does = "ends" if margin.attracts else "begins"
     ways = listed(margin_ways(margin), "or")
     says = f"{does} {ways}" if ways else f"no other from {low} to {high} times yours"
-    return UNKNOWN if margin.open_sides else f"{says}{'' if margin.certain else ' (not certain)'}"
+    return UNKNOWN if margin.open_sides and not ways else f"{says}{'' if margin.certain else ' (not certain)'}"
 
 
 def _kicks(case: Case, kick: Kick | None, unit: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from friso.equations.bandwidth import bandwidth
+from friso.equations.scaled_friction import least_static_factor
 from friso.hunting import SEARCH_LIMITS, CheckPart
 from friso.hunting.criteria import ATTRACTED
 from friso.quantities import percent, plain_factor
@@ -104,7 +105,11 @@ def conclusion(cases: Mapping[str, Case]) -> str | None:
 def _reserve(case: Case) -> str:
     """That a case that settles is closer to hunting than advice should lead, if it is."""
     thin = thin_margins(case)
-    return f", but with little reserve: {listed(thin, 'or')} brings it back" if thin else ""
+    sure = (case.static_friction is None or case.static_friction.certain) and (
+        case.judgement.margin is None or case.judgement.margin.certain
+    )
+    back = "brings it back" if sure else "may bring it back"
+    return f", but with little reserve: {listed(thin, 'or')} {back}" if thin else ""
 
 
 def at_the_end(case: Case) -> str:
@@ -162,7 +167,8 @@ def _transient(case: Case) -> str:
         return " ".join([says, *_held(case)])
     attracts = "no cycle attracts" if judgement.hunting.certain else "no cycle was found that attracts"
     says = [f"transient: {attracts}, but this motion has not settled at its end ({end}).", *_held(case)]
-    if case.peak_to_peak < _TEN_MICRON and getattr(case.stage.controller, "integral_leak", None):
+    leaks = getattr(case.stage.controller, "integral_leak", None) and case.force_limit is None
+    if leaks and case.peak_to_peak < _TEN_MICRON and judgement.hunting.certain and not judgement.runs_away:
         stays = f"; it is still there after {with_unit(judgement.followed, 's')}" if judgement.followed else ""
         off = f"{length_at_rest(abs(case.offset))} off its reference"
         return f"does not hunt ({attracts}), but rests {off}: the leak of its integral holds it there{stays}."
@@ -412,12 +418,12 @@ def _faster(case: Case, edge: Margin) -> str:
 
 def _with_other_friction(case: Case) -> str:
     """Whether the bandwidth that advice leads to keeps a margin in static friction."""
-    distance = f"{SEARCH_LIMITS.edge_distance:g}"
-    return {
-        None: "",
-        True: f", also with static friction {distance} times as high or as low",
-        False: f"; but hunting returns there with static friction {distance} times as high or as low",
-    }[case.advice_keeps_friction]
+    if case.advice_keeps_friction is None:
+        return ""
+    distance = SEARCH_LIMITS.edge_distance
+    lower = "as low as Coulomb friction" if least_static_factor(case.stage.flat()) > 1 / distance else "as low"
+    friction = f"with static friction {distance:g} times as high or {lower}"
+    return f", also {friction}" if case.advice_keeps_friction else f"; but hunting returns there {friction}"
 
 
 def _distance(case: Case, edge: Margin) -> float:

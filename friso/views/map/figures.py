@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.hunting.criteria import ATTRACTED
+from friso.hunting.criteria import ATTRACTED, FAILED
+from friso.hunting.criteria import VERDICTS as VERDICT_WORDS
 from friso.studies.cells import VERDICTS
 from friso.views.drawing.drawable import cell_edges
 from friso.views.drawing.figure import BLUE, INK, Axis, Cloud, Figure, Map, Markers, Panel, Series
@@ -100,7 +101,9 @@ def _edges(x: CellAxis, y: CellAxis, colouring: Look, codes: np.ndarray) -> tupl
     from contourpy import contour_generator
 
     columns, rows = (np.log(axis.positions) if axis.log else axis.positions for axis in (x, y))
-    lines: Any = contour_generator(columns, rows, np.isin(codes, attracted).astype(float)).lines(0.5)
+    decided = [k for k, kind in enumerate(colouring.categories) if kind.label in VERDICT_WORDS and kind.label != FAILED]
+    cells = np.where(np.isin(codes, decided), np.isin(codes, attracted), np.nan)
+    lines: Any = contour_generator(columns, rows, np.ma.masked_invalid(cells)).lines(0.5)
     if not lines:
         return ()
     right, up = np.concatenate([np.vstack([line, [np.nan, np.nan]]) for line in lines]).T

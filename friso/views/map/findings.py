@@ -11,7 +11,7 @@ from friso.axis import axis_shown
 from friso.hunting.criteria import ATTRACTED, BAND, CREEPS, LASTING, RESTS, SWINGS
 from friso.quantities import percent
 from friso.shares import share_interval
-from friso.studies.cells import CYCLE, CYCLE_UNITS, SWING, UNKNOWN, VERDICTS
+from friso.studies.cells import CYCLE, CYCLE_UNITS, SKETCH, SWING, UNKNOWN, VERDICTS
 from friso.studies.scalings import SCALINGS
 from friso.views.drawing.prefixes import listed, percentage
 from friso.views.loop_words import unstable_loop
@@ -263,11 +263,14 @@ def own_place(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
         return []
     ways = []
     for k, axis in enumerate(axes):
-        line = np.isin(words[(*at[:k], slice(None), *at[k + 1 :])], ATTRACTED)
-        ways += _changes(axis, line, at[k])
+        ways += _changes(axis, words[(*at[:k], slice(None), *at[k + 1 :])], at[k])
+    exact = all(np.isclose(axis.positions[k], value, rtol=1e-3) for axis, value, k in zip(axes, own, at, strict=True))
+    subject = "Your stage" if exact else "The cell nearest to your stage"
+    verb = words[at] if words[at] in ("hunts", "settles") else f"is {words[at]}"
+    by = " by this sketch" if metric == SKETCH else ""
     does = "begins" if words[at] in _QUIET else "ends"
-    where = f"hunting {does} at {listed(ways, 'or')}" if ways else f"hunting {does} at no other value of one axis alone"
-    return [f"Your stage {words[at]}; on the map {where}."]
+    where = f"; hunting {does} at {listed(ways, 'or')}" if ways else ""
+    return [f"{subject} {verb}{by}{where}."]
 
 
 def _spans(axis: CellAxis, value: float) -> bool:
@@ -275,10 +278,13 @@ def _spans(axis: CellAxis, value: float) -> bool:
     return bool(not axis.words and 0 < axis.positions.min() <= value <= axis.positions.max())
 
 
-def _changes(axis: CellAxis, attracted: np.ndarray, at: int) -> list[str]:
-    """Between which cells along an axis it changes whether something attracts, next to a cell on either side."""
-    differ = np.flatnonzero(attracted != attracted[at])
-    ends = [(k, k + 1) for k in differ[differ < at][-1:]] + [(k - 1, k) for k in differ[differ > at][:1]]
+def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
+    """Between which cells along an axis, of verdicts in words, it changes whether something attracts, next to a cell on
+    either side; on a side on which a cell without a verdict lies nearer, nowhere."""
+    attracted = np.isin(words, ATTRACTED)
+    differ = np.flatnonzero((attracted != attracted[at]) | ~np.isin(words, (*ATTRACTED, *_QUIET)))
+    ends = [(k, k + 1) for k in differ[differ < at][-1:] if words[k] in (*ATTRACTED, *_QUIET)]
+    ends += [(k - 1, k) for k in differ[differ > at][:1] if words[k] in (*ATTRACTED, *_QUIET)]
     return [f"{in_sentence(axis.key)} {axis.value(low)} to {axis.value(high)}" for low, high in ends]
 
 
