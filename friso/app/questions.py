@@ -242,7 +242,7 @@ def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     lines, rough = _lines("boundary", asked, options), None
     if len(keys) == 2 and not KEPT.holds(friso.boundary, asked.machine, options):
         ranges = {name: f"{options[name]}:{COARSE_TO_FINE[0]}" for name in ("x", "y")}
-        coarse = {**ranges, "log": options.get("log", False), "metric": "verdict"}
+        coarse = {**ranges, "log": options.get("log", False), "metric": "sketch"}
         verdicts = KEPT.answer(friso.sweep, asked.machine, work, coarse)
         rough = {**parts_of(verdicts, lambda figure: _on_map(figure, asked, keys)), **lines}
         yield {**rough, "kind": "partly"}

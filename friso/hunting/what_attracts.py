@@ -200,7 +200,8 @@ def _seen_on_map(mapped: Mapped, stage: int) -> Iterator[Swinging]:
         whole = swings if swings % 2 == 0 or not attractor.periodic else 2 * swings
         period = whole * swing if attractor.periodic else 2 * swing
         time = swings * swing if attractor.periodic else np.nan
-        yield Swinging(stage, size * length, time, period, float(attractor.distances[0]) * length, whole)
+        first, slope = float(attractor.distances[0]) * length, landing_map.slope(attractor)
+        yield Swinging(stage, size * length, time, period, first, whole, slope=slope)
 
 
 _SEARCHES_ALONE = ContextVar("searches alone", default=False)

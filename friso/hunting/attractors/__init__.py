@@ -84,12 +84,12 @@ class Attractors:
         amplitude, period, lasting, early = (np.full(len(self.decided), np.nan) for _ in range(4))
         observed = np.zeros(len(self.decided), bool)
         for motion in self.motions:
-            observed[motion.stage] |= motion.cycles is None
+            observed[motion.stage] |= motion.observed
             k, unit = motion.stage, min(motion.period, PATIENT * self.typical[motion.stage])
             amplitude[k] = np.fmin(amplitude[k], motion.amplitude)
             period[k] = np.fmax(period[k], motion.period)
             constants = CONSTANTS * motion.time_constant / unit
-            waited = (UNCLOSED if motion.cycles is None else WAITED) * motion.period
+            waited = (UNCLOSED if motion.observed else WAITED) * motion.period
             until = max(np.clip(np.nan_to_num(constants), *PERIODS) * unit, waited)
             lasting[k] = np.fmax(lasting[k], until)
             early[k] = np.fmax(early[k], EARLY * until if constants < PERIODS[1] else until)

@@ -80,7 +80,8 @@ class Swinging:
     `time` in which it repeats itself [s] (NaN: it does not) and its `period` [s], twice that if it is its mirror image
     by then (of one that does not repeat itself, about the time from one swing to the next but one); a `distance` [m] at
     which it sticks; the number of `swings`, to one side or the other, in a period; and the cycle, closed as an orbit,
-    with its number among `cycles` (None: it was observed, in a simulation, and last `seen` in a state, (states,))."""
+    with its number among `cycles` (None: it was observed, in a simulation, and last `seen` in a state, (states,), or on
+    a return map, whose `slope` tells how much of a deviation remains after its time; NaN: that is not known)."""
 
     stage: int
     amplitude: float
@@ -91,6 +92,7 @@ class Swinging:
     cycles: Cycles | None = None
     number: int = 0
     seen: np.ndarray | None = None
+    slope: float = float("nan")
 
     def like(self, other: Swinging) -> bool:
         """Whether two motions of a stage are the same, or mirror images."""
@@ -100,8 +102,17 @@ class Swinging:
         return same and (self.cycles is None) == (other.cycles is None)
 
     @property
+    def observed(self) -> bool:
+        """Whether a simulation alone shows it: there may be others beside it, and how soon motions come to it is not
+        known."""
+        return self.cycles is None and not np.isfinite(self.slope)
+
+    @property
     def time_constant(self) -> float:
-        return float("nan") if self.cycles is None else float(self.cycles.time_constant[self.number])
+        """In which deviations from it shrink by a factor of e [s]; NaN where that is not known."""
+        if self.cycles is not None:
+            return float(self.cycles.time_constant[self.number])
+        return -self.time / float(np.log(self.slope)) if 0 < self.slope < 1 else float("nan")
 
 
 _Kind = tuple[int, float, float]
