@@ -18,7 +18,7 @@ SHARES = np.array([0.04, 0.08, 0.13, 0.19, 0.28, 0.42, 0.65, 1.0])
 closest together where a machine may well be, and as many as are run at once on most processors."""
 
 FINER = 5
-"""Steps into which the one in which what attracts changes is divided next."""
+"""Into how many steps a range is divided in which hunting seems to begin or end."""
 
 OFF, SAME = (0.02, 0.06), 1e-6
 """How far from where hunting seems to end the values lie that are searched thoroughly, where something attracts and
@@ -83,8 +83,8 @@ def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: flo
 
     What holds at the stage itself is known: whether something `attracts`. Both sides are surveyed roughly, at values
     that lie farther apart the farther off they are, then more closely where that changes; both ends are searched
-    thoroughly. So ranges
-    narrower than these steps may be missed. Where an allowance is used up, or that does not decide, a side is open.
+    thoroughly. So ranges narrower than these steps may be missed. Where an allowance is used up, or that does not
+    decide, a side is open.
     """
     ends: dict[int, MarginEnd | None] = {-1: None, 1: None}
     open_sides = []
@@ -144,8 +144,8 @@ class _Side:
         return np.geomspace(self.factors[first - 1], self.factors[first], FINER + 1)[1:-1]
 
     def _pair(self, first: int) -> np.ndarray:
-        """The numbers of two factors about the first at which it has changed, `OFF` where hunting seems to end: there
-        motions take long to die out, and a rough survey may be wrong. What they show is surveyed roughly at first."""
+        """The numbers of two factors about the first at which it has changed, as far off as `OFF` says: next to where
+        hunting ends motions take long to die out, and a rough survey may be wrong. New ones are surveyed roughly."""
         inward, outward = OFF if self.attracts else OFF[::-1]
         places, farthest = np.abs(np.log(self.factors)), abs(np.log(self.factors[-1]))
         wanted = np.clip([places[first - 1] - inward, places[first] + outward], 0.0, farthest)

@@ -27,9 +27,9 @@ SKETCH_DISTANCES = np.concatenate([[0.003], np.geomspace(0.02, 3.0, 14)])
 force."""
 
 HARDLY, FEW = 0.95, 4
-"""Factor by which deviations from an attractor of a sketch remain until it repeats itself, from which on it may repel:
-of 753 cells of a map of the thesis's rig over bandwidth and static friction in which a cycle attracts, 51 of 149 with a
-larger one did not, and 2 of the others; and fewer points of a map than an attractor needs that is to be trusted."""
+"""Where an attractor of a sketch is not trusted: a larger share of a deviation than `HARDLY` remains when it repeats
+itself, or fewer of the map's points than `FEW` come to it. Of the sketched attractors of the thesis's rig, over
+bandwidth and static friction, 51 of 149 with a larger share did not attract, and 2 of all others."""
 
 SKETCH_RTOL = 1e-5
 """Relative tolerance of the runs of a sketch."""
