@@ -21,6 +21,7 @@ from benchmarks.compiled import compile_equations
 from benchmarks.peers import peers, piecewise
 from benchmarks.report import Goal, clock, print_goals, print_table, spread
 from benchmarks.rigs import rig_of
+from friso.platform.system import usable_cores
 from friso.stage import Stage
 from friso.studies.execute import Crew, local_crew
 from friso.studies.processes import processes
@@ -28,7 +29,6 @@ from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.study import Study
 from friso.studies.sweep import run_in_memory, run_in_store
-from friso.system import usable_cores
 from friso_thesis.studies.thesis.studies import STUDIES, thesis_rig
 
 RTOLS = (1e-4, 1e-6)

@@ -18,7 +18,7 @@ from benchmarks.report import Goal, clock, print_table, spread
 from benchmarks.rigs import RTOLS, SAMPLE, Rig
 from friso.engine.batch import RunOptions, run_chunks
 from friso.hunting import measures
-from friso.system import usable_cores
+from friso.platform.system import usable_cores
 
 RUNS = 512
 REFERENCE_RTOL = 1e-11

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from friso.system import usable_cores
+from friso.platform.system import usable_cores
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from benchmarks.report import Goal as Target
 from benchmarks.report import print_goals, print_table
 from friso.frequency.bandwidth import loop_bandwidths
 from friso.frequency.crossover import limits
+from friso.questions.tune.words import changes
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet, draw_fleet
@@ -35,7 +36,6 @@ from friso.remedies.variables import of_key
 from friso.remedies.verified import performance_of
 from friso.stage import Stage, load, loads
 from friso.stage.correlations import Correlations
-from friso.views.tune.words import changes
 
 AXIS = """
 [masses]

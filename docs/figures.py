@@ -14,10 +14,10 @@ from functools import cache
 from pathlib import Path
 
 import friso
-from friso.answers.answer import Answer
+from friso.interface.answer import Answer
+from friso.questions.flexure.svg import arrow, box, circle, leader, path, sheet, words
+from friso.shown.drawing.matplotlib_renderer import image
 from friso.stage import Stage
-from friso.views.drawing.matplotlib_renderer import image
-from friso.views.flexure.svg import arrow, box, circle, leader, path, sheet, words
 
 DOCS = Path(__file__).parent
 MADE = DOCS / "figures.json"

@@ -1,6 +1,6 @@
 """friso: friction-induced hunting of positioning stages, and the friction isolator that stops it."""
 
-import friso.early  # noqa: F401 (notes a signal that comes while the rest is imported)
+import friso.platform.early  # noqa: F401 (notes a signal that comes while the rest is imported)
 
 # isort: split
 import importlib
@@ -11,22 +11,6 @@ from typing import TYPE_CHECKING, Any
 from friso.version import VERSION as __version__
 
 if TYPE_CHECKING:
-    from friso.answers.bode import bode
-    from friso.answers.boundary import boundary
-    from friso.answers.check import check
-    from friso.answers.compare import compare
-    from friso.answers.convert import convert
-    from friso.answers.design import design
-    from friso.answers.doctor import doctor
-    from friso.answers.export import export
-    from friso.answers.flexure import flexure
-    from friso.answers.identify import identify
-    from friso.answers.logs import logs
-    from friso.answers.rig import rig
-    from friso.answers.simulate import simulate
-    from friso.answers.starting import example, init, schema
-    from friso.answers.sweep import sweep
-    from friso.answers.tune import tune
     from friso.errors import InputError, LogError, SpecError, StageError, StoreError
     from friso.frequency.analysis import linear
     from friso.frequency.describing.function import describing
@@ -34,6 +18,22 @@ if TYPE_CHECKING:
     from friso.frequency.describing.response import plant_response
     from friso.frequency.members import Members, member
     from friso.frequency.tuning import Tuning, tuning
+    from friso.questions.bode.question import bode
+    from friso.questions.boundary.question import boundary
+    from friso.questions.check.question import check
+    from friso.questions.compare.question import compare
+    from friso.questions.convert.question import convert
+    from friso.questions.design.question import design
+    from friso.questions.doctor.question import doctor
+    from friso.questions.export.question import export
+    from friso.questions.flexure.question import flexure
+    from friso.questions.identify.question import identify
+    from friso.questions.init.starting import example, init, schema
+    from friso.questions.logs.question import logs
+    from friso.questions.map.question import sweep
+    from friso.questions.rig.question import rig
+    from friso.questions.simulate.question import simulate
+    from friso.questions.tune.question import tune
     from friso.remedies.sensitivities import Sensitivities, sensitivity
     from friso.stage import Stage, load, loads, save
     from friso.studies.harmonic_balance import harmonic_balance
@@ -41,22 +41,22 @@ if TYPE_CHECKING:
     from friso.studies.store import read_store
 
 _PLACES = {
-    "friso.answers.bode": ("bode",),
-    "friso.answers.boundary": ("boundary",),
-    "friso.answers.check": ("check",),
-    "friso.answers.compare": ("compare",),
-    "friso.answers.convert": ("convert",),
-    "friso.answers.design": ("design",),
-    "friso.answers.doctor": ("doctor",),
-    "friso.answers.export": ("export",),
-    "friso.answers.flexure": ("flexure",),
-    "friso.answers.identify": ("identify",),
-    "friso.answers.logs": ("logs",),
-    "friso.answers.rig": ("rig",),
-    "friso.answers.simulate": ("simulate",),
-    "friso.answers.starting": ("example", "init", "schema"),
-    "friso.answers.sweep": ("sweep",),
-    "friso.answers.tune": ("tune",),
+    "friso.questions.bode.question": ("bode",),
+    "friso.questions.boundary.question": ("boundary",),
+    "friso.questions.check.question": ("check",),
+    "friso.questions.compare.question": ("compare",),
+    "friso.questions.convert.question": ("convert",),
+    "friso.questions.design.question": ("design",),
+    "friso.questions.doctor.question": ("doctor",),
+    "friso.questions.export.question": ("export",),
+    "friso.questions.flexure.question": ("flexure",),
+    "friso.questions.identify.question": ("identify",),
+    "friso.questions.logs.question": ("logs",),
+    "friso.questions.rig.question": ("rig",),
+    "friso.questions.simulate.question": ("simulate",),
+    "friso.questions.init.starting": ("example", "init", "schema"),
+    "friso.questions.map.question": ("sweep",),
+    "friso.questions.tune.question": ("tune",),
     "friso.remedies.sensitivities": ("Sensitivities", "sensitivity"),
     "friso.errors": ("InputError", "LogError", "SpecError", "StageError", "StoreError"),
     "friso.frequency.analysis": ("linear",),
@@ -129,7 +129,7 @@ def __getattr__(name: str) -> Any:
         from difflib import get_close_matches
 
         from friso.errors import InputError
-        from friso.installed import FUNCTIONS, load_declared
+        from friso.platform.installed import FUNCTIONS, load_declared
 
         if name in _installed():
             try:
@@ -147,6 +147,6 @@ def __dir__() -> list[str]:
 
 def _installed() -> Mapping[str, str]:
     """The modules of functions that installed packages name, by name."""
-    from friso.installed import FUNCTIONS, installed_modules
+    from friso.platform.installed import FUNCTIONS, installed_modules
 
     return installed_modules(FUNCTIONS, frozenset(_LAZY))

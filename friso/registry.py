@@ -12,7 +12,7 @@ from pkgutil import iter_modules
 from typing import Any, Generic, TypeVar
 
 from friso.errors import InputError
-from friso.installed import installed_modules, leave_out, load_declared
+from friso.platform.installed import installed_modules, leave_out, load_declared
 
 Item = TypeVar("Item")
 

@@ -94,7 +94,7 @@ def own_bandwidth(monkeypatch: pytest.MonkeyPatch) -> None:
 def unprinted() -> Iterator[None]:
     """Pages hold empty prints, whose drawing takes most of a page's time; tests/test_check_views.py has one with its
     own. Figures that are files are drawn, but for tests that ask for `undrawn`."""
-    from friso.views import pages  # slow
+    from friso.shown import pages  # slow
 
     with patched({pages: {"image": lambda *_, **__: b"<svg/>"}}):
         yield
@@ -104,7 +104,7 @@ def unprinted() -> Iterator[None]:
 def drawn_here() -> Iterator[None]:
     """Figures are drawn in this process: others would take a second for each command. tests/test_drawing.py has those
     of its own."""
-    from friso.views.drawing import images
+    from friso.shown.drawing import images
 
     with patched({images: {"usable_cores": lambda: 1}}):
         yield
@@ -122,15 +122,15 @@ def unhurried() -> Iterator[None]:
 @pytest.fixture
 def printed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages hold their prints all the same."""
-    from friso.views.drawing import images
+    from friso.shown.drawing import images
 
-    monkeypatch.setattr("friso.views.pages.image", images.image)
+    monkeypatch.setattr("friso.shown.pages.image", images.image)
 
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures that are files are empty: what is tested is beside them."""
-    monkeypatch.setattr("friso.views.drawing.matplotlib_renderer.image", lambda *_, **__: b"")
+    monkeypatch.setattr("friso.shown.drawing.matplotlib_renderer.image", lambda *_, **__: b"")
 
 
 @pytest.fixture(scope="session")

@@ -14,9 +14,9 @@ import xarray as xr
 from friso.equations.controllers.pid_gains import PidGains
 from friso.equations.controllers.van_dijk import VanDijk
 from friso.hunting import Cycle, Hunting, Judgement, Kick, Margin, MoveShare, ReturnMap, Target
-from friso.views.check.page import check_html
-from friso.views.drawing import matplotlib_renderer, plotly_renderer
-from friso.views.drawing.figure import Axis, Figure, Limit, Map, Markers, Panel, Series
+from friso.questions.check.page import check_html
+from friso.shown.drawing import matplotlib_renderer, plotly_renderer
+from friso.shown.drawing.figure import Axis, Figure, Limit, Map, Markers, Panel, Series
 
 UNITS = {
     "reference": "m",

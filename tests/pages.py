@@ -7,7 +7,7 @@ import re
 from html.parser import HTMLParser
 from typing import Any
 
-from friso.views.drawing import plotly_renderer
+from friso.shown.drawing import plotly_renderer
 
 NAMESPACES = {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
 """The names by which pictures say what they are; nothing is loaded from there."""

@@ -19,13 +19,13 @@ from friso.equations.settings import settings_named
 from friso.errors import InputError
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases
+from friso.questions.compare.figures import LINES
+from friso.questions.compare.words import PROSE, _disturbance_rejection
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 from friso.studies.compare.disturbance_rejection import ADRC
 from friso.studies.compare.machines import draw_machines
 from friso.studies.compare.options import NAMES, Option, linear_flat, options
-from friso.views.compare.figures import LINES
-from friso.views.compare.words import PROSE, _disturbance_rejection
 
 MASS, RATIO = 1.7, 5.0
 STATIC, COULOMB, STRIBECK, SIGMA_0, SIGMA_1, SIGMA_2 = 3.0, 1.0, 1.6e-3, 1e5, 1e5**0.5, 0.5

@@ -21,10 +21,10 @@ from test_map_views import plain
 import friso
 from friso.app.frames import frame
 from friso.escapes import escaped
-from friso.views.check.page import check_html
-from friso.views.drawing.figure import INK, Axis, Figure, Panel, Series
-from friso.views.map.page import map_html
-from friso.views.pages import Report
+from friso.questions.check.page import check_html
+from friso.questions.map.page import map_html
+from friso.shown.drawing.figure import INK, Axis, Figure, Panel, Series
+from friso.shown.pages import Report
 
 pytestmark = [needs_browser, pytest.mark.usefixtures("own_bandwidth")]
 

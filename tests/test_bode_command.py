@@ -19,18 +19,18 @@ from refusals import Refused
 from snapshots import Snapshots
 
 import friso
-from friso.answers.output_folder import MARKER
 from friso.cli.commands.bode import bode as command
 from friso.frequency.bode import Bode, Unstable, bode
+from friso.interface.output_folder import MARKER
+from friso.questions.bode.document import bode_document
+from friso.questions.bode.figures import bode_figures, phases
+from friso.questions.bode.states import shown_states
+from friso.questions.bode.table import rows
+from friso.questions.bode.words import caveats, crossovers, sentences, stability
+from friso.shown.drawing import matplotlib_renderer, plotly_renderer
+from friso.shown.drawing.drawable import drawable
+from friso.shown.drawing.figure import Axis, Band, Figure, Panel, Series
 from friso.stage import Stage
-from friso.views.bode.document import bode_document
-from friso.views.bode.figures import bode_figures, phases
-from friso.views.bode.states import shown_states
-from friso.views.bode.table import rows
-from friso.views.bode.words import caveats, crossovers, sentences, stability
-from friso.views.drawing import matplotlib_renderer, plotly_renderer
-from friso.views.drawing.drawable import drawable
-from friso.views.drawing.figure import Axis, Band, Figure, Panel, Series
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, EMPS = EXAMPLES / "thesis_rig.toml", EXAMPLES / "emps_axis.toml"

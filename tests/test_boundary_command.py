@@ -15,7 +15,6 @@ from pages import Page
 from refusals import Refused, Wording
 from snapshots import Snapshots
 
-from friso.answers.output_folder import MARKER
 from friso.hunting import (
     Bifurcation,
     Branch,
@@ -32,11 +31,12 @@ from friso.hunting import (
     find_cycles,
     plane,
 )
+from friso.interface.output_folder import MARKER
+from friso.questions.boundary.figures import LOST, NODES, boundary_figure
+from friso.questions.boundary.words import VERDICTS, ShownKey, _along_one, conclusion, sentences
+from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.stage import Stage
 from friso.studies.boundary_lines import corner_verdicts, end_verdicts, lines, plane_edge
-from friso.views.boundary.figures import LOST, NODES, boundary_figure
-from friso.views.boundary.words import VERDICTS, ShownKey, _along_one, conclusion, sentences
-from friso.views.drawing import matplotlib_renderer, plotly_renderer
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, STICK_SLIP = EXAMPLES / "thesis_rig.toml", EXAMPLES / "lugre_stick_slip.toml"

@@ -21,8 +21,8 @@ from friso.engine import building, cache, private, prune
 from friso.engine.cache import DAY
 from friso.engine.prune import KEPT_FOR
 from friso.engine.seal import LENGTH, SECRET, read_sealed, write_sealed
-from friso.helper_process import HelperProcess
-from friso.whole_file import PARTIAL
+from friso.platform.helper_process import HelperProcess
+from friso.platform.whole_file import PARTIAL
 
 BUILDER = """
 import os
@@ -308,13 +308,13 @@ def test_disks_that_are_all_full_are_said_in_a_line() -> None:
 
 ASKING = """
 import sys
-from friso.helper_process import HelperProcess
+from friso.platform.helper_process import HelperProcess
 HelperProcess("sleeping", sys.argv[1], paths=sys.path).ask(60.0)
 """
 SLEEPING = """
 import sys, time
 from filelock import FileLock
-from friso.helper_process import answer_questions
+from friso.platform.helper_process import answer_questions
 with FileLock(sys.argv[1]):
     answer_questions(time.sleep, orphaned=False)
 """

@@ -34,14 +34,14 @@ from friso.identification.experiments.moves import identify_moves
 from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.common import record
 from friso.progress import silent
+from friso.questions.compare.words import sentences as comparison_sentences
+from friso.questions.rig.page import sentences
 from friso.stage import Stage
 from friso.studies.compare import study
 from friso.studies.compare.study import compare
 from friso.studies.rig.experiments import hunting as rig_hunting
 from friso.studies.rig.moves_on_rails import rails
 from friso.studies.sweep import sweep
-from friso.views.compare.words import sentences as comparison_sentences
-from friso.views.rig.page import sentences
 
 KV, KP, T_V, MASS = 60.0, 50.0, 0.03, 1.7
 

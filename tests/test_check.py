@@ -8,9 +8,9 @@ import pytest
 from variants import VARIANTS
 
 import friso
-from friso.answers.check import CheckAnswer
 from friso.hunting import check_given
 from friso.hunting.measures import measured_run
+from friso.questions.check.question import CheckAnswer
 from friso.stage import Stage
 from friso.studies.sweep import sweep
 

@@ -35,17 +35,17 @@ from snapshots import Snapshots
 
 from friso.hunting import AttractionEnd, BandwidthWindow, CheckPart, Judgement, Kick, LowerGains, Margin, Swing
 from friso.hunting.criteria import Verdict
+from friso.questions.check.figures import check_figures, response_figure
+from friso.questions.check.page import check_html, conclusion, verdict_sentence
+from friso.questions.check.table import rows, rows_behind
+from friso.questions.check.words import edge_text
+from friso.shown import pages
+from friso.shown.cases import COLOURS, ShownCase, shown_cases
+from friso.shown.drawing import images, matplotlib_renderer, plotly_renderer
+from friso.shown.drawing.drawable import drawable
+from friso.shown.drawing.figure import Figure
+from friso.shown.pages import made_with
 from friso.version import VERSION
-from friso.views import pages
-from friso.views.check.cases import COLOURS, ShownCase, shown_cases
-from friso.views.check.figures import check_figures, response_figure
-from friso.views.check.page import check_html, conclusion, verdict_sentence
-from friso.views.check.table import rows, rows_behind
-from friso.views.check.words import edge_text
-from friso.views.drawing import images, matplotlib_renderer, plotly_renderer
-from friso.views.drawing.drawable import drawable
-from friso.views.drawing.figure import Figure
-from friso.views.pages import made_with
 
 # ---------------------------------------------------------------- figures of a check
 

@@ -17,8 +17,8 @@ from refusals import Refused
 import friso
 from friso.cli.app import _failed
 from friso.cli.progress import ProgressBar
+from friso.platform.system import LIBRARIES
 from friso.progress import WORK_CLOCK
-from friso.system import LIBRARIES
 
 ROOT = Path(__file__).parent.parent
 RIG, STICK_SLIP = ROOT / "examples" / "thesis_rig.toml", ROOT / "examples" / "lugre_stick_slip.toml"

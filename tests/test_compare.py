@@ -15,7 +15,6 @@ from patched import patched
 from refusals import Refused, Wording
 from snapshots import Snapshots
 
-from friso.answers.output_folder import MARKER
 from friso.equations.motion import Stand
 from friso.equations.settings import SETTINGS, settings_named
 from friso.equations.structure import structure
@@ -24,7 +23,13 @@ from friso.frequency import crossover
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases, member
 from friso.hunting.criteria import end_of_traces, outcomes, settling_of_traces
+from friso.interface.output_folder import MARKER
+from friso.questions.compare.document import compare_document
+from friso.questions.compare.figures import figures
+from friso.questions.compare.page import page
+from friso.questions.compare.words import _setting, conclusion, paired_rows, sentences, table_rows
 from friso.shares import share
+from friso.shown.drawing.matplotlib_renderer import image
 from friso.stage import Stage, load
 from friso.stage.correlations import Correlations
 from friso.stage.lists import element_keys
@@ -34,11 +39,6 @@ from friso.studies.compare.measures import linear_loops
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import difference, median, quantile_interval
 from friso.studies.compare.study import Comparison, OptionResult, compare
-from friso.views.compare.document import compare_document
-from friso.views.compare.figures import figures
-from friso.views.compare.page import page
-from friso.views.compare.words import _setting, conclusion, paired_rows, sentences, table_rows
-from friso.views.drawing.matplotlib_renderer import image
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 COARSE = {"drive.sample_time": "250 us", "drive.delay": "250 us"}
@@ -541,7 +541,7 @@ def test_interrupted_it_leaves_nothing(tmp_path: Path, comparison: Comparison, m
         patch.setattr(study, "compare", stop)
         assert friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out").returncode == 130
     monkeypatch.setattr(study, "compare", lambda *inputs: comparison)
-    monkeypatch.setattr("friso.views.drawing.matplotlib_renderer.image", stop)
+    monkeypatch.setattr("friso.shown.drawing.matplotlib_renderer.image", stop)
     assert friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out").returncode == 130
     assert not [*tmp_path.iterdir()]
 

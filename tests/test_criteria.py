@@ -37,9 +37,9 @@ from friso.hunting.criteria import (
     verdicts,
 )
 from friso.hunting.measures import measure_runs, measuring_options, scan_turning_points
+from friso.questions.simulate.words import conclusion
 from friso.stage import Stage
 from friso.studies.rig.moves_on_rails import turning_points
-from friso.views.simulate.words import conclusion
 
 STEP, DURATION = 1 / 128, 20.0
 TIME = np.arange(0, DURATION + STEP / 2, STEP)

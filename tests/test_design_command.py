@@ -22,7 +22,6 @@ from refusals import Refused, Wording
 from snapshots import Snapshots
 
 import friso
-from friso.answers.output_folder import MARKER
 from friso.cli.app import main
 from friso.cli.commands.design import design as command
 from friso.design_method import choice, controller, edges, front, hunting_map, method, population, verification
@@ -31,19 +30,20 @@ from friso.design_method.geometry import Geometry, Sheet
 from friso.design_method.method import Design, Frictions, NoDesign
 from friso.design_method.relax import Relaxation
 from friso.design_method.spec import Position, Spec, load_spec
+from friso.interface.output_folder import MARKER
 from friso.progress import Progress
 from friso.quantities import outwards
+from friso.questions.design.control import controller_step, moves_step
+from friso.questions.design.document import design_document, refused_document
+from friso.questions.design.figures import design_figures
+from friso.questions.design.leaves import leaves_step, requirement_rows
+from friso.questions.design.steps import isolator_step, joint_step, steps
+from friso.questions.design.window import lower, stiffest, upper
+from friso.questions.design.words import brings, edge, headline, hertz, refusal, settling
+from friso.shown import files
+from friso.shown.drawing import matplotlib_renderer, plotly_renderer
+from friso.shown.drawing.figure import Figure
 from friso.stage import Stage
-from friso.views import files
-from friso.views.design.control import controller_step, moves_step
-from friso.views.design.document import design_document, refused_document
-from friso.views.design.figures import design_figures
-from friso.views.design.leaves import leaves_step, requirement_rows
-from friso.views.design.steps import isolator_step, joint_step, steps
-from friso.views.design.window import lower, stiffest, upper
-from friso.views.design.words import brings, edge, headline, hertz, refusal, settling
-from friso.views.drawing import matplotlib_renderer, plotly_renderer
-from friso.views.drawing.figure import Figure
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, SPEC = EXAMPLES / "thesis_rig.toml", EXAMPLES / "specs" / "thesis.toml"
@@ -122,8 +122,8 @@ def folder(written: tuple[Path, str]) -> Path:
 @pytest.fixture
 def quick(written: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are not drawn again, and nothing is written."""
-    monkeypatch.setattr("friso.answers.output_folder.write", lambda *_: [])
-    monkeypatch.setattr("friso.views.design.page.design_figures", lambda design: ())
+    monkeypatch.setattr("friso.interface.output_folder.write", lambda *_: [])
+    monkeypatch.setattr("friso.questions.design.page.design_figures", lambda design: ())
 
 
 @pytest.fixture

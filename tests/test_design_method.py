@@ -36,8 +36,8 @@ from friso.leaf_springs.beams import BeamFailure
 from friso.leaf_springs.closed_model import closed_form_model
 from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.mechanism import Mechanism
+from friso.questions.design.words import refusal
 from friso.stage import Stage
-from friso.views.design.words import refusal
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SPEC = load_spec(EXAMPLES / "specs" / "thesis.toml")

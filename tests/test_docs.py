@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 import friso
-from friso.views.glossary import Glossary, entries
+from friso.shown.glossary import Glossary, entries
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

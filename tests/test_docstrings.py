@@ -14,7 +14,7 @@ import friso_thesis
 
 PACKAGES = [Path(str(package.__file__)).parent for package in (friso, friso_thesis)]
 
-SHELL = ("cli", "app", "commands", "views")
+SHELL = ("cli", "app", "commands", "questions", "shown")
 """Floors of commands and sentences, whose functions take what the floors below return."""
 
 ERRORS = ("InputError", "StageError", "LogError", "SpecError", "StoreError")

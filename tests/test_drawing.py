@@ -37,13 +37,13 @@ from pages import packed_values
 
 from friso.axis import ROTARY, speaking_of
 from friso.quantities import percent
-from friso.views import pages
-from friso.views.check.figures import check_figures
-from friso.views.drawing import images, matplotlib_renderer, plotly_renderer
-from friso.views.drawing.drawable import drawable
-from friso.views.drawing.figure import GREY, Axis, Category, Figure, Map, Panel, Series
-from friso.views.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
-from friso.views.drawing.thinning import BUCKETS, KEPT, thin
+from friso.questions.check.figures import check_figures
+from friso.shown import pages
+from friso.shown.drawing import images, matplotlib_renderer, plotly_renderer
+from friso.shown.drawing.drawable import drawable
+from friso.shown.drawing.figure import GREY, Axis, Category, Figure, Map, Panel, Series
+from friso.shown.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
+from friso.shown.drawing.thinning import BUCKETS, KEPT, thin
 
 # ---------------------------------------------------------------- plain data
 
@@ -238,7 +238,7 @@ def test_figures_are_drawn_beside_as_they_are_here(monkeypatch):
 
 def test_a_figure_that_no_process_draws_is_drawn_here(monkeypatch):
     monkeypatch.setattr(images, "usable_cores", lambda: 2)
-    monkeypatch.setattr(images, "PROGRAM", "friso.views.drawing.no_such_program")
+    monkeypatch.setattr(images, "PROGRAM", "friso.shown.drawing.no_such_program")
     with images.drawing_beside():
         images.draw_beforehand([figure := small_figure()], [images.Image("png")])
         assert images.image(figure, "png").startswith(b"\x89PNG")
@@ -285,7 +285,7 @@ def test_dollars_and_markup_in_names_are_text():
 
 @pytest.mark.thorough
 def test_files_are_the_same_bytes_in_every_process(request, tmp_path, monkeypatch, printed):
-    monkeypatch.setattr("friso.views.pages.foreign", list)  # other tests bring some to this process
+    monkeypatch.setattr("friso.shown.pages.foreign", list)  # other tests bring some to this process
     (tmp_path / "matplotlibrc").write_text("font.size: 30\n")
     environment = {"PYTHONHASHSEED": "2", "MATPLOTLIBRC": str(tmp_path), "HOME": str(tmp_path), "PATH": "/usr/bin:/bin"}
     environment |= {"PYTHONPATH": os.pathsep.join(map(str, (request.config.rootpath, request.path.parent)))}

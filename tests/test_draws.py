@@ -12,12 +12,12 @@ from scipy.stats import beta
 import friso
 from friso.cli import main
 from friso.hunting.criteria import ATTRACTED, VERDICTS
+from friso.questions.check.document import draws_document
+from friso.questions.check.draws import draws_figure, draws_rows, draws_sentences
+from friso.shown.documents import plain_json
 from friso.stage import Stage, save
 from friso.stage.correlations import Correlations, Sample, draw
 from friso.studies.draws import Draws, Fates, different, fates
-from friso.views.check.document import draws_document
-from friso.views.check.draws import draws_figure, draws_rows, draws_sentences
-from friso.views.documents import plain_json
 
 pytestmark = pytest.mark.xdist_group("rig")
 

@@ -20,10 +20,10 @@ from pages import packed_values
 import friso
 from friso.cli.terminal import Escaping, console, spelled
 from friso.escapes import escaped, one_line, table_cell
+from friso.shown.drawing import matplotlib_renderer, plotly_renderer
+from friso.shown.drawing.drawable import drawable
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
 from friso.studies.export import export
-from friso.views.drawing import matplotlib_renderer, plotly_renderer
-from friso.views.drawing.drawable import drawable
-from friso.views.drawing.figure import Axis, Figure, Panel, Series
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 HOSTILE = "\x1b[2J\x1b]0;owned\x07 \u202egnp.exe \x9b31m \u2066x\r"

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from friso.answers.output_folder import OutputFolder
 from friso.cli.app import main
 from friso.cli.command import COMMANDS, HUNTS, Command
 from friso.cli.output import print_document
@@ -23,15 +22,16 @@ from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import FORMATS, LogFormat
 from friso.identification.logs.log import Log
 from friso.identification.logs.read import file_format, read_table
+from friso.interface.output_folder import OutputFolder
 from friso.progress import Progress
+from friso.questions.identify.kind_view import VIEWS, KindView
+from friso.questions.rig.outcome_view import OUTCOME_VIEWS
+from friso.shown.drawing.figure import Axis, Figure, Panel, Series
+from friso.shown.pages import Report
 from friso.stage import Stage
 from friso.stage.foreign import foreign
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.studies.rig.outcome import Outcome, RigLog
-from friso.views.drawing.figure import Axis, Figure, Panel, Series
-from friso.views.identify.kind_view import VIEWS, KindView
-from friso.views.pages import Report
-from friso.views.rig.outcome_view import OUTCOME_VIEWS
 
 ROOT = Path(__file__).parents[1]
 

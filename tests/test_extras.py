@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 import friso
-from friso import extras
 from friso.errors import InputError
-from friso.extras import EXTRAS, need
+from friso.platform import extras
+from friso.platform.extras import EXTRAS, need
 
 ROOT = Path(__file__).parents[1]
 

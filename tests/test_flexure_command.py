@@ -19,25 +19,25 @@ from refusals import Refused, Wording
 from snapshots import Snapshots
 
 import friso
-from friso.answers.flexure import EXAMPLE
-from friso.answers.output_folder import MARKER
 from friso.cli.commands.flexure import flexure as command
 from friso.errors import InputError
+from friso.interface.output_folder import MARKER
 from friso.leaf_springs.beams import BeamFailure
 from friso.leaf_springs.both_models import BEAMS, CLOSED, BothModels, both_models
 from friso.leaf_springs.evaluation import Mode
 from friso.leaf_springs.mechanism import Mechanism
+from friso.questions.flexure.document import flexure_document
+from friso.questions.flexure.drawing import drawing_svg
+from friso.questions.flexure.figures import flexure_figures
+from friso.questions.flexure.layout import SCALES, WIDTH, block_size
+from friso.questions.flexure.modes import VIEWS, best_view, modes_figure
+from friso.questions.flexure.page import flexure_html
+from friso.questions.flexure.question import EXAMPLE
+from friso.questions.flexure.table import rows
+from friso.questions.flexure.words import assumptions, findings, sentences, warnings
+from friso.shown.drawing import matplotlib_renderer, plotly_renderer
+from friso.shown.drawing.figure import Figure
 from friso.stage import Stage
-from friso.views.drawing import matplotlib_renderer, plotly_renderer
-from friso.views.drawing.figure import Figure
-from friso.views.flexure.document import flexure_document
-from friso.views.flexure.drawing import drawing_svg
-from friso.views.flexure.figures import flexure_figures
-from friso.views.flexure.layout import SCALES, WIDTH, block_size
-from friso.views.flexure.modes import VIEWS, best_view, modes_figure
-from friso.views.flexure.page import flexure_html
-from friso.views.flexure.table import rows
-from friso.views.flexure.words import assumptions, findings, sentences, warnings
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 FIGURES = ("flexure_force", "flexure_support", "flexure_modes")

@@ -15,7 +15,7 @@ import xarray as xr
 from inside import friso_inside
 from pages import Page
 
-from friso.answers.drafts import DRAFTS
+from friso.interface.drafts import DRAFTS
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 PRELOAD = Path(__file__).parent / "foreign_host"
@@ -216,11 +216,11 @@ from pathlib import Path
 from unittest.mock import patch
 
 from friso.app.names import plain_name
-from friso.bounded_file import content_of
+from friso.platform.bounded_file import content_of
 from friso.engine import building
 from friso.engine.private import read_private
-from friso.system import cause_of, check_free, delete_file, name_new_file, name_refused, path_of, remove_folder
-from friso.system import replace_file, shell_word
+from friso.platform.system import cause_of, check_free, delete_file, name_new_file, name_refused, path_of, remove_folder
+from friso.platform.system import replace_file, shell_word
 
 assert [plain_name(name, "log") for name in ("nul", "Con.csv", "a. ", "x.csv")] == ["_nul", "_Con.csv", "a", "x.csv"]
 assert shell_word("position=Act Pos") == 'position="Act Pos"'

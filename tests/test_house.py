@@ -24,21 +24,10 @@ KNOW_CONTROLLERS = ("equations/controllers/", "drives/formats/", "stage/stage.py
 """Where keys of a controller may be named: its own files, the stage file's schema, the template of one, and parameter
 files of drives, which are translated into friso's controllers."""
 
-SHARED_VIEWS = {
-    "__init__.py",
-    "documents.py",
-    "files.py",
-    "glossary.py",
-    "loop_words.py",
-    "machine_words.py",
-    "pages.py",
-}
-"""Modules of views that belong to no command; the rest stands in the command's folder or in drawing/."""
-
 ABOUT_TUNING = (
     *(
         "design_method/",
-        "views/design/",
+        "questions/design/",
         "friso_thesis/",
         "studies/compare/disturbance_rejection.py",
     ),
@@ -159,11 +148,6 @@ def is_percentage(value: ast.expr, behind: ast.expr | None) -> bool:
     return (hundred and sign) or (value.format_spec is not None and "%'" in ast.unparse(value.format_spec))
 
 
-def test_views_stand_in_the_folder_of_their_command() -> None:
-    shared = {path.name for package in (PACKAGE, THESIS) for path in (package / "views").glob("*.py")}
-    assert shared - SHARED_VIEWS == set()
-
-
 def test_files_and_documents_of_commands_are_made_in_the_same_places() -> None:
     """A command that writes has <command>_files in page.py; every one with --json has <command>_document."""
     group = typer.main.get_command(command_line())
@@ -172,9 +156,9 @@ def test_files_and_documents_of_commands_are_made_in_the_same_places() -> None:
     for name, command in group.commands.items():
         options = {option for parameter in command.params for option in parameter.opts}
         places = {"--out": ("page", f"{name}_files"), "--json": ("document", f"{name}_document")}
-        package = PACKAGE if (PACKAGE / "views" / name).exists() else THESIS
+        package = PACKAGE if (PACKAGE / "questions" / name).exists() else THESIS
         for module, function in (place for option, place in places.items() if option in options):
-            path = package / "views" / name / f"{module}.py"
+            path = package / "questions" / name / f"{module}.py"
             if not path.exists() or f"def {function}(" not in path.read_text(encoding="utf-8"):
                 missing.append(f"{path.relative_to(package)}: {function}")
     assert missing == []

@@ -11,7 +11,7 @@ import pytest
 import friso
 from friso.identification.estimate import Estimate
 from friso.identification.kinds import KINDS
-from friso.views.identify.numbers import interval_text
+from friso.questions.identify.numbers import interval_text
 
 TIME = np.arange(0, 2, 2e-3)
 STEP = np.where(TIME > 1, 1.0, 0.0)

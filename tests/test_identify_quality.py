@@ -49,7 +49,7 @@ from friso.identification.stage_file import (
     with_origins,
 )
 from friso.progress import silent
-from friso.views.identify.numbers import interval_text, value_text
+from friso.questions.identify.numbers import interval_text, value_text
 
 DT = 1e-3
 MASS, VISCOUS, COULOMB, OFFSET = 6.0, 20.0, 11.0, 0.5

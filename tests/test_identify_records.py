@@ -25,8 +25,8 @@ from friso.identification.output_error.identifiable import IdentifiableFit
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.readings.common import LINEARITY, record
 from friso.identification.sources import log_with_signals, read_all
-from friso.views.identify.document import identify_document
-from friso.views.identify.words import answer, headline
+from friso.questions.identify.document import identify_document
+from friso.questions.identify.words import answer, headline
 
 DT = 2e-3
 MASS, VISCOUS, COULOMB = 6.0, 20.0, 11.0

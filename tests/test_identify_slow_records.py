@@ -19,7 +19,7 @@ from friso.identification.readings.common import record
 from friso.identification.readings.ramps import Ramps
 from friso.identification.slow_records import with_unexplained_inertia, without_sliding
 from friso.identification.stage_file import made_up
-from friso.views.identify.kinds.moves import FALLING, _inverse_text
+from friso.questions.identify.kinds.moves import FALLING, _inverse_text
 
 FLAT = {"friction.stribeck_velocity": 1e-3, "axis.kind": "linear"}
 MASSES = Estimate.normal("masses.cart", "kg", 3.0, 0.1, "drawn")

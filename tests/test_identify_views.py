@@ -43,16 +43,13 @@ from friso.identification.response.analysis import analyse
 from friso.identification.response.two_mass import two_masses
 from friso.identification.sources import LogFile
 from friso.identification.stage_file import estimate_text, identified_stage, made_up
-from friso.stage.correlations import Correlations
-from friso.views.drawing import plotly_renderer
-from friso.views.drawing.figure import Figure, Panel, Series
-from friso.views.identify.document import identify_document
-from friso.views.identify.figures import identify_figures
-from friso.views.identify.kinds.constant_speed import VIEW as CONSTANT_SPEED
-from friso.views.identify.moves_figures import moves_figures, record_panels
-from friso.views.identify.numbers import interval_text, unit_of, value_text, with_interval
-from friso.views.identify.page import identify_html
-from friso.views.identify.words import (
+from friso.questions.identify.document import identify_document
+from friso.questions.identify.figures import identify_figures
+from friso.questions.identify.kinds.constant_speed import VIEW as CONSTANT_SPEED
+from friso.questions.identify.moves_figures import moves_figures, record_panels
+from friso.questions.identify.numbers import interval_text, unit_of, value_text, with_interval
+from friso.questions.identify.page import identify_html
+from friso.questions.identify.words import (
     LEFT,
     NO_STAGE,
     answer,
@@ -62,6 +59,9 @@ from friso.views.identify.words import (
     prediction_line,
     summaries,
 )
+from friso.shown.drawing import plotly_renderer
+from friso.shown.drawing.figure import Figure, Panel, Series
+from friso.stage.correlations import Correlations
 
 pytestmark = pytest.mark.xdist_group("identify-views")
 

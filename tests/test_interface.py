@@ -17,10 +17,10 @@ from inside import friso_inside
 from typer.core import TyperGroup
 
 import friso
-from friso.answers.answer import Answer
 from friso.axis import unit_of_key
 from friso.cli.app import command_line
 from friso.cli.command import QUESTIONS
+from friso.interface.answer import Answer
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 STICK_SLIP, LEAVES = EXAMPLES / "lugre_stick_slip.toml", EXAMPLES / "thesis_leaves.toml"
@@ -28,7 +28,7 @@ STICK_SLIP, LEAVES = EXAMPLES / "lugre_stick_slip.toml", EXAMPLES / "thesis_leav
 OF_THE_SHELL = {"--out", "--overwrite", "--json", "--details", "--help"}
 """Options that say where an answer goes: `report` and `to_dict` of the answer in Python."""
 
-OTHERWISE = {("map", "--check"): "friso.answers.sweep.whole"}
+OTHERWISE = {("map", "--check"): "friso.questions.map.question.whole"}
 """Options that are not keywords, and what does the same."""
 
 FUNCTIONS = {"map": "sweep"}

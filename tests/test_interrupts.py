@@ -22,10 +22,10 @@ from filelock import FileLock
 from inside import friso_inside
 from systems import posix
 
-from friso import early, interrupts
-from friso.answers.output_folder import write_file
 from friso.engine import building
 from friso.engine.overtaken import Overtaken, ended_by
+from friso.interface.output_folder import write_file
+from friso.platform import early, interrupts
 
 pytestmark = posix  # elsewhere a process cannot send itself such a signal, but is ended
 
@@ -42,7 +42,7 @@ def test_a_signal_while_friso_starts_is_one_line(tmp_path: Path, seed: int) -> N
         assert process.stderr is not None
         imported, line = 0, ""
         for line in process.stderr:
-            imported += imported > 0 or "friso.early" in line
+            imported += imported > 0 or "friso.platform.early" in line
             if imported == wanted:
                 process.send_signal(number)
         assert process.wait() == 128 + number
@@ -63,7 +63,7 @@ def test_a_signal_that_a_library_turns_into_something_else(
                 raise becomes from None
             raise
 
-    monkeypatch.setattr("friso.answers.bode.read_stage", interrupted)
+    monkeypatch.setattr("friso.questions.bode.question.read_stage", interrupted)
     before = signal.getsignal(number)
     done = friso_inside(tmp_path, "bode", RIG)
     assert done.returncode == 128 + number
@@ -76,7 +76,7 @@ import atexit, signal, sys
 
 atexit.register(lambda: print(signal.getsignal(signal.SIGTERM) is signal.SIG_IGN))
 sys.argv[0] = "friso"
-import friso.interrupts
+import friso.platform.interrupts
 """
 
 
@@ -156,7 +156,7 @@ from hashlib import pbkdf2_hmac
 from threading import Timer
 
 sys.argv[0] = "friso"
-from friso import interrupts
+from friso.platform import interrupts
 
 def swallow():
     while True:
@@ -232,8 +232,8 @@ WAITING = """
 import os, signal, sys, time
 
 sys.argv[0] = "friso"
-from friso import interrupts
-from friso.system import interrupts_held
+from friso.platform import interrupts
+from friso.platform.system import interrupts_held
 
 with interrupts.raising():
     try:

@@ -11,12 +11,12 @@ from inside import friso_inside
 from refusals import Wording
 from variants import VARIANTS, gains, lugre, release, stage
 
+from friso.questions.check.laws import laws_document, laws_rows, laws_sentences
+from friso.shown.drawing.prefixes import NOTHING
 from friso.stage import violations
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import convert
 from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw, frictions_that_keep, verdicts_by_law
-from friso.views.check.laws import laws_document, laws_rows, laws_sentences
-from friso.views.drawing.prefixes import NOTHING
 
 RIGID = VARIANTS["rigid"]
 PD = stage(release(), friction=lugre(2), controller=gains(kp=1000, kd=20, tau=1e-3))

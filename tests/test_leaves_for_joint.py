@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from friso import Stage, load, loads
-from friso.answers.tune import TuneAnswer
 from friso.design_method.geometry import Sheet, mechanisms
 from friso.design_method.leaves_for_joint import leaves_for_joint
 from friso.design_method.outline import outline
@@ -18,12 +17,13 @@ from friso.leaf_springs import closed_forms
 from friso.leaf_springs.beams import beams
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
+from friso.questions.tune.page import stage_files
+from friso.questions.tune.question import TuneAnswer
+from friso.questions.tune.words import DOUBTS, UNMADE, answer
 from friso.remedies.catalogue import remedies
 from friso.remedies.goal import Goal
 from friso.remedies.method import Advice, Unmade, _Session, tune
 from friso.remedies.search import Budget
-from friso.views.tune.page import stage_files
-from friso.views.tune.words import DOUBTS, UNMADE, answer
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG = load(EXAMPLES / "thesis_rig.toml")

@@ -10,7 +10,7 @@ import pytest
 from filelock import FileLock
 from systems import posix
 
-from friso.leftovers import is_leftover, locked_folder, remove_leftovers
+from friso.platform.leftovers import is_leftover, locked_folder, remove_leftovers
 
 LOCK = "lock"
 

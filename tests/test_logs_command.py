@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from inside import friso_inside
 
-from friso.answers.output_folder import OutputFolder
 from friso.identification.contents import log_content
 from friso.identification.logs.mapping import Mapping, from_options
-from friso.views.logs.words import next_command, sparkline
+from friso.interface.output_folder import OutputFolder
+from friso.questions.logs.words import next_command, sparkline
 
 TIME = 1e-3 * np.arange(1200)
 FORCE = 30 * np.sin(2 * np.pi * 3 * TIME) * np.exp(-2 * TIME)  # nothing repeats: a log of moves

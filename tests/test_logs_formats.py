@@ -30,7 +30,7 @@ from friso.identification.logs.preamble import preamble
 from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
 from friso.identification.logs.sniff import split_line
 from friso.identification.logs.units import is_unit, spelled, split_heading
-from friso.system import LIMITS_MEMORY
+from friso.platform.system import LIMITS_MEMORY
 
 M = log_files.motion()
 HEADING = ["time [ms]", "position [mm]", "force [N]"]

@@ -20,8 +20,8 @@ from refusals import Refused, Wording
 from systems import posix
 
 import friso as friso_api
-from friso.answers.map_study import refuse_overwriting, stored_study
 from friso.errors import InputError, StoreError
+from friso.questions.map.study import refuse_overwriting, stored_study
 from friso.studies.cells import USUAL
 from friso.studies.metadata import annotate_metadata
 
@@ -278,7 +278,7 @@ def test_a_file_beside_a_store_that_appears_while_it_runs_stays(
     def appears(*arguments: object) -> None:
         (tmp_path / "a.html").write_text("precious")
 
-    monkeypatch.setattr("friso.answers.sweep.drawn_runs", appears)
+    monkeypatch.setattr("friso.questions.map.question.drawn_runs", appears)
     done = friso_inside(tmp_path, "map", "a.zarr")
     assert (done.returncode, "the runs are in a.zarr" in done.stderr) == (1, True)
     assert {path.name for path in tmp_path.iterdir()} == {"a.zarr", "a.html"}
@@ -310,7 +310,7 @@ def test_a_store_is_drawn_elsewhere_also_where_nothing_can_be_written_into_it(
     )
     assert (done.returncode, "cannot be written to" in done.stderr) == (2, True)  # not the runs of the other study
     (tmp_path / "a.png").unlink()
-    monkeypatch.setattr("friso.answers.sweep.verify_cells", None)  # refused before anything is run
+    monkeypatch.setattr("friso.questions.map.question.verify_cells", None)  # refused before anything is run
     assert "example:  friso map a.zarr --out figures" in friso_inside(tmp_path, "map", "a.zarr").stderr
     assert {file.name for file in tmp_path.iterdir()} == {"a.zarr", "figures", "c.csv"}
 
@@ -348,7 +348,7 @@ def test_what_a_store_holds_is_drawn_and_what_it_lacks_is_named(
         assert "('" not in done.stderr
     more = tmp_path / "b.zarr"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("friso.answers.map_study.USUAL", (*USUAL, "verdict"))
+        patch.setattr("friso.questions.map.study.USUAL", (*USUAL, "verdict"))
         small = ("--x", "controller.crossover=4 Hz, 5 Hz", "--out", more, "--verify", "0")
         assert friso_inside(tmp_path, "map", RIG, *small).returncode == 0
     done = friso_inside(tmp_path, "map", RIG, *small, "--metric", "peaks")

@@ -24,16 +24,16 @@ from scipy.stats import binomtest
 from snapshots import Snapshots
 
 import friso
-from friso.views.drawing import matplotlib_renderer, plotly_renderer
-from friso.views.drawing.colours import painted, ramp, scale
-from friso.views.drawing.drawable import cell_edges, colour_key, drawable
-from friso.views.drawing.figure import Category, Cloud, Figure, Map
-from friso.views.map.cells import axes_of, look, pick
-from friso.views.map.data import MOST, NONE
-from friso.views.map.figures import SLICES, map_figure, map_panel
-from friso.views.map.findings import headline, statement, verification
-from friso.views.map.page import map_files, map_html, marked_figure
-from friso.views.map.words import CATEGORIES, FAILED, INFERRED, INVALID, NOT_RUN, QUIET, quantity
+from friso.questions.map.cells import axes_of, look, pick
+from friso.questions.map.data import MOST, NONE
+from friso.questions.map.figures import SLICES, map_figure, map_panel
+from friso.questions.map.findings import headline, statement, verification
+from friso.questions.map.page import map_files, map_html, marked_figure
+from friso.questions.map.words import CATEGORIES, FAILED, INFERRED, INVALID, NOT_RUN, QUIET, quantity
+from friso.shown.drawing import matplotlib_renderer, plotly_renderer
+from friso.shown.drawing.colours import painted, ramp, scale
+from friso.shown.drawing.drawable import cell_edges, colour_key, drawable
+from friso.shown.drawing.figure import Category, Cloud, Figure, Map
 
 CROSSOVER, STROKE, DAMPING, LOCKED = (
     "controller.crossover",

@@ -18,8 +18,8 @@ from friso.equations.scaled_friction import (
 from friso.hunting import MarginEnd, ParameterMargin, check, find_attractors, joint_margins
 from friso.hunting import parameter_margin as module
 from friso.hunting.parameter_margin import parameter_margin
+from friso.questions.check.margin_words import friction_sentences, margin_sentence, thin_margins
 from friso.stage import Stage
-from friso.views.check.margin_words import friction_sentences, margin_sentence, thin_margins
 
 
 @pytest.fixture(scope="module")

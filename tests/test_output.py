@@ -19,9 +19,11 @@ from inside import friso_inside
 from refusals import Refused
 from systems import posix
 
-from friso.answers import drafts as drafts_module
-from friso.answers.drafts import DRAFTS, Drafts, made
-from friso.answers.output_folder import (
+from friso.cli.app import command_line
+from friso.errors import InputError
+from friso.interface import drafts as drafts_module
+from friso.interface.drafts import DRAFTS, Drafts, made
+from friso.interface.output_folder import (
     MARKER,
     UNFINISHED,
     OutputFolder,
@@ -30,10 +32,8 @@ from friso.answers.output_folder import (
     write,
     write_file,
 )
-from friso.cli.app import command_line
-from friso.errors import InputError
+from friso.shown.files import Content
 from friso.stage import load
-from friso.views.files import Content
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, DRIVE, LEAVES = (EXAMPLES / f"thesis_{name}.toml" for name in ("rig", "drive", "leaves"))
@@ -152,7 +152,7 @@ def test_the_folder_of_a_map_is_its_store(tmp_path: Path, monkeypatch: pytest.Mo
         def protected(*arguments: object) -> None:
             raise PermissionError(errno.EACCES, "Permission denied")
 
-        patch.setattr("friso.answers.output_folder._try_draft", protected)
+        patch.setattr("friso.interface.output_folder._try_draft", protected)
         check_store_folder(tmp_path / "a.zarr")
         with pytest.raises(InputError, match=rf"new\.zarr[\s\S]*Permission denied: {re.escape(str(tmp_path))}\)"):
             check_store_folder(tmp_path / "new.zarr")
@@ -461,7 +461,7 @@ def test_a_command_that_fails_while_writing_leaves_nothing(
     command: str, stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
 ) -> None:
     monkeypatch.setattr(
-        "friso.answers.drafts.Drafts.put_in_place", failing(lambda *named: None, 1, OSError("disk full"))
+        "friso.interface.drafts.Drafts.put_in_place", failing(lambda *named: None, 1, OSError("disk full"))
     )
     done = friso_inside(tmp_path, command, stage, "--out", "out")
     assert done.returncode == 1

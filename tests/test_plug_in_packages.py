@@ -244,7 +244,7 @@ def test_a_function_that_is_of_no_use_is_refused_and_leaves_the_others(tmp_path:
     package(tmp_path, "other", functions={"check": "taken", "missing": "missing", "stage": "taken"})
     code = "import friso\nprint(friso.check.__module__, friso.stage.__name__)\nfriso.missing"
     done = python(tmp_path, code)
-    assert done.stdout == "friso.answers.check friso.stage\n"
+    assert done.stdout == "friso.questions.check.question friso.stage\n"
     assert "friso.functions: check is left out: taken; expected: a name that is not taken: friso has it" in done.stderr
     assert "AttributeError: friso.functions: missing" in done.stderr
     assert "which cannot be imported: No module named 'missing'" in done.stderr

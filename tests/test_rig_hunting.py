@@ -11,6 +11,8 @@ from refusals import Refused
 from friso import load
 from friso.engine.arrays import Status
 from friso.progress import silent
+from friso.questions.rig.document import rig_document
+from friso.questions.rig.page import figures, sentences
 from friso.studies.rig.experiments import hunting
 from friso.studies.rig.moves_on_rails import (
     RailRuns,
@@ -25,8 +27,6 @@ from friso.studies.rig.moves_on_rails import (
     turning_points,
     with_joint,
 )
-from friso.views.rig.document import rig_document
-from friso.views.rig.page import figures, sentences
 from friso.virtual_rig.run import RecordedRuns
 
 RIG = load(Path(__file__).parents[1] / "examples" / "thesis_drive.toml")

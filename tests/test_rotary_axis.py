@@ -17,9 +17,9 @@ from friso.axis import LINEAR, ROTARY, speak_of, unit_shown
 from friso.design_method.outline import outline
 from friso.errors import InputError, StageError
 from friso.intervals import UncertainValue
+from friso.shown.drawing.prefixes import with_unit
 from friso.stage import Stage, numeric_keys
 from friso.stage.plausible import implausible_values
-from friso.views.drawing.prefixes import with_unit
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

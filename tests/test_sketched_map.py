@@ -5,16 +5,16 @@ import pytest
 from patched import patched
 
 import friso
-from friso.answers.sweep import SweepAnswer
 from friso.equations.bandwidth import faster
 from friso.equations.scaled_friction import with_friction
 from friso.errors import InputError
 from friso.hunting import check, sketch_attractors, what_attracts
 from friso.hunting.criteria import ATTRACTED
+from friso.questions.map.figures import map_figure
+from friso.questions.map.findings import own_place
+from friso.questions.map.question import SweepAnswer
 from friso.stage import Stage
 from friso.studies.study import study_of
-from friso.views.map.figures import map_figure
-from friso.views.map.findings import own_place
 
 SPEEDS = np.array([0.6, 0.9, 1.0, 1.3, 1.7])
 

@@ -12,9 +12,9 @@ from refusals import Refused, Wording
 from systems import posix
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
-from friso import paths
-from friso.answers.inputs import stage_of
 from friso.errors import InputError, StageError
+from friso.interface.inputs import stage_of
+from friso.platform import paths
 from friso.quantities import Quantity, Value, any_sign, positive
 from friso.stage import Stage, load, loads, numeric_keys, parse_set, save, violations
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from friso import system
 from friso.engine import batch
+from friso.platform import system
 from friso.stage import Stage
 from friso.studies.sweep import sweep
 

@@ -23,10 +23,10 @@ from friso.frequency.parts import plant
 from friso.hunting import Decline, Ensemble, Feeding, cannot_hunt, hunting, unstable
 from friso.hunting import feeding as hunting_feeding
 from friso.hunting.feeding import dry_friction, feeding
+from friso.questions.bode.words import caveats
+from friso.questions.check.feeding_words import feeding_sentences
 from friso.stage import Stage
 from friso.stage.plausible import idle_encoder
-from friso.views.bode.words import caveats
-from friso.views.check.feeding_words import feeding_sentences
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import own_motion
 

@@ -17,7 +17,6 @@ from variants import stage as variant
 
 import friso
 from friso import Stage, load, loads
-from friso.answers.tune import TuneAnswer
 from friso.app import questions
 from friso.cli.asking import show
 from friso.design_method.isolator import isolated
@@ -36,6 +35,28 @@ from friso.frequency.family import controller_response
 from friso.hunting import CheckPart, Ensemble, check_given, find_cycles, find_margin
 from friso.hunting.criteria import settling_of_runs
 from friso.hunting.measures import measured_run
+from friso.questions.check.isolator_words import isolator_sentence
+from friso.questions.tune.document import tune_document
+from friso.questions.tune.figures import _sensitivity, drawn_stages, figures
+from friso.questions.tune.gain_words import gain_lines
+from friso.questions.tune.page import tune_files
+from friso.questions.tune.question import TuneAnswer
+from friso.questions.tune.sensitivity_words import ranked_sentences
+from friso.questions.tune.words import (
+    DOUBTS,
+    _no_relaxation,
+    _reasons,
+    _without_friction,
+    answer,
+    assumptions,
+    changes,
+    failing,
+    price,
+    rows,
+    size_words,
+    slowest_time,
+    window_lines,
+)
 from friso.remedies import method
 from friso.remedies import search as search_module
 from friso.remedies import verified as verified_module
@@ -62,31 +83,10 @@ from friso.remedies.trials import (
 from friso.remedies.variables import BANDWIDTH, of_key
 from friso.remedies.verified import ONE, Performance, RemedyOutcome, _stiffness, performance_of, unmet_goals
 from friso.remedies.window import HALVINGS, POINTS, windows
+from friso.shown.drawing import matplotlib_renderer
+from friso.shown.drawing.prefixes import NOTHING, with_unit
 from friso.stage.controllers import as_tuned, controller_of
 from friso.stage.correlations import Correlations
-from friso.views.check.isolator_words import isolator_sentence
-from friso.views.drawing import matplotlib_renderer
-from friso.views.drawing.prefixes import NOTHING, with_unit
-from friso.views.tune.document import tune_document
-from friso.views.tune.figures import _sensitivity, drawn_stages, figures
-from friso.views.tune.gain_words import gain_lines
-from friso.views.tune.page import tune_files
-from friso.views.tune.sensitivity_words import ranked_sentences
-from friso.views.tune.words import (
-    DOUBTS,
-    _no_relaxation,
-    _reasons,
-    _without_friction,
-    answer,
-    assumptions,
-    changes,
-    failing,
-    price,
-    rows,
-    size_words,
-    slowest_time,
-    window_lines,
-)
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 AS_IS = partial(Remedy.settled_on, "")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from refusals import Refused, Wording
 from scipy.stats import kstest, norm, spearmanr, truncnorm
 
-from friso.answers.inputs import read_stage
+from friso.interface.inputs import read_stage
 from friso.intervals import COVERAGE, UncertainValue
 from friso.stage import Stage, load, numeric_keys, parse_set, save
 from friso.stage.correlations import (

@@ -15,8 +15,8 @@ from inside import friso_inside
 from systems import posix
 
 import friso
-from friso.answers.inputs import stage_of
 from friso.errors import InputError
+from friso.interface.inputs import stage_of
 from friso.stage.files import MOST_BYTES
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

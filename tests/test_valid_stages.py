@@ -12,10 +12,10 @@ import pytest
 
 import friso
 from benchmarks.trust.stages import drawn_stages
-from friso.answers.answer import Answer
 from friso.app.machine import Machine, machine_on_page
 from friso.design_method.isolator import isolated
 from friso.equations.structure import structure
+from friso.interface.answer import Answer
 from friso.stage import Stage
 from friso.stage.plausible import idle_encoder, implausible_values
 from friso.studies.rig.moves_on_rails import with_joint

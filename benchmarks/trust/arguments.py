@@ -23,7 +23,7 @@ from friso.cli import main
 from friso.cli.app import command_line
 from friso.engine.cache import CodeRequest
 from friso.errors import InputError
-from friso.views.drawing import matplotlib_renderer
+from friso.shown.drawing import matplotlib_renderer
 
 CALLS: dict[str, dict[str, Any]] = {
     **{name: {"stage": RIG} for name in ("bode", "check", "simulate", "tune")},

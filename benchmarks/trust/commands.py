@@ -17,8 +17,8 @@ from pathlib import Path
 import psutil
 
 from benchmarks.trust.inputs import ANSWERS, AXIS, DRIVE, LEAVES, RIG, SPEC, STICK_SLIP, folder_until_the_end
-from friso.answers.drafts import DRAFTS
-from friso.answers.output_folder import MARKER, UNFINISHED, marked, write
+from friso.interface.drafts import DRAFTS
+from friso.interface.output_folder import MARKER, UNFINISHED, marked, write
 
 FRISO = [sys.executable, "-m", "friso"]
 SMALL = ["--x", "controller.crossover=2 Hz..16 Hz:24", "--y", "joint.stroke=0.1 mm..1 mm:24", "--rtol", "1e-8"]

@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager
 from multiprocessing.util import Finalize
 from pathlib import Path
 
-from friso.leftovers import temporary_folder
+from friso.platform.leftovers import temporary_folder
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 RIG, DRIVE, LEAVES = (str(EXAMPLES / f"thesis_{name}.toml") for name in ("rig", "drive", "leaves"))

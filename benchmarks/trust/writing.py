@@ -19,10 +19,10 @@ import friso
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.faults import struck
 from benchmarks.trust.inputs import folder_until_the_end
-from friso.answers.map_study import write_beside
-from friso.answers.output_folder import MARKER, OutputFolder
 from friso.errors import InputError
+from friso.interface.output_folder import MARKER, OutputFolder
 from friso.progress import silent
+from friso.questions.map.study import write_beside
 from friso.studies import metadata
 from friso.studies.request import Request
 from friso.studies.store import Store, check_store, read_store

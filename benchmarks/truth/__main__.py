@@ -32,7 +32,7 @@ from benchmarks.truth.positions import compared, summary
 from benchmarks.truth.tally import document, page, print_tally
 from friso.engine.kernel import kernels
 from friso.hunting import needed_kernels
-from friso.system import usable_cores
+from friso.platform.system import usable_cores
 
 
 def main() -> None:

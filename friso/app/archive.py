@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from friso.axis import speaking_of
-from friso.leftovers import temporary_folder
-from friso.views.files import pictures
+from friso.platform.leftovers import temporary_folder
+from friso.shown.files import pictures
 
 if TYPE_CHECKING:
-    from friso.answers.answer import Answer
+    from friso.interface.answer import Answer
 
 
 def archive(answer: Answer, more: Mapping[str, str]) -> bytes:

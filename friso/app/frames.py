@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from friso.views.drawing import plotly_renderer
-from friso.views.drawing.figure import Figure
+from friso.shown.drawing import plotly_renderer
+from friso.shown.drawing.figure import Figure
 
 
 def frame(value: Any) -> bytes:

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from friso.views.drawing.figure import Figure, Panel
+from friso.shown.drawing.figure import Figure, Panel
 
 if TYPE_CHECKING:
-    from friso.answers.answer import Answer
+    from friso.interface.answer import Answer
 
 GHOST = "#a9a9a9"
 """Colour of what is pinned."""

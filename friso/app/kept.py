@@ -10,9 +10,9 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from friso.answers.answer import Answer
     from friso.app.machine import Machine
     from friso.app.work import Work
+    from friso.interface.answer import Answer
 
 MOST = 4
 """Answers that are kept of each function, those that were asked for last: a Bode plot takes 20 MB."""

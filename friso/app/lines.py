@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from friso.platform.system import shell_word
 from friso.quantities import as_toml
-from friso.system import shell_word
 
 
 def command_line(command: str, files: Sequence[str], options: Mapping[str, Any]) -> str:

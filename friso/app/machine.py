@@ -9,10 +9,10 @@ from functools import cache, lru_cache
 from threading import Lock
 from typing import Any
 
-from friso.answers.schema import stage_schema
 from friso.app.names import plain_name
 from friso.errors import InputError
 from friso.quantities import Number, Quantity
+from friso.questions.init.schema import stage_schema
 from friso.stage import Stage, loads, numeric_keys
 
 REACH = 10.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from friso.system import name_refused
+from friso.platform.system import name_refused
 
 _OUTSIDE = re.compile(r"[^\w.+ -]")
 

@@ -22,18 +22,18 @@ from friso.axis import speaking_of
 from friso.errors import InputError
 from friso.identification.logs.mapping import MAPPABLE
 from friso.quantities import exactly
+from friso.questions.map.places import SHOWN, with_places
+from friso.shown.cases import case_labels
+from friso.shown.drawing.figure import Figure
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
-from friso.views.check.cases import case_labels
-from friso.views.drawing.figure import Figure
-from friso.views.map.places import SHOWN, with_places
 
 if TYPE_CHECKING:
-    from friso.answers.answer import Answer
-    from friso.answers.identify import IdentifyAnswer
-    from friso.answers.logs import LogsAnswer
-    from friso.answers.sweep import SweepAnswer
     from friso.app.work import Work
+    from friso.interface.answer import Answer
+    from friso.questions.identify.question import IdentifyAnswer
+    from friso.questions.logs.question import LogsAnswer
+    from friso.questions.map.question import SweepAnswer
 
 AnswerPart = dict[str, Any]
 

@@ -16,13 +16,13 @@ from types import FrameType
 import uvicorn
 from starlette.types import ASGIApp
 
-from friso.answers.starting import example
 from friso.app.connections import MOST, Connection, Once, failed
 from friso.app.gate import LOOPBACK, Access
 from friso.app.server import application
 from friso.app.work import Workshop
-from friso.early import SIGNALS
 from friso.errors import InputError
+from friso.platform.early import SIGNALS
+from friso.questions.init.starting import example
 from friso.stage.files import load, text_of
 
 PORT = 8741

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from friso.app.names import plain_name
 from friso.errors import InputError
-from friso.leftovers import temporary_folder
-from friso.system import remove_folder
+from friso.platform.leftovers import temporary_folder
+from friso.platform.system import remove_folder
 
 MOST_BYTES = 64_000_000
 """Size of a log at most."""

@@ -16,14 +16,14 @@ from typing import Annotated, Any, NoReturn, TextIO
 import typer
 from typer.core import TyperGroup
 
-from friso import interrupts
 from friso.cli.arguments import number_refused, parted_path, refuse_empty, with_checked_paths
 from friso.cli.command import COMMANDS, QUESTIONS
 from friso.cli.common import INTERRUPTED, say
 from friso.cli.terminal import SPELLED, escaping
 from friso.errors import InputError, shortened
-from friso.installed import installed_modules
-from friso.system import LIBRARIES, cause_of, path_of
+from friso.platform import interrupts
+from friso.platform.installed import installed_modules
+from friso.platform.system import LIBRARIES, cause_of, path_of
 from friso.version import VERSION
 
 

@@ -13,10 +13,10 @@ from typing import Any, get_args, get_type_hints
 from typer import BadParameter
 from typer.models import ArgumentInfo
 
-from friso import paths
 from friso.cli.command import COMMANDS
 from friso.errors import InputError
-from friso.system import shell_word
+from friso.platform import paths
+from friso.platform.system import shell_word
 
 
 def refuse_empty(arguments: Iterable[str]) -> None:

@@ -17,10 +17,10 @@ from friso.cli.common import print_table, print_wrapped, say
 from friso.cli.output import print_document, print_written
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
-from friso.system import cause_of, path_of
+from friso.platform.system import cause_of, path_of
 
 if TYPE_CHECKING:
-    from friso.answers.answer import Answer
+    from friso.interface.answer import Answer
 
 DRAWING = "drawing the page"
 """What is being done once an answer is there."""
@@ -47,8 +47,8 @@ def ask(
     """
     target, beside = None, nullcontext()
     if out is not None:
-        from friso.answers.output_folder import OutputFolder
-        from friso.views.drawing.images import drawing_beside
+        from friso.interface.output_folder import OutputFolder
+        from friso.shown.drawing.images import drawing_beside
 
         target = OutputFolder(command, out, overwrite, [*_paths(about)])
         target.check(writes)

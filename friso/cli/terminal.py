@@ -11,7 +11,7 @@ from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from friso.escapes import escaped
-from friso.system import closed_pipes_told
+from friso.platform.system import closed_pipes_told
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -12,7 +12,7 @@ from friso.drives.format import FORMATS, TOLD, AsStage, AxisParameters, Paramete
 from friso.drives.questions import UserAnswers, refuse_open
 from friso.errors import InputError, shortened
 from friso.escapes import one_line
-from friso.paths import flaw_of
+from friso.platform.paths import flaw_of
 from friso.quantities import quoted
 from friso.stage import Stage
 from friso.stage.files import text_of

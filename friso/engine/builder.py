@@ -1,7 +1,8 @@
 """The program that fills the cache: ``python -m friso.engine.builder FOLDER``.
 
-It is asked pairs, the name of a module and a task (`friso.helper_process`), has the module's `build(folder, task)` keep
-what the task asks for in the cache's FOLDER, and answers the name of the entry, or the OSError that kept it from that.
+It is asked pairs, the name of a module and a task (`friso.platform.helper_process`), has the module's
+`build(folder, task)` keep what the task asks for in the cache's FOLDER, and answers the name of the entry, or the
+OSError that kept it from that.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from friso.helper_process import answer_questions
+from friso.platform.helper_process import answer_questions
 
 GARBAGE = 100_000, 50, 100
 """How often unused objects are looked for: as often as is usual takes a tenth of the time."""

@@ -21,9 +21,9 @@ from filelock import FileLock, Timeout
 from friso.engine.cache import CodeRequest, Compiled, cache_folder, leave_cache, logger
 from friso.engine.overtaken import ASKER, Overtaken, go_on
 from friso.engine.prune import prune
-from friso.helper_process import HelperProcess
+from friso.platform.helper_process import HelperProcess
+from friso.platform.system import usable_cores
 from friso.progress import WORK_CLOCK
-from friso.system import usable_cores
 
 _PATIENCE = 0.1
 """How long [s] is waited before it is looked whether there is still need."""

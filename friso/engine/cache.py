@@ -38,8 +38,8 @@ from platformdirs import user_cache_dir
 from friso.engine.private import make_private
 from friso.engine.processor import processor
 from friso.engine.seal import read_sealed, write_sealed
-from friso.leftovers import locked_folder, temporary_folder
-from friso.system import cause_of, path_of, remove_folder
+from friso.platform.leftovers import locked_folder, temporary_folder
+from friso.platform.system import cause_of, path_of, remove_folder
 from friso.version import VERSION
 
 logger = logging.getLogger("friso")

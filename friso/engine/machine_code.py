@@ -13,7 +13,7 @@ from llvmlite import ir
 
 from friso.engine.kinds import CompiledKind, Packing
 from friso.engine.processor import processor
-from friso.system import HAS_JIT_LINK
+from friso.platform.system import HAS_JIT_LINK
 
 
 def object_code(module: ir.Module) -> bytes:

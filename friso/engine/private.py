@@ -11,8 +11,8 @@ import stat
 from contextlib import suppress
 from pathlib import Path
 
-from friso.system import closed_to_others, foreign_writers, open_file
-from friso.whole_file import FOR_USER, whole_file
+from friso.platform.system import closed_to_others, foreign_writers, open_file
+from friso.platform.whole_file import FOR_USER, whole_file
 
 
 def make_private(folder: Path) -> None:

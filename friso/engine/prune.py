@@ -9,7 +9,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from friso.engine.cache import DAY, ENTRY, REQUEST, entry_lock, logger
-from friso.whole_file import PARTIAL
+from friso.platform.whole_file import PARTIAL
 
 KEPT_FOR, KEPT_IN_ALL = 60 * DAY, 200_000_000
 """How long [s] what is not used is kept, and how much [bytes]; what was used within a day is kept in any case."""

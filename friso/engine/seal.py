@@ -11,7 +11,7 @@ from pathlib import Path
 from filelock import FileLock
 
 from friso.engine.private import read_private, write_private
-from friso.system import is_open_to_others
+from friso.platform.system import is_open_to_others
 
 SECRET, LENGTH = "secret", 32
 """The file with the secret, and the length [bytes] of it and of an authenticator."""

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from friso.engine.overtaken import ended_by, go_on
-from friso.system import usable_cores
+from friso.platform.system import usable_cores
 
 _T = TypeVar("_T")
 _Other = TypeVar("_Other")

@@ -17,9 +17,9 @@ from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import last_corner
 from friso.equations.structure import structure
 from friso.errors import InputError, StageError
-from friso.extras import missing
 from friso.frequency.crossover import Limits, limits
 from friso.hunting import Case
+from friso.platform.extras import missing
 from friso.progress import Progress, silent
 from friso.remedies.catalogue import Remedy, remedies, with_bandwidth
 from friso.remedies.change import ChangeSize, change_size

@@ -179,7 +179,7 @@ def verified(stage: Stage) -> Case:
 
 
 def unmet_goals(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
-    """What of the goal a stage does not meet, or not surely: names of `friso.views.tune.words.DOUBTS`."""
+    """What of the goal a stage does not meet, or not surely: names of `friso.questions.tune.words.DOUBTS`."""
     return (*unsettled_parts(case, measured, goal), *missed_parts(measured, goal))
 
 

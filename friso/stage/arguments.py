@@ -13,8 +13,8 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from friso import paths
 from friso.errors import InputError
+from friso.platform import paths
 from friso.quantities import quoted
 from friso.stage.stage import Stage
 

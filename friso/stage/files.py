@@ -10,15 +10,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from friso import paths
-from friso.bounded_file import LargeFileError, content_of
 from friso.errors import InputError, StageError
 from friso.escapes import one_line
+from friso.platform import paths
+from friso.platform.bounded_file import LargeFileError, content_of
+from friso.platform.system import cause_of, check_free, shell_word
+from friso.platform.whole_file import whole_file
 from friso.quantities import quoted
 from friso.stage.arguments import check_arguments
 from friso.stage.stage import Stage, changed
-from friso.system import cause_of, check_free, shell_word
-from friso.whole_file import whole_file
 
 MOST_BYTES = 4_000_000
 """Size of a text file at most."""

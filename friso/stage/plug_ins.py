@@ -19,7 +19,7 @@ from functools import cache
 from pathlib import Path
 
 from friso.errors import InputError
-from friso.installed import installed_modules, leave_out, load_module
+from friso.platform.installed import installed_modules, leave_out, load_module
 
 OWN = "friso"
 SCRIPT = "__main__"

@@ -16,11 +16,11 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.resources import files
 from pathlib import Path
 
-from friso.extras import EXTRAS, install
-from friso.leftovers import temporary_folder
+from friso.platform.extras import EXTRAS, install
+from friso.platform.leftovers import temporary_folder
+from friso.platform.system import LIBRARIES, MODES_TELL, is_open_to_others, usable_cores
 from friso.stage import Stage
 from friso.stage.files import loads
-from friso.system import LIBRARIES, MODES_TELL, is_open_to_others, usable_cores
 from friso.version import VERSION
 
 RUNS = 64

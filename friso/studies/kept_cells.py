@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from friso.platform.system import remove_folder
 from friso.studies.cells import WORDS, Columns
 from friso.studies.refine import Ask, asked_for
 from friso.studies.store_files import keep_arrays, kept_arrays
 from friso.studies.study import Study
-from friso.system import remove_folder
 
 
 class KeptCells:

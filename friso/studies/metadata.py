@@ -22,9 +22,9 @@ from typing import Any
 
 from friso.errors import StoreError
 from friso.escapes import one_line
+from friso.platform.system import cause_of
 from friso.studies.cells import METRICS
 from friso.studies.store_files import digest_of, put, stored
-from friso.system import cause_of
 
 logger = logging.getLogger("friso")
 

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from friso.engine.cache import FOLDER_VARIABLE, cache_folder, remove_if_passing
+from friso.platform.system import interrupts_held
 from friso.studies.cells import Columns, run_cells
 from friso.studies.execute import Crew
-from friso.system import interrupts_held
 
 _cancel = np.zeros(1, np.int64)
 """The flag that has this process end its block early; in a worker, memory that is shared with who started it."""

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 from zarr.storage import LocalStore, WrapperStore
 
 from friso.errors import StoreError
+from friso.platform.system import cause_of, shell_word
 from friso.studies.cells import METRICS
 from friso.studies.ledger import Ledger
 from friso.studies.metadata import Metadata
-from friso.system import cause_of, shell_word
 
 if TYPE_CHECKING:
     from zarr.abc.buffer import Buffer

@@ -25,6 +25,7 @@ import numpy as np
 from friso.engine.cache import machine
 from friso.errors import StoreError
 from friso.escapes import one_line
+from friso.platform.system import cause_of, once_free, path_of
 from friso.stage.arguments import check_arguments
 from friso.studies.cells import UNITS, WORDS, attributes_of
 from friso.studies.kept_cells import KeptCells
@@ -42,7 +43,6 @@ from friso.studies.store_folder import (
 )
 from friso.studies.study import CellBlock, Study, study_of
 from friso.studies.verify import check_verified
-from friso.system import cause_of, once_free, path_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from friso.bounded_file import content_of
 from friso.errors import StoreError
-from friso.system import shell_word
-from friso.whole_file import PARTIAL, whole_file
+from friso.platform.bounded_file import content_of
+from friso.platform.system import shell_word
+from friso.platform.whole_file import PARTIAL, whole_file
 
 MOST_BYTES = 64 << 20
 """Size of a file of a store at most: the largest chunk, of texts that nothing compresses, has a sixth of it."""

@@ -17,11 +17,11 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from friso.errors import StoreError
-from friso.interrupts import hold_interrupts
-from friso.leftovers import is_leftover, remove_leftover
+from friso.platform.interrupts import hold_interrupts
+from friso.platform.leftovers import is_leftover, remove_leftover
+from friso.platform.system import DRAFT_MODE, MOVES_OPEN_FOLDERS, cause_of, delete_file, remove_folder, rename_folder
+from friso.platform.whole_file import PARTIAL, is_partial
 from friso.studies.store_files import is_of_store
-from friso.system import DRAFT_MODE, MOVES_OPEN_FOLDERS, cause_of, delete_file, remove_folder, rename_folder
-from friso.whole_file import PARTIAL, is_partial
 
 LOCK = ".friso.lock"
 """The file that is locked while a store is written to."""

@@ -31,8 +31,8 @@ def guideline(
 
     A quick try: friso guideline --samples 64 --out guideline
     """
-    from friso.answers.output_folder import UNFINISHED
-    from friso_thesis.answers.guideline import guideline as question
+    from friso.interface.output_folder import UNFINISHED
+    from friso_thesis.questions.guideline.question import guideline as question
     from friso_thesis.studies.guideline.compute import checked_samples
     from friso_thesis.studies.guideline.sweeps import Keep
 

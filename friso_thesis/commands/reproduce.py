@@ -41,8 +41,8 @@ def reproduce(
 
     One claim: friso reproduce --only F15B
     """
-    from friso.answers.output_folder import UNFINISHED
-    from friso_thesis.answers.reproduce import reproduce as question
+    from friso.interface.output_folder import UNFINISHED
+    from friso_thesis.questions.reproduce.question import reproduce as question
     from friso_thesis.studies.thesis.kept import Kept
 
     folder = out or Path("-".join(("reproduction", *sorted({claim.upper() for claim in only or ()}))))

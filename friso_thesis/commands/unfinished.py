@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from friso.cli.common import say
-from friso.interrupts import hold_interrupts
+from friso.platform.interrupts import hold_interrupts
 
 
 class UnfinishedWork(Protocol):

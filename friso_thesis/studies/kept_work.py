@@ -13,9 +13,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from friso.engine.cache import code_digest, machine
+from friso.platform.system import remove_folder
 from friso.studies.store_files import keep_arrays, kept_arrays
 from friso.studies.study import equations_version
-from friso.system import remove_folder
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from friso.answers.answer import Answer, question
-from friso.answers.inputs import Changes, StageLike, read_stage
 from friso.equations.bandwidth import proportional_stiffness
 from friso.equations.breakaway import breakaway
+from friso.interface.answer import Answer, question
+from friso.interface.inputs import Changes, StageLike, read_stage
 from friso.progress import Progress, silent
+from friso.shown.drawing.prefixes import with_unit
+from friso.shown.files import Files
+from friso.shown.pages import Report
 from friso.stage import Stage
-from friso.views.drawing.prefixes import with_unit
-from friso.views.files import Files
-from friso.views.pages import Report
 
 
 class RestingAnswer(Answer):

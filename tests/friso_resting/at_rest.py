@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from friso.progress import Progress
+from friso.questions.rig.outcome_view import OutcomeView
 from friso.stage import Stage
 from friso.studies.rig.outcome import Outcome, RigLog
-from friso.views.rig.outcome_view import OutcomeView
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:

@@ -17,13 +17,14 @@ from refusals import Refused
 from snapshots import Snapshots
 from variants import VARIANTS
 
-from friso.answers.output_folder import UNFINISHED, write
 from friso.cli import main
 from friso.equations.model import assemble
 from friso.equations.structure import structure
 from friso.hunting import Ensemble, find_cycles
+from friso.interface.output_folder import UNFINISHED, write
 from friso.progress import Tally, silent
 from friso.stage import Stage
+from friso_thesis.questions.guideline.words import parasitic_sentences
 from friso_thesis.studies.guideline import checks, compute, parasitic, persistence, sweeps, worked
 from friso_thesis.studies.guideline.claims import judged_claims, least_gap
 from friso_thesis.studies.guideline.edges import ABOVE, BELOW, FLIP, JUMP, LOST, UNKNOWN, Edges, find_edges
@@ -42,7 +43,6 @@ from friso_thesis.studies.guideline.parasitic import ParasiticLimits, holding
 from friso_thesis.studies.guideline.persistence import swings_from_any_distance
 from friso_thesis.studies.guideline.thesis_rig import plain_rig
 from friso_thesis.studies.thesis.studies import thesis_rig
-from friso_thesis.views.guideline.words import parasitic_sentences
 
 RIGID = pytest.mark.xdist_group("rigid")
 FREE_RIG = pytest.mark.xdist_group("free")
@@ -440,8 +440,8 @@ def test_parasitic_rows_say_what_the_page_says_of_them(quick: compute.Guideline)
 
 
 def test_page_renders_with_its_charts(quick: compute.Guideline, tmp_path: Path, snapshots: Snapshots) -> None:
-    from friso_thesis.views.guideline.document import guideline_document
-    from friso_thesis.views.guideline.page import guideline_files
+    from friso_thesis.questions.guideline.document import guideline_document
+    from friso_thesis.questions.guideline.page import guideline_files
 
     paths = write({tmp_path / name: content for name, content in guideline_files(quick).items()}, ())
     files = {path.name: path for path in paths}

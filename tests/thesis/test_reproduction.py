@@ -24,16 +24,22 @@ from rig_evidence import cycles as rail_cycles
 from snapshots import Snapshots
 
 import friso
-from friso.answers.output_folder import UNFINISHED, write
 from friso.cli import main
 from friso.cli.command import COMMANDS
 from friso.equations.motion import size
 from friso.hunting import find_margin
+from friso.interface.output_folder import UNFINISHED, write
 from friso.shares import share
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.studies.rig.moves_on_rails import distance
 from friso.studies.store_files import kept_arrays
 from friso.studies.study import _DECISIVE
+from friso_thesis.questions.reproduce.document import reproduce_document
+from friso_thesis.questions.reproduce.figures import reproduction_figures
+from friso_thesis.questions.reproduce.page import COLOURS, reproduce_files, reproduce_html
+from friso_thesis.questions.reproduce.questions import QUESTIONS
+from friso_thesis.questions.reproduce.summary import summary_sheet
+from friso_thesis.questions.reproduce.words import SHORT, details, in_order, reasons, short
 from friso_thesis.studies.thesis import (
     STUDIES,
     Evidence,
@@ -76,12 +82,6 @@ from friso_thesis.studies.thesis.studies import rig_gains
 from friso_thesis.studies.thesis.taken_apart import put_together, taken_apart
 from friso_thesis.studies.thesis.verdicts import not_covered, verdict
 from friso_thesis.studies.thesis.ways import COUNT, CYCLE, SWING, by_attraction, by_peak_count, by_swing_at_end, weakest
-from friso_thesis.views.reproduce.document import reproduce_document
-from friso_thesis.views.reproduce.figures import reproduction_figures
-from friso_thesis.views.reproduce.page import COLOURS, reproduce_files, reproduce_html
-from friso_thesis.views.reproduce.questions import QUESTIONS
-from friso_thesis.views.reproduce.summary import summary_sheet
-from friso_thesis.views.reproduce.words import SHORT, details, in_order, reasons, short
 
 ROOT = Path(__file__).parents[2]
 POINTS = 21
@@ -902,8 +902,7 @@ def test_what_is_kept_depends_on_all_sources_it_was_computed_with() -> None:
     """Every part of friso that these parts import is one of them, or decides on no number."""
     package = files("friso")
     parts = {*SOURCES, *_DECISIVE}
-    undecisive = {"errors", "escapes", "extras", "installed", "progress", "registry", "system", "version"}
-    undecisive |= {"bounded_file", "helper_process", "interrupts", "leftovers", "whole_file"}
+    undecisive = {"errors", "escapes", "platform", "progress", "registry", "version"}
     folders = [Path(str(package / part)) for part in parts if ".py" not in part and ".toml" not in part]
     texts = [file.read_text("utf-8") for folder in folders for file in folder.rglob("*.py")]
     imported = {name for text in texts for name in re.findall(r"^ *from friso\.(\w+)", text, re.MULTILINE)}
@@ -1018,7 +1017,7 @@ def test_a_count_unknown_at_both_tolerances_does_not_differ(thorough_study: Repr
 @pytest.mark.parametrize(("ink", "paper"), [("#222222", "#ffffff"), ("#e8e8e8", "#16181b")], ids=["light", "dark"])
 def test_the_word_of_agreement_stands_out_from_the_page(ink: str, paper: str) -> None:
     """Coloured words have the contrast that WCAG 2 asks of text, 4.5, in either scheme of page.html."""
-    skeleton, own = (ROOT / package / "views" / "templates" for package in ("friso", "friso_thesis"))
+    skeleton, own = (ROOT / package / "shown" / "templates" for package in ("friso", "friso_thesis"))
     of_all = "".join(re.findall(r":root \{[^}]*\}", (skeleton / "page.html").read_text("utf-8")))
     assert {ink.replace("#222222", "#222"), paper.replace("#ffffff", "#fff")} <= {*re.findall(r"#\w+", of_all)}
     style = (own / "reproduce.html").read_text("utf-8")

@@ -9,9 +9,9 @@ from refusals import Refused
 
 from friso import load
 from friso.progress import silent
+from friso.questions.rig.document import rig_document
+from friso.questions.rig.page import figures, sentences
 from friso.studies.rig.moves_on_rails import rails, with_joint
-from friso.views.rig.document import rig_document
-from friso.views.rig.page import figures, sentences
 from friso_thesis.studies.rig import in_position, measured_cycles, stroke_crossover
 
 RIG = load(Path(__file__).parents[2] / "examples" / "thesis_drive.toml")

@@ -30,7 +30,7 @@ def bode(
 
     Example: friso bode examples/thesis_rig.toml --frequencies "0.1 Hz..1 kHz" --out bode
     """
-    from friso.answers.bode import bode as question
+    from friso.questions.bode.question import bode as question
 
     options = {"set": overrides, "frequencies": frequencies, "series": series}
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json}

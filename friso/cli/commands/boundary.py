@@ -37,7 +37,7 @@ def boundary(
 
     Example: friso boundary rig.toml --set joint.locked=true --x controller.crossover="1 Hz..40 Hz" --out edge
     """
-    from friso.answers.boundary import boundary as question
+    from friso.questions.boundary.question import boundary as question
 
     options = {"x": x, "y": y, "link": link, "log": log, "set": overrides, "rtol": rtol}
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json, "details": details}

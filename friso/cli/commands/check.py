@@ -46,7 +46,7 @@ def check(
 
     Example: friso check examples/thesis_rig.toml --set controller.crossover="12 Hz" --out report
     """
-    from friso.answers.check import check as question
+    from friso.questions.check.question import check as question
 
     options = {"set": overrides, "rtol": rtol, "draws": draws, "seed": seed, "laws": laws}
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json, "details": details}

@@ -49,7 +49,7 @@ def compare(
 
     Example: friso compare examples/thesis_drive.toml --machines 200 --out compare
     """
-    from friso.answers.compare import compare as question
+    from friso.questions.compare.question import compare as question
 
     options = {"set": overrides, "machines": machines, "seed": seed, "within": within, "also": also or ()}
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json, "details": details}

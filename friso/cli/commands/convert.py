@@ -36,7 +36,7 @@ def convert(
 
     Example: friso convert examples/thesis_rig.toml --friction gms --elements 6 --out gms
     """
-    from friso.answers.convert import convert as question
+    from friso.questions.convert.question import convert as question
 
     options = {"friction": law, "elements": elements, "virgin": virgin, "set": overrides}
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json}

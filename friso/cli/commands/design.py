@@ -35,9 +35,9 @@ def design(
 
     Example: friso design examples/thesis_rig.toml examples/specs/thesis.toml --out design
     """
-    from friso.answers.design import STAGES
-    from friso.answers.design import design as question
     from friso.design_method.method import NoDesign
+    from friso.questions.design.question import STAGES
+    from friso.questions.design.question import design as question
 
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json, "details": details}
     try:
@@ -48,10 +48,10 @@ def design(
 
 def _refuse(failure: NoDesign, stage_file: Path, spec_file: Path | None, as_json: bool) -> NoReturn:
     """Say why there is no design, and leave."""
-    from friso.answers.design import specification_of
+    from friso.questions.design.document import refused_document
+    from friso.questions.design.question import specification_of
+    from friso.questions.design.words import refusal
     from friso.stage import load
-    from friso.views.design.document import refused_document
-    from friso.views.design.words import refusal
 
     if as_json:
         stage = load(stage_file)

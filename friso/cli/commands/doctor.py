@@ -21,7 +21,7 @@ def doctor(
 
     Example: friso doctor
     """
-    from friso.answers.doctor import doctor as question
+    from friso.questions.doctor.question import doctor as question
 
     ask("doctor", question, full_paths=full_paths, as_json=as_json)
 

@@ -24,8 +24,8 @@ def example(
 
     Example: friso example thesis_rig
     """
-    from friso.answers.output_folder import write_file
-    from friso.answers.starting import example as example_path
+    from friso.interface.output_folder import write_file
+    from friso.questions.init.starting import example as example_path
 
     if name is None:
         for listed, title in listed_examples():
@@ -41,8 +41,8 @@ def listed_examples() -> list[tuple[str, str]]:
     """The examples, each by the name of its stage, or by what it is for."""
     import tomllib
 
-    from friso.answers.starting import example as example_path
-    from friso.answers.starting import example_names
+    from friso.questions.init.starting import example as example_path
+    from friso.questions.init.starting import example_names
 
     paths = {name: example_path(name) for name in example_names()}
     return [

@@ -36,7 +36,7 @@ def export(
 
     Example: friso export gains examples/twincat_cascade.toml --set travel_per_turn="10 mm"
     """
-    from friso.answers.export import export as question
+    from friso.questions.export.question import export as question
 
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json}
     ask("export", question, what, stage_file, set=values, to=to, **shown)

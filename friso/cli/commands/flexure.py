@@ -26,7 +26,7 @@ def flexure(
 
     Example: friso flexure rig.toml --stroke "1 mm" --out flexure
     """
-    from friso.answers.flexure import flexure as question
+    from friso.questions.flexure.question import flexure as question
 
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json}
     ask("flexure", question, stage_file, stroke=stroke, set=overrides, **shown, what="bending the leaves")

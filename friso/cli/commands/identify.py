@@ -18,12 +18,12 @@ from friso.cli.output import DefaultFolder, Overwrite
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.escapes import one_line
-from friso.system import shell_word
+from friso.platform.system import shell_word
 
 if TYPE_CHECKING:
-    from friso.answers.output_folder import OutputFolder
     from friso.identification.logs.mapping import Mapping
-    from friso.views.files import Content
+    from friso.interface.output_folder import OutputFolder
+    from friso.shown.files import Content
 
 
 def identify(
@@ -73,11 +73,11 @@ def identify(
 
     Example: friso identify log.csv --stage stage.toml --map position=ActPos --scale force="35.15 N/V" --out identified
     """
-    from friso.answers.identify import identify as question
-    from friso.answers.output_folder import OutputFolder
     from friso.identification.sources import OpenQuestions
-    from friso.views.drawing.images import drawing_beside
-    from friso.views.identify.page import STAGE
+    from friso.interface.output_folder import OutputFolder
+    from friso.questions.identify.page import STAGE
+    from friso.questions.identify.question import identify as question
+    from friso.shown.drawing.images import drawing_beside
 
     target = OutputFolder("identify", out, overwrite, [*logs, *(predict or []), *([stage] if stage else [])])
     target.check([STAGE])
@@ -106,9 +106,9 @@ def identify(
 
 def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> list[Path]:
     """Keep what was said of logs, by file, for the next time, where it is not kept so already: the files written."""
-    from friso.answers.output_folder import write
     from friso.identification.logs.mapping import load_mapping, mapping_text
     from friso.identification.sources import kept_at
+    from friso.interface.output_folder import write
 
     folder = target.folder
     new = {path: mapping for path, mapping in mappings.items() if mapping != load_mapping(path, folder)}

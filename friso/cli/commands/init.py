@@ -11,7 +11,7 @@ from friso.cli.asking import named_as_options
 from friso.cli.command import MACHINE, Command
 from friso.cli.common import Overrides
 from friso.cli.output import Replace
-from friso.system import shell_word
+from friso.platform.system import shell_word
 
 SourceArgument = Annotated[
     Path | None,
@@ -45,7 +45,7 @@ def init(
 
     Example: friso init my_stage.toml
     """
-    from friso.answers.starting import init as write_start
+    from friso.questions.init.starting import init as write_start
 
     options = {"spec": spec_of, "from_": source, "axis": axis, "set": overrides}
     with named_as_options(options):

@@ -25,8 +25,8 @@ def logs(
 
     Example: friso logs log.csv --out logs
     """
-    from friso.answers.logs import logs as question
-    from friso.answers.output_folder import output_folder
+    from friso.interface.output_folder import output_folder
+    from friso.questions.logs.question import logs as question
 
     target = output_folder("logs", out, overwrite, logs)
     options = {"map": maps, "unit": units, "scale": scales, "dt": dt, "axis": axis}

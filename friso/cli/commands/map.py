@@ -34,7 +34,7 @@ from friso.cli.map_options import (
 from friso.cli.output import print_document
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
-from friso.system import shell_word
+from friso.platform.system import shell_word
 
 
 def map_cells(
@@ -69,11 +69,11 @@ def map_cells(
     """
     if check:
         return _check(source, as_json)
-    from friso.answers.map_study import write_beside
-    from friso.answers.output_folder import output_folder
-    from friso.answers.sweep import sweep
     from friso.axis import speak_of
-    from friso.views.drawing.images import drawing_beside
+    from friso.interface.output_folder import output_folder
+    from friso.questions.map.question import sweep
+    from friso.questions.map.study import write_beside
+    from friso.shown.drawing.images import drawing_beside
 
     store, elsewhere = out or Path(f"{source.stem}_map.zarr"), None
     if source.is_dir():
@@ -111,7 +111,7 @@ def map_cells(
 
 def _check(store: Path, as_json: bool) -> None:
     """Tell whether a store is whole; status 1 where it is not. Raises StoreError where it cannot be read at all."""
-    from friso.answers.sweep import whole
+    from friso.questions.map.question import whole
 
     if store.is_file():
         raise InputError(

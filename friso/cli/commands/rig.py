@@ -33,7 +33,7 @@ def rig(
 
     Example: friso rig stiffness examples/thesis_drive.toml --out rig
     """
-    from friso.answers.rig import rig as question
+    from friso.questions.rig.question import rig as question
 
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json, "details": details}
     ask("rig", question, experiment, stage_file, set=overrides, seed=seed, **shown, writes=["truth/stage.toml"])

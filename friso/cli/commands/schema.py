@@ -20,7 +20,7 @@ def schema(
 
     Example: friso schema > stage.schema.json
     """
-    from friso.answers.starting import schema as schema_of
+    from friso.questions.init.starting import schema as schema_of
 
     with named_as_options({"of": of}):
         print(json.dumps(schema_of(of), indent=2, ensure_ascii=False))

@@ -32,7 +32,7 @@ def simulate(
 
     A cell of a map: friso simulate --cell rig_map.zarr 3 4
     """
-    from friso.answers.simulate import simulate as question
+    from friso.questions.simulate.question import simulate as question
 
     about = arguments if cell else [Path(argument) for argument in arguments]
     options = {"set": overrides, "cell": cell, "rtol": rtol, "sample_time": sample_time}

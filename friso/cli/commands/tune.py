@@ -10,7 +10,7 @@ from friso.cli.asking import Details, ask
 from friso.cli.command import STOPS, Command
 from friso.cli.common import AsJson, Overrides, StageFile
 from friso.cli.output import OutFolder, Overwrite
-from friso.interrupts import answers_interrupts
+from friso.platform.interrupts import answers_interrupts
 from friso.remedies import Changeable
 
 WithinOption = Annotated[
@@ -62,7 +62,7 @@ def tune(
 
     Example: friso tune examples/thesis_rig.toml --only controller --within "2 um" --out tuned
     """
-    from friso.answers.tune import tune as question
+    from friso.questions.tune.question import tune as question
 
     answers_interrupts()
     options = {"set": overrides, "within": within, "settle": settle, "force_limit": force_limit}

@@ -16,7 +16,7 @@ from typing import Any
 
 from friso.errors import LogError
 from friso.identification.logs import binary
-from friso.system import LIMITS_MEMORY
+from friso.platform.system import LIMITS_MEMORY
 
 CPU_SIGNAL = getattr(signal, "SIGXCPU", 0)
 """What ends a process that has taken a processor's time for too long, where the system counts that."""

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from friso.errors import LogError
-from friso.extras import install, is_installed
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.confined import content
+from friso.platform.extras import install, is_installed
 
 
 def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:

@@ -15,9 +15,9 @@ from friso.axis import KINDS, LINEAR, ROTARY, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.roles import role_of
+from friso.platform.system import shell_word
 from friso.quantities import Bound, Quantity, as_toml, quoted
 from friso.stage.files import parsed, text_of
-from friso.system import shell_word
 
 SUFFIX = ".friso.toml"
 MAPPABLE = ("time", *ROLES)

@@ -9,7 +9,7 @@ from friso.errors import LogError
 from friso.identification.logs.channel import ChannelTable
 from friso.identification.logs.format import FORMATS, FileHead
 from friso.identification.logs.measured_response import MeasuredResponse
-from friso.system import cause_of, once_free
+from friso.platform.system import cause_of, once_free
 
 MOST_BYTES = 2 << 30
 """Largest file that is read, 2 GiB: all its channels are held in memory at once, about as large again."""

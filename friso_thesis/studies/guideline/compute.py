@@ -14,9 +14,9 @@ import numpy as np
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.structure import shared_structure
 from friso.errors import InputError
+from friso.platform.system import usable_cores
 from friso.progress import Progress, Tally, silent
 from friso.quantities import quoted
-from friso.system import usable_cores
 from friso_thesis.studies.guideline.checks import SimulationCheck, simulate_samples
 from friso_thesis.studies.guideline.groups import Count, group_count, values_of
 from friso_thesis.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, FittedLaw, fit_law

@@ -1,0 +1,275 @@
+"""What every function of friso that has a command returns: one `Answer`, read by people, pages and programs alike."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from contextvars import copy_context
+from dataclasses import dataclass
+from functools import wraps
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Concatenate, ParamSpec, TypeVar
+
+from friso.axis import LINEAR, AxisKind, speaking_of
+from friso.errors import InputError
+from friso.escapes import escaped
+from friso.stage.arguments import check_arguments
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+    from friso.shown.drawing.figure import Figure
+    from friso.shown.files import Files
+
+
+Arguments = ParamSpec("Arguments")
+Returned = TypeVar("Returned")
+
+
+def question(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
+    """A public function: its arguments are checked, and the kind of axis that it speaks of stays its own."""
+    answer = check_arguments(function)
+
+    @wraps(function)
+    def asked(*arguments: Arguments.args, **options: Arguments.kwargs) -> Returned:
+        return copy_context().run(answer, *arguments, **options)
+
+    return asked
+
+
+@dataclass(frozen=True)
+class AnswerTable:
+    """A small table: columns with a label each, and rows that have names. One that stands `behind` the answer is shown
+    with its details alone."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[tuple[str, Sequence[str]]]
+    behind: bool = False
+
+
+_SHOWN = {"sentences", "blocks", "tables", "details", "next_steps", "figures", "document", "files"}
+"""Methods of an answer that show it."""
+
+
+def _in_its_units(method: Callable[Concatenate[Answer, Arguments], Returned]) -> Callable[..., Returned]:
+    """The method of an answer, in the units of the answer's axis."""
+
+    @wraps(method)
+    def shown(answer: Answer, *arguments: Arguments.args, **options: Arguments.kwargs) -> Returned:
+        with speaking_of(answer.axis_kind):
+            return method(answer, *arguments, **options)
+
+    return shown
+
+
+class Answer(ABC):
+    """What friso answers to a question.
+
+    The answer in words stands first (`sentences`), then small `tables`, then `details`. `result` is what the analysis
+    returned: whatever else is asked of the answer is asked of the result, so that ``cases["given"]`` is a case of
+    `friso.check` and ``runs.outcome`` a variable of `friso.sweep`.
+
+    Attributes
+    ----------
+    result
+        What the analysis returned: a Dataset, cases by name, or a class of its own.
+    failure : str
+        What could not be completed; "" where all went well.
+    data : xarray.Dataset
+        The numbers with their units.
+    """
+
+    command: ClassVar[str]
+    """The command that gives this answer."""
+    result: Any
+    axis_kind: AxisKind = LINEAR
+
+    status: ClassVar[int] = 1
+    """The exit status of the command where the answer is a failure."""
+
+    def __init_subclass__(cls) -> None:
+        """Whatever an answer shows is in the units of its axis, whoever asks."""
+        for name in _SHOWN & vars(cls).keys():
+            setattr(cls, name, _in_its_units(getattr(cls, name)))
+
+    @property
+    def failure(self) -> str:
+        """What could not be completed, or is not met; "" where all went well."""
+        return ""
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended what it rests on: it says what was found so far."""
+        return False
+
+    @abstractmethod
+    def sentences(self) -> Sequence[str]:
+        """The answer in words, the conclusion first."""
+
+    def blocks(self) -> Sequence[str]:
+        """Drawings and files in characters of one width."""
+        return ()
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """The numbers that the answer rests on, as texts."""
+        return ()
+
+    def details(self) -> Sequence[str]:
+        """What else there is to say, a paragraph each."""
+        return ()
+
+    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
+        """Commands that follow from the answer, the `files` of which were written."""
+        return ()
+
+    def figures(self) -> Sequence[Figure]:
+        """The figures, the most telling first."""
+        return ()
+
+    @abstractmethod
+    def document(self) -> dict[str, Any]:
+        """The JSON document of the command."""
+
+    @abstractmethod
+    def files(self) -> Files:
+        """What the command writes, by name."""
+
+    @property
+    def data(self) -> xr.Dataset:
+        """The numbers of the answer with their units, as an xarray.Dataset."""
+        from friso.interface.data import dataset_of
+
+        return dataset_of(self.to_dict())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The document that `--json` prints, without the files that a command writes.
+
+        Returns
+        -------
+        dict
+            Plain numbers, texts, lists and dictionaries; SI units, named at the end of the keys (`_m`, `_s`, `_hz`).
+        """
+        return self.document()
+
+    def plot(self, axes: Axes | Sequence[Axes] | None = None, figure: int = 0) -> list[Axes]:
+        """Draw one of the figures.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes or sequence of them, optional
+            Where to draw its panels, one each; by default a figure is made.
+        figure : int
+            Which of the figures: 0 is the most telling one.
+
+        Returns
+        -------
+        list of matplotlib.axes.Axes
+            The axes of its panels.
+
+        Raises
+        ------
+        InputError
+            For a figure that there is not, and for other than one axes per panel.
+        """
+        from friso.shown.drawing.matplotlib_renderer import draw_on
+
+        drawn = self.figures()
+        if not 0 <= figure < len(drawn):
+            expected = f"0 to {len(drawn) - 1}" if drawn else "no figure: this answer has none"
+            raise InputError("figure", str(figure), expected, "plot(figure=0)")
+        with speaking_of(self.axis_kind):
+            return draw_on(drawn[figure], axes)
+
+    def report(self, path: str | Path, overwrite: bool = False) -> list[Path]:
+        """Write what the command writes with `--out`.
+
+        Parameters
+        ----------
+        path : str or Path
+            A folder; or a file that ends in .html, for the page alone.
+        overwrite : bool
+            Whether files of the same name may be replaced.
+
+        Returns
+        -------
+        list of Path
+            The files written.
+
+        Raises
+        ------
+        InputError
+            Where something is in the way, or there is no page.
+        """
+        from friso.interface.output_folder import OVERWRITE, OutputFolder, write_file
+
+        place = Path(path)
+        with speaking_of(self.axis_kind):
+            page = self._page(place) if place.suffix == ".html" else None
+            try:
+                if page is None:
+                    return OutputFolder(self.command, place, overwrite).write(self.files())
+                write_file("path", place, page, overwrite)
+            except InputError as error:
+                expected = error.expected.replace(OVERWRITE, "overwrite=True")
+                raise InputError("path", error.actual, expected, f'report("report-2{place.suffix}")') from None
+        return [place]
+
+    def _page(self, place: Path) -> str:
+        page = next((content for name, content in self.files().items() if name.endswith("html")), None)
+        if not isinstance(page, str):
+            raise InputError("path", str(place), f"a folder: friso {self.command} has no page", 'report("folder")')
+        return page
+
+    def __repr__(self) -> str:
+        return f"<friso {self.command}: {escaped(next(iter(self.sentences()), 'no answer'))}>"
+
+    def __str__(self) -> str:
+        return escaped("\n".join(self.sentences()))
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the answer and the small tables, no arrays."""
+        first, *rest = [escape(sentence) for sentence in self.sentences()] or ["no answer"]
+        blocks = "".join(f"<pre>{escape(block)}</pre>" for block in self.blocks())
+        tables = blocks + "".join(_html_table(table) for table in self.tables() if not table.behind)
+        texts = "".join(f"<p>{sentence}</p>" for sentence in rest)
+        return escaped(f"<div><p><b>{first}</b></p>{texts}{tables}</div>")
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or name == "result":
+            raise AttributeError(name)
+        try:
+            return getattr(self.result, name)
+        except AttributeError:
+            raise AttributeError(f"{type(self).__name__} and what it holds have no {name!r}") from None
+
+    def __getitem__(self, key: Any) -> Any:
+        return self.result[key]
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self.result)
+
+    def __len__(self) -> int:
+        return len(self.result)
+
+    def __contains__(self, key: object) -> bool:
+        return key in self.result
+
+    def __bool__(self) -> bool:
+        return True
+
+    def __dir__(self) -> list[str]:
+        own = (name for name in super().__dir__() if name.startswith("__") or not name.startswith("_"))
+        return sorted({*own, *(name for name in dir(self.result) if not name.startswith("_"))})
+
+
+def _html_table(table: AnswerTable) -> str:
+    head = "".join(f"<th>{escape(column)}</th>" for column in ("", *table.columns))
+    rows = "".join(
+        f"<tr><th>{escape(label)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
+        for label, cells in table.rows
+    )
+    caption = f"<caption>{escape(table.title)}</caption>" if table.title else ""
+    return f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"

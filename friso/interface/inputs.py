@@ -1,0 +1,210 @@
+"""What the questions are asked about, read in all the forms in which people give it: stages, numbers with units."""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from numbers import Integral
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from friso.errors import InputError, StageError
+from friso.quantities import Quantity, exactly, positive, quoted
+from friso.stage import Stage, load, parse_set
+from friso.stage.correlations import Correlations, correlations_file, read_correlations
+from friso.stage.files import load_changed, load_tables
+from friso.stage.plausible import idle_encoder, implausible_values
+from friso.stage.rig import AS_BUILT
+
+StageLike: TypeAlias = Stage | str | os.PathLike[str] | Mapping[str, Any]
+"""A stage, the path of a stage file, or its tables as a dictionary."""
+
+Changes: TypeAlias = Mapping[str, Any] | Iterable[str] | None
+"""Keys to be overridden: a dictionary, or texts KEY=VALUE."""
+
+Whole: TypeAlias = int
+"""A whole number whose limits `whole_number` checks, however large it is."""
+
+_NAMED = 3
+"""Uncertain keys that are named, at most, where there are more."""
+
+LOGGER = logging.getLogger("friso")
+
+
+def stage_of(source: StageLike, changes: Changes = None) -> Stage:
+    """The stage that is meant, with keys overridden. Raises InputError."""
+    wanted = changes_of(changes)
+    if isinstance(source, Stage | Mapping):
+        stage = source if isinstance(source, Stage) else Stage(**source)
+    else:
+        try:
+            stage = load(source)
+        except StageError:
+            if not wanted:
+                raise
+            return load_changed(Path(source), wanted)
+    typed = changes is not None and not isinstance(changes, Mapping)
+    return stage.replace(stage.in_own_units(wanted) if typed else wanted) if wanted else stage
+
+
+def tables_of(source: StageLike) -> dict[str, Any]:
+    """The tables of a stage as they are written, whether they make a whole one or not. Raises InputError."""
+    if isinstance(source, Stage):
+        return source.as_written()
+    return dict(source) if isinstance(source, Mapping) else load_tables(source)
+
+
+def changes_of(changes: Changes) -> dict[str, Any]:
+    """Keys to their new values, from a dictionary or texts KEY=VALUE. Raises InputError."""
+    if changes is None:
+        return {}
+    keys: list[Any] = [*changes] if isinstance(changes, Iterable) and not isinstance(changes, str | bytes) else [None]
+    if not all(isinstance(key, str) for key in keys):
+        expected = "a dictionary of keys, or texts KEY=VALUE"
+        raise wrong("set", type(changes).__name__, expected, '{"masses.stage": "0.6 kg"}')
+    return dict(changes) if isinstance(changes, Mapping) else dict(map(parse_set, keys))
+
+
+def read_stage(
+    source: StageLike, changes: Changes = None, leaves_out: Sequence[str] = AS_BUILT, uncertain_too: bool = False
+) -> Stage:
+    """The stage that is meant, with keys overridden. It is mentioned (to the logger "friso") what is doubtful about it,
+    that the centres of uncertain keys are used, unless these are wanted too (`uncertain_too`), and which of its tables
+    the analysis leaves out. Raises InputError."""
+    stage = stage_of(source, changes)
+    for doubt in (*implausible_values(stage), *idle_encoder(stage)):
+        LOGGER.warning(doubt)
+    keys = [] if uncertain_too else [*stage.uncertain()]
+    if keys:
+        several = f"{len(keys)} keys are" if len(keys) > 1 else "1 key is"
+        named = ", ".join([*keys[:_NAMED], *(["..."] if len(keys) > _NAMED else [])])
+        centres = "their centres are" if len(keys) > 1 else "its centre is"
+        LOGGER.warning(
+            f"{several} uncertain ({named}): {centres} used; friso check --draws 1000 samples the whole range"
+        )
+    placed = stage.conditions is not None and stage.conditions.place is not None
+    left = [name for name in leaves_out if getattr(stage, name) and not (name == "rail" and placed)]
+    if left:
+        tables = ", ".join(f"[{name}]" for name in left)
+        bode = "; friso bode takes sampling, delay and current loop into account" if "drive" in left else ""
+        verb = "are" if len(left) > 1 else "is"
+        LOGGER.warning(f"{tables} {verb} left out: friso rig simulates the machine as built{bode}")
+    return stage
+
+
+def mention_unstable_loop(stage: Stage) -> None:
+    """Mention (to the logger "friso") that the loop of a stage is unstable, if it is: before the work whose answer
+    rests on that, which may take minutes."""
+    from friso.hunting import unstable
+    from friso.shown.loop_words import unstable_loop
+
+    for sentence in unstable_loop(unstable(stage)):
+        LOGGER.warning(sentence.removesuffix("."), extra={"meanwhile": True})
+
+
+def correlations_of(source: StageLike, stage: Stage) -> Correlations:
+    """How the uncertain keys of a stage hang together, as a file beside its stage file says. Raises InputError."""
+    correlations = Correlations()
+    if not isinstance(source, Stage | Mapping) and correlations_file(Path(source)).exists():
+        correlations = read_correlations(correlations_file(Path(source)), load(source))
+    return correlations.among(stage.uncertain())
+
+
+_LONGEST_STEM = 150
+"""Bytes of the part of a name that is taken from another file."""
+
+
+def stem_of(source: StageLike, usual: str = "stage") -> str:
+    """What files about a stage are called: the name of its file without the suffix, "_" for bytes that are no text; the
+    beginning of a long one, with room for what follows it."""
+    if isinstance(source, Stage | Mapping):
+        return usual
+    return re.sub("[\ud800-\udfff]", "_", Path(source).stem).encode()[:_LONGEST_STEM].decode(errors="ignore")
+
+
+def tolerance_of(value: str | float) -> float:
+    """A relative tolerance of the solver. Raises InputError."""
+    from friso.engine.tolerance import checked_rtol
+
+    try:
+        return checked_rtol(float(value))
+    except ValueError:
+        raise wrong("rtol", quoted(value), "a number from 1e-12 to 1e-2", "1e-6") from None
+
+
+def text_of(value: str | float, unit: str) -> str:
+    """A quantity as a file would have it: a text as it is, a number with its unit."""
+    return value if isinstance(value, str) else exactly(value, unit)
+
+
+def quantity_of(value: str | float, name: str, quantity: Quantity, example: str = "") -> float:
+    """The SI value of a text with a unit, or of a number, which is in SI already. Raises InputError."""
+    try:
+        return float(quantity.read(text_of(value, quantity.unit)))
+    except InputError as error:
+        raise InputError(name, error.actual, error.expected, f"{name}={example or error.example}") from None
+
+
+def seconds_of(value: str | float, name: str, example: str = "1 ms") -> float:
+    """A time [s]. Raises InputError."""
+    return quantity_of(value, name, Quantity("s", positive, example))
+
+
+def whole_number(value: int, name: str, least: int, most: int, example: str) -> int:
+    """A whole number within limits. Raises InputError."""
+    whole = isinstance(value, Integral) and not isinstance(value, bool)
+    if not whole or not least <= value <= most:
+        long = whole and abs(value) >= 10**18
+        actual = "a number of many digits" if long else str(value) if whole else quoted(str(value))
+        raise wrong(name, actual, f"a whole number from {least} to {most}", example)
+    return value
+
+
+def choice(value: str, name: str, choices: Sequence[str], example: str) -> str:
+    """One of some texts. Raises InputError for anything else."""
+    if not (isinstance(value, str) and value in choices):
+        raise InputError(
+            name, quoted(value), choices[0] if len(choices) == 1 else f"one of {', '.join(choices)}", example
+        )
+    return value
+
+
+def pairs_of(values: Changes, name: str, example: str) -> dict[str, str]:
+    """Keys to texts from a dictionary, or from texts KEY=VALUE. Raises InputError."""
+    if isinstance(values, Mapping):
+        for key, value in values.items():
+            if not isinstance(value, str):
+                of_key, _, text = example.partition("=")
+                raise wrong(name, f"{quoted(value)} for {quoted(key)}", "a text", f'{{"{of_key}": {text}}}')
+        return dict(values)
+    pairs: dict[str, str] = {}
+    for text in values or ():
+        if not isinstance(text, str):
+            raise wrong(name, quoted(text), "KEY=VALUE", example)
+        key, equals, value = text.partition("=")
+        key = key.strip()
+        if not (equals and key and value.strip()):
+            raise wrong(name, text, "KEY=VALUE", example)
+        if key in pairs:
+            raise wrong(name, f"{key} given twice", "each key once", example)
+        pairs[key] = value.strip()
+    return pairs
+
+
+def axes_of(axes: Mapping[str, Any], texts: Mapping[str, str | None], example: str) -> dict[str, Any]:
+    """The axes of a dictionary and those of texts KEY=RANGE by the option's name, each key once. Raises InputError."""
+    every = dict(axes)
+    for name, text in texts.items():
+        ranges = {} if text is None else pairs_of([text], name, example)
+        for key in ranges:
+            if key in every:
+                raise wrong(name, f"{key} given twice", "each key once", example)
+        every |= ranges
+    return every
+
+
+def wrong(name: str, actual: str, expected: str, example: str) -> InputError:
+    """The error for an option, by the name of its keyword: the command line says "--name" for it."""
+    return InputError(name, actual, expected, f"{name}={example}")

@@ -1,0 +1,287 @@
+"""Files that a command writes: all of them or none, into a folder that is new, empty, or its own from an earlier run,
+which a small file in it marks, or which is a store of friso map; else it refuses and names --overwrite. A file that the
+user names has to be new, too. Never does a command replace a file that it reads."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from friso.errors import InputError
+from friso.interface.drafts import DRAFTS, Drafts, made
+from friso.platform import paths
+from friso.platform.interrupts import hold_interrupts
+from friso.platform.system import cause_of, check_free, shell_word
+from friso.progress import Progress, silent
+from friso.quantities import as_toml
+from friso.stage.files import parsed, text_of
+from friso.version import VERSION
+
+if TYPE_CHECKING:
+    from friso.shown.files import Content, Files
+
+LOGGER = logging.getLogger("friso")
+
+STORE_MAKER = "map, a store"
+"""What made a folder that is a store, not one of files."""
+
+MARKER = ".friso-output"
+"""The file that records which command made a folder, and which files there are friso's."""
+
+OVERWRITE, REPLACES = "--overwrite", "which replaces files of the same name"
+"""The option by which a command writes among files of others, and what that does."""
+
+UNFINISHED = ".friso-unfinished"
+"""The folder in which a long command keeps what is done until all is."""
+
+
+class OutputFolder:
+    """The folder that a command writes into; `inputs` are the files that it reads."""
+
+    def __init__(self, command: str, folder: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> None:
+        """Raises InputError where the command must not write there, or cannot."""
+        self.command, self.folder, self.overwrite, self.inputs = command, folder, overwrite, tuple(inputs)
+        refuse_place("--out", folder)
+        if self.unfinished.is_symlink():
+            raise InputError(
+                "--out", f"{folder}, where {UNFINISHED} is a link", "no link", f"rm {shell_word(str(self.unfinished))}"
+            )
+        _check_writable(folder)
+        maker, self.files = marked(folder)
+        self.is_marked = maker == command
+        self.is_own = self.is_marked or not _entries(folder)
+        if not self.is_own and (maker == STORE_MAKER or not overwrite):
+            more = "" if maker == STORE_MAKER else f", or {OVERWRITE}, {REPLACES}"
+            raise _of_others(folder, maker, f"one that friso {command} made{more}")
+        own = [name for name in self.files if self.is_own]
+        self.check(own)
+        for name in own:
+            self._check_free(name)
+
+    @property
+    def unfinished(self) -> Path:
+        """A folder for what is done of long work, from which the next run goes on."""
+        return self.folder / UNFINISHED
+
+    def check(self, names: Iterable[str]) -> None:
+        """Raises InputError where a file of such a name may not be written."""
+        existing = [name for name in names if os.path.lexists(self.folder / name)]
+        for name in existing:
+            if any(_are_one(self.folder / name, file) for file in self.inputs):
+                actual = f"{self.folder}, where {name} is read"
+                raise InputError("--out", actual, "another folder", _beside(self.folder))
+        others = [name for name in existing if name not in self.files]
+        if others and not self.overwrite:
+            actual = f"{self.folder}, with {_first_names(others)}, which friso {self.command} has not written"
+            raise InputError("--out", actual, f"another folder, or {OVERWRITE}", _beside(self.folder))
+
+    def _check_free(self, name: str) -> None:
+        """Raises InputError where a file cannot be replaced, since another program holds it open."""
+        try:
+            if (self.folder / name).exists():
+                check_free(self.folder / name)
+        except OSError as error:
+            actual = f"{self.folder}, where {name} cannot be replaced ({cause_of(error)})"
+            raise InputError("--out", actual, "that file closed, or another folder", _beside(self.folder)) from None
+
+    def write(
+        self, files: Files, progress: Progress = silent, beside: Mapping[Path, Content] | None = None
+    ) -> list[Path]:
+        """Write the files, and some `beside` the inputs, all of them or none; the paths of those in the folder.
+
+        Raises InputError where one may not be written, OSError where one cannot.
+        """
+        self.check(files)
+        others = [name for name in files if name not in self.files and os.path.lexists(self.folder / name)]
+        contents = {self.folder / name: content for name, content in files.items()}
+        own = contents if self.overwrite else [self.folder / name for name in self.files]
+        own = [*own, *filter(Path.is_file, beside or ()), *([self.folder / MARKER] if self.is_marked else ())]
+        gone = {name for name, content in files.items() if content is None}
+        names = [name for name in dict.fromkeys([*self.files, *files]) if name not in gone]
+        leaving = [name for name in gone if os.path.lexists(self.folder / name)]
+        # The marker first: where the process is killed on the way, the next knows what is there for its own.
+        write({**self._marker([*names, *leaving]), **contents, **(beside or {})}, own, progress)
+        if self.is_own:
+            self.is_marked, self.files = True, tuple(names)
+        if leaving:
+            write(self._marker(names), [self.folder / MARKER])
+        if others:
+            LOGGER.warning(f"replaced (--overwrite): {', '.join(others)}")
+        return written(contents)
+
+    def _marker(self, names: Iterable[str]) -> dict[Path, Content]:
+        """The marker with names of files, if the folder is the command's own."""
+        return {self.folder / MARKER: marker(self.command, names)} if self.is_own else {}
+
+
+def refuse_place(option: str, path: Path) -> None:
+    """Raises InputError where nothing can be written to a path, whatever is there (`paths.unwritable`), or nothing but
+    a store's own files, being within it."""
+    from friso.studies.metadata import is_store
+
+    example = f"{option} report" if option.startswith("--") else ""
+    if why := paths.unwritable(path):
+        raise InputError(option, *why, example)
+    if any(is_store(folder) for folder in Path(os.path.abspath(path)).parents):
+        raise InputError(option, f"{path}, in a store of friso map", "a place outside of it", example)
+
+
+def check_store_folder(folder: Path) -> None:
+    """Raises InputError where a folder that is to be a store holds anything but a store of friso map: a store is the
+    whole folder, so that --overwrite does not put one beside files of others. Or where a new one cannot be made."""
+    maker, _ = marked(folder)
+    if _entries(folder):
+        if maker != STORE_MAKER:
+            raise _of_others(folder, maker, f"or a store that friso map made; {OVERWRITE} replaces stores alone")
+        return
+    try:
+        _try_draft(folder.parent / MARKER)
+    except OSError as error:
+        expected = f"a place in a folder that can be written ({cause_of(error)}: {folder.parent})"
+        raise InputError("--out", str(folder), expected, "--out study.zarr") from None
+
+
+def check_file(
+    option: str,
+    path: Path,
+    overwrite: bool,
+    inputs: Sequence[Path | None] = (),
+    is_own: bool = False,
+    example: str = "",
+) -> None:
+    """Raises InputError where a file that the user names must not be written: it is among the `inputs`, which are read,
+    or there already, unless it `is_own` or may be overwritten; with another name as the example, unless one is told."""
+    refuse_place(option, path)
+    another = f"{path.stem}-2{path.suffix}"
+    example = example or (f"{option} {another}" if option.startswith("--") else another)
+    if any(file and _are_one(path, file) for file in inputs):
+        raise InputError(option, f"{path}, which is read", "another file; nothing was overwritten", example)
+    if os.path.lexists(path) and not ((is_own or overwrite) and path.is_file()):
+        expected = f"a new file, or {OVERWRITE}; nothing was overwritten"
+        raise InputError(option, f"{path}, which already exists", expected, example)
+    try:
+        if path.exists():
+            check_free(path)
+        _try_draft(path)
+    except OSError as error:
+        raise _unwritable(option, path, error, example) from None
+
+
+def write_file(option: str, path: Path, content: Content, overwrite: bool) -> None:
+    """Write a file that the user names, whole or not at all. Raises InputError where that must not be, or cannot."""
+    check_file(option, path, overwrite)
+    place = Path(os.path.realpath(path))  # a link stays one
+    try:
+        path.parent.stat()  # a folder that is missing is a mistake, not one to make
+        write({place: content}, [place] if overwrite else ())
+    except OSError as error:
+        raise _unwritable(option, path, error, path.name) from None
+
+
+def _unwritable(option: str, path: Path, error: OSError, example: str) -> InputError:
+    expected = f"a new file in a folder that can be written ({cause_of(error)}); nothing was overwritten"
+    return InputError(option, str(path), expected, example)
+
+
+def output_folder(
+    command: str, folder: Path | None, overwrite: bool, inputs: Sequence[Path] = ()
+) -> OutputFolder | None:
+    """The folder that a command writes into, if it is to write. Raises InputError as `OutputFolder`."""
+    return None if folder is None else OutputFolder(command, folder, overwrite, inputs)
+
+
+def write(files: Mapping[Path, Content], may_replace: Collection[Path], progress: Progress = silent) -> list[Path]:
+    """Write files, all of them or none, at any moment; their paths. Those that `may_replace` does not name have to be
+    new. Raises FileExistsError where one is not, another OSError where it cannot be written."""
+    with drafts_of(files, progress) as drafts:
+        drafts.put_in_place(may_replace)
+    return written(files)
+
+
+@contextmanager
+def drafts_of(files: Mapping[Path, Content], progress: Progress = silent) -> Iterator[Drafts]:
+    """The drafts of some files. Raises OSError."""
+    with Drafts() as drafts:
+        for number, (path, content) in enumerate(files.items()):
+            progress(number, len(files), "files")
+            drafts.add(path, content)
+        yield drafts
+
+
+def written(files: Mapping[Path, Content]) -> list[Path]:
+    """The files that are there once some are written: one without content is deleted."""
+    return [path for path, content in files.items() if content is not None]
+
+
+def _are_one(path: Path, other: Path) -> bool:
+    """Whether two paths lead to the same file."""
+    return path.exists() and other.exists() and path.samefile(other)
+
+
+def marker(command: str, names: Iterable[str]) -> str:
+    """What the marker says of a command and the files that are its own."""
+    lines = [f'command = "{command}"', f'version = "{VERSION}"', "files = [", *(f"  {as_toml(n)}," for n in names), "]"]
+    return "\n".join(["# Made by friso, which replaces these files when the command is run again.", *lines, ""])
+
+
+def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
+    """The command that made a folder and the files that it wrote there; empty where no command of friso did."""
+    try:
+        document = parsed(text_of(folder / MARKER, "a marker"), "a marker")
+    except InputError:
+        from friso.studies.metadata import is_store
+
+        return (STORE_MAKER if folder.is_dir() and is_store(folder) else ""), ()
+    command, files = document.get("command"), document.get("files")
+    if not (isinstance(command, str) and isinstance(files, list)):
+        return "", ()
+    return command, tuple(str(name) for name in files)
+
+
+def _of_others(folder: Path, maker: str, expected: str) -> InputError:
+    """That a folder is not new, empty or the command's own; `expected` is what else it may be."""
+    made = f"made by friso {maker}" if maker else f"with {_first_names(_entries(folder))} in it"
+    holds = "a store of friso map" if maker == STORE_MAKER else made
+    return InputError("--out", f"{folder}, {holds}", f"a new or empty folder, {expected}", _beside(folder))
+
+
+def _beside(folder: Path) -> str:
+    """The option for another folder."""
+    return f"--out {shell_word(f'{folder}-2' if folder.name.strip('.') else 'report')}"
+
+
+def _entries(folder: Path) -> list[str]:
+    """What is in a folder, but for what friso keeps there of runs that have not ended."""
+    names = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+    return [name for name in names if name != UNFINISHED and not name.startswith(DRAFTS)]
+
+
+def _first_names(names: Sequence[str]) -> str:
+    """The first of some names, and how many there are more."""
+    more = len(names) - _LISTED
+    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+_LISTED = 8
+
+
+def _check_writable(folder: Path) -> None:
+    """Raises InputError where no file can be written into the folder, or it cannot be made."""
+    try:
+        with hold_interrupts():
+            for path in reversed(made(folder)):
+                path.rmdir()  # for now: it appears with what is written
+        _try_draft(folder / MARKER)
+    except OSError as error:
+        expected = f"a folder that can be written ({cause_of(error)})"
+        raise InputError("--out", str(folder), expected, "--out report") from None
+
+
+def _try_draft(path: Path) -> None:
+    """Raises OSError where no draft of a file can be made: on Windows and on network shares nothing else tells."""
+    with Drafts() as drafts:
+        drafts.add(path, "")

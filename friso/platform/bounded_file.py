@@ -1,0 +1,35 @@
+"""Files that may come from others: regular ones alone are read, whole, up to a size; none has no end."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from friso.platform.system import open_file
+
+_READING = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+
+
+class LargeFileError(OSError):
+    """A file of `size` [bytes], which is more than was to be read."""
+
+    def __init__(self, size: int) -> None:
+        super().__init__(f"a file of {size / 1e6:.3g} MB")
+        self.size = size
+
+
+def content_of(path: Path, most: int, follow: bool = True) -> bytes:
+    """What is in a file of `most` bytes or fewer; a symbolic link is followed if `follow`.
+
+    Raises LargeFileError, or another OSError where it cannot be read or is a device, a pipe or a socket.
+    """
+    flags = _READING if follow else _READING | getattr(os, "O_NOFOLLOW", 0)
+    with open(open_file(path, flags), "rb") as file:
+        status = os.fstat(file.fileno())
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError("a device or a pipe")
+        content = b"" if status.st_size > most else file.read(most + 1)
+        if (size := max(status.st_size, len(content))) > most:
+            raise LargeFileError(size)
+        return content

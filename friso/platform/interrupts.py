@@ -1,0 +1,175 @@
+"""Ctrl-C, a termination and a closed terminal end the command line in one line, whenever they come.
+
+Importing friso and its libraries takes up to a second, in which an exception is lost, or ends in a traceback out of a
+library that is half there. So a signal raises KeyboardInterrupt only where no import is under way, and before the
+command begins it is noted (`friso.platform.early`). Where that does not end the command in time, the process is ended.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+from types import FrameType
+from typing import Any
+
+from friso.platform import early
+from friso.platform.early import SIGNALS
+from friso.platform.system import interrupts_held, no_signal_later, signal_later, signals_told
+
+_AGAIN = 0.02
+"""After how long [s] it is looked again whether an import has ended."""
+
+PATIENCE = 10.0
+"""How long [s] after a signal a command may take to end."""
+
+_raising = _said = False
+_bounded = True
+_waits = False
+"""Whether a signal came during an import, after which it is raised."""
+
+_held = 0
+"""Blocks in which signals wait for the end (`hold_interrupts`), one within another."""
+
+_whole = threading.RLock()
+"""Held in these blocks."""
+
+
+def came() -> int:
+    """The signal that came first, 0 for none."""
+    return early.came[0] if early.came else 0
+
+
+def last_word(number: int) -> str:
+    """How a command says what ended it, its last line."""
+    global _said
+    _said = True
+    return "interrupted" if number in (0, signal.SIGINT) else "terminated"
+
+
+def answers_interrupts() -> None:
+    """Let this command take as long as it needs to end: it answers Ctrl-C with what it has so far."""
+    global _bounded
+    _bounded = False
+
+
+@contextmanager
+def raising() -> Iterator[None]:
+    """Signals raise KeyboardInterrupt within, one that came before at once. In another thread than the main one they
+    are as they were."""
+    global _raising, _waits
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before, ignored = _take(_arrived), sys.unraisablehook
+    if early.IS_COMMAND:
+        with interrupts_held():  # Ctrl-C is for the main thread, where it may wait
+            threading.Thread(target=_end_in_time, args=(signals_told(),), daemon=True).start()
+    sys.unraisablehook = partial(_lost, ignored)
+    _raising = True
+    try:
+        if came():
+            raise KeyboardInterrupt
+        yield
+    finally:
+        _raising = _waits = False
+        no_signal_later()
+        if not early.IS_COMMAND:  # which ends now, and is not to be interrupted in that
+            sys.unraisablehook = ignored
+            early.came.clear()
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+def raise_what_waits() -> None:
+    """Wait for the KeyboardInterrupt of a signal that came during an import, before anything is done that must be
+    whole, for whose end it would have to wait."""
+    while _waits and not _held:
+        time.sleep(_AGAIN)
+
+
+@contextmanager
+def hold_interrupts() -> Iterator[None]:
+    """Ctrl-C and a termination wait for the end of the block. In another thread than the main one, which they do not
+    reach, nothing is done."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    global _held
+    arrived: list[int] = []
+    before = _take(lambda number, frame: arrived.append(number))
+    _held += 1
+    try:
+        with _whole:
+            yield
+    finally:
+        _held -= 1
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if arrived:
+            signal.raise_signal(arrived[0])
+
+
+def _take(handler: Callable[[int, FrameType | None], object]) -> dict[int, Any]:
+    """Handle the signals so, but those that are ignored (nohup); what Python did with them before."""
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    taken = {number: earlier for number, earlier in before.items() if earlier is not signal.SIG_IGN}
+    for number in taken:
+        signal.signal(number, handler)
+    return {number: earlier for number, earlier in taken.items() if earlier is not None}
+
+
+def _arrived(number: int, frame: FrameType | None) -> None:
+    global _waits
+    if number in SIGNALS:
+        early.came.append(number)
+    if not _raising:
+        return
+    _waits = _imports(frame) or bool(_held)
+    if _waits:  # it comes again
+        signal_later(_AGAIN, _arrived)
+        return
+    raise KeyboardInterrupt
+
+
+def _end_in_time(pipe: int) -> None:
+    """End the process some time after a signal, whatever its main thread is at: an import that does not return, a
+    library that leaves the interpreter for minutes or swallows the exception. What must be whole, becomes so before.
+
+    `pipe`: the descriptor from which signals can be read, a byte each, also while the main thread hears none."""
+    number = came()
+    while number not in SIGNALS:
+        number = os.read(pipe, 1)[0]
+    time.sleep(PATIENCE)
+    while _bounded and not _whole.acquire(blocking=False):
+        time.sleep(PATIENCE)
+    if not _bounded:
+        return
+    threading.Timer(1.0, os._exit, (128 + number,)).start()  # a pipe that nobody reads takes no last word
+    if not _said:
+        with suppress(OSError):  # nor does a terminal that is closed
+            os.write(2, f"friso: {last_word(number)}\n".encode())
+    os._exit(128 + number)
+
+
+def _lost(otherwise: Callable[[Any], object], what: Any) -> None:
+    """Python ignores what is raised while an object goes (a finalizer, the callback of a weak reference), and prints a
+    traceback: a KeyboardInterrupt is raised again instead, and of what was cut short by one nothing is said."""
+    if _raising and isinstance(what.exc_value, KeyboardInterrupt):
+        signal_later(_AGAIN, _arrived)
+    elif not came():
+        otherwise(what)
+
+
+def _imports(frame: FrameType | None) -> bool:
+    """Whether an import is under way."""
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            return True
+        frame = frame.f_back
+    return False

@@ -1,0 +1,103 @@
+"""Folders that a process keeps locked, by a file in them, for as long as it uses them: one whose process was killed is
+a leftover."""
+
+from __future__ import annotations
+
+import errno
+import shutil
+import stat
+import tempfile
+import uuid
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from friso.platform.system import DRAFT_MODE, MOVES_OPEN_FOLDERS, foreign_writers, is_users_own, remove_folder
+
+_TRIES = 3
+
+
+@contextmanager
+def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
+    """A new folder that only this user may open, locked and thus no leftover within, and removed in the end. Raises
+    OSError. What killed processes left of such folders is removed first."""
+    remove_leftovers(root, prefix, lock)
+    folder, held = _made_and_locked(root, prefix, lock, _TRIES)
+    try:
+        yield folder
+    finally:
+        held.release()
+        remove_folder(folder)
+
+
+def temporary_folder(prefix: str) -> AbstractContextManager[Path]:
+    """The same where the system keeps temporary files."""
+    return locked_folder(Path(tempfile.gettempdir()), prefix, "lock")
+
+
+def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Path, FileLock]:
+    """The folder and its lock. Before that is held another process may remove the folder, and filelock makes it again,
+    for others to read: then it is another folder that is tried."""
+    folder = root / f"{prefix}{uuid.uuid4().hex[:12]}"
+    folder.mkdir(mode=DRAFT_MODE)  # mkdtemp tries for ever where Windows lets no folder be made (python/cpython#66305)
+    held = FileLock(folder / lock)
+    try:
+        made = folder.lstat()
+        held.acquire()
+        now = folder.lstat()
+        if (now.st_mode, now.st_uid) != (made.st_mode, made.st_uid):  # inodes are used again, or change on a network
+            raise FileNotFoundError(errno.ENOENT, "another process removed it", str(folder))
+        return folder, held
+    except BaseException as error:
+        held.release()
+        remove_folder(folder)
+        if isinstance(error, FileNotFoundError) and tries > 1:
+            return _made_and_locked(root, prefix, lock, tries - 1)
+        raise
+
+
+def is_leftover(folder: Path, lock: str) -> bool:
+    """Whether nobody holds the file called `lock` in a folder, which is no link to one."""
+    with _unless_locked(folder, lock) as free:
+        return free
+
+
+def remove_leftover(folder: Path, lock: str) -> None:
+    """Remove a folder with all that is in it, as far as this user may, if it is a leftover."""
+    with _unless_locked(folder, lock) as free:
+        if free:
+            shutil.rmtree(folder, ignore_errors=True)
+    if free and not MOVES_OPEN_FOLDERS:  # where a file that is open stays, such as the lock
+        with suppress(OSError):
+            (folder / lock).unlink(missing_ok=True)
+            folder.rmdir()
+
+
+def remove_leftovers(root: Path, prefix: str, lock: str) -> None:
+    """Remove the leftovers of this user among the folders below `root` whose names begin with a prefix; one that others
+    may write to stays, in which they may have put a link for a lock."""
+    for folder in root.glob(f"{prefix}*"):
+        with suppress(OSError):  # another process was quicker
+            if not foreign_writers(folder.lstat()):
+                remove_leftover(folder, lock)
+
+
+@contextmanager
+def _unless_locked(folder: Path, lock: str) -> Iterator[bool]:
+    """Whether nobody else held the lock of a folder, which is held within; never that of another user's folder, or of
+    a link to one."""
+    try:
+        status = folder.lstat()
+        if not (stat.S_ISDIR(status.st_mode) and is_users_own(status)):
+            raise NotADirectoryError(folder)
+        held = FileLock(folder / lock)
+        held.acquire(timeout=0)
+    except (OSError, Timeout):
+        yield False
+        return
+    try:
+        yield True
+    finally:
+        held.release()

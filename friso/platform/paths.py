@@ -1,0 +1,47 @@
+"""Paths as they were given: what no system takes for the path of a file is told before it is tried."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from friso.platform.system import name_refused
+
+LONGEST_NAME = 255
+"""Bytes of a name at most, on Linux, macOS and Windows alike."""
+
+LONGEST_PATH = 1024
+"""Characters of a path at most: macOS takes no more."""
+
+LONGEST_WRITTEN = 200
+"""Bytes of the name of a file or store that is written, at most: its draft has a longer one."""
+
+EXPECTED = f"a path with names of at most {LONGEST_NAME} bytes, and of at most {LONGEST_PATH} characters"
+
+
+def flaw_of(path: str | os.PathLike[str], longest_name: int = LONGEST_NAME) -> str:
+    """Why a path is none of a file or a folder, in words; "" where it may be one."""
+    text = os.fspath(path)
+    if not text:
+        return "an empty path"
+    if "\0" in text:
+        return "a path with a null character in it"
+    try:
+        longest = max(len(os.fsencode(part)) for part in Path(text).parts or [text])
+    except UnicodeEncodeError:
+        return "a path with half a character in it"
+    if longest > longest_name:
+        return f"a path with a name of {longest} bytes"
+    if len(text) > LONGEST_PATH:
+        return f"a path of {len(text)} characters"
+    return ""
+
+
+def unwritable(path: Path) -> tuple[str, str] | None:
+    """Why nothing can be written to a path, whatever is there, and what can, in words; None where it may be: it has no
+    name, one that is too long, or one that Windows does not take."""
+    if flaw := flaw_of(path, LONGEST_WRITTEN):
+        return flaw, f"names of at most {LONGEST_WRITTEN} bytes"
+    if why := name_refused(path):
+        return str(path), f"another name: {why}"
+    return None

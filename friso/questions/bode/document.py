@@ -1,0 +1,84 @@
+"""The JSON document of `friso bode`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from friso.frequency.bode import Bode
+from friso.frequency.crossover import Limits
+from friso.frequency.margins import Margins
+from friso.frequency.members import Members
+from friso.questions.bode.states import has_limiter, side
+from friso.questions.bode.words import stability
+from friso.shown.documents import plain_json
+
+
+def bode_document(bode: Bode) -> dict[str, Any]:
+    """The JSON document of `bode`; infinite and undefined numbers are null."""
+    joint = bode.stage.joint
+    state = "given" if joint is None else ("locked" if joint.locked else "free")
+    crossover = bode.stage.controller.bandwidth_key is not None
+    document = {
+        "conclusion": stability(bode)[0],
+        "stage": bode.stage.name,
+        "cases": {name: _margins(case.margins) for name, case in bode.cases.items()},
+        "cascade_loops": {
+            name: {loop: _margins(margins) for loop, margins in cascade.margins.items()}
+            for name, cascade in bode.cascades.items()
+        },
+        "worst": _at(bode, *bode.worst),
+        "worst_settled": _at(bode, *bode.settled),
+        "unstable_speeds_m_per_s": [
+            {
+                "low": unstable.low,
+                "high": unstable.high,
+                "limiter": _limiter(bode, unstable.touched),
+                "forward": unstable.forward,
+            }
+            for unstable in bode.unstable
+        ],
+        "limits": {name: _limits(margins, "hz" if crossover else "factor") for name, margins in bode.limits.items()},
+        "highest_stable_crossover_hz": bode.limits[state].highest_stable if crossover else None,
+        "still_stable_there": bode.limits[state].open_ended,
+    }
+    return plain_json(document)
+
+
+def _margins(margins: Margins) -> dict[str, Any]:
+    return {
+        "stable": margins.stable,
+        "crossovers_hz": list(margins.crossovers),
+        "phase_margin_deg": margins.phase_margin,
+        "gain_margin": margins.gain_margin,
+        "gain_reduction": margins.gain_reduction,
+        "delay_margin_s": margins.delay_margin,
+        "modulus_margin": margins.modulus_margin,
+        "peak_sensitivity": margins.peak_sensitivity,
+        "closest_hz": margins.closest,
+        "poles": [[pole.real, pole.imag] for pole in margins.poles.tolist()],
+    }
+
+
+def _at(bode: Bode, member: Members, margins: Margins) -> dict[str, Any]:
+    """The margins of a member of the family, and which one it is."""
+    at = {
+        "bias_n": float(member.bias[0]),
+        "speed_m_per_s": float(member.speed[0]),
+        "limiter": _limiter(bode, bool(member.touched[0])),
+        "forward": bool(member.forward[0]),
+    }
+    return {**_margins(margins), "at": at}
+
+
+def _limiter(bode: Bode, touched: bool) -> str | None:
+    return side(touched) if has_limiter(bode) else None
+
+
+def _limits(margins: Limits, unit: str) -> dict[str, Any]:
+    return {
+        f"highest_stable_crossover_{unit}": margins.highest_stable,
+        "still_stable_there": margins.open_ended,
+        f"stable_{unit}": margins.stable,
+        f"modulus_margin_above_half_{unit}": margins.comfortable,
+        f"searched_{unit}": margins.searched,
+    }

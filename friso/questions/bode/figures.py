@@ -1,0 +1,297 @@
+"""The figures of a linear analysis: plant, open loop, Nyquist and sensitivity, in all limit cases and the family."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friso.frequency.bode import Bode, BodeCase
+from friso.frequency.cascaded import CascadeLoop
+from friso.frequency.crossover import WANTED
+from friso.questions.bode.states import SERIES, colour, dash, has_family, has_limiter, label
+from friso.questions.bode.table import decibels
+from friso.shown.drawing.colours import ramp
+from friso.shown.drawing.figure import (
+    INK,
+    LIGHT,
+    Array,
+    Axis,
+    Band,
+    Dash,
+    Figure,
+    Limit,
+    Markers,
+    Panel,
+    Series,
+)
+from friso.shown.drawing.prefixes import pretty, with_unit
+from friso.stage.transmission import moving_mass
+
+QUARTER = 90.0
+"""Phases are read in quarters of a turn [deg]."""
+
+STARTS = -315.0
+"""The first phase [deg] begins in the turn above this one, between those of whole numbers of integrations."""
+
+LEAST_PHASE = -720.0
+"""Phases [deg] below this one, as of a delay at high frequencies, are left out of view."""
+
+NEAR = ((-3.0, 1.5), (-1.5, 1.5))
+"""What is seen of the complex plane about -1."""
+
+KEPT = (0.02, 5.0)
+"""Sizes of the loop that are drawn of the family in it."""
+
+DRAWN = {True: 40, False: 12}
+"""Members of the family that are drawn there, of the stable ones and of the others."""
+
+SIZES = (-90.0, 90.0)
+"""Sizes of the open loop [dB] that are in view at most."""
+
+LEAST_SENSITIVITY = -40.0
+"""Sensitivities [dB] from which on they are in view."""
+
+WIDTHS = {False: 2.6, True: 1.3}
+"""Widths of lines, of a free and a touched limiter: where both do the same, both are seen."""
+
+LOST = "#eeb48f"
+
+
+def bode_figures(bode: Bode) -> tuple[Figure, ...]:
+    """All figures, in the order in which they are read."""
+    return (*first_figures(bode), *_drawn(bode, (_speeds(bode), _nyquist(bode), _sensitivity(bode))))
+
+
+def first_figures(bode: Bode) -> tuple[Figure, ...]:
+    """The first of them, which show the limit cases alone: the others need the family behind these, and take longer."""
+    return _drawn(bode, (_plant(bode), *_cascade(bode), _loop(bode)))
+
+
+def _drawn(bode: Bode, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
+    return tuple(replace(figure, subject=bode.stage.name) for figure in figures if figure.panels)
+
+
+@dataclass(frozen=True)
+class ResponseCurve:
+    """A complex frequency response, shape (k,), as a Bode plot draws it."""
+
+    response: np.ndarray
+    label: str
+    colour: str
+    dash: Dash = "solid"
+    width: float = 1.4
+
+
+def phases(responses: Sequence[np.ndarray]) -> list[Array]:
+    """Phases [deg], each of shape (k,), without jumps of a turn: the first begins between -315 and 45 degrees, and the
+    others lie in the same turn at high frequencies, where all of them do the same."""
+    angles = [np.angle(response) for response in responses]
+    lagging = [np.where(angle > np.pi - 1e-9, angle - 2 * np.pi, angle) for angle in angles]  # half a turn is a lag
+    first, *others = [np.degrees(np.unwrap(angle)) for angle in lagging]
+    first = first - 360 * np.floor((first[0] - STARTS) / 360)
+    high = slice(len(first) // 2, None)
+    return [first, *(phase + 360 * np.round(np.median(first[high] - phase[high]) / 360) for phase in others)]
+
+
+def magnitude(response: np.ndarray) -> Array:
+    """Absolute value [dB]."""
+    return 20 * np.log10(np.abs(response))
+
+
+def _plant(bode: Bode) -> Figure:
+    """Stage position over actuator force, with the mass lines (thesis, Fig. 7)."""
+    curves = [_curve(name, case.plant) for name, case in bode.cases.items()]
+    sizes = np.concatenate([np.abs(curve.response) for curve in curves])
+    axis = Axis("Magnitude", "m/N", (float(sizes.min()) / 2, float(sizes.max()) * 2), log=True, prefixed=False)
+    above = _magnitudes(_hertz(bode), curves, axis, np.abs)
+    lines = tuple(
+        Series(_hertz(bode), 1 / (mass * bode.omega**2), f"mass of {mass:.4g} {pretty('kg')}", INK, style, 0.9)
+        for mass, style in zip(_masses(bode), ("dashed", "dotted"), strict=False)
+    )
+    caption = (
+        "Stage position over actuator force for small motions, in the limit cases of Table 1 of the thesis (its Fig. "
+        "7), with the mass lines. A stuck cart rests on its bristles, a sliding one sees viscous friction only."
+    )
+    if has_limiter(bode):
+        in_series = any(name.endswith(SERIES) for name in bode.cases)
+        dashed = "; dashed: in series, as Table 1 prints it" if in_series else ""
+        caption += f" A touched limiter acts in parallel with the joint{dashed}."
+    panels = (replace(above, series=(*above.series, *lines)), _phases(_hertz(bode), curves))
+    return Figure("bode_plant", "Plant", caption, panels)
+
+
+def _loop(bode: Bode) -> Figure:
+    """The open loop in the limit cases."""
+    caption = (
+        "The loop cut at the actuator: controller, plant and, if the stage file has one, the drive. The phase margin "
+        "is the distance to −180° where the magnitude crosses 0 dB."
+    )
+    panels = loop_panels(_hertz(bode), [_loop_of(name, case) for name, case in bode.cases.items()])
+    return Figure("bode_loop", "Open loop, limit cases", caption, panels)
+
+
+def _cascade(bode: Bode) -> Iterator[Figure]:
+    """What a drive's own Bode plots show of a cascade: the plant of its velocity loop, and each loop."""
+    if not bode.cascades:
+        return
+    from_sliding = sorted(bode.cascades, key=lambda name: name.startswith("stuck"))  # whose phase begins at 0
+    moved = [_curve(name, bode.cascades[name].plant) for name in from_sliding]
+    sizes = np.concatenate([np.abs(curve.response) for curve in moved])
+    axis = Axis("Magnitude", "m/(N*s)", (float(sizes.min()) / 2, float(sizes.max()) * 2), log=True, prefixed=False)
+    panels = (_magnitudes(_hertz(bode), moved, axis, np.abs), _phases(_hertz(bode), moved))
+    caption = (
+        "Velocity at its encoder over the force that is commanded, with hold, delay and current loop of the drive."
+    )
+    yield Figure("bode_velocity_plant", "Current command to velocity", caption, panels)
+    opened: dict[CascadeLoop, str] = {
+        "velocity": "The velocity loop, cut where the velocity is fed back; the position loop is open.",
+        "position": "The position loop, cut where the position is fed back; the velocity loop is closed.",
+    }
+    for loop, caption in opened.items():
+        curves = [
+            _marked(_curve(name, loops.loops[loop]), loops.margins[loop].stable)
+            for name, loops in bode.cascades.items()
+        ]
+        panels = loop_panels(_hertz(bode), curves)
+        yield Figure(f"bode_{loop}_loop", f"{loop.capitalize()} loop, opened", caption, panels)
+
+
+def _speeds(bode: Bode) -> Figure:
+    """The open loop at prescribed speeds of the cart (thesis, Fig. 8); no panels without friction."""
+    caption = (
+        "The same while the cart slides at a prescribed speed"
+        f"{', limiter free' if has_limiter(bode) else ''} (thesis, Fig. 8): the faster it slides, the sooner the "
+        "bristles yield. Where friction falls with speed, the loop may be unstable (dashed)."
+    )
+    count = len(bode.prescribed)
+    styles = zip(ramp(count + 1)[:count], np.linspace(2.6, 1.2, count), strict=True)  # the last shade is light
+    curves = [
+        _marked(
+            ResponseCurve(at.loop, with_unit(at.speed, "m/s", 1) if at.speed else "stuck", shade, width=width),
+            at.stable,
+        )
+        for at, (shade, width) in zip(bode.prescribed, styles, strict=True)
+    ]
+    return Figure("bode_speeds", "Open loop, prescribed cart speeds", caption, loop_panels(_hertz(bode), curves))
+
+
+def _marked(curve: ResponseCurve, stable: bool) -> ResponseCurve:
+    """The curve of a loop; dashed, and labelled so, if it is not stable."""
+    return curve if stable else replace(curve, label=f"{curve.label} (unstable)", dash="dashed")
+
+
+def _nyquist(bode: Bode) -> Figure:
+    """The loop about -1: limit cases, and the family behind them."""
+    family = [
+        *_family(bode, True, "stable states of the family", LIGHT),
+        *_family(bode, False, "unstable states of the family", LOST),
+    ]
+    cases = [
+        Series(np.real(curve.response), np.imag(curve.response), curve.label, curve.colour, curve.dash, curve.width)
+        for curve in (_loop_of(name, case) for name, case in bode.cases.items())
+    ]
+    turn = np.linspace(0, 2 * np.pi, 181)
+    name = f"modulus margin {WANTED:g}"
+    circle = Series(-1 + WANTED * np.cos(turn), WANTED * np.sin(turn), name, INK, "dashed", 1.0)
+    point = Markers(np.array([-1.0]), np.array([0.0]), "−1", INK, "cross")
+    x, y = (Axis(f"{part} part of L", "", limits) for part, limits in zip(("Real", "Imaginary"), NEAR, strict=True))
+    panel = Panel("", x, y, (*family, *cases, circle), (point,), equal=True)
+    caption = (
+        "The loop for positive frequencies. Its smallest distance from −1 is the modulus margin: above 0.5 the loop "
+        "stays outside the circle."
+    )
+    if family:
+        caption += " Light lines: a selection of the family, stuck under bias forces and sliding at all speeds."
+    return Figure("bode_nyquist", "Nyquist plot", caption, (panel,))
+
+
+def _family(bode: Bode, stable: bool, name: str, shade: str) -> list[Series]:
+    """Evenly picked members that are stable, or those that are not, where they are in view."""
+    numbers = np.flatnonzero(bode.scan.stable == stable) if has_family(bode) else np.empty(0, int)
+    picked = numbers[np.linspace(0, len(numbers) - 1, min(DRAWN[stable], len(numbers))).round().astype(int)]
+    lines = []
+    for k, loop in enumerate(bode.loops[picked]):
+        near = (np.abs(loop) > KEPT[0]) & (np.abs(loop) < KEPT[1])
+        visible = np.where(near, loop, np.nan)[np.convolve(near, np.ones(3), "same") > 0]
+        lines.append(Series(np.real(visible), np.imag(visible), "" if k else name, shade, width=0.9))
+    return lines
+
+
+def _sensitivity(bode: Bode) -> Figure:
+    """Sensitivity of the limit cases that are stable, and the band of the family."""
+    stable = bode.scan.stable
+    lines = tuple(
+        Series(_hertz(bode), -magnitude(1 + curve.response), curve.label, curve.colour, curve.dash, curve.width)
+        for curve in (_loop_of(name, case) for name, case in bode.cases.items() if case.margins.stable)
+    )
+    bands = ()
+    if stable.any() and has_family(bode):
+        all_ = -magnitude(1 + bode.loops[stable])
+        name = "stable states of the family"
+        bands = (Band(_hertz(bode), all_.min(axis=0), all_.max(axis=0), name, LIGHT),)
+    if not (lines or bands):
+        return Figure("bode_sensitivity", "", "", ())
+    largest = max(float(np.max(part)) for part in (*(line.y for line in lines), *(band.high for band in bands)))
+    limit = Limit((-decibels(WANTED),), f"{-decibels(WANTED):.0f} dB: modulus margin {WANTED:g}", INK)
+    axis = Axis("|1/(1 + L)|", "dB", (LEAST_SENSITIVITY, max(10.0, 1.08 * largest)))
+    caption = "How much of a disturbance remains: above 0 dB the controller amplifies it."
+    excluded = f"; {(~stable).sum()} unstable ones are left out; near them the sensitivity is unbounded"
+    note = (
+        f"Band: smallest to largest of {stable.sum()} stable states{'' if stable.all() else excluded}." if bands else ""
+    )
+    panel = Panel("", Axis.of_frequency(_hertz(bode)), axis, lines, limits=(limit,), bands=bands)
+    return Figure("bode_sensitivity", "Sensitivity", caption, (panel,), note=note)
+
+
+def loop_panels(hertz: Array, curves: Sequence[ResponseCurve]) -> tuple[Panel, ...]:
+    """Magnitude [dB] and phase [deg] of loops over frequencies (k,) [Hz], with the lines at 0 dB and half a turn; none
+    of no loops."""
+    if not curves:
+        return ()
+    sizes = np.concatenate([magnitude(curve.response) for curve in curves])
+    view = max(float(sizes.min()) - 5, SIZES[0]), min(float(sizes.max()) + 5, SIZES[1])
+    above = _magnitudes(hertz, curves, Axis("Magnitude", "dB", view, step=30.0), magnitude)
+    below = _phases(hertz, curves)
+    low, high = below.y.limits or (-180.0, 180.0)
+    halves = tuple(turn for turn in (-540.0, -180.0, 180.0) if low < turn < high)
+    return replace(above, limits=(Limit((0.0,), "", INK),)), replace(below, limits=(Limit(halves, "", INK),))
+
+
+def _magnitudes(hertz: Array, curves: Sequence[ResponseCurve], axis: Axis, of: Callable[[np.ndarray], Array]) -> Panel:
+    lines = (Series(hertz, of(curve.response), curve.label, curve.colour, curve.dash, curve.width) for curve in curves)
+    return Panel("", Axis.of_frequency(hertz), axis, tuple(lines))
+
+
+def _phases(hertz: Array, curves: Sequence[ResponseCurve]) -> Panel:
+    """The phases, without labels: those stand above the magnitudes."""
+    angles = zip(curves, phases([curve.response for curve in curves]), strict=True)
+    lines = tuple(Series(hertz, y, "", curve.colour, curve.dash, curve.width) for curve, y in angles)
+    least = QUARTER * np.floor((min(line.y.min() for line in lines) + 1) / QUARTER)
+    most = QUARTER * np.ceil((max(line.y.max() for line in lines) - 1) / QUARTER)
+    if most == least:
+        least, most = least - QUARTER, most + QUARTER
+    view = max(float(least), LEAST_PHASE) - 10, float(most) + 10
+    step = QUARTER if view[1] - view[0] < 6 * QUARTER else 2 * QUARTER
+    return Panel("", Axis.of_frequency(hertz), Axis("Phase", "°", view, step=step), lines)
+
+
+def _curve(name: str, response: np.ndarray) -> ResponseCurve:
+    """A response of a limit case."""
+    return ResponseCurve(response, label(name), colour(name), dash(name), WIDTHS["touched" in name])
+
+
+def _loop_of(name: str, case: BodeCase) -> ResponseCurve:
+    return _marked(_curve(name, case.loop), case.margins.stable)
+
+
+def _masses(bode: Bode) -> list[float]:
+    """All that moves, and what moves with the actuator, if that can move without the cart [kg]."""
+    flat = bode.stage.flat()
+    free = "joint.locked" in flat and not flat["joint.locked"]
+    return [float(moving_mass(flat)), *([float(moving_mass({**flat, "masses.cart": 0.0}))] if free else [])]
+
+
+def _hertz(bode: Bode) -> Array:
+    return bode.omega / (2 * np.pi)

@@ -1,0 +1,107 @@
+"""How the states of a linear analysis are named and coloured: the same in every figure, sentence and table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from friso.frequency.bode import Bode
+from friso.frequency.cascaded import CascadeLoop
+from friso.frequency.margins import Margins
+from friso.frequency.members import Members
+from friso.shown.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Dash
+from friso.shown.drawing.prefixes import with_unit
+
+SERIES = "-series"
+"""Ends the name of a case whose limiter acts by the formula that Table 1 of the thesis prints."""
+
+COLOURS = {"given": BLUE, "stuck": BLUE, "sliding": VERMILLION, "stuck-touched": SKY, "sliding-touched": ORANGE}
+_ENDINGS = {"touched": "limiter touched", "touched-series": "limiter in series"}
+
+
+@dataclass(frozen=True)
+class ShownState:
+    """A state with its margins, always under this label, in this colour; `where` says which state it is, if the label
+    does not; and, of a cascade in a limit case, the margins of each of its `loops`."""
+
+    label: str
+    colour: str
+    where: str
+    margins: Margins
+    loops: Mapping[CascadeLoop, Margins] = field(default_factory=dict)
+
+
+def shown_states(bode: Bode) -> tuple[ShownState, ...]:
+    """The limit cases, the worst of all settled states, and the worst of the whole family, if that is another one."""
+    cases = [
+        ShownState(label(name), colour(name), _speed(case.members), case.margins, _loops(bode, name))
+        for name, case in bode.cases.items()
+    ]
+    if not has_family(bode):
+        return tuple(cases)
+    (settled, margins), (worst, worst_margins) = bode.settled, bode.worst
+    cases.append(ShownState("Worst settled", GREY, place(settled, bode), margins))
+    if worst != settled:
+        cases.append(ShownState("Worst of the family", GREY, place(worst, bode), worst_margins))
+    return tuple(cases)
+
+
+def _loops(bode: Bode, name: str) -> Mapping[CascadeLoop, Margins]:
+    """The margins of the loops of a cascade in a limit case."""
+    return bode.cascades[name].margins if name in bode.cascades else {}
+
+
+def label(name: str) -> str:
+    """A limit case in words: "stuck-touched" is "Stuck, limiter touched"."""
+    move, _, rest = name.partition("-")
+    first = {"given": "As given"}.get(move, move.capitalize())
+    return ", ".join([first, *([_ENDINGS[rest]] if rest else [])])
+
+
+def colour(name: str) -> str:
+    return COLOURS[name.removesuffix(SERIES)]
+
+
+def dash(name: str) -> Dash:
+    return "dashed" if name.endswith(SERIES) else "solid"
+
+
+def place(member: Members, bode: Bode) -> str:
+    """A state in words, as far as states differ: "sliding at 1.78 mm/s, limiter free"."""
+    return in_words(cart(member) if has_friction(bode) else "", bool(member.touched[0]), has_limiter(bode))
+
+
+def in_words(cart: str, touched: bool, limited: bool) -> str:
+    """What the cart does and, if there are two possibilities, whether the limiter is touched."""
+    return ", ".join([*([cart] if cart else []), *([f"limiter {side(touched)}"] if limited else [])]) or "as given"
+
+
+def cart(member: Members) -> str:
+    """What the cart does."""
+    if not member.stuck[0]:
+        return f"sliding{'' if member.forward[0] else ' backwards'} at {with_unit(member.speed[0], 'm/s')}"
+    return f"stuck under a bias force of {with_unit(member.bias[0], 'N')}" if member.bias[0] else "stuck"
+
+
+def side(touched: bool) -> str:
+    return "touched" if touched else "free"
+
+
+def has_limiter(bode: Bode) -> bool:
+    """Whether the limiter may be touched or not; it is always the same where the joint is locked or has no stroke."""
+    return bool(np.ptp(bode.scan.members.touched.astype(int)))
+
+
+def has_family(bode: Bode) -> bool:
+    """Whether there are states behind the limit cases: only friction makes some."""
+    return len(bode.scan.members) > len(bode.cases)
+
+
+def has_friction(bode: Bode) -> bool:
+    return bode.stage.flat()["friction.model"] != "none"
+
+
+def _speed(member: Members) -> str:
+    return "" if member.stuck[0] else f"at {with_unit(member.speed[0], 'm/s')}"

@@ -1,0 +1,201 @@
+"""The results of a linear analysis in sentences: where the controller is stable, why not elsewhere, how fast it may
+be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from friso.equations.bandwidth import bandwidth
+from friso.equations.structure import structure
+from friso.frequency.bode import Bode, Unstable
+from friso.frequency.crossover import WANTED, Limits
+from friso.frequency.margins import Margins
+from friso.frequency.members import Members
+from friso.frequency.ranges import Range
+from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place
+from friso.questions.bode.table import growth
+from friso.shown.drawing.prefixes import listed, range_with_unit, window_with_unit, with_unit
+
+SETTLED = "the limit cases, and stuck under any bias force"
+
+
+BACKLASH = (
+    "All this is for a load that stays on one flank of the backlash; friso check says whether the loop, however stable "
+    "there, swings across it."
+)
+
+
+TARGET = (
+    "The crossover that is set is the target of van Dijk's rules, for the tuned mass alone; the loop itself crosses "
+    "0 dB where the table says, since friction, joint, sampling and delay are in it."
+)
+
+
+def sentences(bode: Bode) -> list[str]:
+    """All that is said, in order."""
+    limits = [crossover_heading(bode), *crossovers(bode).values()]
+    return [*stability(bode), *limits, *crossover_meaning(bode), *caveats(bode)]
+
+
+def stability(bode: Bode) -> list[str]:
+    """Whether the one controller is stable in the settled states, and how well; whether in all others; and why not."""
+    if len(bode.scan.members) == 1:
+        margins = bode.settled[1]
+        state = f"stable, {_margin(margins)}" if margins.stable else f"not stable: a deviation {growth(margins)}"
+        return [f"The loop is {state}."]
+    member, margins = bode.settled
+    states = f"all settled states ({SETTLED})" if has_friction(bode) else "all limit cases"
+    worst = f"Worst: {place(member, bode)}, {_margin(margins) if margins.stable else growth(margins)}."
+    but = f", but not {'; '.join(_where(bode))}" if margins.stable and not bode.stable else ""
+    sentence = f"{_tuned(bode)}, this controller is {'' if margins.stable else 'not '}stable in {states}{but}. {worst}"
+    if bode.stable:
+        anywhere, least = bode.worst
+        where = f"{place(anywhere, bode)}, {_margin(least)}"
+        return [sentence, f"It is stable in every state: {_states_checked(bode)}. Worst: {where}."]
+    elsewhere = [] if but else [f"Unstable: {'; '.join(_where(bode))}."]
+    return [sentence, *elsewhere, *_why(bode)]
+
+
+def _tuned(bode: Bode) -> str:
+    crossover = bandwidth(bode.stage.flat())
+    return "As given" if crossover is None else f"At {with_unit(crossover, 'Hz')}"
+
+
+def _margin(margins: Margins) -> str:
+    margin = f"modulus margin {margins.modulus_margin:.3g} (peak sensitivity {margins.peak_sensitivity:.3g})"
+    return f"{margin} at {with_unit(margins.closest, 'Hz')}"
+
+
+def crossover_heading(bode: Bode) -> str:
+    """What the sentences of `crossovers` are about."""
+    if len(bode.scan.members) == 1:
+        return f"How fast this controller can be, {_subject(bode)}:"
+    settled = "settled states" if has_friction(bode) else "limit cases"
+    return f"How fast this controller can be, {_subject(bode)} at which all {settled} are stable:"
+
+
+def crossovers(bode: Bode) -> dict[str, str]:
+    """By joint: at which crossovers (or bandwidths, of a controller by gains) it is stable, and comfortably so."""
+    joint = bode.stage.joint
+    as_given = "" if joint is None else ("locked" if joint.locked else "free")
+    labels = {name: f"{name.capitalize()}{' (as given)' if name == as_given else ''}" for name in bode.limits}
+    labels |= {"given": "As given"}
+    return {name: f"{labels[name]}: {_limits(bode, name)}" for name in bode.limits}
+
+
+def crossover_meaning(bode: Bode) -> list[str]:
+    """What the crossover is that a stage file states: not where the loop crosses 0 dB."""
+    return [TARGET] if _crossing(bode) and bode.stage.controller.bandwidth_name == "crossover" else []
+
+
+def caveats(bode: Bode) -> list[str]:
+    """That a loop is looked at on one flank of a backlash; that stability does not go on for ever, where the search
+    found no end."""
+    ends = {limits.searched[1] for limits in bode.limits.values() if limits.open_ended}
+    flanks = [BACKLASH] if structure(bode.stage.flat()).plays else []
+    if not ends:
+        return flanks
+    drive = bode.stage.drive
+    timed = drive is not None and drive.sample_time is not None
+    causes = [] if timed else ["sampling (drive.sample_time)"]
+    causes += [] if drive is not None and drive.delay is not None else ["delay (drive.delay)"]
+    half = ", half the sampling frequency" if timed and _crossing(bode) else ""
+    end, causes = with_unit(max(ends), _unit(bode)), listed([*causes, "modes"], "and")
+    return [
+        *flanks,
+        f"The loop is still stable at {end}{half}, where the search ended; on the real machine {causes}, which the "
+        "stage file leaves out, set a lower limit.",
+    ]
+
+
+def _crossing(bode: Bode) -> bool:
+    """Whether a key of the controller states its bandwidth."""
+    return bode.stage.controller.bandwidth_key is not None
+
+
+def _subject(bode: Bode) -> str:
+    return f"in {bode.stage.controller.bandwidth_name}s" if _crossing(bode) else "in multiples of its bandwidth"
+
+
+def _unit(bode: Bode) -> str:
+    return "Hz" if _crossing(bode) else "times this bandwidth"
+
+
+def _states_checked(bode: Bode) -> str:
+    """The family in words."""
+    members = bode.scan.members
+    parts = []
+    if has_friction(bode):
+        speeds, biases = members.speed[~members.stuck], np.abs(members.bias)
+        parts += [f"stuck under bias forces of up to {with_unit(biases.max(), 'N')}"] if biases.any() else []
+        parts.append(f"sliding at {range_with_unit(speeds.min(), speeds.max(), 'm/s')}")
+    if has_limiter(bode):
+        parts.append("limiter free and touched")
+    return f"{', '.join(parts)} ({len(members)} states)"
+
+
+def _where(bode: Bode) -> list[str]:
+    """The states that are not stable: stuck ones (or any, without friction), and the ranges of speed."""
+    members, stable = bode.scan.members, bode.scan.stable
+    states = []
+    for touched in np.unique(members.touched[members.stuck & ~stable]).tolist():
+        rest = members.stuck & (members.touched == touched)
+        states.append(in_words(_stuck(members.bias[rest & ~stable], bode), touched, has_limiter(bode)))
+    return states + [_speeds(speeds, bode) for speeds in bode.unstable]
+
+
+def _stuck(unstable: np.ndarray, bode: Bode) -> str:
+    """Stuck under these bias forces [N], or under any; nothing without friction."""
+    if not has_friction(bode):
+        return ""
+    low, high = float(unstable.min()), float(unstable.max())
+    if (low, high) == (bode.scan.members.bias.min(), bode.scan.members.bias.max()):
+        return "stuck"
+    return f"stuck under a bias force of {with_unit(low, 'N') if low == high else range_with_unit(low, high, 'N')}"
+
+
+def _speeds(unstable: Unstable, bode: Bode) -> str:
+    speeds = bode.scan.members.speed[~bode.scan.members.stuck]
+    window = window_with_unit(unstable.low, unstable.high, (float(speeds.min()), float(speeds.max())), "m/s")
+    return in_words(f"sliding{'' if unstable.forward else ' backwards'}, {window}", unstable.touched, has_limiter(bode))
+
+
+def _why(bode: Bode) -> list[str]:
+    """What makes states unstable: friction that falls with speed, or tuning."""
+    settled = all(case.margins.stable for name, case in bode.cases.items() if not name.endswith(SERIES))
+    if not (settled and bode.scan.stable[bode.scan.members.stuck].all()):
+        even = ": not even all settled states (listed below) are stable" if has_friction(bode) else ""
+        return [f"This is a matter of tuning{even}."]
+    if not all(speeds.falling for speeds in bode.unstable):
+        return []
+    return [
+        "Friction falls with speed there (Stribeck effect), so the stage sticks and slips; a higher crossover may "
+        "shrink the range. The settled states are stable; friso check determines whether the stage hunts."
+    ]
+
+
+def _limits(bode: Bode, name: str) -> str:
+    limits = bode.limits[name]
+    stable = _remark(bode, name, limits.highest_stable, "lost first", limits.first_lost)
+    calm = _remark(bode, name, limits.highest_comfortable, "closest to −1", limits.closest)
+    return (
+        f"stable: {_windows(limits.stable, limits, bode)}{stable}; modulus margin above {WANTED:g}: "
+        f"{_windows(limits.comfortable, limits, bode)}{calm}."
+    )
+
+
+def _remark(bode: Bode, name: str, end: float | None, meaning: str, member: Members | None) -> str:
+    """Which state ends a range of crossovers, or is why there is none."""
+    if member is None or len(bode.scan.members) == 1:
+        return ""
+    where = f"above {with_unit(end, _unit(bode))}" if end else "as given"
+    state = in_words(cart(member) if has_friction(bode) else "", bool(member.touched[0]), name == "free")
+    return f" ({where}, {meaning}: {state})"
+
+
+def _windows(ranges: Sequence[Range], limits: Limits, bode: Bode) -> str:
+    unit = _unit(bode)
+    windows = [window_with_unit(*window, limits.searched, unit) for window in ranges]
+    return listed(windows, "and") or f"none from {range_with_unit(*limits.searched, unit)}"

@@ -1,0 +1,83 @@
+"""The JSON document of `friso boundary`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from friso.hunting import Diagram, Plane
+from friso.questions.boundary.words import ShownKey, conclusion
+from friso.shown.documents import plain_json
+from friso.studies.boundary_lines import Line, corner_verdicts, end_verdicts, lines, lost_places
+
+
+def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
+    """The JSON document of `boundary`; values of the keys in the units of the command line."""
+    document = _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
+    return plain_json({"conclusion": conclusion(traced, keys), **document})
+
+
+def _of_diagram(traced: Diagram, key: ShownKey) -> dict[str, Any]:
+    branches = lines(traced)
+    points = [_point(line, k, key) for line in branches for k in line.special]
+    return {
+        "key": key.key,
+        "unit": key.unit,
+        "points": sorted(points, key=lambda point: point["value"]),
+        "ends": dict(zip(("low", "high"), end_verdicts(traced), strict=True)),
+        "branches": [_branch(line, key) for line in branches],
+    }
+
+
+def _point(line: Line, k: int, key: ShownKey) -> dict[str, Any]:
+    return {
+        "value": key.number(line.at[k, 0]),
+        "kind": line.kinds[k],
+        "error": key.number(line.error[k, 0]),
+        "cycle": line.shape,
+        "amplitude_m": float(line.amplitude[k]),
+        "period_s": float(line.period[k]),
+    }
+
+
+def _branch(line: Line, key: ShownKey) -> dict[str, Any]:
+    multiplier = line.multiplier[line.ordinary]
+    return {
+        "cycle": line.shape,
+        "values": [key.number(value) for value in line.at[line.ordinary, 0].tolist()],
+        "amplitude_m": line.amplitude[line.ordinary].tolist(),
+        "period_s": line.period[line.ordinary].tolist(),
+        "multiplier": multiplier.tolist(),
+        "attracts": (abs(multiplier) < 1).tolist(),
+        "ends": line.ends,
+    }
+
+
+def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
+    x, y = keys
+    verdicts = [verdict for _, _, verdict in corner_verdicts(traced)]
+    return {
+        "x": {"key": x.key, "unit": x.unit},
+        "y": {"key": y.key, "unit": y.unit},
+        "curves": [_curve(line, keys) for line in lines(traced)],
+        "lost": _numbers(lost_places(traced), keys),
+        "corners": dict(zip(("low low", "low high", "high low", "high high"), verdicts, strict=True)),
+    }
+
+
+def _curve(line: Line, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
+    return {
+        "kind": line.kinds[0],
+        "cycle": line.shape,
+        "points": _numbers(line.at, keys),
+        "error": _numbers(line.error, keys),
+        "amplitude_m": line.amplitude.tolist(),
+        "period_s": line.period.tolist(),
+        "ends": line.ends,
+    }
+
+
+def _numbers(values: np.ndarray, keys: tuple[ShownKey, ...]) -> list[list[float]]:
+    """Values of both keys [SI], shape (n, 2), in the units shown."""
+    return [[key.number(value) for key, value in zip(keys, row, strict=True)] for row in values.tolist()]

@@ -1,0 +1,150 @@
+"""The figures of a boundary of hunting: branches of cycles over one key, curves in the plane of two."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from friso.hunting import Diagram, KeyRange, Plane
+from friso.questions.boundary.words import BASIN, CYCLES, MEANINGS, ShownKey, end_sentence
+from friso.questions.map.words import QUIET, quantity
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREY,
+    INK,
+    LIGHT,
+    VERMILLION,
+    Axis,
+    Category,
+    Cloud,
+    Dash,
+    Figure,
+    Limit,
+    Markers,
+    Panel,
+    Series,
+    Symbol,
+)
+from friso.studies.boundary_lines import (
+    ATTRACTS,
+    INVALID,
+    REPELS,
+    UNKNOWN,
+    CycleShape,
+    Line,
+    lines,
+    lost_places,
+    node_verdicts,
+)
+
+NAMES: dict[CycleShape, str] = {
+    "symmetric": "hunting cycle",
+    "asymmetric": "asymmetric cycle",
+    "whole": "hunting cycle",
+}
+COLOURS: dict[CycleShape, str] = {"symmetric": INK, "asymmetric": BLUE, "whole": INK}
+SYMBOLS: dict[str, Symbol] = {"flip": "circle", "fold": "triangle", "torus": "patch"}
+DASHES: dict[str, Dash] = {"flip": "solid", "fold": "dashed", "torus": "dotted"}
+NODES = {
+    ATTRACTS: Category("hunting is possible", VERMILLION),
+    REPELS: Category("no hunting was found", QUIET),
+    UNKNOWN: Category("unknown", "#ffffff"),
+    INVALID: Category("invalid stage", LIGHT),
+}
+
+LOST = "a change, no curve begun"
+"""What is said of places between stages that differ, where no curve could be begun."""
+
+REACH = 2.5
+"""Multipliers up to which they are shown."""
+
+LOGARITHMIC = 30.0
+"""Ratio of the largest to the smallest amplitude from which on its axis is logarithmic."""
+
+MARGIN = 0.02
+"""Share of a range by which the plane of two keys is drawn larger, so that nodes at its sides are seen whole."""
+
+
+def boundary_figure(traced: Diagram | Plane, keys: tuple[ShownKey, ...], subject: str = "") -> Figure:
+    """The branches over one key, or the curves in the plane of two; special points are named in the units shown."""
+    figure = _diagram(traced, keys[0]) if isinstance(traced, Diagram) else _plane(traced)
+    return replace(figure, subject=subject)
+
+
+def _diagram(traced: Diagram, key: ShownKey) -> Figure:
+    """Amplitude, period and multiplier of all cycles over the key; the legend stands above the first of them."""
+    branches, x = lines(traced), _axis(traced.space.ranges[0])
+    sizes = [size for line in branches for size in line.amplitude]
+    log = max(sizes, default=0.0) > LOGARITHMIC * min(sizes, default=0.0)
+    panels = (
+        _panel(branches, "amplitude", x, Axis("Amplitude", "m", log=log), key),
+        _panel(branches, "period", x, Axis("Period", "s")),
+        _panel(branches, "multiplier", x, Axis("Multiplier", "", (-REACH, REACH))),
+    )
+    bounds = Limit((-1.0, 1.0), "", GREY, "dotted")
+    panels = (*panels[:2], replace(panels[2], title="A cycle attracts between −1 and 1", limits=(bounds,)))
+    styles = "Solid: the cycle attracts, nearby motions end in it. Dashed: it repels."
+    note = f"{styles if branches else 'No cycle was found.'} {end_sentence(traced, key)}"
+    return Figure("boundary", "Hunting cycles", "", panels, note=note)
+
+
+def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: ShownKey | None = None) -> Panel:
+    """One measure of all branches, with their special points; with labels if there is a key."""
+    labels: set[str] = set()
+    series = []
+    for line in branches:
+        for attracts, run in _runs(line):
+            label = f"{NAMES[line.shape]} {'attracts' if attracts else 'repels'}"
+            text = label if key and label not in labels else ""
+            labels.add(label)
+            style = ("solid", 2.0) if attracts else ("dashed", 1.4)
+            series.append(Series(line.at[run, 0], getattr(line, measure)[run], text, COLOURS[line.shape], *style))
+    turns = sorted(((line, k) for line in branches for k in line.special), key=lambda turn: turn[0].at[turn[1], 0])
+    markers = []
+    for line, k in turns:
+        text = f"{line.kinds[k]} at {key.as_known(line.at[k, 0], line.error[k, 0])}" if key else ""
+        value = getattr(line, measure)[[k]]
+        markers.append(Markers(line.at[[k], 0], value, text, COLOURS[line.shape], SYMBOLS[line.kinds[k]]))
+    return Panel("", x, y, tuple(series), tuple(markers))
+
+
+def _runs(line: Line) -> Iterator[tuple[bool, np.ndarray]]:
+    """The parts of a branch between changes: whether its cycles attract there, and the numbers of its points."""
+    changes = np.flatnonzero(np.diff(line.attracts)) + 1
+    for legs in np.split(np.arange(line.attracts.size), changes):
+        if legs.size:
+            yield bool(line.attracts[legs[0]]), np.append(legs, legs[-1] + 1)
+
+
+def _plane(traced: Plane) -> Figure:
+    """The curves, and between them the verdicts at the nodes of the grid."""
+    x, y = (_axis(swept, MARGIN) for swept in traced.space.ranges)
+    curves = lines(traced)
+    series = tuple(
+        Series(
+            line.at[:, 0],
+            line.at[:, 1],
+            f"{line.kinds[0]} of {CYCLES[line.shape]}",
+            COLOURS[line.shape],
+            DASHES[line.kinds[0]],
+            2.2,
+        )
+        for line in curves
+    )
+    across, up, verdicts = zip(*node_verdicts(traced), strict=True)
+    codes = np.array([list(NODES).index(verdict) for verdict in verdicts], dtype=float)
+    numbers = np.full(codes.shape, np.nan)
+    nodes = Cloud(np.array(across), np.array(up), numbers, "", "", categories=tuple(NODES.values()), codes=codes)
+    kinds = dict.fromkeys(line.kinds[0] for line in curves)
+    meanings = [f"Beyond a {kind} of a cycle, {MEANINGS[kind]}." for kind in kinds]
+    note = " ".join([*meanings, BASIN] if any(line.shape == "asymmetric" for line in curves) else meanings)
+    gaps = lost_places(traced)
+    markers = (Markers(gaps[:, 0], gaps[:, 1], LOST, GREY, "cross"),) if len(gaps) else ()
+    return Figure("boundary", "Edge of hunting", "", (Panel("", x, y, series, markers, clouds=(nodes,)),), note=note)
+
+
+def _axis(swept: KeyRange, margin: float = 0.0) -> Axis:
+    low, high = swept.at(np.array([-margin, 1 + margin])).tolist()
+    return Axis(quantity(swept.key), swept.unit, (low, high), swept.log)

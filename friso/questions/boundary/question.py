@@ -1,0 +1,153 @@
+"""Where hunting ends: over one key, or in the plane of two."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from friso.axis import AxisKind
+from friso.equations.bandwidth import range_example
+from friso.hunting import CYCLE_RTOL, Diagram, KeyRange, Plane
+from friso.interface.answer import Answer, question
+from friso.interface.inputs import (
+    Changes,
+    StageLike,
+    axes_of,
+    mention_unstable_loop,
+    pairs_of,
+    read_stage,
+    stem_of,
+    tolerance_of,
+    wrong,
+)
+from friso.progress import Progress, silent
+from friso.quantities import Quantity, any_sign
+from friso.stage import Stage
+
+if TYPE_CHECKING:
+    from friso.questions.boundary.words import ShownKey
+    from friso.shown.drawing.figure import Figure
+    from friso.shown.files import Files
+
+
+class BoundaryAnswer(Answer):
+    """Where hunting ends: `result` is a `Diagram` over one key or a `Plane` of two; `texts`, its ranges as given."""
+
+    command = "boundary"
+
+    def __init__(self, stage: Stage, traced: Diagram | Plane, texts: Sequence[str], name: str) -> None:
+        self.stage, self.result, self.texts, self.name = stage, traced, tuple(texts), name
+        self.axis_kind = stage.axis_kind
+
+    @cached_property
+    def keys(self) -> tuple[ShownKey, ...]:
+        """The keys, in the units in which their ranges were given."""
+        ranges = zip(self.result.space.ranges, self.texts, strict=True)
+        return tuple(_in_its_unit(swept, text, self.axis_kind) for swept, text in ranges)
+
+    def sentences(self) -> Sequence[str]:
+        """Where hunting ends, in one sentence."""
+        from friso.questions.boundary.words import conclusion
+
+        return [conclusion(self.result, self.keys)]
+
+    def details(self) -> Sequence[str]:
+        """Every special point, branch and curve."""
+        from friso.questions.boundary.words import sentences
+
+        return sentences(self.result, self.keys)[1:]
+
+    def figures(self) -> Sequence[Figure]:
+        """The branches of cycles, or the curves on which hunting ends."""
+        from friso.questions.boundary.figures import boundary_figure
+
+        return [boundary_figure(self.result, self.keys, self.stage.name)]
+
+    def document(self) -> dict[str, Any]:
+        """Points, branches and curves."""
+        from friso.questions.boundary.document import boundary_document
+
+        return boundary_document(self.result, self.keys)
+
+    def files(self) -> Files:
+        """The page, the figure, and the table of its points."""
+        from friso.questions.boundary.page import boundary_files
+
+        return boundary_files(self.result, self.keys, self.stage, f"{self.name}_boundary")
+
+
+@question
+def boundary(
+    stage: StageLike,
+    axes: Mapping[str, str] | None = None,
+    *,
+    x: str | None = None,
+    y: str | None = None,
+    link: Changes = None,
+    log: bool = False,
+    rtol: float | str = CYCLE_RTOL,
+    set: Changes = None,
+    progress: Progress = silent,
+) -> BoundaryAnswer:
+    """Where hunting ends: the values at which the hunting cycle stops attracting, over one key or two.
+
+    Parameters
+    ----------
+    stage : Stage, path or dict
+        The stage, its file, or the tables of one. Its motion plays no part.
+    axes : dict, optional
+        One key or two with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``; behind ":log", logarithmic.
+    x, y : str, optional
+        The same as texts, as on the command line: ``x="controller.crossover=1 Hz..40 Hz"``.
+    link : dict, optional
+        Keys tied to others: ``{"masses.cart": "0.7 * mass"}``.
+    log : bool
+        Whether both ranges are logarithmic.
+    rtol : float
+        Relative tolerance of the solver, at most 1e-6.
+    set : dict, optional
+        Keys to override, ``{"joint.locked": True}``.
+    progress : Progress
+        Called as cycles are followed.
+
+    Returns
+    -------
+    BoundaryAnswer
+        All branches of cycles over one key, or the curves in the plane of two on which hunting ends.
+
+    Raises
+    ------
+    InputError
+        For a range, a link or a stage that is not usable, such as one that cannot hunt.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.boundary(friso.example("thesis_rig"), x="controller.crossover=1 Hz..40 Hz")  # doctest: +SKIP
+    """
+    chosen, tolerance = read_stage(stage, set), tolerance_of(rtol)
+    example = range_example(chosen.flat())
+    ranges = axes_of(axes or {}, {"x": x, "y": y}, example)
+    if not ranges or (y and not (x or axes)):
+        raise wrong("x", "no key", "one key or two with their ranges", example)
+    links = pairs_of(link, "link", 'masses.cart="0.7 * mass"')
+    from friso.studies.boundary import boundary as traced_boundary
+
+    def begins() -> None:
+        mention_unstable_loop(chosen)
+        progress(0, 0, f"following cycles over {' and '.join(ranges)}")
+
+    traced = traced_boundary(chosen, ranges, links, tolerance, log, begins, progress)
+    return BoundaryAnswer(chosen, traced, [*ranges.values()], stem_of(stage))
+
+
+def _in_its_unit(swept: KeyRange, text: str, axis: AxisKind) -> ShownKey:
+    """A key in the unit in which its range was given, that of the last value."""
+    from friso.questions.boundary.words import ShownKey
+
+    match = re.search(r"\.\.\s*[-+.\deE]*\s*([^:]*)", text)
+    unit = match[1].strip() if match else ""
+    field = Quantity(swept.unit, any_sign, "").on(axis)
+    return ShownKey(swept.key, unit, field.factor(unit)) if unit else ShownKey(swept.key)

@@ -1,0 +1,318 @@
+"""A boundary of hunting in words: where hunting ends, each special point, branch and curve, and the verdicts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from friso.hunting import END_OF_RANGE, Diagram, KeyRange, Plane, Space
+from friso.shown.drawing.figure import Array
+from friso.shown.drawing.prefixes import listed, plus_minus, pretty, with_unit
+from friso.studies.boundary_lines import (
+    ATTRACTS,
+    INVALID,
+    REPELS,
+    UNKNOWN,
+    CycleShape,
+    Line,
+    PlaneEdge,
+    StabilityChange,
+    corner_verdicts,
+    end_verdicts,
+    followed_changes,
+    lines,
+    lost_places,
+    place_verdicts,
+    plane_edge,
+    stability_changes,
+)
+
+VERDICTS = {
+    ATTRACTS: "hunting is possible",
+    REPELS: "no hunting was found",
+    UNKNOWN: "unknown (some simulations failed or had not settled when they were stopped, or something may attract "
+    "beyond them)",
+    INVALID: "not a valid stage",
+}
+CYCLES: dict[CycleShape, str] = {
+    "symmetric": "the hunting cycle",
+    "asymmetric": "an asymmetric cycle",
+    "whole": "the hunting cycle",
+}
+MEANINGS = {
+    "flip": "it still exists, but repels",
+    "fold": "it has merged with another cycle, and neither exists",
+    "torus": "it still exists, but motions spiral away from it",
+}
+"""What has become of a cycle on the other side of a special point."""
+BASIN = "Asymmetric cycles bound the basin of the hunting cycle."
+
+
+PLAIN = 1e-5
+"""Share of a value by which it may be off and still be told alone, in six digits."""
+
+
+@dataclass(frozen=True)
+class ShownKey:
+    """A key and the unit in which its values are printed: its name, and its value in SI."""
+
+    key: str
+    unit: str = ""
+    factor: float = 1.0
+
+    def number(self, value: float) -> float:
+        """A value [SI] in the unit."""
+        return float(f"{value / self.factor:.15g}")
+
+    def text(self, value: float, digits: int = 6) -> str:
+        """A value [SI] with its unit."""
+        return self._with_unit(f"{self.number(value):.{digits}g}")
+
+    def uncertain(self, value: float, error: float) -> str:
+        """A value with its error [SI], to a digit more than that."""
+        if not math.isfinite(error):
+            return f"{self.text(value)} (error unknown)"
+        number, off = self.number(value), self.number(error)
+        rounded = round(number, 1 - math.floor(math.log10(off))) if off > 0 else number
+        return self._with_unit(f"{rounded:.6g} ± {float(f'{off:.1g}'):g}")
+
+    def as_known(self, value: float, error: float) -> str:
+        """The same, without an error that its digits do not show."""
+        return self.text(value) if error < PLAIN * abs(value) else self.uncertain(value, error)
+
+    def extent(self, values: Array, swept: KeyRange) -> str:
+        """From the lowest value [SI] to the highest inside a range."""
+        low, high = self.number(max(swept.low, float(values.min()))), self.number(min(swept.high, float(values.max())))
+        return self._with_unit(f"{low:.6g} to {high:.6g}")
+
+    def _with_unit(self, numbers: str) -> str:
+        return f"{numbers} {pretty(self.unit)}".rstrip()
+
+
+ROUGHLY = 3
+"""Digits of where a curve begins and ends, in the answer."""
+
+
+SHOWN_CURVES = 3
+"""Curves at most of which the answer says where they run; the figure and the details have all."""
+
+
+def sentences(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+    """All that is said, in order, the answer first."""
+    details = _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
+    return [conclusion(traced, keys), *details]
+
+
+def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
+    """Where hunting is possible, and where it ends; first of all, where the loop is not stable."""
+    return " ".join([*_unstable(traced, keys), _where(traced, keys)])
+
+
+def _unstable(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+    """At which of the values tried the loop is not stable, whatever the friction."""
+    if not traced.unstable.any():
+        return []
+    points = traced.places[:, None] if isinstance(traced, Diagram) else traced.space.grid(traced.nodes)[traced.allowed]
+    values = traced.space.values(points[traced.unstable]).values()
+    box = zip(keys, values, traced.space.ranges, strict=True)
+    places = listed([f"{key.key} {key.extent(column, swept)}" for key, column, swept in box], "and")
+    return [
+        f"The loop is unstable, whatever the friction, at {np.count_nonzero(traced.unstable)} of the "
+        f"{traced.unstable.size} stages tried ({places}): there, retune the controller (friso bode)."
+    ]
+
+
+def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
+    if isinstance(traced, Diagram):
+        return f"{_edges(traced, keys[0])} {end_sentence(traced, keys[0])}"
+    if edge := plane_edge(traced):
+        return _along_one(edge, keys)
+    verdicts = [verdict for _, _, verdict in corner_verdicts(traced)]
+    if curves := lines(traced):
+        longest = sorted(curves, key=lambda line: -len(line.at))[:SHOWN_CURVES]
+        more = [f"There are {len(curves) - len(longest)} more curves."] if len(curves) > len(longest) else []
+        return " ".join([_hunting_corners(traced, keys), *(_course(line, keys) for line in longest), *more])
+    if traced.gaps or UNKNOWN in verdicts:
+        return f"{_hunting_corners(traced, keys)} No curve could be followed."
+    return f"{_hunting_corners(traced, keys)} {_no_boundary(traced.space, keys)}"
+
+
+def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
+    """Below or above which values of one key hunting is possible, from one end of the other one's range to the other:
+    the first and last, and what lies farther out in between."""
+    along, across = keys[edge.along], keys[1 - edge.along]
+    side, other = ("below", "above") if edge.below else ("above", "below")
+
+    def ends(k: int) -> str:
+        low, high = (along.text(float(column[k]), ROUGHLY) for column in (edge.low, edge.high))
+        return low if edge.low[k] == edge.high[k] else f"{low} to {high}"
+
+    def at(k: int) -> str:
+        return f"{across.key} = {across.text(float(edge.across[k]), ROUGHLY)}"
+
+    answer = f"Hunting is possible {side} {along.key} = {ends(0)} at {at(0)}, and {side} {ends(-1)} at {at(-1)}"
+    farther = [int(np.argmin(edge.low)), int(np.argmax(edge.high))]
+    beyond = [f"{ends(k)} at {at(k)}" for k in dict.fromkeys(farther) if ends(k) not in (ends(0), ends(-1))]
+    between = f", {side} {listed(beyond, 'and')} in between" if beyond else ""
+    return f"{answer}{between}; {other}, none was found."
+
+
+def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
+    """At which corners of the plane hunting is possible."""
+    corners = corner_verdicts(traced)
+    hunting = [_place((x, y), keys) for x, y, verdict in corners if verdict == ATTRACTS]
+    unknown = sum(verdict == UNKNOWN for _, _, verdict in corners)
+    others = f" (unknown at {unknown})" if unknown else ""
+    if len(hunting) in (0, len(corners)):
+        return f"Hunting is possible at {'all' if hunting else 'none'} of the corners of the plane{others}."
+    return f"Of the corners of the plane, hunting is possible at {'; '.join(hunting)}{others}."
+
+
+def _course(line: Line, keys: tuple[ShownKey, ...]) -> str:
+    """From where to where a boundary runs, and why it ends there."""
+    first, last = (_place(place, keys, ROUGHLY) for place in line.at[[0, -1]].tolist())
+    return f"A {line.kinds[0]} of {CYCLES[line.shape]} runs from {first} to {last}{_ends(line)}."
+
+
+def _edges(traced: Diagram, key: ShownKey) -> str:
+    """Where hunting begins and ends over the range, and how finely that was looked for."""
+    changes, verdicts = stability_changes(traced), place_verdicts(traced)
+    values_tried = f"{len(verdicts)} values were tried"
+    unknown = f"; unknown at {verdicts.count(UNKNOWN)} of them" if UNKNOWN in verdicts else ""
+    at = {change.low for change in changes}
+    errors = {float(line.at[k, 0]): float(line.error[k, 0]) for line in lines(traced) for k in line.special}
+    others = [(value, begins) for value, begins in followed_changes(traced) if value not in at]
+    answer = f"{_no_boundary(traced.space, (key,))[:-1]} ({values_tried}{unknown})."
+    if changes:
+        places = [
+            f"{'begins' if change.begins else 'ends'} {_between(change, key, errors)}{_if_unstable(traced, change)}"
+            for change in changes
+        ]
+        answer = f"Hunting {listed(places, 'and')} ({values_tried}{unknown})."
+    return " ".join([answer, *_also_attracting(others, key, errors)])
+
+
+def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors: Mapping[float, float]) -> list[str]:
+    """Ranges, or their ends, in which a cycle attracts between the values that were tried; `turns` are the values at
+    which one begins to (true), or ceases to, in ascending order."""
+    text = {value: key.as_known(value, errors[value]) for value, _ in turns}
+    ranges = [(low, high) for (low, begins), (high, begins_too) in pairwise(turns) if begins and not begins_too]
+    within = {value for ends in ranges for value in ends}
+    others = [text[value] for value, _ in turns if value not in within]
+    spans = [f"from {text[low]} to {text[high]}" for low, high in ranges]
+    return [
+        *([f"Between values tried, a cycle attracts {listed(spans, 'and')} as well."] if spans else []),
+        *([f"Cycles also begin or stop attracting at {listed(list(dict.fromkeys(others)), 'and')}."] if others else []),
+    ]
+
+
+def _if_unstable(traced: Diagram, change: StabilityChange) -> str:
+    """That a change lies where the loop is unstable anyway; "" where it is not."""
+    beside = np.argmin(np.abs([traced.value(place) - change.low for place in traced.places]))
+    return " (where the loop is unstable anyway)" if traced.unstable[beside] else ""
+
+
+def _between(change: StabilityChange, key: ShownKey, errors: Mapping[float, float]) -> str:
+    """Where hunting begins or ends; `errors` of special points [SI] by their values."""
+    if change.low == change.high:
+        return f"at {key.key} = {key.as_known(change.low, errors[change.low])}"
+    return f"between {key.key} = {key.text(change.low)} and {key.text(change.high)}, where no cycle could be followed"
+
+
+def _of_diagram(traced: Diagram, key: ShownKey) -> list[str]:
+    branches = lines(traced)
+    turns = sorted((line.at[k, 0], _turn(line, k, key)) for line in branches for k in line.special)
+    return [*(text for _, text in turns), *(_branch_sentence(line, key, traced.space) for line in branches)]
+
+
+def _turn(line: Line, k: int, key: ShownKey) -> str:
+    """What happens to a cycle at a special point of its branch as the key rises."""
+    value = float(line.at[k, 0])
+    above = [j for j in (k - 1, k + 1) if 0 <= j < len(line.at) and line.at[j, 0] > value]
+    goes_on = bool(above) if line.kinds[k] == "fold" else any(line.attracts[min(j, k)] for j in above)
+    verb = _VERBS[line.kinds[k] == "fold", goes_on]
+    size = f"{plus_minus(line.amplitude[k], 'm')} every {with_unit(line.period[k], 's')}"
+    where = f"{key.key} = {key.uncertain(value, float(line.error[k, 0]))}"
+    meaning = f"{line.kinds[k]}: {'below' if goes_on else 'above'}, {MEANINGS[line.kinds[k]]}"
+    return f"{CYCLES[line.shape].capitalize()} ({size}) {verb} at {where} ({meaning})."
+
+
+_VERBS = {
+    (True, True): "appears",
+    (True, False): "vanishes",
+    (False, True): "begins to attract",
+    (False, False): "stops attracting",
+}
+
+
+def _branch_sentence(line: Line, key: ShownKey, space: Space) -> str:
+    """Over which values a branch was followed, and how it ends."""
+    pair = "Asymmetric cycles, which bound the basin of the hunting cycle where they repel,"
+    name = pair if line.shape == "asymmetric" else "Hunting cycles"
+    return f"{name} were followed over {key.extent(line.at[:, 0], space.ranges[0])}{_ends(line)}."
+
+
+def end_sentence(traced: Diagram, key: ShownKey) -> str:
+    """The verdicts at both ends of the range."""
+    swept = traced.space.ranges[0]
+    first, last = end_verdicts(traced)
+    return f"At {key.text(swept.low)}: {VERDICTS[first]}; at {key.text(swept.high)}: {VERDICTS[last]}."
+
+
+def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+    curves = lines(traced)
+    text = [_curve(line, keys, traced.space) for line in curves]
+    text += [
+        f"{kind.capitalize()}: beyond, {MEANINGS[kind]}." for kind in dict.fromkeys(line.kinds[0] for line in curves)
+    ]
+    text += [BASIN] if any(line.shape == "asymmetric" for line in curves) else []
+    return [*text, *_corners(traced, keys), *_untraced(traced, keys)]
+
+
+def _curve(line: Line, keys: tuple[ShownKey, ...], space: Space) -> str:
+    """How many points a curve has, where it runs, how it ends, and its largest errors."""
+    sides = zip(keys, line.at.T, space.ranges, strict=True)
+    extents = ", ".join(f"{key.key} {key.extent(values, swept)}" for key, values, swept in sides)
+    finite = line.error[np.isfinite(line.error).all(axis=1)]
+    errors = ", ".join(key.text(error, 1) for key, error in zip(keys, finite.max(axis=0, initial=0.0), strict=True))
+    head = f"{line.kinds[0].capitalize()} of {CYCLES[line.shape]}: {len(line.at)} points, {extents}"
+    unknown = len(line.error) - len(finite)
+    errors_at = [f"largest error: {errors}"] if len(finite) else []
+    errors_at += [f"error unknown at {unknown} of the points"] if unknown else []
+    return f"{head}{_ends(line)}; {', '.join(errors_at)}."
+
+
+def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+    """The verdicts at the corners, in one sentence where they agree."""
+    corners = corner_verdicts(traced)
+    if len({verdict for _, _, verdict in corners}) == 1:
+        return [f"At all four corners: {VERDICTS[corners[0][2]]}."]
+    return [f"At {_place((x, y), keys)}: {VERDICTS[verdict]}." for x, y, verdict in corners]
+
+
+def _untraced(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+    places = [_place(values, keys) for values in lost_places(traced).tolist()]
+    return [f"A change was found near {'; '.join(places)}, but no curve could be started there."] if places else []
+
+
+def _place(values: Sequence[float], keys: tuple[ShownKey, ...], digits: int = 6) -> str:
+    return ", ".join(f"{key.key} = {key.text(value, digits)}" for key, value in zip(keys, values, strict=True))
+
+
+def _no_boundary(space: Space, keys: tuple[ShownKey, ...]) -> str:
+    between = (
+        f"{key.key} {key.text(swept.low)} to {key.text(swept.high)}"
+        for key, swept in zip(keys, space.ranges, strict=True)
+    )
+    return f"No beginning or end of hunting was found for {', '.join(between)}."
+
+
+def _ends(line: Line) -> str:
+    """How a line ends, to follow where it runs."""
+    if set(line.ends) == {END_OF_RANGE}:
+        return ", to both ends of the range"
+    return f"; ends: {'; '.join(dict.fromkeys(line.ends))}"

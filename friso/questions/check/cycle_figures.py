@@ -1,0 +1,139 @@
+"""The figures of a hunting cycle: the return map that shows whether there is one, and the cycle itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.equations.motion import last_corner
+from friso.questions.check.traces import common_range, samples, subject, trace_of
+from friso.shown.cases import ShownCase
+from friso.shown.drawing.figure import GREY, INK, Array, Axis, Band, Dash, Figure, Markers, Panel, Series
+
+if TYPE_CHECKING:
+    from friso.hunting import Cycle
+
+_VIEW = 2.2  # reach of a return map's axes, in units of the largest cycle, or swing followed by one as large
+_STARTS, _FOLLOWED = 401, 300  # distances that are followed by a return map, and for how many swings
+_BASIN = "#fbe3d6"  # a pale vermillion, the colour of hunting
+_APART = 0.01  # share of the amplitude from which on the cart is seen to move otherwise than the stage
+_DASHES: dict[bool, Dash] = {True: "solid", False: "dashed"}
+_WORDS = {True: "attracts", False: "repels"}
+
+
+def return_map_figure(cases: list[ShownCase]) -> Figure:
+    """How far each swing reaches against the one before: the map, and this motion's own swings."""
+    panels = tuple(panel for item in cases for panel in _return_map(item))
+    caption = (
+        "Each swing of the stage past its target (curve: from the positive side), given by its turning point, against "
+        "the previous one. Where the curve crosses the dashed diagonal, every swing reaches as far as the last: a "
+        "hunting cycle, which attracts if the curve is less steep there than the diagonal; where it stays below, "
+        "swings die out. The thin line is this motion after its last move. Shaded are the distances from which swings "
+        "end in hunting, by this curve. Beyond its ends the stage does not swing past its target."
+    )
+    if any((joint := item.case.stage.joint) and not joint.locked for item in cases):
+        caption += (
+            " A stage on a free joint turns farther out than the point where its cart sticks, slightly off the curve."
+        )
+    hunting = [(item.label, item.case.judgement.hunting) for item in cases]
+    caption += "".join(f" {label}: no cycle, as {search.reason}." for label, search in hunting if search.reason)
+    return Figure("return-map", "Does the next swing reach as far?", caption, panels, 2, subject(cases))
+
+
+def _return_map(item: ShownCase) -> list[Panel]:
+    hunting = item.case.judgement.hunting
+    if hunting.returns is None or not np.any(hunting.returns.returns > 0):
+        return []
+    distances, returns = hunting.returns.distances[0], hunting.returns.returns[0]
+    largest = max([cycle.amplitude for cycle in hunting.cycles], default=np.max(np.minimum(distances, returns)))
+    reach = _VIEW * float(largest)
+    swings = np.repeat(_swings(item), 2)
+    series = [
+        Series(np.array([0.0, reach]), np.array([0.0, reach]), "", GREY, "dashed"),
+        Series(distances, np.where(returns > 0, returns, np.nan), "next swing", item.colour, width=2.2),
+    ]
+    if swings.size > 2:
+        series.append(Series(swings[1:-1], swings[2:], "this motion", INK, width=0.8))
+    x, y = Axis("This swing", "m", (0.0, reach)), Axis("Next swing", "m", (0.0, reach))
+    mirrored = bool(hunting.cycles) and all(cycle.symmetric for cycle in hunting.cycles)
+    basins = _basins(distances, returns, reach) if hunting.attracting and mirrored else ()
+    return [Panel(item.label, x, y, tuple(series), _fixed_points(hunting.cycles), bands=basins)]
+
+
+def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:
+    """Strips over the distances up to `reach` [m] from which swings go on for ever, by a map that was followed from
+    swing to swing, of a stage that is its own mirror image."""
+    starts = np.linspace(0.0, reach, _STARTS)
+    at = starts
+    for _ in range(_FOLLOWED):
+        at = np.interp(at, distances, np.maximum(returns, 0.0), left=0.0, right=0.0)
+    ends = np.flatnonzero(np.diff((at > 0).astype(int), prepend=0, append=0))
+    floor, top = np.zeros(2), np.full(2, reach)
+    strips = [starts[[first, after - 1]] for first, after in zip(ends[::2], ends[1::2], strict=True)]
+    labels = ["ends in hunting", *[""] * len(strips)]
+    return tuple(Band(strip, floor, top, label, _BASIN) for strip, label in zip(strips, labels, strict=False))
+
+
+def _swings(item: ShownCase) -> Array:
+    """How far the stage swings to one side and the other in turn [m], after the last corner of the reference."""
+    trace = trace_of(item)
+    late = samples(trace, "turning_time") > last_corner(item.case.stage.flat())
+    turns = samples(trace, "turning_deviation")[late]
+    sides = np.split(turns, np.flatnonzero(np.diff(np.sign(turns))) + 1)
+    return np.array([np.abs(side).max() for side in sides if side.size])
+
+
+def _fixed_points(cycles: tuple[Cycle, ...]) -> tuple[Markers, ...]:
+    """The cycles by their two turning points, those that attract and those that repel; of a stage that is its own
+    mirror image also the mirror images."""
+    mirrored = any(cycle.symmetric for cycle in cycles)
+    markers = []
+    for attracts, label in _WORDS.items():
+        position = [samples(cycle.trace, "position") for cycle in cycles if cycle.attracts == attracts]
+        x, y = (np.array([np.max(side * array) for array in position]) for side in (1, -1))
+        if mirrored:
+            x, y = np.concatenate((x, y)), np.concatenate((y, x))
+        if x.size:
+            markers.append(Markers(x, y, label, INK, "target" if attracts else "cross"))
+    return tuple(markers)
+
+
+def cycle_figure(cases: list[ShownCase]) -> Figure:
+    """One period of every cycle in time, and as a loop of velocity over position."""
+    panels = tuple(panel for item in cases if item.case.judgement.hunting.cycles for panel in _cycle_panels(item))
+    caption = (
+        "One period: the stage sticks off its target while the integral action winds up the actuator force, breaks "
+        "away, overshoots and sticks on the other side. Motions near a solid cycle end in it; motions near a dashed "
+        "one leave it."
+    )
+    return Figure("cycle", "The hunting cycle", caption, panels, 3, subject(cases))
+
+
+def _cycle_panels(item: ShownCase) -> list[Panel]:
+    cycles = item.case.judgement.hunting.cycles
+    time = Axis("Time", "s", (0.0, max(cycle.period for cycle in cycles)))
+    names = ["stage"] if len(cycles) == 1 else [_WORDS[cycle.attracts] for cycle in cycles]
+    lines = [line for cycle, name in zip(cycles, names, strict=True) for line in _positions(cycle, name, item.colour)]
+    forces = [_line(cycle, "time", "force", "", item.colour) for cycle in cycles]
+    loops = [_line(cycle, "position", "velocity", "", item.colour) for cycle in cycles]
+    size = Axis("Position", "m", common_range([line.y for line in lines]))
+    return [
+        Panel(f"{item.label}: position", time, size, tuple(lines)),
+        Panel("Actuator force", time, Axis("Force", "N"), tuple(forces)),
+        Panel("Velocity over position", size, Axis("Velocity", "m/s"), tuple(loops)),
+    ]
+
+
+def _positions(cycle: Cycle, label: str, colour: str) -> list[Series]:
+    """The stage, and the cart where it is seen to move otherwise."""
+    lines = [_line(cycle, "time", "position", label, colour)]
+    if "cart_position" in cycle.trace:
+        cart = _line(cycle, "time", "cart_position", "cart", INK)
+        if np.max(np.abs(cart.y - lines[0].y)) > _APART * cycle.amplitude:
+            lines.append(cart)
+    return lines
+
+
+def _line(cycle: Cycle, x: str, y: str, label: str, colour: str) -> Series:
+    return Series(samples(cycle.trace, x), samples(cycle.trace, y), label, colour, _DASHES[cycle.attracts])

@@ -1,0 +1,193 @@
+"""The JSON document of `friso check` (design.md, section 3)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from friso.questions.check.laws import laws_document
+from friso.questions.check.words import answer
+from friso.shown.documents import plain_json
+from friso.stage.tables import passive_where
+
+if TYPE_CHECKING:
+    from friso.hunting import AttractionEnd, Case, Cycle, Feeding, Judgement, Margin, MarginEnd, ParameterMargin, Swing
+    from friso.remedies.suggestion import Suggestion
+    from friso.shares import Share
+    from friso.studies.draws import Draws
+    from friso.studies.laws.verdicts import VerdictsByLaw
+
+
+def check_document(
+    cases: Mapping[str, Case],
+    draws: Draws | None = None,
+    isolator: Suggestion | None = None,
+    laws: VerdictsByLaw | None = None,
+) -> dict[str, Any]:
+    """The cases with their verdicts, what stages drawn from an uncertain one do, what an isolator would, and the
+    verdicts across friction laws."""
+    document = {name: _case(case) for name, case in cases.items()}
+    if draws is not None:
+        for name, case in document.items():
+            case["draws"] = draws_document(draws, name)
+    return plain_json(
+        {
+            "conclusion": " ".join(answer(cases)),
+            "stage": cases["given"].stage.name,
+            "friction_passive_where": passive_where(cases["given"].stage.flat()) or None,
+            "cases": document,
+            **({"isolator": _isolator(isolator)} if isolator else {}),
+            **({"laws": laws_document(laws)} if laws else {}),
+        }
+    )
+
+
+def _isolator(isolator: Suggestion) -> dict[str, Any]:
+    flat = isolator.stage.flat()
+    return {
+        "settles": isolator.settles,
+        "stiffness_n_per_m": flat["joint.stiffness"],
+        "stroke_m": flat["joint.stroke"],
+        "damping_ns_per_m": flat["joint.damping"],
+        "modulus_margin": isolator.margin,
+    }
+
+
+def _feeding(feeding: Feeding) -> dict[str, Any]:
+    """Down to which share of friction, and of backlash, hunting lasts, and from which on it does not."""
+    parts = {"friction": feeding.friction, "backlash": feeding.backlash}
+    return {name: asdict(part) | {"needed": part.needed} for name, part in parts.items() if part}
+
+
+def _case(case: Case) -> dict[str, Any]:
+    into_1um, into_10um = case.settling_time.values()
+    last_1um, last_10um = case.in_the_end.values()
+    judgement = case.judgement
+    return {
+        "verdict": case.verdict,
+        "peaks": case.peaks,
+        "peak_to_peak_m": case.peak_to_peak,
+        "period_s": case.period,
+        "settling_time_s": into_1um,
+        "settling_time_10um_s": into_10um,
+        "settling_time_in_the_end_s": last_1um,
+        "settling_time_10um_in_the_end_s": last_10um,
+        "largest_force_n": case.largest_force,
+        "breakaway_force_n": case.breakaway,
+        "unmoved": case.unmoved,
+        "cycle": _cycle(judgement.cycle) if judgement.cycle else None,
+        "cycles": len(judgement.hunting.cycles),
+        "reason": judgement.hunting.reason or None,
+        "settled_after_s": judgement.settled_after,
+        "margin": _margin(judgement.margin) if judgement.margin else None,
+        "windows": [{"low": _end(window.low), "high": _end(window.high)} for window in judgement.windows],
+        "settles_below": _end(judgement.lower),
+        "static_friction": _parameter_margin(case.static_friction) if case.static_friction else None,
+        "advice_keeps_friction": case.advice_keeps_friction,
+        "kick": _kick(judgement),
+        "displacements_that_run_away_m": judgement.running_away.windows if judgement.running_away else None,
+        "moves": {"drawn": judgement.moves.count, "hunting": judgement.moves.hunting} if judgement.moves else None,
+        "observed": judgement.observed,
+        "given_up": judgement.given_up,
+        "loop_unstable_while_it": case.unstable,
+        **({"feeding": _feeding(case.feeding)} if case.feeding else {}),
+        "observed_swings": [_swing(swing) for swing in judgement.hunting.observed],
+        "certain": judgement.hunting.certain,
+        "solver": {
+            "status": case.solver.status,
+            "steps": case.solver.steps,
+            "rejected": case.solver.rejected,
+            "rtol": case.solver.rtol,
+        },
+    }
+
+
+def _cycle(cycle: Cycle) -> dict[str, Any]:
+    return {
+        "amplitude_m": cycle.amplitude,
+        "period_s": cycle.period,
+        "swings_per_period": cycle.swings,
+        "multiplier": cycle.multiplier,
+        "symmetric": cycle.symmetric,
+        "attracts": cycle.attracts,
+        "slope": cycle.slope,
+        "growth": cycle.growth,
+        "residual": cycle.residual,
+        "time_constant_s": cycle.time_constant,
+    }
+
+
+def _swing(swing: Swing) -> dict[str, Any]:
+    return {
+        "amplitude_m": swing.amplitude,
+        "period_s": swing.period,
+        "regular": swing.regular,
+        "swings_per_period": swing.swings,
+    }
+
+
+def _kick(judgement: Judgement) -> dict[str, Any] | None:
+    if judgement.displacement is None or judgement.push is None:
+        return None
+    return {
+        "displacement_m": judgement.displacement.windows,
+        "velocity_m_per_s": judgement.push.windows,
+        "displacements_given_up": judgement.displacement.unknown,
+        "velocities_given_up": judgement.push.unknown,
+    }
+
+
+def _margin(edge: Margin) -> dict[str, Any]:
+    crossover = {"factor": edge.factor, "crossover_hz": edge.crossover, "certain": edge.certain}
+    return {**crossover, "settles_at_factor": edge.quiet, "reserve": edge.reserve}
+
+
+def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
+    """One end of the bandwidths at which something attracts."""
+    if end is None:
+        return None
+    return {
+        "factor": end.inside,
+        "settles_at_factor": end.outside,
+        "certain": end.certain,
+        "reserve": end.reserve,
+    }
+
+
+def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
+    """At which multiples of a parameter hunting begins, or ends: of the last with which it is as with the parameter
+    itself, and the next with which it is not."""
+
+    def end(one: MarginEnd | None) -> dict[str, Any] | None:
+        return one and {"same_at_factor": one.same, "other_at_factor": one.other, "certain": one.certain}
+
+    return {
+        "hunts": margin.attracts,
+        "below": end(margin.below),
+        "above": end(margin.above),
+        "searched": margin.range,
+        "not_determined": [{-1: "below", 1: "above"}[side] for side in margin.open_sides],
+    }
+
+
+def draws_document(draws: Draws, case: str) -> dict[str, Any]:
+    """What became of the stages drawn, in a case."""
+    from friso.hunting.criteria import ATTRACTED, VERDICT_CRITERION
+
+    fates = draws.fates[case]
+    return {
+        "count": draws.sample.count,
+        "seed": draws.seed,
+        "left_out": draws.sample.left_out,
+        "hunts": _share_document(fates.share(("hunts",))),
+        "attracting_cycle": _share_document(fates.share(ATTRACTED)),
+        "criterion": VERDICT_CRITERION,
+        "verdicts": fates.counts,
+        "loop_unstable": int(fates.unstable.sum()),
+        "separation": fates.separations(draws.sample.keys),
+    }
+
+
+def _share_document(share: Share) -> dict[str, float]:
+    return {"probability": share.probability, "low": share.low, "high": share.high}

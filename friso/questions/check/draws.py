@@ -1,0 +1,98 @@
+"""What stages drawn from an uncertain one do: the table, the sentences and the figure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.hunting.criteria import ATTRACTED, VERDICTS
+from friso.shown.cases import case_labels
+from friso.shown.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel
+from friso.shown.drawing.prefixes import NOTHING, share_with_interval
+from friso.studies.draws import Draws, Fates
+
+COLOURS = {"hunts": VERMILLION, "bistable": ORANGE, "transient": SKY, "settles": BLUE, "failed": GREY}
+
+BINS = 24
+"""Bars of the figure."""
+
+MOST_LISTED = 4
+"""Most keys whose influence on the verdict the table lists."""
+
+
+def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
+    """The rows of the table of draws, one text per case."""
+    fates = [draws.fates[name] for name in case_labels(draws.stage)]
+    rows = [
+        ("Hunts after this move", [share_with_interval(fate.share(("hunts",))) for fate in fates]),
+        ("A cycle attracts", [share_with_interval(fate.share(ATTRACTED)) for fate in fates]),
+        *((f"Verdict {word}", [str(fate.counts[word]) for fate in fates]) for word in VERDICTS),
+    ]
+    separations = [fate.separations(draws.sample.keys) for fate in fates]
+    strength = {
+        key: max((abs(separation[key]) for separation in separations if separation), default=0.0)
+        for key in draws.sample.keys
+    }
+    strongest = sorted(strength, key=lambda key: -strength[key])[:MOST_LISTED]
+    rows += [
+        (f"Decided by {key}", [f"{separation[key]:+.2f}" if separation else NOTHING for separation in separations])
+        for key in strongest
+    ]
+    return rows
+
+
+def draws_sentences(draws: Draws) -> list[str]:
+    """What the draws say, a sentence per case, and what was left out."""
+    sample = draws.sample
+    sentences = [f"{label}: {_sentence(draws.fates[name], draws)}" for name, label in case_labels(draws.stage).items()]
+    if sample.left_out:
+        reasons = [f"{count}: {why}" for why, count in sample.broken.items()]
+        beyond = [f"{sample.beyond}: a key beyond its bounds"] if sample.beyond else []
+        sentences.append(f"{sample.left_out} invalid draws were left out ({'; '.join([*beyond, *reasons])}).")
+    return sentences
+
+
+def _sentence(fates: Fates, draws: Draws) -> str:
+    failed, keys = fates.counts["failed"], fates.separations(draws.sample.keys)
+    lost = int(np.count_nonzero(fates.unstable))
+    sentences = (
+        [f"the loop of {lost} of {draws.sample.count} draws is unstable, whatever the friction."] if lost else []
+    )
+    sentences += [
+        f"of {draws.sample.count} draws, hunts with a probability of {share_with_interval(fates.share(('hunts',)))}, "
+        f"has a cycle that attracts with {share_with_interval(fates.share(ATTRACTED))}."
+    ]
+    if failed:
+        noun, pronoun = ("draw", "it") if failed == 1 else ("draws", "them")
+        sentences.append(f"{failed} {noun} failed; the intervals cover both outcomes for {pronoun}.")
+    if keys:
+        key, separation = next(iter(keys.items()))
+        sentences.append(
+            f"{key} matters most ({separation:+.2f}): {'larger' if separation > 0 else 'smaller'} values hunt."
+        )
+    return " ".join(sentences)
+
+
+def draws_figure(draws: Draws) -> Figure:
+    """The verdicts over the key that decides most, case by case, as bars on top of each other."""
+    panels = [_panel(label, draws.fates[name], draws) for name, label in case_labels(draws.stage).items()]
+    caption = (
+        f"{draws.sample.count} stages drawn from the uncertain keys (seed {draws.seed}), by the key that best "
+        "separates those with an attracting cycle from the others; all other uncertain keys vary too."
+    )
+    return Figure("draws", "What if the parameters are wrong?", caption, tuple(panels), min(2, len(panels)))
+
+
+def _panel(label: str, fates: Fates, draws: Draws) -> Panel:
+    keys = draws.sample.keys
+    key = next(iter(fates.separations(keys) or keys))
+    edges = np.histogram_bin_edges(keys[key], BINS)
+    x, bands, below = np.repeat(edges, 2)[1:-1], [], np.zeros(2 * BINS)
+    for word in VERDICTS:
+        counts = np.repeat(np.histogram(keys[key][fates.verdicts == word], edges)[0], 2).astype(float)
+        if counts.any():
+            bands.append(Band(x, below, below + counts, word, COLOURS[word]))
+            below = below + counts
+    limits = (0.0, 1.05 * float(below.max()))
+    x_axis = Axis(key, draws.unit(key), (float(edges[0]), float(edges[-1])))
+    title = f"{label}: all {bands[0].label}" if len(bands) == 1 else label  # one band alone has no legend
+    return Panel(title, x_axis, Axis("Draws", "", limits), bands=tuple(bands))

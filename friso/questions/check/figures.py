@@ -1,0 +1,271 @@
+"""The figures of `friso check` and `friso simulate`, from what these computed to plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.axis import axis_shown
+from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER, PEAK_RULE
+from friso.questions.check.cycle_figures import cycle_figure, return_map_figure
+from friso.questions.check.traces import common_range, samples, subject, trace_of
+from friso.shown.cases import BANDS, ShownCase, band_text, shown_cases
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREY,
+    INK,
+    LIGHT,
+    ORANGE,
+    PINK,
+    SKY,
+    Array,
+    Axis,
+    Dash,
+    Figure,
+    Limit,
+    Markers,
+    Panel,
+    Series,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from friso.hunting import Case
+
+SHARES = {"force_p": ("P", SKY), "force_i": ("I", ORANGE), "force_d": ("D", PINK)}
+
+_FLOOR = 1e-9  # [m] lower end of the logarithmic settling panel: below any sensor of such a stage
+_PERIODS = 4  # hunting periods shown of the force shares
+
+
+def check_figures(cases: Mapping[str, Case]) -> tuple[Figure, ...]:
+    """Every figure that the cases have data for, the most telling first; none for cases without traces."""
+    with_trace = [item for item in shown_cases(cases) if item.case.trace is not None]
+    if not with_trace:
+        return ()
+    motion = (_overview(with_trace), _shares(with_trace), _joint(with_trace), _friction(with_trace))
+    cycles = return_map_figure(with_trace), cycle_figure(with_trace)
+    return tuple(figure for figure in (_settling_figure(with_trace), *cycles, *motion) if figure.panels)
+
+
+def response_figure(trace: xr.Dataset) -> Figure:
+    """Position, error, force and joint deflection of one simulated run, over the whole of it."""
+    time = samples(trace, "time")
+    reference = Series(time, samples(trace, "reference"), "reference", GREY, "dashed")
+    position = Series(time, samples(trace, "position"), "position", BLUE)
+    panels = [Panel("Position", _TIME, Axis("Position", "m"), (reference, position))]
+    end = time >= _late(trace)
+    for name, title in (
+        ("error", "Error"),
+        ("force", "Actuator force"),
+        ("joint_deflection", "Joint deflection"),
+    ):
+        if name in trace:
+            values = samples(trace, name)
+            line = Series(time, values, title.lower(), BLUE)
+            view = common_range([values[end]], least=2 * min(BANDS)) if name == "error" else None
+            panels.append(Panel(title, _TIME, Axis(title, str(trace[name].attrs["units"]), view), (line,)))
+    caption = (
+        "The whole run; the error is the reference minus the position, at the scale of what follows the move: the move "
+        "itself is cut off."
+    )
+    return Figure("response", "Time response", caption, tuple(panels), subject=str(trace.attrs.get("name", "")))
+
+
+def _late(trace: xr.Dataset) -> float:
+    """The time [s] from which on a run shows what it does at its end: half of what follows the last change of its
+    reference."""
+    time, reference = samples(trace, "time"), samples(trace, "reference")
+    changes = np.flatnonzero(np.diff(reference))
+    begin = time[changes[-1]] if len(changes) and changes[-1] < 0.9 * len(time) else time[0]
+    return float(begin + (time[-1] - begin) / 2)
+
+
+_TIME = Axis("Time", "s")
+
+
+def _settling_figure(cases: list[ShownCase]) -> Figure:
+    """Deviation after the move with the counted peaks (thesis, Fig. 5), and how each case settles."""
+    start, end = _window(cases)
+    lines, peaks = [], []
+    for item in cases:
+        time, deviation = _cut(item, _deviation(item), start, end)
+        lines.append(Series(time, deviation, item.label, item.colour))
+        if len(item.case.peak_times):
+            label = f"counted peaks, {item.label.lower()}: {item.case.peaks}"
+            peaks.append(Markers(item.case.peak_times, item.case.peak_heights, label, item.colour, "triangle"))
+    limits = (Limit((COUNTED_ABOVE,), "peaks count above", GREY, "dotted"),) if peaks else ()
+    # A stage that stays within the finest band shows as a line, not as a screenful of solver noise.
+    view = common_range([line.y for line in lines], least=2 * min(BANDS))
+    zoom = Panel(
+        f"From {start:g} s on: deviation from the reference",
+        Axis("Time", "s", (start, end)),
+        Axis("Deviation", "m", view),
+        tuple(lines),
+        tuple(peaks),
+        limits,
+    )
+    caption = (
+        "Hunting appears as a deviation that keeps coming back; so does a long transient, for a while. Peaks are "
+        f"counted as in the thesis (Sec. 3.2.2): {PEAK_RULE}. Below: the size of the "
+        "deviation over the whole run, on a logarithmic scale that ends at 1 nm; a stage that hunts never stays under "
+        "the lines."
+    )
+    caption = axis_shown().text(caption)
+    return Figure("settled", "Does it hunt?", caption, (zoom, _settling(cases)), subject=subject(cases))
+
+
+def _settling(cases: list[ShownCase]) -> Panel:
+    """Size of the deviation over the whole run on a logarithmic scale, with the settling bands."""
+    lines = []
+    for item in cases:
+        size = np.maximum(np.abs(_deviation(item)), _FLOOR)
+        lines.append(Series(samples(trace_of(item), "time"), size, item.label, item.colour))
+    largest = max((float(np.max(line.y[np.isfinite(line.y)], initial=_FLOOR)) for line in lines), default=_FLOOR)
+    dashes: tuple[Dash, ...] = ("dotted", "dashed")
+    bands = tuple(Limit((band,), band_text(band), INK, dash) for band, dash in zip(BANDS, dashes, strict=True))
+    axis = Axis("|Deviation|", "m", (_FLOOR, max(2 * largest, 1e-3)), log=True)
+    return Panel("Whole run: size of the deviation", _TIME, axis, tuple(lines), limits=bands)
+
+
+def _overview(cases: list[ShownCase]) -> Figure:
+    """Reference and position, and the actuator force, over the whole run, the cases side by side."""
+    view = common_range([samples(trace_of(item), "position") for item in cases], least=2 * min(BANDS))
+    panels = []
+    for item in cases:
+        time = samples(trace_of(item), "time")
+        series = (
+            Series(time, samples(trace_of(item), "reference"), "reference", LIGHT, width=4.0),
+            Series(time, samples(trace_of(item), "position"), "position", item.colour),
+        )
+        panels.append(Panel(f"{item.label}: reference and position", _TIME, Axis("Position", "m", view), series))
+    bounds = _force_limit(cases)
+    arrays = [samples(trace_of(item), "force") for item in cases]
+    view = common_range([*arrays, *(np.array(bound.values) for bound in bounds)])
+    for item, force in zip(cases, arrays, strict=True):
+        series = (Series(samples(trace_of(item), "time"), force, "force", item.colour),)
+        title = f"{item.label}: actuator force"
+        panels.append(Panel(title, _TIME, Axis("Force", "N", view), series, limits=bounds))
+    caption = "The whole run. On this scale cases that differ by millimetres may look the same."
+    return Figure("overview", "The motion", caption, tuple(panels), len(cases), subject(cases))
+
+
+def _force_limit(cases: list[ShownCase]) -> tuple[Limit, ...]:
+    """The force limit of the controller, where a case comes near it: a distant one would flatten all."""
+    bound = cases[0].case.stage.controller.force_limit
+    forces = np.abs(np.concatenate([samples(trace_of(item), "force") for item in cases]))
+    if bound is None or not np.any(forces[np.isfinite(forces)] > bound / 2):
+        return ()
+    return (Limit((-float(bound), float(bound)), "force limit"),)
+
+
+def _shares(cases: list[ShownCase]) -> Figure:
+    """P, I and D shares of the actuator force after the move (thesis, Fig. 13), one scale for all cases."""
+    start, end = _window(cases)
+    periods = [item.case.period for item in cases if item.case.period and np.isfinite(item.case.period)]
+    if periods:
+        start = max(start, end - _PERIODS * max(periods))
+    panels = []
+    for item in cases:
+        trace = trace_of(item)
+        named = [(name, *SHARES[name]) for name in SHARES if name in trace and np.any(samples(trace, name))]
+        lines = [(*share, 1.8) for share in named] + ([("force", "total", INK, 0.9)] if named else [])
+        series = tuple(
+            Series(*_cut(item, samples(trace_of(item), name), start, end), label, colour, width=width)
+            for name, label, colour, width in lines
+        )
+        if series:
+            panels.append(Panel(item.label, Axis("Time", "s", (start, end)), Axis("Force", "N"), series))
+    limits = common_range([line.y for panel in panels for line in panel.series])
+    panels = [Panel(panel.title, panel.x, Axis("Force", "N", limits), panel.series) for panel in panels]
+    caption = (
+        "While the stage sticks, the integral share grows until the friction breaks away; the others follow "
+        "the error. A share that is zero throughout is left out."
+    )
+    return Figure("shares", "What the controller does", caption, tuple(panels), subject=subject(cases))
+
+
+def _joint(cases: list[ShownCase]) -> Figure:
+    """Joint deflection with its limits, over the whole run and its settled part, where the joint is free."""
+    start, end = _window(cases)
+    panels = []
+    for item in cases:
+        joint = item.case.stage.joint
+        if joint is None or joint.stroke is None or joint.locked or "joint_deflection" not in trace_of(item):
+            continue
+        stroke, deflection = float(joint.stroke), samples(trace_of(item), "joint_deflection")
+        limits = (Limit((-stroke, stroke), "limiter touches"),)
+        time = samples(trace_of(item), "time")
+        axis = Axis("Joint deflection", "m")
+        trace = Series(time, deflection, item.label, item.colour)
+        after = Series(*_cut(item, deflection, start, end), item.label, item.colour)
+        panels += [
+            Panel("Whole run", _TIME, axis, (trace,), limits=limits),
+            Panel(f"From {start:g} s on", Axis("Time", "s", (start, end)), axis, (after,), limits=limits),
+        ]
+    caption = "Deflection of the stage against the cart. Beyond the dashed lines the stroke limiter carries load."
+    return Figure("joint", "The joint", caption, tuple(panels), columns=2, subject=subject(cases))
+
+
+def _friction(with_trace: list[ShownCase]) -> Figure:
+    """Friction against velocity and displacement of the cart: while a case hunts, else the whole run."""
+    cases = [item for item in with_trace if "friction_force" in trace_of(item)]
+    hunting = any(item.case.peaks for item in cases)
+    start, end = _window(with_trace) if hunting else (-np.inf, np.inf)
+    part = f"From {start:g} s on." if hunting else "The whole run."
+    caption = f"{part} The friction force opposes the velocity of the cart. A case at rest is a single point."
+    along = "Cart position from the target" if hunting else "Cart position"
+    panels = []
+    for title, quantity, unit, name in (
+        ("Against velocity", "Cart velocity", "m/s", "cart_velocity"),
+        ("Against displacement", along, "m", "cart_position"),
+    ):
+        lines = []
+        for item in cases:
+            values = samples(trace_of(item), name)
+            if hunting and name == "cart_position":
+                values = values - samples(trace_of(item), "reference")[-1]
+            force = _cut(item, samples(trace_of(item), "friction_force"), start, end)[1]
+            lines.append(Series(_cut(item, values, start, end)[1], force, item.label, item.colour, width=1.2))
+        if lines:
+            panels.append(_loops(title, Axis(quantity, unit), Axis("Friction force", "N"), lines))
+    return Figure("friction", "The friction", caption, tuple(panels), columns=2, subject=subject(with_trace))
+
+
+def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
+    """The lines, those that hardly move beside the others as the point at which they rest."""
+    spans = [_span(line.x) for line in lines]
+    rest = [span <= 0.01 * max(spans) for span in spans]
+    points = [
+        Markers(line.x[-1:], line.y[-1:], f"{line.label}: at rest", line.colour)
+        for line, resting in zip(lines, rest, strict=True)
+        if resting
+    ]
+    moving = [line for line, resting in zip(lines, rest, strict=True) if not resting]
+    return Panel(title, x, y, tuple(moving), tuple(points))
+
+
+def _window(cases: list[ShownCase]) -> tuple[float, float]:
+    """Begin and end [s] of the settled part: from where peaks count, or the later half of a shorter run."""
+    end = max(float(samples(trace_of(item), "time")[-1]) for item in cases)
+    return (COUNTED_AFTER if end > COUNTED_AFTER else end / 2), end
+
+
+def _deviation(item: ShownCase) -> Array:
+    return samples(trace_of(item), "position") - samples(trace_of(item), "reference")
+
+
+def _cut(item: ShownCase, values: Array, start: float, end: float) -> tuple[Array, Array]:
+    """Time [s] and values between start and end [s]."""
+    time = samples(trace_of(item), "time")
+    inside = (time >= start) & (time <= end)
+    return time[inside], values[inside]
+
+
+def _span(values: Array) -> float:
+    """Largest less smallest finite value; 0 where there are none."""
+    finite = values[np.isfinite(values)]
+    return float(np.ptp(finite)) if finite.size else 0.0

@@ -1,0 +1,32 @@
+"""What an isolator would do for a rigid stage, in a sentence."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from friso.hunting import SEARCH_LIMITS
+from friso.shown.drawing.prefixes import with_unit
+
+if TYPE_CHECKING:
+    from friso.remedies.suggestion import Suggestion
+
+LITTLE = 0.5
+"""Modulus margin below which the controller has to be tuned as well."""
+
+
+def isolator_sentence(suggestion: Suggestion) -> str:
+    """Whether it would settle on an isolator, and on which."""
+    flat = suggestion.stage.flat()
+    joint = (
+        f"an isolator of k_j = {with_unit(flat['joint.stiffness'], 'N/m')}, stroke "
+        f"{with_unit(flat['joint.stroke'], 'm')} and damping {with_unit(flat['joint.damping'], 'N*s/m')}"
+    )
+    if not suggestion.settles:
+        return f"It would not surely settle on {joint}, or on any shorter stroke tried."
+    low = "" if suggestion.margin >= LITTLE else ": too little, so that the controller has to be tuned as well"
+    masses = [with_unit(flat[f"masses.{part}"], "kg") for part in ("cart", "stage")]
+    return (
+        f"On {joint} between {masses[0]} on the cart and {masses[1]} on the stage it would settle: nothing was found "
+        f"to attract it down to 1/{SEARCH_LIMITS.edge_distance:g} of this bandwidth. Its modulus margin would be "
+        f"{suggestion.margin:.2f}{low}. This is a first estimate: friso tune finds the best isolator and verifies it."
+    )

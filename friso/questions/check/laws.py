@@ -1,0 +1,232 @@
+"""The verdict across friction laws: sentences, the table, and the part of the JSON document."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from friso.axis import axis_shown
+from friso.hunting import SEARCH_LIMITS
+from friso.quantities import percent
+from friso.questions.convert.words import SHOWN
+from friso.shown.cases import case_labels
+from friso.shown.drawing.prefixes import NOTHING, digits_that_differ, listed, range_with_unit, with_unit
+from friso.stage.stage import declared_keys
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw
+
+SAME = 1e-3
+"""Share by which edges differ that are told as one."""
+
+COUNTS = {3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9: "nine"}
+
+
+def laws_sentences(laws: VerdictsByLaw) -> list[str]:
+    """Case by case whether the verdict depends on the law, and what would decide; then which laws were not tried."""
+    labels = case_labels(laws.stage)
+    says = [f"{labels[case]}: {_sentence(laws, case)}{_beyond(laws, case)}" for case in labels]
+    if laws.left_out:
+        lost = [f"{law} ({listed([SHOWN[kind] for kind in kinds], 'and')})" for law, kinds in laws.left_out.items()]
+        says.append(f"Not tried, because they cannot reproduce the measurements: {'; '.join(lost)}.")
+    says += [text for verdict in laws.verdicts if (text := _misses(verdict))]
+    return says
+
+
+def _misses(verdict: LawVerdict) -> str:
+    """By how much a law that was tried misses the virgin curve; "" where it reproduces it."""
+    off = next((item.off for item in verdict.conversion.lost if item.kind == "virgin"), 0.0)
+    advice = "leave it out if the virgin curve of this machine was measured"
+    return f"{verdict.law} misses the virgin curve by {percent(off)} of break-away: {advice}." if off else ""
+
+
+def _sentence(laws: VerdictsByLaw, case: str) -> str:
+    hunts, edges = laws.hunts(case), _edges(laws, case)
+    if hunts is not None:
+        verdicts = {name for verdict in laws.verdicts for name in verdict.verdicts(case)}
+        return f"under {_all(laws)} the stage {_does(verdicts)}, {edges}."
+    if not laws.answers(case):
+        return "the verdict is not certain under any law that was tried."
+    parts = []
+    for answer in (True, False):
+        alike = [verdict for verdict in laws.verdicts if verdict.hunts(case) is answer]
+        if alike:
+            does = _does({name for verdict in alike for name in verdict.verdicts(case)})
+            subject = "" if parts else "the stage "
+            parts.append(f"{subject}{does} under {listed([verdict.law for verdict in alike], 'and')}")
+    left_open = [_open(verdict, case) for verdict in laws.verdicts if verdict.hunts(case) is None]
+    depends = ["the verdict depends on the friction law"] if laws.depends_on_law(case) else []
+    measure = listed(laws.deciding(case), "and")
+    first = ": ".join([*depends, *(["; ".join(parts)] if parts else [])])
+    decide = f"To decide, measure {measure}" if measure else ""
+    said = [first, *left_open, edges[0].upper() + edges[1:], decide]
+    return " ".join(f"{text}." for text in said if text)
+
+
+def _all(laws: VerdictsByLaw) -> str:
+    """The laws that were tried."""
+    count = len(laws.verdicts)
+    if count == 1:
+        return "the one law that was tried"
+    return f"{'both' if count == 2 else f'all {COUNTS.get(count, count)}'} laws that were tried"
+
+
+def _does(verdicts: set[str]) -> str:
+    """What a stage does that has one of these verdicts, which all hunt or all do not."""
+    if verdicts <= {"hunts"}:
+        return "hunts"
+    if verdicts <= {"hunts", "bistable"}:
+        return "can hunt"
+    return "settles" if verdicts <= {"settles"} else "does not hunt"
+
+
+def _open(verdict: LawVerdict, case: str) -> str:
+    """What the stage does under a law with which values of what is open in it, where it does not do the same with
+    all."""
+    trials: dict[str, list[Trial]] = {}
+    for trial in verdict.trials:
+        does = _does({trial.cases[case].verdict}) if trial.certain(case) else "is not certain"
+        trials.setdefault(does, []).append(trial)
+    if len(trials) == 1:
+        return f"Under {verdict.law} that is not certain"
+    parts = [f"{does} with {_values(verdict, having)}" for does, having in trials.items()]
+    return f"Under {verdict.law} it {listed(parts, 'and')}"
+
+
+def _values(verdict: LawVerdict, trials: Sequence[Trial]) -> str:
+    """The values of what is open in a law, key by key, in some trials."""
+    converted, fields = verdict.conversion.stage.flat(), declared_keys(verdict.conversion.stage.flat())
+    texts = []
+    for key in verdict.conversion.open:
+        unit = getattr(fields[key], "unit", "")
+        every, values = (
+            sorted({trial.drawn.get(key, converted[key]) for trial in some}) for some in (verdict.trials, trials)
+        )
+        digits = digits_that_differ(every)
+        shown = listed([with_unit(value, unit, digits) if unit else f"{value:.{digits}g}" for value in values], "and")
+        texts.append(f"{key.removeprefix('friction.').replace('_', ' ')} {shown}")
+    return listed(texts, "and")
+
+
+def _edges(laws: VerdictsByLaw, case: str) -> str:
+    """Over which bandwidths the edge of hunting lies under all laws."""
+    edges = [edge for verdict in laws.verdicts if (edge := verdict.edges(case))]
+    unsought = [verdict.law for verdict in laws.verdicts if not verdict.edges_sought(case)]
+    part = "in part " if any(verdict.edges(case) for verdict in laws.verdicts if verdict.law in unsought) else ""
+    missing = f"{part}not determined under {listed(unsought, 'and')}" if unsought else ""
+    if not edges:
+        low, high = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
+        none = f"no edge of hunting between {low:g} and {high:g} times its bandwidth"
+        return f"its edge of hunting {missing}" if missing else none
+    low, high = min(edge[0] for edge in edges), max(edge[1] for edge in edges)
+    doubt = "" if all(verdict.edges_certain(case) for verdict in laws.verdicts) else " (not certain)"
+    return f"edge {_span(laws, (low, high))}{doubt}{', ' + missing if missing else ''}"
+
+
+def _beyond(laws: VerdictsByLaw, case: str) -> str:
+    """That advice keeps clear of the edge under the stage's own law, where that is not the highest."""
+    own, *others = laws.verdicts
+    edges = own.edges(case)
+    highest = max((other[1] for verdict in others if (other := verdict.edges(case))), default=0.0)
+    if own.hunts(case) is not True or edges is None or highest <= edges[1] * (1 + SAME):
+        return ""
+    return f" The advice keeps clear of the edge under {own.law} alone; keep clear of the highest of these."
+
+
+def _span(laws: VerdictsByLaw, ends: tuple[float, float]) -> str:
+    """Edges in hertz, or in factors of the bandwidth."""
+    low, high = ends
+    if laws.in_hertz:
+        return range_with_unit(low, high, "Hz")
+    first, last = f"{low:.3g}", f"{high:.3g}"
+    return f"at {first}{'' if first == last else f' to {last}'} times the bandwidth"
+
+
+def laws_columns(laws: VerdictsByLaw) -> list[str]:
+    """The laws, the stage's own first."""
+    return [verdict.law + (" (as given)" if k == 0 else "") for k, verdict in enumerate(laws.verdicts)]
+
+
+def laws_rows(laws: VerdictsByLaw) -> list[tuple[str, list[str]]]:
+    """The rows of the table, a column per law: verdict, amplitude and edge case by case, and what was drawn."""
+    rows = []
+    for case, label in case_labels(laws.stage).items():
+        rows += [
+            (f"{label}: verdict", [_verdict(verdict, case) for verdict in laws.verdicts]),
+            (f"{label}: amplitude", [_amplitude(verdict, case) for verdict in laws.verdicts]),
+            (f"{label}: edge", [_edge(laws, verdict, case) for verdict in laws.verdicts]),
+        ]
+    rows.append(("Varied (left open)", [_drawn(verdict) for verdict in laws.verdicts]))
+    rows.append(("Not reproduced", [_not_kept(verdict) for verdict in laws.verdicts]))
+    rows.append(("Passive only if", [verdict.conversion.active or "it is" for verdict in laws.verdicts]))
+    return [(axis_shown().text(name), texts) for name, texts in rows]
+
+
+def _verdict(verdict: LawVerdict, case: str) -> str:
+    return f"{' or '.join(verdict.verdicts(case))}{'' if verdict.certain(case) else ' (not certain)'}"
+
+
+def _amplitude(verdict: LawVerdict, case: str) -> str:
+    sizes = verdict.amplitudes(case)
+    return range_with_unit(*sizes, "m") if sizes else NOTHING
+
+
+def _edge(laws: VerdictsByLaw, verdict: LawVerdict, case: str) -> str:
+    edges = verdict.edges(case)
+    if edges is None:
+        return NOTHING if verdict.edges_sought(case) else "not determined"
+    doubt = "" if verdict.edges_certain(case) else " (not certain)"
+    return f"{_span(laws, edges)}{doubt}{'' if verdict.edges_sought(case) else ', in part not determined'}"
+
+
+def _drawn(verdict: LawVerdict) -> str:
+    keys = dict.fromkeys(key for trial in verdict.trials for key in trial.drawn)
+    return ", ".join(key.removeprefix("friction.") for key in keys) or NOTHING
+
+
+def _not_kept(verdict: LawVerdict) -> str:
+    return ", ".join(SHOWN[item.kind] for item in verdict.conversion.lost) or NOTHING
+
+
+def laws_document(laws: VerdictsByLaw) -> dict[str, Any]:
+    """Law by law and case by case, with every trial; whether the verdict depends on the law or is not certain, and what
+    would decide."""
+    cases = {}
+    for case in case_labels(laws.stage):
+        cases[case] = {
+            "hunts": laws.hunts(case),
+            "depends_on_law": laws.depends_on_law(case),
+            "not_certain": laws.uncertain(case),
+            "measure": laws.deciding(case),
+            "laws": {verdict.law: _law(verdict, case) for verdict in laws.verdicts},
+        }
+    return {
+        "conclusion": " ".join(laws_sentences(laws)),
+        "cases": cases,
+        "left_out": {law: [SHOWN[kind] for kind in kinds] for law, kinds in laws.left_out.items()},
+    }
+
+
+def _law(verdict: LawVerdict, case: str) -> dict[str, Any]:
+    return {
+        "verdicts": list(verdict.verdicts(case)),
+        "trials": [_trial(trial, case) for trial in verdict.trials],
+        "not_kept": [SHOWN[item.kind] for item in verdict.conversion.lost],
+        "passive_where": verdict.conversion.active or None,
+    }
+
+
+def _trial(trial: Trial, name: str) -> dict[str, Any]:
+    case = trial.cases[name]
+    cycle, edge = case.judgement.cycle, case.judgement.margin
+    return {
+        "drawn": dict(trial.drawn),
+        "verdict": case.verdict,
+        "amplitude_m": cycle.amplitude if cycle else None,
+        "multiplier": cycle.multiplier if cycle else None,
+        "edge_hz": edge.crossover if edge else None,
+        "edge_factor": edge.factor if edge else None,
+        "edge_certain": edge.certain if edge else trial.edge_sought(name),
+        "certain": case.judgement.hunting.certain,
+    }

@@ -1,0 +1,92 @@
+"""How much static friction, stroke or stiffness may differ from its value before a stage hunts, or hunts no more."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from friso.equations.scaled_friction import static_frictions
+from friso.hunting import SEARCH_LIMITS
+from friso.quantities import percent, plain_factor
+from friso.shown.drawing.prefixes import listed, rounded_down, rounded_up, with_unit
+
+if TYPE_CHECKING:
+    from friso.hunting import Case, MarginEnd, ParameterMargin
+
+
+def friction_sentences(case: Case) -> list[str]:
+    """Where hunting begins, or ends, if static friction is not what the stage file says; none where that was not
+    asked, or where no friction law tells static and Coulomb friction."""
+    margin = case.static_friction
+    if margin is None:
+        return []
+    lowest = "Coulomb friction" if margin.range[0] > 1 / SEARCH_LIMITS.most_friction else ""
+    return [margin_sentence("static friction", margin, f"{_gap(case, margin)} (Coulomb friction held)", lowest)]
+
+
+def margin_sentence(name: str, margin: ParameterMargin, remark: str = "", lowest: str = "") -> str:
+    """Where hunting begins, or ends, in a parameter with a name; with a remark, and what the parameter is at the
+    `lowest` value searched, if that has a name."""
+    does, starts = ("ends", "ends") if margin.attracts else ("begins", "starts")
+    sure = all(end.certain for end in (margin.below, margin.above) if end)
+    doubt = "" if sure else "; this is not certain"
+    left = listed([_side(side) for side in margin.open_sides], "and")
+    if left:
+        doubt += f"; {left} yours it was not determined"
+    if ways := margin_ways(margin):
+        return f"Hunting {does} with {name} {listed(ways, 'or')}{remark}{doubt}."
+    if left:
+        return f"Whether {name} {left} yours {starts} hunting was not determined."
+    low, high = margin.range
+    return f"No {name} tried from {lowest or f'{low:.2g}'} to {high:g} times yours {starts} hunting{remark}{doubt}."
+
+
+def joint_sentences(margins: Mapping[str, ParameterMargin]) -> list[str]:
+    """Where hunting begins, or ends, if a joint's stroke or stiffness is not as designed, for margins by their keys."""
+    return [margin_sentence(key.replace(".", " "), margin, " (joint free)") for key, margin in margins.items()]
+
+
+def margin_ways(margin: ParameterMargin) -> list[str]:
+    """Below and above which multiple of its value a parameter makes hunting begin, or end: never farther off than it
+    does begin, and never nearer than it has ended."""
+    return [_way(margin, side, end) for side in (-1, 1) if (end := margin.end(side))]
+
+
+def thin_margins(case: Case) -> list[str]:
+    """What brings hunting back in a case that settles, within the factor that advice keeps off an edge."""
+    distance, thin = SEARCH_LIMITS.edge_distance, []
+    edge, friction = case.judgement.margin, case.static_friction
+    if edge and edge.quiet * distance > 1:
+        thin.append(f"a bandwidth that is lower by {percent(1 - edge.factor)}")
+    for side in (-1, 1):
+        end = friction.end(side) if friction and not friction.attracts else None
+        if end and max(end.same, 1 / end.same) < distance:
+            thin.append(f"static friction of {plain_factor(end.other)} times yours")
+    return thin
+
+
+def _side(side: int) -> str:
+    return "below" if side < 0 else "above"
+
+
+def _way(margin: ParameterMargin, side: int, end: MarginEnd) -> str:
+    """Below or above which multiple of its value a parameter makes hunting begin, or end, rounded to the safe side."""
+    outward, inward = (rounded_up, rounded_down) if side > 0 else (rounded_down, rounded_up)
+    if margin.attracts:
+        return f"{_side(side)} {plain_factor(outward(end.other))} times yours"
+    if end.same == 1:  # how little it takes is not known
+        return f"of {plain_factor(end.other)} times yours already"
+    return f"{_side(side)} {plain_factor(inward(end.same))} times yours"
+
+
+def _gap(case: Case, margin: ParameterMargin) -> str:
+    """The gap between static and Coulomb friction at the nearest end, of a stage with one friction law."""
+    flat = case.stage.flat()
+    pairs = static_frictions(flat)
+    ends = [end for end in (margin.below, margin.above) if end]
+    if len(pairs) != 1 or len(ends) != 1:
+        return ""
+    ((static, coulomb),) = pairs.items()
+    (end,) = ends
+    factor = end.other if margin.attracts or end.same == 1 else end.same
+    return f", a gap to Coulomb friction of {with_unit(flat[static] * factor - flat[coulomb], 'N')}"

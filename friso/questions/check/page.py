@@ -1,0 +1,68 @@
+"""The report of `friso check`: one page that opens offline, prints, and is the same bytes on every run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from friso.questions.check.draws import draws_figure, draws_sentences
+from friso.questions.check.figures import check_figures
+from friso.questions.check.isolator_words import isolator_sentence
+from friso.questions.check.laws import laws_sentences
+from friso.questions.check.table import rows, rows_behind
+from friso.questions.check.words import conclusion, verdict_sentence
+from friso.shown.cases import shown_cases
+from friso.shown.files import Content
+from friso.shown.pages import Report
+from friso.studies.draws import Draws
+
+if TYPE_CHECKING:
+    from friso.hunting import Case
+    from friso.remedies.suggestion import Suggestion
+    from friso.studies.laws.verdicts import VerdictsByLaw
+
+
+BASIS = (
+    "The verdict is by everything that attracts the stage; peaks are also counted, as in the thesis (Fix, Univ. of "
+    "Twente, Sec. 3.2.2). Settling times count from the last corner of the reference; "
+    "there and back, the longer one of both ends"
+)
+
+
+def check_files(
+    cases: Mapping[str, Case],
+    draws: Draws | None = None,
+    isolator: Suggestion | None = None,
+    laws: VerdictsByLaw | None = None,
+) -> dict[str, Content]:
+    """The page, as `check_html`."""
+    return {"report.html": check_html(cases, draws, isolator, laws)}
+
+
+def check_html(
+    cases: Mapping[str, Case],
+    draws: Draws | None = None,
+    isolator: Suggestion | None = None,
+    laws: VerdictsByLaw | None = None,
+) -> str:
+    """The whole page for the cases "given" and, with a joint, "locked" and "free"; traces may be missing. `draws`
+    adds what stages drawn from an uncertain one do, `isolator` what an isolator would, `laws` the verdict across
+    friction laws."""
+    in_order = shown_cases(cases)
+    stage = in_order[0].case.stage if "given" not in cases else cases["given"].stage
+    tolerances = sorted({f"{item.case.solver.rtol:g}" for item in in_order})
+    return Report.of_stage(
+        "check",
+        stage,
+        (*check_figures(cases), *([draws_figure(draws)] if draws else [])),
+        verdicts=[(item.colour, f"{item.label}: {verdict_sentence(item, cases)}") for item in in_order],
+        sentences=[
+            *filter(None, [conclusion(cases)]),
+            *([isolator_sentence(isolator)] if isolator else []),
+            *(draws_sentences(draws) if draws else []),
+            *(laws_sentences(laws) if laws else []),
+        ],
+        columns=in_order,
+        rows=[*rows(in_order), *rows_behind(in_order)],
+        computed=f", relative tolerance {', '.join(tolerances)}. {BASIS}",
+    ).html()

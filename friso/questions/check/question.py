@@ -1,0 +1,252 @@
+"""Does the stage hunt: as given, and with its joint locked and free."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+from friso.engine.kernel import kernels
+from friso.engine.simulate import RTOL, simulate
+from friso.errors import InputError
+from friso.hunting import LONG_RUN_RTOL, Case, needed_kernels
+from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.inputs import (
+    LOGGER,
+    Changes,
+    StageLike,
+    Whole,
+    correlations_of,
+    mention_unstable_loop,
+    read_stage,
+    tolerance_of,
+    whole_number,
+)
+from friso.progress import Progress, silent
+from friso.stage import Stage
+from friso.stage.correlations import Correlations, draw
+from friso.studies.draws import MOST, Draws
+
+if TYPE_CHECKING:
+    from friso.hunting.criteria import Verdict
+    from friso.hunting import ParameterMargin
+    from friso.remedies.suggestion import Suggestion
+    from friso.shown.drawing.figure import Figure
+    from friso.shown.files import Files
+    from friso.studies.laws.verdicts import VerdictsByLaw
+
+MOST_SEED = 2**32 - 1
+
+
+class CheckAnswer(Answer):
+    """The verdict on a stage: `result` holds a `Case` each for "given" and, with a joint, "locked" and "free";
+    `draws`, what becomes of stages drawn from its uncertain keys, and `laws`, the verdicts across friction laws, or
+    None."""
+
+    command = "check"
+
+    def __init__(self, stage: Stage, cases: dict[str, Case], draws: Draws | None, laws: VerdictsByLaw | None) -> None:
+        self.stage, self.result, self.draws, self.laws = stage, cases, draws, laws
+        self.axis_kind = stage.axis_kind
+
+    @cached_property
+    def isolator(self) -> Suggestion | None:
+        """What an isolator would do for a stage without a joint that hunts; None for any other."""
+        from friso.hunting.criteria import ATTRACTED
+
+        case = self.result["given"]
+        if case.stage.joint or case.verdict not in ATTRACTED:
+            return None
+        from friso.remedies.suggestion import suggestion
+
+        return suggestion(case.stage)
+
+    @property
+    def verdict(self) -> str:
+        """The verdict on the stage as it is given: "hunts", "bistable", "transient", "settles" or "failed"."""
+        return self.result["given"].verdict
+
+    @property
+    def failure(self) -> str:
+        """Whether the run of a case was not completed."""
+        if any(not case.solver.done and not case.runs_away for case in self.result.values()):
+            return "the computation could not be completed; see the status above"
+        away = any(case.runs_away for case in self.result.values())
+        return "there is no verdict on hunting for a motion that runs away" if away else ""
+
+    def sentences(self) -> Sequence[str]:
+        """The verdicts, and the chances where keys are uncertain."""
+        from friso.questions.check.draws import draws_sentences
+        from friso.questions.check.isolator_words import isolator_sentence
+        from friso.questions.check.laws import laws_sentences
+        from friso.questions.check.words import answer
+
+        suggested = [isolator_sentence(self.isolator)] if self.isolator else []
+        drawn = draws_sentences(self.draws) if self.draws else []
+        return [*answer(self.result), *suggested, *drawn, *(laws_sentences(self.laws) if self.laws else [])]
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """The numbers of each case, and of the stages drawn."""
+        from friso.questions.check.draws import draws_rows
+        from friso.questions.check.laws import laws_columns, laws_rows
+        from friso.questions.check.table import rows, rows_behind
+        from friso.shown.cases import case_labels, shown_cases
+
+        cases = shown_cases(self.result)
+        tables = [AnswerTable(self.stage.name, [item.label for item in cases], rows(cases))]
+        if self.draws:
+            title = f"{self.draws.sample.count} stages drawn from the uncertain keys, seed {self.draws.seed}"
+            tables.append(AnswerTable(title, [*case_labels(self.draws.stage).values()], draws_rows(self.draws)))
+        if self.laws:
+            tables.append(AnswerTable("Across friction laws", laws_columns(self.laws), laws_rows(self.laws)))
+        behind = AnswerTable("How that was computed", [item.label for item in cases], rows_behind(cases), behind=True)
+        return [*tables, behind]
+
+    def details(self) -> Sequence[str]:
+        """What the search for the edge may miss, how far a joint may be from its design, and whether the friction law
+        may give energy back."""
+        from friso.questions.check.margin_words import joint_sentences
+        from friso.questions.check.words import between_surveyed
+        from friso.questions.convert.words import activity_sentences
+        from friso.stage.tables import passive_where
+
+        activity = activity_sentences(passive_where(self.stage.flat()))
+        return [*between_surveyed(self.result), *joint_sentences(self.joint_margins), *activity]
+
+    @cached_property
+    def joint_margins(self) -> Mapping[str, ParameterMargin]:
+        """The margins of the case with a free joint in the joint's stroke and stiffness, by key."""
+        from friso.hunting import joint_margins
+
+        case = self.result.get("free", self.result["given"])
+        return joint_margins(case.stage, case.judgement)
+
+    @cached_property
+    def traced(self) -> Mapping[str, Case]:
+        """The cases with their time responses, which figures show."""
+        return {name: replace(case, trace=simulate(case.stage, case.solver.rtol)) for name, case in self.result.items()}
+
+    def figures(self) -> Sequence[Figure]:
+        """The motion and the hunting cycles of each case."""
+        from friso.questions.check.figures import check_figures
+
+        return check_figures(self.traced)
+
+    def document(self) -> dict[str, Any]:
+        """The cases with their verdicts."""
+        from friso.questions.check.document import check_document
+
+        return check_document(self.result, self.draws, self.isolator, self.laws)
+
+    def files(self) -> Files:
+        """The report."""
+        from friso.questions.check.page import check_files
+
+        return check_files(self.traced, self.draws, self.isolator, self.laws)
+
+
+@question
+def check(
+    stage: StageLike,
+    rtol: float | str = RTOL,
+    *,
+    set: Changes = None,
+    draws: Whole | None = None,
+    seed: Whole = 0,
+    laws: bool = False,
+    progress: Progress = silent,
+) -> CheckAnswer:
+    """Does the stage hunt: as given, and with its joint locked and free.
+
+    Parameters
+    ----------
+    stage : Stage, path or dict
+        The stage, its file, or the tables of one.
+    rtol : float
+        Relative tolerance of the solver, 1e-12 to 1e-2.
+    set : dict, optional
+        Keys to override, ``{"joint.locked": True}``.
+    draws : int, optional
+        How many stages to draw from the uncertain keys, to report how many of them hunt; default: as many as a fixed
+        work allows, some tens.
+    seed : int
+        Seed of the draws: the same one gives the same stages.
+    laws : bool
+        Whether to give the verdict under every friction law that fits the same measurements as well.
+    progress : Progress
+        Called as work is done, also from worker threads.
+
+    Returns
+    -------
+    CheckAnswer
+        The cases by name: ``answer["locked"].verdict``, ``answer["locked"].judgement.cycle.amplitude`` [m].
+
+    Raises
+    ------
+    InputError
+        For a stage or an option that is not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> answer = friso.check(friso.example("lugre_stick_slip"))
+    >>> answer.verdict
+    'transient'
+    >>> print(answer.data["peak_to_peak"].attrs["units"])
+    m
+    """
+    chosen, tolerance = read_stage(stage, set, uncertain_too=True), tolerance_of(rtol)
+    loose = max(tolerance, LONG_RUN_RTOL)
+    whole_number(seed, "seed", 0, MOST_SEED, "1000")
+    sample = uncertain = None
+    if draws is not None:
+        whole_number(draws, "draws", 1, MOST, "1000")
+        try:
+            sample = draw(chosen, correlations_of(stage, chosen), draws, seed)
+        except InputError as error:
+            raise error if error.origin else error.found_in("draws") from None
+    elif chosen.uncertain():
+        uncertain = _drawable(chosen, correlations_of(stage, chosen), seed)
+    from friso.hunting import check as judged
+
+    kernels(needed_kernels(chosen))
+    mention_unstable_loop(chosen)
+    cases = judged(chosen, tolerance, progress=progress, tell=partial(mention_verdict, chosen))
+    drawn = across = None
+    if uncertain is not None:
+        from friso.studies.draws import affordable
+
+        sample = draw(chosen, uncertain, affordable(chosen, uncertain, seed, loose), seed)
+    if sample is not None:
+        from friso.studies.draws import fates
+
+        drawn = Draws(chosen, sample, seed, fates(chosen, sample, loose, progress))
+    if laws:
+        from friso.studies.laws.verdicts import verdicts_by_law
+
+        across = verdicts_by_law(chosen, loose, progress=progress)
+    return CheckAnswer(chosen, cases, drawn, across)
+
+
+def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
+    """Mention (to the logger "friso", as information) the verdict on a case of a stage, certain by what was computed so
+    far, while its edge, kicks and other cases are still computed."""
+    from friso.questions.check.words import IN_SHORT
+    from friso.shown.cases import case_labels
+
+    if name in (labels := case_labels(stage)):
+        LOGGER.info(f"{labels[name]}: {IN_SHORT[verdict]}", extra={"meanwhile": True})
+
+
+def _drawable(stage: Stage, correlations: Correlations, seed: int) -> Correlations | None:
+    """The correlations of a stage that is uncertain, if stages can be drawn from it; None if hardly any draw is
+    allowed, which is mentioned."""
+    from friso.studies.draws import TRIAL
+
+    try:
+        draw(stage, correlations, TRIAL, seed)
+    except InputError as error:
+        LOGGER.warning(f"no machines were drawn from the uncertain keys ({error.actual}); their centres are used")
+        return None
+    return correlations

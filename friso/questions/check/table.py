@@ -1,0 +1,194 @@
+"""The table of a check: what is named, and its text for each case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from friso.axis import axis_shown
+from friso.hunting import CheckPart
+from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
+from friso.quantities import percent, plain_factor
+from friso.questions.check.margin_words import margin_ways
+from friso.questions.check.words import at_the_end, edge_text
+from friso.shown.cases import BANDS, ShownCase
+from friso.shown.drawing.prefixes import (
+    NOTHING,
+    listed,
+    percent_range,
+    plus_minus,
+    range_with_unit,
+    window_with_unit,
+    with_unit,
+)
+
+if TYPE_CHECKING:
+    from friso.hunting import Case, Cycle, Kick
+
+_WINDOWS = 4  # windows of kicks that are listed, at most
+UNKNOWN = "not determined: that takes more work than a check may"
+
+
+def rows(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
+    """The rows of which some case has something to say."""
+    return _rows(_NUMBERS, cases)
+
+
+def rows_behind(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
+    """The same of what those rest on, in terms of the method."""
+    return _rows(_BEHIND, cases)
+
+
+def _rows(columns: dict[str, Callable[[Case], str]], cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
+    texts = [(axis_shown().text(name), [text(item.case) for item in cases]) for name, text in columns.items()]
+    return [(name, row) for name, row in texts if set(row) != {NOTHING}]
+
+
+def _of_the_cycle(text: Callable[[Cycle], str]) -> Callable[[Case], str]:
+    def of_the_case(case: Case) -> str:
+        cycle = case.judgement.cycle
+        return text(cycle) if cycle else NOTHING
+
+    return of_the_case
+
+
+def _amplitude(cycle: Cycle) -> str:
+    return f"{plus_minus(cycle.amplitude, 'm', 4)}{'' if cycle.attracts else ' (repels)'}"
+
+
+def _multiplier(cycle: Cycle) -> str:
+    simulated = f" (simulated: {cycle.growth:.4f})" if cycle.growth == cycle.growth else ""
+    return f"{cycle.multiplier:.4f}{simulated}"
+
+
+def _decided(cycle: Cycle) -> str:
+    method = "slope of the returns" if cycle.multiplier == cycle.slope else "Floquet"
+    return f"{'half a' if cycle.symmetric else 'a whole'} period ({method})"
+
+
+def _further_cycles(case: Case) -> str:
+    judgement = case.judgement
+    return (
+        "; ".join(_further_cycle(cycle) for cycle in judgement.hunting.cycles if cycle is not judgement.cycle)
+        or NOTHING
+    )
+
+
+def _further_cycle(cycle: Cycle) -> str:
+    kind = "symmetric" if cycle.symmetric else "asymmetric"
+    return f"{kind}, {plus_minus(cycle.amplitude, 'm', 4)}, {'attracts' if cycle.attracts else 'repels'}"
+
+
+def _observed(case: Case) -> str:
+    swings = case.judgement.hunting.observed
+    return (
+        "; ".join(f"{plus_minus(s.amplitude, 'm', 4)} every {with_unit(s.period, 's', 4)}" for s in swings) or NOTHING
+    )
+
+
+def _verdict(case: Case) -> str:
+    if case.runs_away:
+        return f"{case.verdict} (runs away)"
+    return case.verdict if case.judgement.hunting.certain else f"{case.verdict} (not certain)"
+
+
+def _edge(case: Case) -> str:
+    edge = case.judgement.margin
+    if edge is None:
+        return UNKNOWN if CheckPart.BANDWIDTHS in case.judgement.given_up else NOTHING
+    return f"{edge_text(case, edge.end)}{'' if edge.certain else ' (not certain)'}"
+
+
+def _static_friction(case: Case) -> str:
+    margin = case.static_friction
+    if margin is None:
+        return NOTHING
+    low, high = (plain_factor(factor) for factor in margin.range)
+    does = "ends" if margin.attracts else "begins"
+    ways = listed(margin_ways(margin), "or")
+    says = f"{does} {ways}" if ways else f"no other from {low} to {high} times yours"
+    return UNKNOWN if margin.open_sides and not ways else f"{says}{'' if margin.certain else ' (not certain)'}"
+
+
+def _kicks(case: Case, kick: Kick | None, unit: str) -> str:
+    if kick is None:
+        return UNKNOWN if CheckPart.STARTS in case.judgement.given_up else NOTHING
+    searched = range_with_unit(*kick.searched, unit)
+    if not kick.windows:
+        return UNKNOWN if kick.unknown else f"none from {searched}"
+    lost = f" ({kick.unknown} run{'s were' if kick.unknown > 1 else ' was'} given up)" if kick.unknown else ""
+    return f"{_windows(kick, unit, searched)}{lost}"
+
+
+def _windows(kick: Kick, unit: str, searched: str) -> str:
+    """The kicks that start hunting, at least one, of the range `searched`."""
+    if kick.windows == (kick.searched,):
+        return f"all that were tried, {searched}"
+    texts = [window_with_unit(*window, kick.searched, unit) for window in kick.windows[:_WINDOWS]]
+    more = len(kick.windows) - len(texts)
+    text = ", ".join([*texts, *([f"and {more} more range{'s' * (more > 1)}"] if more else [])])
+    open_ended = kick.windows[0][0] == kick.searched[0] or kick.windows[-1][1] == kick.searched[1]
+    return f"{text} (tried: {searched})" if open_ended else text
+
+
+def _moves(case: Case) -> str:
+    moves = case.judgement.moves
+    if moves is None:
+        return UNKNOWN if CheckPart.STARTS in case.judgement.given_up else NOTHING
+    low, high = moves.interval
+    return f"{percent(moves.fraction)} ({percent_range(low, high)}) of {moves.count} moves"
+
+
+def _peaks(case: Case) -> str:
+    """The peak count, and why it contradicts the verdict where it does; none where the run ends too early."""
+    if case.stage.motion.duration <= COUNTED_AFTER:
+        return (
+            f"{NOTHING} (counted from {COUNTED_AFTER:g} s on, and the run ends at {case.stage.motion.duration:.4g} s)"
+        )
+    remarks = {
+        ("hunts", False): f" (counted from {COUNTED_AFTER:g} s on, if higher than {with_unit(COUNTED_ABOVE, 'm')})",
+        ("bistable", False): " (another motion hunts)",
+        ("bistable", True): " (a long transient)",
+        ("transient", True): " (a long transient)",
+        ("settles", True): " (a long transient)",
+    }
+    return f"{case.peaks}{remarks.get((case.verdict, case.peaks > 0), '')}"
+
+
+def _settled_within(band: float) -> Callable[[Case], str]:
+    def text(case: Case) -> str:
+        time = case.settling_time.get(band)
+        if time is not None:
+            return with_unit(time, "s")
+        if case.in_the_end.get(band) is not None:
+            return f"not before it returns; {with_unit(case.in_the_end[band] or 0.0, 's')} afterwards"
+        return "never" if case.verdict == "hunts" else "not in this run"
+
+    return text
+
+
+_NUMBERS: dict[str, Callable[[Case], str]] = {
+    "Verdict": _verdict,
+    "Hunting cycle, amplitude": _of_the_cycle(_amplitude),
+    "Hunting cycle, period": _of_the_cycle(lambda cycle: with_unit(cycle.period, "s", 4)),
+    "Other hunting cycles": _further_cycles,
+    "Observed in simulations": _observed,
+    "Time constant of transients": _of_the_cycle(lambda cycle: with_unit(cycle.time_constant, "s")),
+    "Edge of hunting": _edge,
+    "Hunting, by static friction": _static_friction,
+    "Displacements that hunt": lambda case: _kicks(case, case.judgement.displacement, "m"),
+    "Pushes that hunt": lambda case: _kicks(case, case.judgement.push, "m/s"),
+    "Moves that end in hunting": _moves,
+    "Peak to peak, last quarter": at_the_end,
+    "Period, last quarter": lambda case: with_unit(case.period, "s"),
+    **{f"Settling time into {text}": _settled_within(band) for band, text in BANDS.items()},
+    "Largest actuator force": lambda case: with_unit(case.largest_force, "N"),
+}
+
+_BEHIND: dict[str, Callable[[Case], str]] = {
+    "Hunting multiplier": _of_the_cycle(_multiplier),
+    "Multiplier taken over": _of_the_cycle(_decided),
+    "Counted peaks": _peaks,
+    "Solver status": lambda case: case.solver.status,
+    "Steps (rejected)": lambda case: f"{case.solver.steps} ({case.solver.rejected})",
+}

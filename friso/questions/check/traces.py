@@ -1,0 +1,41 @@
+"""What the figures of a check take from its time responses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.shown.cases import ShownCase
+from friso.shown.drawing.figure import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def trace_of(item: ShownCase) -> xr.Dataset:
+    """The time response of a case that has one."""
+    assert item.case.trace is not None  # check_figures let no other through
+    return item.case.trace
+
+
+def samples(trace: xr.Dataset, name: str) -> Array:
+    """The numbers of a variable, in its own unit."""
+    return np.asarray(trace[name].values, dtype=float)
+
+
+def common_range(arrays: Sequence[Array], least: float = 0.0) -> tuple[float, float] | None:
+    """A range of at least `least` that holds all finite data with a margin; None where it would be empty."""
+    gathered = np.concatenate([np.empty(0), *arrays])
+    finite = gathered[np.isfinite(gathered)]
+    if finite.size == 0 or max(np.ptp(finite), least) == 0:
+        return None
+    low, high = float(finite.min()), float(finite.max())
+    margin = max(0.06 * (high - low), (least - (high - low)) / 2)
+    return low - margin, high + margin
+
+
+def subject(cases: Sequence[ShownCase]) -> str:
+    """The stage that the cases are of, as figures name it."""
+    return str(cases[0].case.stage.name)

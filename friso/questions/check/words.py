@@ -1,0 +1,469 @@
+"""What a check found, in words: the sentence per case, and the conclusion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from friso.equations.bandwidth import bandwidth
+from friso.equations.scaled_friction import least_static_factor
+from friso.hunting import SEARCH_LIMITS, CheckPart
+from friso.hunting.criteria import ATTRACTED
+from friso.quantities import percent, plain_factor
+from friso.questions.check.feeding_words import feeding_sentences
+from friso.questions.check.margin_words import friction_sentences, thin_margins
+from friso.shown.cases import BANDS, ShownCase, band_text, shown_cases
+from friso.shown.drawing.prefixes import (
+    digits_that_differ,
+    length_at_rest,
+    listed,
+    plus_minus,
+    rounded_down,
+    rounded_up,
+    with_unit,
+)
+from friso.shown.loop_words import unstable_where
+from friso.stage.controllers import FORCE_LIMIT
+
+if TYPE_CHECKING:
+    from friso.hunting import AttractionEnd, BandwidthWindow, Case, Kick, Margin
+    from friso.hunting.criteria import Verdict
+
+_MICRON, _TEN_MICRON = BANDS
+
+_AFTERWARDS = {
+    "stable": "dies out slowly, if at all",
+    "unstable": "grows",
+    "unknown": "may last, grow or die out",
+}
+"""What becomes of a swing that was observed beyond a force limit without anti-windup, by the loop at lower gains."""
+
+_UNFINISHED = (
+    "could not be judged: its own run was completed, but not the longer one that shows whether it ends in the hunting "
+    "that was found."
+)
+"""That what a stage does in the end is not known."""
+
+IN_SHORT: Mapping[Verdict, str] = {
+    "hunts": "hunts",
+    "bistable": "settles after this motion, but hunts after others",
+    "transient": "does not hunt",
+    "settles": "does not hunt",
+}
+"""What a case does, before its margin is known."""
+
+ONE_PLACE = 1.01
+"""Factor between the ends of a window below which it is told by its middle and its width."""
+
+ROUGH = 5e-4
+"""Reserve of an edge, as a share of it, from which on it is told: the digits that are shown do not hold."""
+
+
+def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
+    """What a case does, and what to do about it, for the engineer who decides; `cases` are all of the check."""
+    case = item.case
+    loop = _loop(case)
+    says = {"hunts": _hunting, "bistable": _bistable, "transient": _transient, "settles": _settling}
+    if case.runs_away:
+        return " ".join([*loop, "runs away from its reference for good."])
+    if case.verdict not in says and case.solver.done:
+        return " ".join([*loop, _UNFINISHED])
+    if case.verdict not in says:
+        return " ".join([*loop, f"could not be simulated to the end of its motion ({case.solver.status})."])
+    feeds = feeding_sentences(case.feeding) if case.feeding else []
+    feeds += [f"{_too_much('What feeds it')}."] if CheckPart.FEEDING in case.judgement.given_up else []
+    after = _remedy(item, cases) if case.verdict in ATTRACTED else _outlook(case)
+    after += friction_sentences(case)
+    return " ".join([*loop, says[case.verdict](case), *feeds, *_doubts(case), *_running_away(case), *after])
+
+
+def _loop(case: Case) -> list[str]:
+    """That the loop is not stable comes before what friction makes of it."""
+    return [f"the loop is {unstable_where(case.unstable)}. The stage"] if case.unstable else []
+
+
+def answer(cases: Mapping[str, Case]) -> list[str]:
+    """A sentence for each case that is shown, and what follows from both."""
+    says = [f"{item.label}: {verdict_sentence(item, cases)}" for item in shown_cases(cases)]
+    return [*says, *filter(None, [conclusion(cases)])]
+
+
+def conclusion(cases: Mapping[str, Case]) -> str | None:
+    """What the joint does to the hunting, where both of its cases were run to a verdict that is certain."""
+    both = [cases[key] for key in ("locked", "free") if key in cases]
+    words = [case.verdict for case in both]
+    if len(words) < 2 or "failed" in words or not all(case.judgement.hunting.certain for case in both):
+        return None
+    locked, free = (word in ATTRACTED for word in words)
+    if not free:
+        return f"The free joint stops the hunting{_reserve(both[1])}." if locked else None
+    if words == ["hunts", "bistable"]:
+        return "The free joint stops the hunting after this move, but does not rule it out."
+    return "The free joint does not stop the hunting." if locked else "The stage hunts only with its joint free."
+
+
+def _reserve(case: Case) -> str:
+    """That a case that settles is closer to hunting than advice should lead, if it is."""
+    thin = thin_margins(case)
+    sure = (case.static_friction is None or case.static_friction.certain) and (
+        case.judgement.margin is None or case.judgement.margin.certain
+    )
+    back = "brings it back" if sure else "may bring it back"
+    return f", but with little reserve: {listed(thin, 'or')} {back}" if thin else ""
+
+
+def at_the_end(case: Case) -> str:
+    """Peak to peak."""
+    return length_at_rest(case.peak_to_peak)
+
+
+def _hunting(case: Case) -> str:
+    if not case.judgement.observed:
+        return f"hunts, {_swing(case)}."
+    seen = "This rests on long simulations: no attracting orbit could be closed."
+    if case.judgement.hunting.passing:
+        return f"hunts, {_swing(case)} when its run was stopped. {seen}"
+    if case.judgement.swing:
+        return f"hunts, {_swing(case)}. {seen}"
+    size, after = with_unit(case.judgement.lasting, "m"), with_unit(case.judgement.followed, "s")
+    return f"hunts, still {size} peak to peak after {after}. {seen}"
+
+
+def _bistable(case: Case) -> str:
+    kicks = (("displacement", case.judgement.displacement, "m"), ("push", case.judgement.push, "m/s"))
+    starts = [_kick(name, kick, unit) for name, kick, unit in kicks if kick and kick.windows]
+    if (moves := case.judgement.moves) and moves.hunting:
+        least, most = SEARCH_LIMITS.move_shares
+        like = f"this move at {least:g} to {most:g} times its acceleration and acceleration time"
+        starts.append(f"{percent(moves.fraction)} of the moves tried ({like})")
+    first = f"settles after this move{_stuck(case)}"
+    if not starts and CheckPart.STARTS in case.judgement.given_up:
+        return f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."
+    if case.judgement.hunting.passing:
+        after = _AFTERWARDS[case.judgement.hunting.lower_gains or "unknown"]
+        return f"{first}, but another move or a kick may start a swing that {after}."
+    if not starts:
+        return f"{first}, and none of the kicks and moves tried starts hunting ({_swing(case)})."
+    seen = " (observed in simulations; no orbit that attracts could be closed)" if case.judgement.observed else ""
+    return f"{first}, but {listed(starts, 'or')} can start hunting, {_swing(case)}{seen}."
+
+
+def _too_much(what: str) -> str:
+    """That something was not determined."""
+    return f"{what} was not determined, as that takes more work than a check may"
+
+
+def _kick(name: str, kick: Kick, unit: str) -> str:
+    """The smallest kick that starts hunting, or that was tried."""
+    least = kick.windows[0][0]
+    return f"a {name} of {with_unit(least, unit)}{' (the smallest tried)' if least == kick.searched[0] else ''}"
+
+
+def _transient(case: Case) -> str:
+    judgement, end = case.judgement, _end(case)
+    if not judgement.hunting.possible:
+        cannot = f"cannot hunt, because {judgement.hunting.reason}; but this motion "
+        says = f"{cannot if judgement.hunting.certain else ''}has not settled at its end ({end})."
+        return " ".join([says, *_held(case)])
+    attracts = "no cycle attracts" if judgement.hunting.certain else "no cycle was found that attracts"
+    says = [f"transient: {attracts}, but this motion has not settled at its end ({end}).", *_held(case)]
+    leaks = getattr(case.stage.controller, "integral_leak", None) and case.force_limit is None
+    if leaks and case.peak_to_peak < _TEN_MICRON and judgement.hunting.certain and not judgement.runs_away:
+        stays = f"; it is still there after {with_unit(judgement.followed, 's')}" if judgement.followed else ""
+        off = f"{length_at_rest(abs(case.offset))} off its reference"
+        return f"does not hunt ({attracts}), but rests {off}: the leak of its integral holds it there{stays}."
+    if judgement.cycle:
+        says.append(f"Transients decay or grow by a factor of e in {with_unit(judgement.cycle.time_constant, 's')}.")
+    if judgement.runs_away:
+        says.append("Afterwards it runs away from its reference.")
+    elif judgement.settled_after is None and judgement.followed is None:
+        says.append(f"{_too_much('How long it takes to settle')}.")
+    elif judgement.settled_after is None:
+        says.append(
+            f"It does not settle to within {band_text(_TEN_MICRON)} in {with_unit(judgement.followed, 's')} either."
+        )
+    else:
+        says.append(f"It settles to within {band_text(_TEN_MICRON)} in {with_unit(judgement.settled_after, 's')}.")
+    return " ".join(says)
+
+
+def _held(case: Case) -> list[str]:
+    """That the limit of the force is what keeps a case where it stands, if it is."""
+    if case.force_limit is None:
+        return []
+    limit, least = _forces(case.force_limit, case.breakaway)
+    more = f", and break-away takes {least}" if case.force_limit < case.breakaway else ""
+    return [f"Its force is at most {FORCE_LIMIT}, {limit}{more}."]
+
+
+def _forces(*forces: float) -> list[str]:
+    """Forces [N] with as many digits as tell them apart."""
+    digits = digits_that_differ(forces)
+    return [with_unit(force, "N", digits) for force in forces]
+
+
+def _settling(case: Case) -> str:
+    hunting = case.judgement.hunting
+    says = _settling_sentence(case)
+    return says if hunting.possible or not hunting.certain else f"{says} It cannot hunt, because {hunting.reason}."
+
+
+def _stuck(case: Case) -> str:
+    """That the motion does not break the stage away, if it does not: only its bristles give way."""
+    if not case.unmoved:
+        return ""
+    force, least = _forces(case.largest_force, case.breakaway)
+    return f" without breaking away (it exerts at most {force}; break-away takes {least})"
+
+
+def _settling_sentence(case: Case) -> str:
+    fine, coarse = case.settling_time.get(_MICRON), case.settling_time.get(_TEN_MICRON)
+    stuck = _stuck(case)
+    if fine == 0 and stuck:
+        return f"settles: it ends within {band_text(_MICRON)} of its reference{stuck}."
+    if fine is not None:
+        return f"settles to within {band_text(_MICRON)} in {with_unit(fine, 's')}{stuck}."
+    if coarse is not None:
+        within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(coarse, 's')}{stuck}"
+        swing = _small_swing(case)
+        finer = f"not to within {band_text(_MICRON)}{_at_the_far_end(case, _MICRON)}"
+        return f"{within}, but {f'does not stay within {band_text(_MICRON)}{swing}' if swing else finer}."
+    if far := _at_the_far_end(case, _TEN_MICRON):
+        within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(case.in_the_end[_TEN_MICRON] or 0.0, 's')}"
+        return f"{within}{stuck}, but not{far}."
+    return " ".join([f"settles{stuck}, but not to within {band_text(_TEN_MICRON)} ({_end(case)}).", *_held(case)])
+
+
+def _at_the_far_end(case: Case, band: float) -> str:
+    """That it is at the far end alone that a stage does not settle to within a band [m] in time; "" if it is not."""
+    return " at the far end before it returns" if case.in_the_end.get(band) is not None else ""
+
+
+def _small_swing(case: Case) -> str:
+    """How a motion that stays within 10 um swings there at its end; "" if it does not."""
+    if not case.period or case.peak_to_peak < _MICRON:
+        return ""
+    return f": at its end it swings by {at_the_end(case)} peak to peak every {with_unit(case.period, 's')}"
+
+
+def _doubts(case: Case) -> list[str]:
+    """Why the verdict is not certain, if it is not."""
+    hunting = case.judgement.hunting
+    if hunting.certain:
+        return []
+    return [f"This is not certain ({hunting.reason}){'' if hunting.target else ': other motions may end in hunting'}."]
+
+
+def _running_away(case: Case) -> list[str]:
+    """That large motions grow without bound, or may, or that this is not known, and what keeps them from it."""
+    cause = 'set controller.anti_windup, which is "none", to "clamp".'
+    if (away := case.judgement.running_away) and away.windows:
+        least = with_unit(away.windows[0][0], "m")
+        return [f"It runs away after a displacement of {least}{_or_more(away)}: {cause}"]
+    return {
+        None: [],
+        "stable": [],
+        "unstable": [f"Large motions may run away: {cause}"],
+        "unknown": [f"It is not known whether large motions run away: {cause}"],
+    }[case.judgement.hunting.lower_gains]
+
+
+def _or_more(kick: Kick) -> str:
+    """That all larger kicks do the same, as far as was searched, if they do."""
+    return " or more" if kick.windows == ((kick.windows[0][0], kick.searched[1]),) else ""
+
+
+def _outlook(case: Case) -> list[str]:
+    """Where hunting begins, of a case that need not hunt."""
+    judgement = case.judgement
+    says: list[str] = []
+    if judgement.margin:
+        up_to = "below" if judgement.margin.certain else "up to"
+        says.append(f"Hunting is possible {up_to} {edge_text(case, judgement.margin.end)}.")
+    elif judgement.hunting.possible and CheckPart.BANDWIDTHS not in judgement.given_up:
+        says.append(f"No hunting was found down to {percent(SEARCH_LIMITS.lowest_bandwidth)} of this bandwidth.")
+    return [*says, *_windows(case), *_unsearched(case)]
+
+
+def _unsearched(case: Case) -> list[str]:
+    """That the search through the bandwidths was given up."""
+    if CheckPart.BANDWIDTHS not in case.judgement.given_up:
+        return []
+    if case.judgement.margin and case.judgement.margin.certain:
+        return [f"{_too_much('Whether hunting is possible again at other bandwidths')}."]
+    if case.judgement.margin:
+        return ["The search for the edge of hunting was given up there: it takes more work than a check may."]
+    return [f"{_too_much('At which bandwidths hunting is possible')}."]
+
+
+def edge_text(case: Case, end: AttractionEnd) -> str:
+    """A bandwidth at which hunting ends; of one that is not certain, where hunting was found and where it was not."""
+    if not end.certain:
+        ends = sorted((end.inside, end.outside))
+        low, high = _bandwidth(case, ends[0], up=False, digits=4), _bandwidth(case, ends[1], digits=4)
+        return f"somewhere between {low} and {high}"
+    if end.reserve < ROUGH:
+        return _bandwidth(case, end.inside, up=None, digits=4)
+    value = end.inside * (_present_bandwidth(case) or 1.0)
+    bound = end.reserve + abs(float(f"{value:.4g}") / value - 1)
+    return f"{_bandwidth(case, end.inside, up=None, digits=4)} (± {percent(rounded_up(bound, 1), 1)})"
+
+
+def _present_bandwidth(case: Case) -> float | None:
+    """The bandwidth of the case [Hz]; None where its controller states none."""
+    edge = case.judgement.margin
+    return edge.crossover / edge.factor if edge and edge.crossover else bandwidth(case.stage.flat())
+
+
+def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 3) -> str:
+    """A bandwidth that is a factor of that of the case, rounded upward, downward or (None) to the nearest."""
+    crossover = _present_bandwidth(case)
+    value = factor * (crossover or 1.0)
+    if up is not None:
+        value = (rounded_up if up else rounded_down)(value, digits)
+    if crossover is None:
+        return f"{value:.{digits}g} times this bandwidth"
+    key = _elsewhere(case)
+    return f"{key} = {with_unit(value, 'Hz', digits)}" if key else with_unit(value, "Hz", digits)
+
+
+def _elsewhere(case: Case) -> str | None:
+    """The key that states a bandwidth [Hz] which is not where the loop crosses 0 dB; None where it is, or without."""
+    controller = case.stage.controller
+    return None if controller.bandwidth_name == "crossover" else controller.bandwidth_key
+
+
+def _windows(case: Case, narrow: bool = False) -> list[str]:
+    """Where else in bandwidth something attracts: in windows that are narrow, or not."""
+    places = [_window(case, window) for window in case.judgement.windows if window.narrow == narrow]
+    return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
+
+
+def _window(case: Case, window: BandwidthWindow) -> str:
+    """Where a window of bandwidths lies."""
+    low, high = window.low, window.high
+    if low and high and high.inside < low.inside * ONE_PLACE:
+        width = percent(high.inside / low.inside - 1)
+        middle = (low.inside + high.inside) / 2
+        return f"within a range of {width} about {_bandwidth(case, middle, up=None, digits=5)}"
+    lowest, highest = (
+        f"{_bandwidth(case, factor, up=None)} (the {name} searched)"
+        for factor, name in ((SEARCH_LIMITS.lowest_bandwidth, "lowest"), (SEARCH_LIMITS.highest_bandwidth, "highest"))
+    )
+    return f"from {edge_text(case, low) if low else lowest} to {edge_text(case, high) if high else highest}"
+
+
+def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
+    """Windows that are so narrow that no machine stays in there, and how far apart the bandwidths are that the search
+    for an edge surveys: others may lie between them."""
+    if all(case.judgement.margin is None for case in cases.values()):
+        return []
+    low, high = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
+    steps = SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond
+    fine, coarse = (percent(10 ** (1 / count) - 1) for count in steps)
+    return [
+        *(f"{item.label}: {sentence}" for item in shown_cases(cases) for sentence in _windows(item.case, narrow=True)),
+        f"Bandwidths from {low:g} to {high:g} times this one were surveyed, {fine} or {coarse} apart. Other ranges in "
+        "which the stage hunts, narrower than these steps, may lie between (friso boundary follows cycles from more "
+        "bandwidths).",
+    ]
+
+
+def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
+    """What keeps a case from hunting."""
+    judgement = item.case.judgement
+    grows = judgement.hunting.passing and judgement.hunting.lower_gains == "unstable"  # the faster the loop, the sooner
+    ways = [_faster(item.case, judgement.margin)] if judgement.margin and not grows else []
+    ways += [_slower(item.case, judgement.lower)] if judgement.lower else []
+    ways += ["free the joint"] if _freeing_helps(item, cases) else []
+    says = [f"{ways[0][0].upper()}{listed(ways, 'or')[1:]}."] if ways else []
+    if judgement.margin or CheckPart.BANDWIDTHS in judgement.given_up:
+        return [*says, *_windows(item.case), *_unsearched(item.case)]
+    if judgement.hunting.target is None:
+        return says
+    given_up = CheckPart.LOWER_BANDWIDTHS in judgement.given_up
+    lower = [f"{_too_much('Whether it hunts at lower bandwidths')}."] if given_up else []
+    still = "is still possible" if judgement.hunting.certain else "was still found"
+    tune = "" if ways else " friso tune looks for other settings."
+    return [f"Hunting {still} at {SEARCH_LIMITS.highest_bandwidth:g} times this bandwidth.{tune}", *says, *lower]
+
+
+def _slower(case: Case, end: AttractionEnd) -> str:
+    """To which lower bandwidth the stage settles."""
+    doubt = "" if end.certain else f" (not certain: hunting was found down to {_bandwidth(case, end.inside, digits=4)})"
+    return f"lower the bandwidth to {_bandwidth(case, end.outside, up=False)}{doubt}"
+
+
+def _faster(case: Case, edge: Margin) -> str:
+    """What to do to the controller so that the stage settles: to a bandwidth at a distance from the edge."""
+    controller, highest = case.stage.controller, _bandwidth(case, edge.factor, up=False, digits=4)
+    apart = _distance(case, edge)
+    kept = (
+        f", at least {apart:g} times the edge of hunting{_with_other_friction(case)}"
+        if apart > 1
+        else ", just above the edge: hunting begins again closely"
+    )
+    doubt = "" if edge.certain else f" (not certain: hunting was found up to {highest})"
+    if edge.crossover is not None:
+        crossover = edge.crossover / edge.factor
+        to = rounded_up(crossover * edge.quiet * apart)
+        by = rounded_up(to - crossover)
+        name = _elsewhere(case) or f"the {controller.bandwidth_name}"
+        return f"raise {name} by {with_unit(by, 'Hz')} (to {with_unit(to, 'Hz')}{kept}){doubt}"
+    factor = rounded_up(edge.quiet * apart)
+    powers = controller.speeds_up.items()
+    gains = [f"{name} × {factor**power:.3g}" for name, power in powers if getattr(controller, name)]
+    return f"make the controller {plain_factor(factor)} times faster{kept} ({', '.join(gains)}){doubt}"
+
+
+def _with_other_friction(case: Case) -> str:
+    """Whether the bandwidth that advice leads to keeps a margin in static friction."""
+    if case.advice_keeps_friction is None:
+        return ""
+    distance = SEARCH_LIMITS.edge_distance
+    lower = "as low as Coulomb friction" if least_static_factor(case.stage.flat()) > 1 / distance else "as low"
+    friction = f"with static friction {distance:g} times as high or {lower}"
+    return f", also {friction}" if case.advice_keeps_friction else f"; but hunting returns there {friction}"
+
+
+def _distance(case: Case, edge: Margin) -> float:
+    """The factor from the edge that advice keeps; 1 where something attracts again within it, over more than a
+    hundredth of the bandwidth or as close to where the advice leads."""
+    distance = SEARCH_LIMITS.edge_distance
+    to = edge.quiet * distance
+
+    def in_the_way(window: BandwidthWindow) -> bool:
+        low, high = window.low, window.high
+        if low is None or not edge.factor < low.inside <= to * (1 + ROUGH):
+            return False
+        return high is None or high.inside * ONE_PLACE >= min(to, low.inside * ONE_PLACE**2)
+
+    again = any(in_the_way(window) for window in case.judgement.windows)
+    return 1.0 if again or to > SEARCH_LIMITS.highest_bandwidth else distance
+
+
+def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:
+    joint, free = item.case.stage.joint, cases.get("free")
+    if free is None or joint is None or not joint.locked:
+        return False
+    return free.verdict in ("settles", "transient") and free.judgement.hunting.certain
+
+
+def _swing(case: Case) -> str:
+    """The size of the hunting cycle, e.g. "±0.52 mm every 1.63 s"."""
+    swing = case.judgement.swing
+    assert swing  # it attracts, or the verdict were another
+    size, turns = plus_minus(swing.amplitude, "m"), swing.swings / 2
+    often = f"{size} every {with_unit(swing.period / turns, 's')}"
+    if turns == 1:
+        return often
+    return f"up to {often}, each swing unlike the next (it repeats itself after {with_unit(swing.period, 's')})"
+
+
+def _end(case: Case) -> str:
+    """What is left of the motion in its last quarter."""
+    if case.peak_to_peak < _TEN_MICRON:
+        return f"at rest, but {length_at_rest(abs(case.offset))} off its reference"
+    if not case.period:
+        return f"in its last quarter it still moves by {at_the_end(case)}"
+    return f"still {at_the_end(case)} peak to peak every {with_unit(case.period, 's')}"

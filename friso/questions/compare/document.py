@@ -1,0 +1,73 @@
+"""Isolator or firmware: the JSON document."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from friso.axis import axis_shown
+from friso.equations.bandwidth import bandwidth
+from friso.hunting.criteria import DISTINCT_CRITERION as PEAKS
+from friso.hunting.criteria import OUTCOME_CRITERION as OUTCOME
+from friso.questions.compare.words import sentences
+from friso.shown.documents import plain_json
+from friso.studies.compare.study import Comparison, OptionResult
+
+
+def compare_document(comparison: Comparison) -> dict[str, Any]:
+    """The JSON document: SI units, the unit in the key's suffix; an infinite time (never) is null."""
+    machines = comparison.machines
+    conclusion, *details = sentences(comparison)
+    return plain_json(
+        {
+            "conclusion": conclusion,
+            "details": details,
+            "stage": comparison.stage.name,
+            "seed": comparison.seed,
+            "machines": machines.count,
+            "criteria": {
+                "swings": f"{OUTCOME}; band: {axis_shown().suffix('within_m')}",
+                "distinct_peaks": axis_shown().text(PEAKS),
+            },
+            "within_m": comparison.within,
+            "deadband_m": comparison.options.deadband,
+            "sample_time_s": comparison.stage.flat()["drive.sample_time"],
+            "from_file": [*machines.from_file],
+            "spreads_percent": dict(machines.spreads),
+            "left_out_draws": machines.sample.left_out,
+            "options": {result.letter: _option(comparison, result) for result in comparison.results},
+            "left_out": dict(comparison.options.left_out),
+            "standstill_compared": comparison.shaken,
+            "notes": [*comparison.notes],
+        }
+    )
+
+
+def _option(comparison: Comparison, result: OptionResult) -> dict[str, Any]:
+    pair = comparison.paired(result)
+    crossover = bandwidth(result.option.stage.flat())
+    return {
+        "name": result.option.name,
+        "crossover_hz": crossover,
+        "bandwidth_factor": result.option.factor,
+        "swings": asdict(result.swinging),
+        "distinct_peaks": asdict(result.counted),
+        "in_position": asdict(result.settled),
+        "stays": asdict(result.stays),
+        "settling_time_s": asdict(result.settling),
+        "in_position_rms_m": asdict(result.in_position),
+        "force_rms_n": asdict(result.force),
+        "modulus_margin": asdict(result.margin) | {"least": float(result.loops.margin.min())},
+        "unstable": result.unstable,
+        "failed": result.failed,
+        "machines_in_position": result.in_position_count,
+        "rests": result.rests,
+        "against_a": {
+            "swings": asdict(pair.swinging),
+            "sooner": asdict(pair.sooner),
+            "later": asdict(pair.later),
+            "alike": asdict(pair.alike),
+            "in_position_rms": asdict(pair.in_position) if comparison.shaken else None,
+            "force_rms": asdict(pair.force),
+        },
+    }

@@ -1,0 +1,147 @@
+"""Isolator or firmware, drawn: which machines swing on, when they settle, how still they stand."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.equations.motion import last_corner
+from friso.questions.compare.words import label
+from friso.shares import Share
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PINK,
+    SKY,
+    VERMILLION,
+    Axis,
+    Dash,
+    Figure,
+    Markers,
+    Panel,
+    Series,
+)
+from friso.shown.drawing.prefixes import with_unit
+from friso.studies.compare.study import LONGER, Comparison, OptionResult
+
+LINES: dict[str, tuple[str, Dash]] = {
+    "a": (INK, "solid"),
+    "b": (BLUE, "solid"),
+    "c": (VERMILLION, "solid"),
+    "d": (ORANGE, "dashed"),
+    "e": (PINK, "dashed"),
+    "f": (SKY, "dashed"),
+    "g": (GREEN, "solid"),
+    "h": (BLUE, "dotted"),
+    "i": (VERMILLION, "dotted"),
+    "j": (ORANGE, "dotted"),
+    "k": (PINK, "dotted"),
+    "l": (SKY, "dotted"),
+    "m": (GREEN, "dotted"),
+    "n": (INK, "dashed"),
+}
+"""Colour and dash of the options."""
+
+BESIDE = 0.16
+"""Distance between the markers of an option, in distances between options."""
+
+MOST = (5, 95)
+"""Percentiles between which most machines are."""
+
+
+def figures(comparison: Comparison) -> list[Figure]:
+    """Probabilities, settling times and standstill in one figure."""
+    within = with_unit(comparison.within, "m")
+    caption = (
+        f"{comparison.machines.count} machines drawn with seed {comparison.seed}, the same in all options; in position "
+        f"means within {within}. Bars of probabilities are 95 % intervals. The settling curve of an option ends at the "
+        "share of machines that settle at all. Standstill: thin bars contain 90 % of the machines, thick bars are 95 % "
+        "intervals of the median."
+    )
+    if not comparison.shaken:
+        caption += " No floor vibration is included: a machine at rest here need not stand still in a real room."
+    panels = (_probabilities(comparison), _settling(comparison, within), _standstill(comparison))
+    return [Figure("compare", "Isolator or firmware?", caption, panels, subject=comparison.stage.name)]
+
+
+def _names(comparison: Comparison) -> Axis:
+    """The options side by side, by the letters that the curves of settling times name; names would not fit a phone."""
+    letters = tuple(result.letter for result in comparison.results)
+    return Axis("Option", "", (-0.5, len(letters) - 0.5), words=letters)
+
+
+def _probabilities(comparison: Comparison) -> Panel:
+    kinds = (
+        ("swings at the end", VERMILLION, [result.swinging for result in comparison.results]),
+        ("not in position at the end", BLUE, [_other(result.settled) for result in comparison.results]),
+        (
+            f"does not stay there ({LONGER} times as long)",
+            GREY,
+            [_other(result.stays) for result in comparison.results],
+        ),
+    )
+    series, markers = [], []
+    for number, (name, colour, shares) in enumerate(kinds):
+        x = np.arange(len(shares), dtype=np.float64) + (number - 1) * BESIDE
+        series.append(_bars(x, [(share.low, share.high) for share in shares], colour, 100))
+        heights = np.array([100 * share.probability for share in shares])
+        markers.append(Markers(x, heights, name, colour))
+    y = Axis("Share of machines", "%", (-3.0, 103.0))
+    return Panel("Machines that do not come to rest", _names(comparison), y, tuple(series), tuple(markers))
+
+
+def _other(share: Share) -> Share:
+    """The probability of the contrary."""
+    return Share(1 - share.probability, 1 - share.high, 1 - share.low)
+
+
+def _bars(
+    x: np.ndarray, ends: list[tuple[float, float]], colour: str, factor: float = 1.0, width: float = 1.4
+) -> Series:
+    """Upright bars as one line with gaps."""
+    places = np.repeat(x, 3)
+    heights = np.array([value for low, high in ends for value in (factor * low, factor * high, np.nan)])
+    return Series(places, heights, "", colour, width=width)
+
+
+def _settling(comparison: Comparison, within: str) -> Panel:
+    flat, count = comparison.stage.flat(), comparison.machines.count
+    end = flat["motion.duration"] - float(last_corner(flat))
+    times = [np.sort(result.measures.settling[np.isfinite(result.measures.settling)]) for result in comparison.results]
+    first = min((float(ordered[0]) for ordered in times if ordered.size), default=end)
+    start = max(first, 1e-3 * end) / 1.3
+    series = []
+    for result, ordered in zip(comparison.results, times, strict=True):
+        colour, dash = LINES[result.letter]
+        x = np.concatenate([[start], np.repeat(np.maximum(ordered, start), 2), [end]])
+        steps = 100 * np.arange(len(ordered) + 1) / count
+        series.append(Series(x, np.repeat(steps, 2), label(result), colour, dash))
+    axis = Axis("Time after the move", "s", (start, end), log=True, prefixed=False)
+    return Panel(f"In position to stay, within {within}", axis, Axis("Share", "%", (-3.0, 103.0)), tuple(series))
+
+
+def _standstill(comparison: Comparison) -> Panel:
+    x, medians = (
+        np.arange(len(comparison.results), dtype=np.float64),
+        [result.in_position for result in comparison.results],
+    )
+    middle = np.array([median.value for median in medians])
+    most = [_most(result) for result in comparison.results]
+    series = (
+        _bars(x, most, GREY),
+        _bars(x, [(median.low, median.high) for median in medians], BLUE, width=4.0),
+    )
+    moves = max((high for _, high in most if high > 0), default=0.0) > 0  # none does that rests where it begins
+    y = Axis("In-position RMS", "m", log=moves)
+    title = "Standstill" if comparison.shaken else "At rest or not (no floor vibration)"
+    return Panel(title, _names(comparison), y, series, (Markers(x, middle, "median", BLUE),))
+
+
+def _most(result: OptionResult) -> tuple[float, float]:
+    finite = result.measures.in_position[np.isfinite(result.measures.in_position)]
+    if not finite.size:
+        return np.nan, np.nan
+    low, high = np.percentile(finite, MOST)
+    return float(low), float(high)

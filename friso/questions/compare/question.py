@@ -1,0 +1,129 @@
+"""Isolator or firmware: the same drawn machines with a joint, and with other settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.inputs import Changes, StageLike, correlations_of, mention_unstable_loop, quantity_of, read_stage
+from friso.progress import Progress, silent
+from friso.quantities import Quantity, positive
+from friso.studies.compare.study import Comparison
+
+if TYPE_CHECKING:
+    from friso.shown.drawing.figure import Figure
+    from friso.shown.files import Files
+
+
+class CompareAnswer(Answer):
+    """Seven options on the same machines: `result` is a `Comparison`."""
+
+    command = "compare"
+
+    def __init__(self, result: Comparison) -> None:
+        self.result, self.axis_kind = result, result.stage.axis_kind
+
+    @property
+    def failure(self) -> str:
+        """Whether runs stopped early."""
+        stopped = sum(result.failed for result in self.result.results)
+        return f"{stopped} runs stopped early" if stopped else ""
+
+    def sentences(self) -> Sequence[str]:
+        """Whether to buy a joint, then which options bring the machines to rest at what cost."""
+        from friso.questions.compare.words import answer
+
+        return answer(self.result)
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """The options, and each beside the first on the same machines."""
+        from friso.questions.compare.words import COLUMNS, PAIRED, paired_rows, table_rows
+
+        return [
+            AnswerTable(self.result.stage.name, COLUMNS, table_rows(self.result)),
+            AnswerTable("Compared with a, machine by machine", PAIRED, paired_rows(self.result)),
+        ]
+
+    def details(self) -> Sequence[str]:
+        """What each option is and does, how machines were drawn, and notes."""
+        from friso.questions.compare.words import details, options_rows, population
+
+        options = [f"{label}: {text}" for label, text in options_rows(self.result)]
+        notes = [f"note: {note}" for note in self.result.notes]
+        return [*options, *details(self.result), *population(self.result), *notes]
+
+    def figures(self) -> Sequence[Figure]:
+        """Shares that swing, settling times, standstill."""
+        from friso.questions.compare.figures import figures
+
+        return figures(self.result)
+
+    def document(self) -> dict[str, Any]:
+        """The options with their numbers and intervals."""
+        from friso.questions.compare.document import compare_document
+
+        return compare_document(self.result)
+
+    def files(self) -> Files:
+        """The page and the figures."""
+        from friso.questions.compare.page import compare_files
+
+        return compare_files(self.result)
+
+
+@question
+def compare(
+    stage: StageLike,
+    *,
+    machines: int = 2000,
+    seed: int = 1,
+    within: float | str | None = None,
+    also: Iterable[str] = (),
+    set: Changes = None,
+    progress: Progress = silent,
+) -> CompareAnswer:
+    """Buy a joint or change settings: which of seven options brings machines like this one to rest, and at what cost.
+
+    Parameters
+    ----------
+    stage : Stage, path or dict
+        The stage with its drive, its file, or the tables of one.
+    machines : int
+        Number of machines drawn around the stage, 20 or more.
+    seed : int
+        Seed of the draws: the same one gives the same machines.
+    within : str or float, optional
+        Deviation that counts as in position, "1 um" or a number [m].
+    also : list of str, optional
+        Also settings of drives against friction, "limit", "leak", "hysteresis", "standstill", "push", "dither"; active
+        disturbance rejection, "adrc"; or "all".
+    set : dict, optional
+        Keys to override.
+    progress : Progress
+        Called as options are simulated.
+
+    Returns
+    -------
+    CompareAnswer
+        The results of the options, ``answer.results``.
+
+    Raises
+    ------
+    InputError
+        For a stage or an option that is not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.compare(friso.example("thesis_drive"), machines=200)  # doctest: +SKIP
+    """
+    chosen = read_stage(stage, set, leaves_out=(), uncertain_too=True)
+    length = Quantity("m", positive, "1 um").on(chosen.axis_kind)
+    tolerance = quantity_of(length.example if within is None else within, "within", length)
+    from friso.studies.compare.study import compare as compared
+
+    correlations = correlations_of(stage, chosen)
+    begins = partial(mention_unstable_loop, chosen)
+    return CompareAnswer(compared(chosen, machines, seed, tolerance, correlations, progress, tuple(also), begins))

@@ -1,0 +1,349 @@
+"""Isolator or firmware, in words: what the options are, the tables, and what follows from them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from friso.equations.bandwidth import bandwidth
+from friso.equations.settings import SETTINGS, Setting
+from friso.evidence import value
+from friso.frequency.crossover import WANTED
+from friso.quantities import percent, plain_factor
+from friso.shown.drawing.prefixes import (
+    NOTHING,
+    length_at_rest,
+    listed,
+    percentage,
+    range_with_unit,
+    share_with_interval,
+    with_unit,
+)
+from friso.shown.machine_words import spread_sentences
+from friso.stage import ControllerSection
+from friso.stage.section import numeric_fields
+from friso.stage.standstill import AgainstFriction
+from friso.studies.compare.disturbance_rejection import rejection
+from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
+from friso.studies.compare.statistics import EstimatedValue
+from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, OptionResult
+
+COLUMNS = (
+    "Swings at the end",
+    "With a distinct peak",
+    "In position at the end",
+    "In position in the longer run",
+    "Settling time",
+    "In-position RMS",
+    "Force RMS",
+    "Modulus margin",
+)
+
+PAIRED = (
+    "Swinging, difference",
+    "In position sooner",
+    "In position later",
+    "No difference",
+    "In-position RMS, ratio",
+    "Force RMS, ratio",
+)
+
+UNSHAKEN = "no [floor]"
+
+PairedRow = tuple[str, list[str]]
+
+
+PROSE = {
+    "a": "the machine as is",
+    "b": "the faster controller",
+    "c": "the isolator",
+    "d": "the deadband",
+    "e": "the reset",
+    "f": "feedforward",
+    "g": "isolator and faster controller",
+    **{setting.letter: f"the {setting.name}" for setting in SETTINGS.values()},
+    "n": "disturbance rejection",
+}
+
+
+def label(result: OptionResult) -> str:
+    return f"{result.letter} {result.option.name}"
+
+
+def in_prose(result: OptionResult) -> str:
+    """An option within a sentence."""
+    return f"{PROSE[result.letter]} ({result.letter})"
+
+
+def options_rows(comparison: Comparison) -> list[tuple[str, str]]:
+    """What each option is."""
+    return [(label(result), _about(result.option, comparison)) for result in comparison.results]
+
+
+def _about(option: Option, comparison: Comparison) -> str:
+    joint = "the joint free" if option.letter in JOINT else "the joint locked" if comparison.stage.joint else "no joint"
+    deadband = with_unit(comparison.options.deadband, "m")
+    meanings = {
+        "a": "the controller of the file",
+        "b": _bandwidth(option, comparison),
+        "c": "the controller of the file",
+        "d": f"the integrator pauses while the error is below {deadband}",
+        "e": "the integrator is reset where the error changes sign",
+        "f": f"feedforward of Coulomb and viscous friction, both {percent(MODEL_ERROR)} too large or both too small, "
+        "drawn for each machine",
+        "g": _bandwidth(option, comparison),
+        "n": _disturbance_rejection(option.stage.flat()),
+    }
+    setting = option.setting
+    return f"{joint}; {_setting(setting, option.stage.flat()) if setting else meanings[option.letter]}"
+
+
+def _disturbance_rejection(flat: Mapping[str, Any]) -> str:
+    """The controller of an option that has it; empty of others."""
+    numbers = rejection(flat)
+    if numbers is None:
+        return ""
+    return (
+        f"linear active disturbance rejection with a bandwidth of {with_unit(numbers.bandwidth, 'Hz')}, at which the "
+        f"loop crosses 0 dB where it does in a, and an observer {numbers.observer_ratio:g} times as fast"
+    )
+
+
+def _setting(setting: Setting, flat: Mapping[str, Any]) -> str:
+    """A setting against friction, with its numbers."""
+    keys = {name: (ControllerSection.key(name), field.unit) for name, field in numeric_fields(AgainstFriction).items()}
+    texts = {name: with_unit(flat[key], unit).strip() for name, (key, unit) in keys.items() if key in flat}
+    return setting.says.format_map(texts)
+
+
+def _bandwidth(option: Option, comparison: Comparison) -> str:
+    present = bandwidth(comparison.stage.flat())
+    faster = f"a controller {plain_factor(option.factor)} times as fast"
+    if present is not None:
+        raised, before = with_unit(present * option.factor, "Hz"), with_unit(present, "Hz")
+        faster = f"a {comparison.stage.controller.bandwidth_name} of {raised} instead of {before}"
+    return f"{faster}, the highest at which the machine of the file has a modulus margin of {WANTED:g}"
+
+
+def table_rows(comparison: Comparison) -> list[PairedRow]:
+    """A row for each option, its texts under `COLUMNS`; 95 % intervals in brackets."""
+    return [
+        (
+            label(result),
+            [
+                *(
+                    share_with_interval(share)
+                    for share in (result.swinging, result.counted, result.settled, result.stays)
+                ),
+                _time(result.settling),
+                _at_rest(result.in_position),
+                _force(result.force),
+                _margin(result, comparison),
+            ],
+        )
+        for result in comparison.results
+    ]
+
+
+def paired_rows(comparison: Comparison) -> list[PairedRow]:
+    """A row for each option but a, its texts under `PAIRED`."""
+    rows = []
+    for result in comparison.results[1:]:
+        pair = comparison.paired(result)
+        points = [100 * value for value in (pair.swinging.value, pair.swinging.low, pair.swinging.high)]
+        more = f"{points[0]:+.1f} points ({points[1]:+.1f} to {points[2]:+.1f})"
+        standstill = _ratio(pair.in_position) if comparison.shaken else UNSHAKEN
+        when = [share_with_interval(share) for share in (pair.sooner, pair.later, pair.alike)]
+        rows.append((label(result), [more, *when, standstill, _ratio(pair.force)]))
+    return rows
+
+
+def _time(median: EstimatedValue) -> str:
+    """A median of settling times, of which more than half may never come."""
+    if math.isfinite(median.high):
+        return f"{with_unit(median.value, 's')} ({range_with_unit(median.low, median.high, 's')})"
+    middle, low = ("never" if value == math.inf else with_unit(value, "s") for value in (median.value, median.low))
+    return middle if middle == low else f"{middle} ({low} to never)"
+
+
+def _at_rest(median: EstimatedValue) -> str:
+    if not _is_known(median):
+        return NOTHING
+    middle, low, high = map(length_at_rest, (median.value, median.low, median.high))
+    return middle if low == high else f"{middle} ({low} to {high})"
+
+
+def _force(median: EstimatedValue) -> str:
+    if not _is_known(median):
+        return NOTHING
+    return f"{with_unit(median.value, 'N')} ({range_with_unit(median.low, median.high, 'N')})"
+
+
+def _is_known(median: EstimatedValue) -> bool:
+    return all(map(math.isfinite, (median.value, median.low, median.high)))
+
+
+def _ratio(median: EstimatedValue) -> str:
+    if not _is_known(median):
+        return NOTHING
+    return f"{median.value:.3g} ({median.low:.3g} to {median.high:.3g})"
+
+
+def _margin(result: OptionResult, comparison: Comparison) -> str:
+    least = f"least {result.loops.margin.min():.2f}"
+    if result.unstable:
+        least = f"{result.unstable} of {comparison.machines.count} not stable"
+    return f"{result.margin.value:.2f} ({least})"
+
+
+def sentences(comparison: Comparison) -> list[str]:
+    """What follows for the one who has to choose between a joint and settings, the answer first."""
+    return [*answer(comparison), *details(comparison)]
+
+
+def answer(comparison: Comparison) -> list[str]:
+    """Whether to buy a joint, then which options bring the machines to rest at what cost."""
+    return [*_unstable(comparison), *_recommendation(comparison), conclusion(comparison)]
+
+
+def _unstable(comparison: Comparison) -> list[str]:
+    """That the loop of the stage as it is is not stable, on how many of the machines: friction aside."""
+    base, count = comparison.results[0], comparison.machines.count
+    if not base.unstable:
+        return []
+    return [
+        f"As it is, the loop is unstable on {base.unstable} of {count} machines, whatever the friction: retune the "
+        "controller (friso bode)."
+    ]
+
+
+def details(comparison: Comparison) -> list[str]:
+    """How well each option does, and what is not compared."""
+    return [*_performance(comparison), *_failing(comparison), *_standstill(comparison)]
+
+
+def conclusion(comparison: Comparison) -> str:
+    """Which options bring the machines to rest, how many of them, and at what cost."""
+    resting, base = _resting(comparison), comparison.results[0]
+    within, count = with_unit(comparison.within, "m"), comparison.machines.count
+    if not resting:
+        best = max(comparison.results, key=lambda result: result.in_position_count)
+        return (
+            f"No option brings {percent(ENOUGH)} of the {count} machines to rest within {within}. The best is "
+            f"{in_prose(best)}, with {best.in_position_count} in position at the end. {_as_is(comparison)}"
+        )
+    first, *further = resting
+    brought = [
+        f"{in_prose(first)} {'brings' if first is not base else 'already brings'} {_number(first, count)} machines to "
+        f"rest within {within}{_cost(first, comparison)}",
+        *(f"{in_prose(result)} {_number(result, count)}{_cost(result, comparison)}" for result in further),
+    ]
+    text = "; ".join(brought)
+    return f"{text[0].upper()}{text[1:]}. {_as_is(comparison)}".rstrip()
+
+
+def _number(result: OptionResult, count: int) -> str:
+    return f"all {count}" if result.in_position_count == count else f"{result.in_position_count} of {count}"
+
+
+def _cost(result: OptionResult, comparison: Comparison) -> str:
+    """What an option takes and leaves, against a."""
+    if result.letter == "a":
+        return ""
+    loops = f"modulus margin {result.margin.value:.2f}, least {result.loops.margin.min():.2f}"
+    if result.unstable:
+        loops = f"the linear loop is unstable on {result.unstable} of {comparison.machines.count}"
+    return f" ({plain_factor(comparison.paired(result).force.value)} times the force RMS of a; {loops})"
+
+
+def _as_is(comparison: Comparison) -> str:
+    """What the machines do as they are, where that is not at rest."""
+    base, count = comparison.results[0], comparison.machines.count
+    if base.rests:
+        return ""
+    swinging = int(np.count_nonzero(base.measures.swings))
+    return f"As is (a), {swinging} of {count} swing at the end, modulus margin {base.margin.value:.2f}."
+
+
+def _recommendation(comparison: Comparison) -> list[str]:
+    """Whether to buy a joint."""
+    resting = _resting(comparison)
+    joint, settings = ([result for result in resting if (result.letter in JOINT) is bought] for bought in (True, False))
+    if any(result.letter == "a" for result in settings):
+        return ["These machines need neither a joint nor other settings."]
+    if joint and settings:
+        return [
+            f"On these machines controller settings do what a joint does: with {_names(settings)} no joint is needed. "
+            "Buy one only if the controller cannot be set that way."
+        ]
+    if joint:
+        return [f"Only a joint brings these machines to rest: {_names(joint)}. No setting does so alone."]
+    if settings:
+        with_joint = any(result.letter in JOINT for result in comparison.results)
+        return [f"Controller settings suffice ({_names(settings)}){'; a joint does not' if with_joint else ''}."]
+    return []
+
+
+def _performance(comparison: Comparison) -> list[str]:
+    """How fast the options that bring the machines to rest do so, how still these are then, and how sure that is."""
+    resting, followed = _resting(comparison), min(FOLLOWED, comparison.machines.count)
+    lines = [
+        f"{label(result)}: in position in {with_unit(result.settling.value, 's')} "
+        f"(median){_still(result, comparison)}; at least {percentage(result.settled.low)} % of such machines come to "
+        "rest (95 % confidence)."
+        for result in resting
+    ]
+    longer = f"Of {followed} machines followed {LONGER} times as long, {percent(ENOUGH)} or more stay at rest with "
+    return [*lines, f"{longer}{listed([result.letter for result in resting], 'and')}."] if lines else []
+
+
+def _still(result: OptionResult, comparison: Comparison) -> str:
+    return f", stands still to {with_unit(result.in_position.value, 'm')} RMS" if comparison.shaken else ""
+
+
+def _failing(comparison: Comparison) -> list[str]:
+    """What the machines do at the end with the other options."""
+    return [
+        f"{label(result)}: not enough. {share_with_interval(result.swinging)} of the machines swing at the end and "
+        f"{share_with_interval(result.settled)} are in position; {share_with_interval(result.stays)} stay in position "
+        f"throughout the last half of a run {LONGER} times as long."
+        for result in comparison.results
+        if not result.rests
+    ]
+
+
+def _standstill(comparison: Comparison) -> list[str]:
+    """Why standstill is no part of the conclusions."""
+    if comparison.shaken:
+        return []
+    joint = (
+        " On the thesis's rig, with a quiet floor and amplifier noise, the stage on its free joint moves "
+        f"{value('rig.in-position', 'rms_ratio'):.2g} times as much (RMS) as with the joint locked "
+        "(friso rig in-position)."
+    )
+    bought = any(result.letter in JOINT for result in comparison.results)
+    return [f"Standstill is not compared: the stage file has no [floor].{joint if bought else ''}"]
+
+
+def _names(results: Sequence[OptionResult]) -> str:
+    return listed([in_prose(result) for result in results], "or")
+
+
+def _resting(comparison: Comparison) -> list[OptionResult]:
+    return [result for result in comparison.results if result.rests]
+
+
+def population(comparison: Comparison) -> list[str]:
+    """How the machines were drawn."""
+    machines = comparison.machines
+    lines = [
+        f"{machines.count} machines were drawn with seed {comparison.seed}; each has the same parameters, rail and "
+        "noise in all options."
+    ]
+    lines += spread_sentences(machines.from_file, machines.spreads)
+    if "rail.seed" in machines.keys:
+        lines.append("Every machine has a different rail.")
+    return lines

@@ -1,0 +1,42 @@
+"""The JSON document of `friso convert`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from friso.questions.convert.words import SHOWN, conversion_sentences
+from friso.shown.documents import plain_json
+
+if TYPE_CHECKING:
+    from friso.studies.laws.conversion import LawConversion
+
+SUFFIXES = {"N": "n", "N/m": "n_per_m", "N*s/m": "n_s_per_m"}
+"""Suffixes of the units."""
+
+
+def convert_document(conversion: LawConversion) -> dict[str, Any]:
+    """What is kept and what is not, what is left open, and the keys of the law."""
+    flat = conversion.stage.flat()
+    return plain_json(
+        {
+            "conclusion": " ".join(conversion_sentences(conversion)),
+            "stage": conversion.stage.name,
+            "law": conversion.law,
+            "friction": {key.removeprefix("friction."): v for key, v in flat.items() if key.startswith("friction.")},
+            "compared": [
+                {
+                    "what": SHOWN[item.kind],
+                    f"before_{SUFFIXES[item.unit]}": item.before,
+                    f"after_{SUFFIXES[item.unit]}": item.after,
+                    "off": item.off,
+                    "kept": item.kept,
+                }
+                for item in conversion.compared
+            ],
+            "open": {key: list(ends) for key, ends in conversion.open.items()},
+            "stiffness_range_n_per_m": [*conversion.points.stiffness] if conversion.points else None,
+            "scatter_n": conversion.points.scatter if conversion.points else None,
+            "passive": not conversion.active,
+            "passive_where": conversion.active or None,
+        }
+    )

@@ -1,0 +1,50 @@
+"""The figure of a conversion: both laws as measurements show them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.frequency.friction import steady_force
+from friso.shown.drawing.figure import BLUE, GREY, VERMILLION, Axis, Figure, Markers, Panel, Series
+
+if TYPE_CHECKING:
+    from friso.studies.laws.conversion import LawConversion
+
+SHOWN = 5.0
+"""How far virgin curves are drawn, in units of the deflection that static friction causes at the first stiffness."""
+
+DRAWN = 40
+"""Measured points that are drawn, at most."""
+
+
+def conversion_figure(conversion: LawConversion) -> Figure:
+    """Virgin curves and steady friction over speed, before and after."""
+    levels, before = conversion.before.levels, conversion.before
+    stages = (
+        (conversion.source, before, VERMILLION, "solid"),
+        (conversion.stage, conversion.after, BLUE, "dashed"),
+    )
+    speeds = np.geomspace(1e-2, 1e2, 400) * levels.stribeck_velocity
+    points = conversion.points
+    reach = SHOWN * levels.static / before.stiffness if before.stiffness else np.inf
+    if points is not None:
+        reach = max(points.displacement)
+    virgin, steady = [], []
+    for stage, curve, colour, dash in stages:
+        flat, near = stage.flat(), curve.displacement <= reach
+        label = flat["friction.model"]
+        shows = "curve through the points" if points and curve is before else label
+        virgin.append(Series(curve.displacement[near], curve.force[near], shows, colour, dash))  # type: ignore[arg-type]
+        steady.append(Series(speeds, steady_force(flat, speeds, True), label, colour, dash))  # type: ignore[arg-type]
+    shown = ()
+    if points is not None:
+        some = np.unique(np.linspace(0, len(points.force) - 1, DRAWN).astype(int))
+        shown = (Markers(points.displacement[some], points.force[some], "measured points", GREY),)
+    panels = (
+        Panel("From rest, slowly", Axis("Displacement", "m"), Axis("Friction force", "N"), tuple(virgin), shown),
+        Panel("Steady motion", Axis("Speed", "m/s", log=True), Axis("Friction force", "N"), tuple(steady)),
+    )
+    caption = "Friction as measurements show it, before and after the conversion."
+    return Figure("friction", "Friction before and after", caption, panels, 2, conversion.stage.name)

@@ -1,0 +1,115 @@
+"""The same stage under another friction law, and what could not be kept."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.inputs import Changes, StageLike, Whole, read_stage, stem_of, whole_number
+from friso.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from friso.shown.drawing.figure import Figure
+    from friso.shown.files import Files
+    from friso.studies.laws.conversion import LawConversion
+
+MOST = 12
+"""Elements at most."""
+
+
+class ConvertAnswer(Answer):
+    """A stage under another friction law: `result` is the `LawConversion`, ``answer.stage`` the stage."""
+
+    command = "convert"
+
+    def __init__(self, result: LawConversion, title: str, name: str) -> None:
+        self.result, self.title, self.name = result, title, name
+        self.axis_kind = result.stage.axis_kind
+
+    def sentences(self) -> Sequence[str]:
+        """What is kept, and what is not."""
+        from friso.questions.convert.words import conversion_sentences
+
+        return conversion_sentences(self.result)
+
+    def blocks(self) -> Sequence[str]:
+        """The [friction] table."""
+        from friso.questions.convert.words import friction_table
+
+        return [friction_table(self.result)]
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """What measurements show of both laws."""
+        from friso.questions.convert.words import COLUMNS, conversion_rows
+
+        return [AnswerTable(self.title, COLUMNS, conversion_rows(self.result))]
+
+    def figures(self) -> Sequence[Figure]:
+        """Virgin curves and steady friction, before and after."""
+        from friso.questions.convert.figures import conversion_figure
+
+        return [conversion_figure(self.result)]
+
+    def document(self) -> dict[str, Any]:
+        """The keys, and what is kept."""
+        from friso.questions.convert.document import convert_document
+
+        return convert_document(self.result)
+
+    def files(self) -> Files:
+        """The stage file and the figure."""
+        from friso.questions.convert.page import convert_files
+
+        return convert_files(self.result, self.name)
+
+
+@question
+def convert(
+    stage: StageLike,
+    friction: str,
+    *,
+    elements: Whole = 6,
+    virgin: str | os.PathLike[str] | None = None,
+    set: Changes = None,
+    progress: Progress = silent,
+) -> ConvertAnswer:
+    """Convert friction to another law that fits the same measurements, and say what could not be kept.
+
+    Parameters
+    ----------
+    stage : Stage, path or dict
+        The stage, its file, or the tables of one.
+    friction : str
+        The friction law to convert to; a wrong one is answered with all of them.
+    elements : int
+        Elements of a law that has several, side by side, 1 to 12.
+    virgin : path, optional
+        A file of any log format with measured force over displacement from rest up to break-away, one channel of each,
+        with its unit; in place of what the stage's own law says of it.
+    set : dict, optional
+        Keys to override.
+    progress : Progress
+        Not called: this is quick.
+
+    Returns
+    -------
+    ConvertAnswer
+        The converted stage, ``answer.stage``, and what is kept.
+
+    Raises
+    ------
+    InputError
+        For a stage, a law, a number or a file that is not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.convert(friso.example("thesis_rig"), "gms")  # doctest: +SKIP
+    """
+    chosen = read_stage(stage, set)
+    whole_number(elements, "elements", 1, MOST, "6")
+    from friso.studies.laws.conversion import convert as converted
+
+    return ConvertAnswer(converted(chosen, friction, elements, virgin), chosen.name, f"{stem_of(stage)}_{friction}")

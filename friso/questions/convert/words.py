@@ -1,0 +1,98 @@
+"""A conversion to another friction law in words: what is kept, what is not, and what is left open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.quantities import percent
+from friso.shown.drawing.prefixes import listed, with_unit
+from friso.stage.stage import declared_keys
+
+if TYPE_CHECKING:
+    from friso.studies.laws.conversion import LawConversion, MeasuredChange, MeasuredKind
+
+SHOWN: Mapping[MeasuredKind, str] = {
+    "curve": "steady friction over speed",
+    "static": "break-away",
+    "stiffness": "stiffness before sliding",
+    "virgin": "virgin curve",
+    "conditions": "the conditions of the stage",
+    "damping": "damping at rest",
+    "viscous": "viscous damping",
+}
+"""What measurements show."""
+
+COLUMNS = ("before", "after", "off by", "kept")
+"""Of the table of what is compared."""
+
+
+def conversion_sentences(conversion: LawConversion) -> list[str]:
+    """What could not be kept comes first; then what is left open, and whether the law may give energy back."""
+    law, lost = conversion.law, conversion.lost
+    name = conversion.stage.name or "the stage"
+    if lost:
+        says = [f"{name} under {law}: {listed([_change(item) for item in lost], 'and')}."]
+    else:
+        says = [f"{name} under {law} fits the same measurements."]
+    if conversion.points:
+        says.append(_stiffness(conversion.points.stiffness, conversion.before.stiffness))
+    says += [_open(key, ends, conversion) for key, ends in conversion.open.items()]
+    return [*says, *activity_sentences(conversion.active)]
+
+
+def _stiffness(ends: tuple[float, float], stiffness: float) -> str:
+    low, high, value = (with_unit(x, "N/m") for x in (*ends, stiffness))
+    if np.isinf(ends[1]):
+        return (
+            f"The points do not show the stiffness before sliding, which is taken as {value}: too few lie close to "
+            "rest. Measure closer to rest, and see that displacement 0 is where the force begins."
+        )
+    between = f"between {low} and {high}" if ends[0] else f"up to {high}"
+    return (
+        f"The points show a stiffness before sliding {between}, if displacement 0 is where the force begins; "
+        f"it is taken as {value}."
+    )
+
+
+def activity_sentences(condition: str) -> list[str]:
+    """That a law may give energy back, with the `condition` of passivity that it does not meet; "": it is passive."""
+    return [f"The law may give energy back, which no friction does. It is passive where {condition}."] * bool(condition)
+
+
+def _change(item: MeasuredChange) -> str:
+    before, after = (with_unit(value, item.unit) for value in (item.before, item.after))
+    return f"{SHOWN[item.kind]} is not kept ({before} becomes {after})"
+
+
+def _open(key: str, ends: tuple[float, float], conversion: LawConversion) -> str:
+    flat = conversion.stage.flat()
+    unit = getattr(declared_keys(flat)[key], "unit", "")
+    low, high, value = (with_unit(x, unit) if unit else f"{x:.3g}" for x in (*ends, flat[key]))
+    return f"The measurements leave {key} open between {low} and {high}; it is {value}."
+
+
+def conversion_rows(conversion: LawConversion) -> list[tuple[str, list[str]]]:
+    """The rows of the table: before, after, by how much it is off, whether it is kept."""
+    return [
+        (
+            SHOWN[item.kind],
+            [
+                with_unit(item.before, item.unit),
+                with_unit(item.after, item.unit),
+                f"{percent(item.off)}",
+                "yes" if item.kept else "no",
+            ],
+        )
+        for item in conversion.compared
+    ]
+
+
+def friction_table(conversion: LawConversion) -> str:
+    """The table [friction] of the stage file."""
+    text = conversion.stage.to_toml()
+    begin = text.index("[friction]")
+    end = text.find("\n[", begin + 1)
+    return text[begin : end if end > 0 else None].strip()

@@ -1,0 +1,184 @@
+"""The JSON document of a design: SI, the unit in the key's suffix; what is not known or not finite is null."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from friso.design_method.choice import Confirmed
+from friso.design_method.edges import Corners
+from friso.design_method.front import Candidate
+from friso.design_method.geometry import Geometry
+from friso.design_method.method import SLOW, Design, NoDesign
+from friso.design_method.relax import Relaxation
+from friso.design_method.verification import MachineOutcomes
+from friso.questions.design.window import lower, upper
+from friso.questions.design.words import need_words, refusal
+from friso.shown.documents import plain_json, unit_suffix
+
+
+def design_document(design: Design) -> dict[str, Any]:
+    """All but the files."""
+    document = {
+        "conclusion": need_words(design.need),
+        "stage": design.original.name,
+        "spec": design.spec.name,
+        "feasible": design.meets,
+        "relax": _relax(design.unmet),
+        "needed": design.needed,
+        "machine_limit_hz": design.spec.limit,
+        "without": _corners(design.without, design),
+        "joint": _joint(design),
+        "leaves": _leaves(design),
+        "front": _front(design),
+        "controller": _controller(design),
+        "verification": _verification(design),
+    }
+    laws = {"friction_laws": _by_law(design)} if len(design.by_law) > 1 else {}
+    lost = {"friction_laws_lost_in_corners": design.lost} if design.lost else {}
+    return plain_json(document | laws | lost)
+
+
+def _by_law(design: Design) -> dict[str, Any]:
+    return {
+        law: {"without_highest_edge_hz": without.highest, "joint_highest_edge_hz": isolated.highest}
+        for law, (without, isolated) in design.by_law.items()
+    }
+
+
+def refused_document(stage: str, spec: str, failure: NoDesign) -> dict[str, Any]:
+    """What there is to say where no design meets the specification."""
+    document = {"conclusion": refusal(failure), "stage": stage, "spec": spec, "feasible": False}
+    document["reason"] = failure.reason
+    return plain_json(document | {"relax": _relax(failure.relaxed)})
+
+
+def _relax(relaxed: Sequence[Relaxation]) -> list[dict[str, Any]]:
+    return [
+        {
+            "key": relaxation.key,
+            "requirement": relaxation.requirement,
+            "from": relaxation.value,
+            "to": relaxation.needed,
+            "unit": relaxation.unit,
+        }
+        for relaxation in relaxed
+    ]
+
+
+def _corners(corners: Corners, design: Design) -> dict[str, Any]:
+    units = {key: field.unit for key, field in design.stage.numeric_keys().items()}
+    worst = corners.population.of(corners.worst)
+    return {
+        "hunts": corners.hunts,
+        "highest_edge_hz": corners.highest if corners.hunts else None,
+        "corners": corners.population.count,
+        "unknown_corners": corners.unknown,
+        "searched_hz": list(corners.searched),
+        "edges_hz": np.where(corners.edges > 0, corners.edges, np.nan),
+        "worst_corner": {f"{key.replace('.', '_')}{unit_suffix(units[key])}": value for key, value in worst.items()},
+    }
+
+
+def _joint(design: Design) -> dict[str, Any]:
+    beams = design.fitted.choice.beams
+    edges = _corners(design.edges, design)
+    return {
+        "stiffness_n_per_m": beams.drive[0],
+        "stroke_m": design.fitted.task.stroke,
+        "force_at_stroke_n": beams.forces[-1],
+        "least_static_friction_n": design.fitted.task.friction,
+        **edges,
+    }
+
+
+def _leaves(design: Design) -> dict[str, Any]:
+    choice, beams = design.fitted.choice, design.fitted.choice.beams
+    requirements = [{"name": requirement.name, "key": requirement.keys[0].key} for requirement in choice.requirements]
+    return {
+        **_sizes(choice.geometry),
+        "drive_stiffness_n_per_m": beams.drive[0],
+        "first_interfering_hz": choice.frequency,
+        "max_stress_pa": beams.stress,
+        "clamp_stress_pa": beams.clamp_stress,
+        "yield_margin": beams.yield_margin,
+        "fatigue_margin": beams.fatigue_margin,
+        "load_n": design.fitted.task.load,
+        "buckling_load_n": beams.buckling,
+        "requirements": [
+            {**requirement, "excess": excess} for requirement, excess in zip(requirements, choice.excess, strict=True)
+        ],
+        "passed_over": list(choice.passed_over),
+    }
+
+
+def _sizes(geometry: Geometry) -> dict[str, Any]:
+    return {
+        "count": int(geometry.sheet.leaves),
+        "length_m": geometry.length,
+        "width_m": geometry.width,
+        "thickness_m": geometry.sheet.thickness,
+        "spacing_m": geometry.spacing,
+        "material": geometry.sheet.material,
+    }
+
+
+def _front(design: Design) -> list[dict[str, Any]]:
+    """Every candidate, with what beams say of it where they were asked."""
+    confirmed = {confirmation.candidate: confirmation for confirmation in design.confirmed}
+    return [_candidate(candidate, confirmed.get(candidate)) for candidate in design.candidates]
+
+
+def _candidate(candidate: Candidate, beams: Confirmed | None) -> dict[str, Any]:
+    return {
+        **_sizes(candidate.geometry),
+        "drive_stiffness_n_per_m": candidate.stiffness,
+        "frequency_hz": candidate.frequency,
+        "beams_n_per_m": beams.stiffness if beams else None,
+        "beams_hz": beams.frequency if beams else None,
+        "failure": beams.failure or None if beams else None,
+    }
+
+
+def _controller(design: Design) -> dict[str, Any]:
+    controller, gains = design.controller, design.controller.gains
+    kp, ki, kd, _ = gains.parallel.values()
+    return {
+        "crossover_hz": controller.crossover,
+        "bounds_above_hz": [{"value": bound.value, "reason": bound.reason} for bound in upper(design)],
+        "bounds_below_hz": [{"value": bound.value, "reason": bound.reason} for bound in lower(design)],
+        "k_p_n_per_m": gains.k_p,
+        "tau_z_s": gains.tau_z,
+        "tau_i_s": gains.tau_i,
+        "tau_p_s": gains.tau_p,
+        "kp_n_per_m": kp,
+        "ki_n_per_m_s": ki,
+        "kd_n_s_per_m": kd,
+        "modulus_margin": controller.margin,
+        "least_modulus_margin": controller.corners.min(),
+        "joint_dampings_n_s_per_m": controller.damping.tried,
+        "modulus_margins": controller.damping.margins,
+        "joint_damping_worth_n_s_per_m": controller.damping.tried[controller.damping.worth],
+    }
+
+
+def _verification(design: Design) -> dict[str, Any]:
+    verification, limit = design.verification, design.spec.position.settling_time
+    met = None if limit is None else verification.free.slower_than(SLOW) <= limit
+    return {**_outcome(verification.free), "settling_time_met": met, "locked": _outcome(verification.locked)}
+
+
+def _outcome(outcome: MachineOutcomes) -> dict[str, Any]:
+    low, high = outcome.interval
+    return {
+        "moves": outcome.tried,
+        "not_completed": len(outcome.completed) - outcome.tried,
+        "not_at_rest": outcome.missed,
+        "swinging": outcome.swinging,
+        "probability_low": low,
+        "probability_high": high,
+        "settling_median_s": outcome.slower_than(0.5),
+        "settling_95_s": outcome.slower_than(0.05),
+    }

@@ -1,0 +1,183 @@
+"""The figures of a design: Pareto front, modes, map of moves, margins over damping, settling times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from friso.design_method.choice import Confirmed
+from friso.design_method.front import Candidate
+from friso.design_method.method import Design
+from friso.design_method.verification import MachineOutcomes
+from friso.frequency.crossover import WANTED
+from friso.questions.design.window_figure import window_figure
+from friso.questions.design.words import hertz, size
+from friso.questions.flexure.modes import modes_figure
+from friso.questions.flexure.table import newtons_per
+from friso.questions.map.words import QUIET
+from friso.shown.drawing.drawable import cell_edges
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    VERMILLION,
+    Array,
+    Axis,
+    Category,
+    Dash,
+    Figure,
+    Limit,
+    Map,
+    Markers,
+    Panel,
+    Series,
+)
+from friso.shown.drawing.prefixes import listed
+
+CHOSEN = "#e3001b"
+"""The marker of what was chosen, as that of an evaluation point in maps."""
+
+WIDE, FEW = 30.0, 0.01
+"""Settling times more than so many times as long as the share of the shortest are drawn on a logarithmic axis."""
+
+SHARES = 401
+"""Points of a distribution."""
+
+CATEGORIES = (Category("rests in all corners", QUIET), Category("run failed", INK))
+
+
+def design_figures(design: Design) -> tuple[Figure, ...]:
+    """All figures, in the order in which they are read."""
+    modes = replace(modes_figure(design.fitted.choice.beams), name="design_modes")
+    figures = (_map(design), _front(design), modes, window_figure(design), _damping(design), _settling(design))
+    return tuple(replace(figure, subject=design.stage.name) for figure in figures)
+
+
+def _front(design: Design) -> Figure:
+    """Drive stiffness against first interfering frequency."""
+    choice, task, safety = design.fitted.choice, design.fitted.task, design.spec.safety
+    multiple, stiffest = safety.parasitic, task.friction / (safety.breakaway * task.stroke)
+    good = [confirmation for confirmation in design.confirmed if not confirmation.failure]
+    failed = [confirmation.candidate for confirmation in design.confirmed if confirmation.failure]
+    points = [
+        Markers(*_points(good), "by beams", BLUE),
+        *([Markers(*_points(failed), "beams failed", VERMILLION, "cross")] if failed else []),
+        Markers(
+            choice.beams.drive[:1] / 1e3, np.array([choice.frequency]), "chosen, by the beam model", CHOSEN, "target"
+        ),
+    ]
+    limits = (
+        Limit((multiple * design.controller.crossover,), f"{multiple:g} times the crossover chosen", INK),
+        Limit((multiple * design.spec.limit,), f"{multiple:g} times the machine's limit", ORANGE),
+    )
+    axes = Axis("Drive stiffness", "N/mm", prefixed=False), Axis("First interfering frequency", "Hz")
+    line = Series(*_points(design.candidates), "front, by the closed forms", GREY, width=1.8)
+    sheets = sorted(
+        {candidate.geometry.sheet for candidate in design.candidates},
+        key=lambda sheet: (sheet.thickness, sheet.leaves),
+    )
+    kinds = [f"{sheet.leaves:g} leaves of {size(sheet.thickness)} mm {sheet.material}" for sheet in sheets]
+    caption = (
+        "Pareto front: no leaves meeting all requirements are both softer and higher in their first interfering "
+        "frequency. The front ends on the right where the cart would break away within the stroke, at "
+        f"{newtons_per(stiffest, 'mm')}, or where space or available thicknesses end. On this front: "
+        f"{listed(kinds, 'and')}."
+    )
+    panel = Panel("", *axes, (line,), tuple(points), limits)
+    return Figure("design_front", "Pareto front of leaf springs", caption, (panel,))
+
+
+def _points(several: Sequence[Candidate | Confirmed]) -> tuple[Array, Array]:
+    """Stiffness [N/mm] and frequency [Hz] of candidates, by closed forms or beams."""
+    stiffness = np.array([candidate.stiffness / 1e3 for candidate in several])
+    return stiffness, np.array([candidate.frequency for candidate in several])
+
+
+def _map(design: Design) -> Figure:
+    """Whether moves come to rest, over crossover and stroke."""
+    hunting_map, crossover, stroke = design.map, design.controller.crossover, design.fitted.task.stroke
+    codes = np.where(np.isnan(hunting_map.share), 1.0, np.where(hunting_map.share == 0, 0.0, np.nan))
+    percents = np.where(np.isnan(codes), 100 * hunting_map.share, np.nan)
+    strokes, shade = 1e3 * hunting_map.strokes, ("Corners not in position", "%", (0.0, 100.0))
+    field = Map(hunting_map.crossovers, strokes, percents, *shade, categories=CATEGORIES, codes=codes)
+    right, up = _reach(hunting_map.crossovers), _reach(strokes)
+    edge, limit = design.edges.highest, design.spec.limit
+    lines: list[tuple[float, str, Dash]] = [
+        (edge, f"edge of hunting at {size(stroke)} mm: {hertz(edge)}", "dashed"),
+        (limit, f"machine's limit: {hertz(limit)}", "solid"),
+    ]
+    upright = [
+        Series(np.full(2, at), np.array(up), label, INK, dash, 1.8)
+        for at, label, dash in lines
+        if right[0] < at < right[1]
+    ]
+    point = Markers(np.array([crossover]), np.array([1e3 * stroke]), "chosen", CHOSEN, "target")
+    axes = Axis("Crossover", "Hz", right, log=True), Axis("Stroke", "mm", up, log=True, prefixed=False)
+    panel = Panel("", *axes, tuple(upright), (point,), maps=(field,))
+    caption = (
+        f"The share of the {design.edges.population.count} corners of friction and masses in which the stage is not in "
+        "position a quarter of a minute after a typical move: it swings, or creeps too slowly to "
+        "settle. Drive stiffness as chosen."
+    )
+    return Figure("design_map", "Where moves do not come to rest, over crossover and stroke", caption, (panel,))
+
+
+def _reach(centres: Array) -> tuple[float, float]:
+    """The outer edges of cells around logarithmic centres."""
+    edges = cell_edges(centres, log=True)
+    return float(edges[0]), float(edges[-1])
+
+
+def _damping(design: Design) -> Figure:
+    """The least modulus margin over joint damping."""
+    damping = design.controller.damping
+    line = Series(damping.tried, damping.margins, "least modulus margin", BLUE)
+    points = (
+        Markers(damping.tried, damping.margins, "", BLUE),
+        Markers(damping.tried[:1], damping.margins[:1], "as designed", CHOSEN, "target"),
+    )
+    limit = Limit((WANTED,), f"wanted: {WANTED:g}", INK)
+    x = Axis("Joint damping", "N*s/m", log=bool(damping.tried[0] > 0), prefixed=False)
+    top = 1.1 * max(float(damping.margins.max()), WANTED)
+    panel = Panel("", x, Axis("Modulus margin", "", (0.0, top)), (line,), points, (limit,))
+    caption = (
+        "The smallest margin over all settled states if damping were added to the joint; 0 where one of them is "
+        "unstable."
+    )
+    return Figure("design_damping", "Margin over joint damping", caption, (panel,))
+
+
+def _settling(design: Design) -> Figure:
+    """Cumulative distributions of the settling time."""
+    free, locked = design.verification.free, design.verification.locked
+    cases = ((free, "joint free", BLUE), (locked, "joint locked", ORANGE))
+    lines = [Series(*_distribution(outcome), name, colour, width=1.8) for outcome, name, colour in cases]
+    specified = design.spec.position.settling_time
+    if specified is not None:
+        lines.append(Series(np.full(2, float(specified)), np.array([0.0, 100.0]), "specified", INK, "dashed", 1.2))
+    times = np.concatenate([line.x for line in lines])
+    low, high = float(np.quantile(times, FEW)), float(times.max())
+    wide = high > WIDE * low
+    x = Axis("Settling time", "s", (0.8 * low if wide else 0.0, 1.05 * high), log=wide)
+    panel = Panel(
+        "", x, Axis("Moves in position", "%", (0.0, 102.0)), tuple(lines), limits=(Limit((95.0,), "95 %", GREEN),)
+    )
+    caption = (
+        f"The share of the {free.tried} simulated moves that are in position to stay, over the time since the last "
+        "corner of the reference; the same machines with the joint free and locked. If a curve ends below 100 %, the "
+        "remaining moves do not come to rest."
+    )
+    return Figure("design_settling", "Settling times", caption, (panel,))
+
+
+def _distribution(outcome: MachineOutcomes) -> tuple[Array, Array]:
+    """Settling times [s] and the shares of the moves [%] that have settled by then."""
+    times = np.sort(np.maximum(outcome.settling[outcome.completed & np.isfinite(outcome.settling)], 1e-6))
+    if not times.size:
+        return np.array([1e-6]), np.array([np.nan])
+    picked = np.unique(np.linspace(0, len(times) - 1, SHARES).round().astype(int))
+    return times[picked], 100.0 * (picked + 1) / outcome.tried

@@ -1,0 +1,58 @@
+"""The page of `friso design`: one file that opens offline, prints, and is the same bytes on every run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from markupsafe import Markup
+
+from friso.design_method.method import Design
+from friso.materials import materials
+from friso.questions.design.figures import design_figures
+from friso.questions.design.leaves import requirement_rows
+from friso.questions.design.steps import steps
+from friso.questions.design.words import headline
+from friso.questions.flexure.drawing import drawing_svg
+from friso.shown.drawing.figure import Figure
+from friso.shown.files import Content, pictures
+from friso.shown.pages import Report
+
+LEAVES = 2
+"""The step that shows the drawing and the requirements."""
+
+
+def design_files(design: Design) -> dict[str, Content]:
+    """The stages (the design, and the worst machine tried with it), the page, the drawing, and every figure in all
+    formats."""
+    figures = design_figures(design)
+    images = pictures(figures)
+    return {
+        "design.toml": design.stage.to_toml(),
+        "worst.toml": design.verification.worst.to_toml(),
+        "design.html": design_html(design, figures),
+        "design_drawing.svg": drawing(design),
+        **images,
+    }
+
+
+def design_html(design: Design, figures: Sequence[Figure]) -> str:
+    """The whole page of a design and its figures."""
+    return Report.of_stage(
+        "design",
+        design.stage,
+        figures,
+        spec=design.spec,
+        verdicts=headline(design),
+        steps=steps(design),
+        leaves=LEAVES,
+        drawing=Markup(drawing(design)),
+        requirements=requirement_rows(design),
+    ).html()
+
+
+def drawing(design: Design) -> str:
+    """The dimensioned drawing of the leaf springs, SVG."""
+    choice = design.fitted.choice
+    data = materials()[choice.geometry.sheet.material]
+    material = f"{data.name}, {data.grade}"
+    return drawing_svg(choice.beams.mechanism, design.fitted.task.stroke, title=design.stage.name, material=material)

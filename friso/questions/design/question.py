@@ -1,0 +1,163 @@
+"""What stops it: leaf springs, stroke, crossover and gains from a specification, tried in simulated moves."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from friso.design_method.method import Design
+from friso.design_method.outline import outline
+from friso.design_method.prepare import assumed, by_rules, check_designable
+from friso.design_method.spec import Spec, load_spec, read_spec
+from friso.interface.answer import Answer, question
+from friso.interface.inputs import AS_BUILT, LOGGER, Changes, StageLike, mention_unstable_loop, read_stage
+from friso.platform.extras import need
+from friso.platform.system import shell_word
+from friso.progress import Progress, silent
+from friso.stage import Stage, numeric_keys
+
+if TYPE_CHECKING:
+    from friso.shown.drawing.figure import Figure
+    from friso.shown.files import Files
+
+STAGES = ("design.toml", "worst.toml")
+
+
+class DesignAnswer(Answer):
+    """A design: `result` is a `Design`, ``answer.stage`` the designed stage."""
+
+    command, status = "design", 2
+
+    def __init__(self, result: Design) -> None:
+        self.result, self.axis_kind = result, result.stage.axis_kind
+
+    @property
+    def failure(self) -> str:
+        """What of the specification is not met."""
+        from friso.questions.design.words import shortfall
+
+        return "" if self.result.meets else f"the design does not meet the specification: {shortfall(self.result)}"
+
+    def sentences(self) -> Sequence[str]:
+        """The design in short."""
+        from friso.questions.design.words import headline
+
+        return [sentence for _, sentence in headline(self.result)]
+
+    def details(self) -> Sequence[str]:
+        """The steps of the method."""
+        from friso.questions.design.steps import steps
+
+        return [
+            f"{number}. {step.title}: {' '.join(step.sentences)}" for number, step in enumerate(steps(self.result), 1)
+        ]
+
+    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
+        """The check of the design."""
+        return [f"friso check {shell_word(str(files[0]))}"] if files else []
+
+    def figures(self) -> Sequence[Figure]:
+        """Window of crossovers, leaves, map of hunting, moves."""
+        from friso.questions.design.figures import design_figures
+
+        return design_figures(self.result)
+
+    def document(self) -> dict[str, Any]:
+        """The numbers of every step."""
+        from friso.questions.design.document import design_document
+
+        return design_document(self.result)
+
+    def files(self) -> Files:
+        """The stages, the page, the drawing, the figures."""
+        from friso.questions.design.page import design_files
+
+        return design_files(self.result)
+
+
+@question
+def design(
+    stage: StageLike,
+    spec: Spec | str | os.PathLike[str] | None = None,
+    *,
+    set: Changes = None,
+    laws: bool = False,
+    progress: Progress = silent,
+) -> DesignAnswer:
+    """From a specification to leaf springs, stroke and controller that do not hunt.
+
+    Parameters
+    ----------
+    stage : Stage, path or dict
+        The stage as it is, its file, or the tables of one.
+    spec : path, optional
+        The specification: crossover limit, friction, moves, load, space, sheets; default: one made from the stage.
+    set : dict, optional
+        Keys of the stage to override.
+    laws : bool
+        Whether edges of hunting are the worst over all friction laws that keep what is measured.
+    progress : Progress
+        Called as the steps of the method are done.
+
+    Returns
+    -------
+    DesignAnswer
+        The design with the numbers of every step, ``answer.stage``, ``answer.meets``.
+
+    Raises
+    ------
+    InputError
+        For a stage or a specification that is not usable.
+    friso.design_method.method.NoDesign
+        Where nothing meets the specification: with what to relax by how much.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.design(friso.example("thesis_rig"), friso.example("specs/thesis"))  # doctest: +SKIP
+    """
+    need("design", "friso design")
+    chosen = read_stage(stage, set, leaves_out=AS_BUILT[1:])
+    check_designable(chosen)
+    specification = specification_of(chosen, spec)
+    _tell_what_is_assumed(chosen, specification, spec is None)
+    mention_unstable_loop(chosen)
+    if chosen.drive:
+        LOGGER.warning(
+            "[drive] is taken into account for the margins; hunting and moves are simulated in continuous time"
+        )
+    from friso.design_method.method import design as designed
+    from friso.design_method.method import own_law
+    from friso.studies.laws.verdicts import frictions_that_keep
+
+    return DesignAnswer(designed(chosen, specification, progress, frictions_that_keep if laws else own_law))
+
+
+def specification_of(stage: Stage, spec: Spec | str | os.PathLike[str] | None) -> Spec:
+    """The specification that is meant; without any, one made from the stage. Raises InputError."""
+    if spec is None:
+        return read_spec(outline(stage))
+    return spec if isinstance(spec, Spec) else load_spec(Path(spec))
+
+
+def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
+    """Say what neither the stage file nor a specification tells."""
+    from friso.equations.bandwidth import bandwidth
+    from friso.shown.drawing.prefixes import with_unit
+
+    if outlined:
+        made = "friso init --spec STAGE.toml writes it for you to edit"
+        LOGGER.warning(f"no specification: one is made from the stage file; {made}")
+    rules = by_rules(stage)
+    if rules is not stage:
+        hertz = with_unit(bandwidth(rules.flat()), "Hz")
+        LOGGER.warning(
+            f"the design is that of a PID by van Dijk's rules (alpha = 0.1, beta = 2) in the place of the stage file's "
+            f"controller, with its bandwidth when the joint is locked, {hertz}; friso export gains lists its gains"
+        )
+    if keys := assumed(stage, spec):
+        units = numeric_keys(stage.flat() | keys)
+        numbers = ", ".join(f"{key} = {with_unit(value, units[key].unit)}" for key, value in keys.items())
+        LOGGER.warning(f"the stage file has no joint: {numbers} are assumed; state [masses] and [joint] to have others")

@@ -1,0 +1,237 @@
+"""What a design is called and how it ends, in words that the terminal, the page and messages share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.design_method.edges import Corners
+from friso.design_method.geometry import Geometry
+from friso.design_method.method import Design, Need, NoDesign
+from friso.design_method.relax import Relaxation
+from friso.design_method.verification import MachineOutcomes
+from friso.quantities import outwards, percent
+from friso.questions.map.words import in_sentence
+from friso.shown.drawing.figure import GREEN, ORANGE, VERMILLION
+from friso.shown.drawing.prefixes import choose, pretty, with_unit
+from friso.stage.stage import numeric_keys
+
+SHOWN = 5
+"""Number of relaxations listed in a message."""
+
+
+@dataclass(frozen=True)
+class DesignStep:
+    """A step of the method: its result as a title, the reasons, its numbers by name, and the names of its figures."""
+
+    title: str
+    sentences: tuple[str, ...]
+    facts: tuple[tuple[str, str], ...]
+    figures: tuple[str, ...]
+
+
+def headline(design: Design) -> list[tuple[str, str]]:
+    """The verdicts, each with its colour: isolator or not, what it is, whether it holds."""
+    return [
+        (ORANGE if design.needed else GREEN, need_words(design.need)),
+        (
+            GREEN,
+            f"The isolator{'' if design.needed else ', designed nevertheless'}: {leaves(design)}; stroke "
+            f"{size(design.fitted.task.stroke)} mm to each side, crossover {hertz(design.controller.crossover)}.",
+        ),
+        _verified(design),
+        *([(GREEN, across_laws(design))] if len(design.by_law) > 1 else []),
+        *([(ORANGE, lost_laws(design))] if design.lost else []),
+    ]
+
+
+def across_laws(design: Design) -> str:
+    """Between what the edges lie under all laws that were asked, and which law is the worst."""
+    ends = []
+    for place, name in enumerate(("without isolator", "with it")):
+        edges = {law: corners[place].highest for law, corners in design.by_law.items()}
+        least, worst = min(edges, key=edges.__getitem__), max(edges, key=edges.__getitem__)
+        ends.append(f"{name} {hertz(edges[least])} ({least}) to {hertz(edges[worst])} ({worst})")
+    moves = f"the moves are simulated under {next(iter(design.by_law))}"
+    return f"Edges of hunting are the worst of {len(design.by_law)} friction laws: {'; '.join(ends)}; {moves}."
+
+
+def lost_laws(design: Design) -> str:
+    """Which laws were not tried, and in which corners they do not keep what is measured."""
+    corners, flat = design.without, design.stage.flat()
+    laws = "; ".join(
+        f"{law}, not in {len(where)} of {corners.population.count} corners (such as {corner(corners, flat, where[0])})"
+        for law, where in design.lost.items()
+    )
+    return f"Not tried, since they keep what is measured in some corners only: {laws}. Edges may be worse under them."
+
+
+def need_words(need: Need) -> str:
+    """Whether the machine needs an isolator, and why."""
+    limit, factor, without = hertz(need.spec.limit), need.spec.safety.hunting, need.without
+    if not without.hunts:
+        return f"No isolator is needed: without one the machine {edge(without)}."
+    corners = without.population.count > 1
+    if not math.isfinite(without.highest):
+        where = "in the worst corner of friction and masses, " if corners else ""
+        return (
+            f"An isolator is needed: without one the machine hunts, {where}even at {hertz(without.searched[1])}, the "
+            f"highest crossover tried; it allows {limit}."
+        )
+    where = " in the worst corner of friction and masses" if corners else ""
+    above = f"{hertz(factor * without.highest)} or more, {factor:g} times the edge of hunting{where}"
+    if need.isolator:
+        return f"An isolator is needed: without one the crossover must be {above}; the machine allows {limit}."
+    return f"No isolator is needed: without one the crossover must be {above}, and the machine allows {limit}."
+
+
+def brings(design: Design) -> str:
+    """What an isolator brings and costs where none is needed."""
+    moves, crossover, limit = design.verification, design.controller.crossover, design.spec.limit
+    costs = f" This costs bandwidth: a crossover of {hertz(crossover)} instead of {hertz(limit)}."
+    slower = costs if crossover < 0.97 * limit else ""
+    return (
+        f"For comparison, with the isolator the machine {edge(design.edges)}. Moves settle in "
+        f"{seconds(moves.free.slower_than(0.5))} instead of {seconds(moves.locked.slower_than(0.5))} (median), 95 % "
+        f"of them in {seconds(moves.free.slower_than(0.05))} instead of "
+        f"{seconds(moves.locked.slower_than(0.05))}, at the same crossover.{slower}"
+    )
+
+
+def leaves(design: Design) -> str:
+    """The leaf springs chosen."""
+    return leaf_words(design.fitted.choice.geometry)
+
+
+def leaf_words(geometry: Geometry) -> str:
+    """Leaf springs in words."""
+    edges = f"{size(geometry.length)} x {size(geometry.width)} x {size(geometry.sheet.thickness)}"
+    return (
+        f"{geometry.sheet.leaves:g} leaves of {edges} mm, {size(geometry.spacing)} mm apart, of "
+        f"{geometry.sheet.material}"
+    )
+
+
+def _verified(design: Design) -> tuple[str, str]:
+    free, locked, limit = design.verification.free, design.verification.locked, design.spec.position.settling_time
+    held = f" With the joint locked, {restless(locked)}." if locked.missed else ""
+    if design.needed and not locked.missed:
+        held = (
+            f" With the joint locked, all do as well: it does not hunt in this sample, but lies closer to the edge of "
+            f"hunting than the safety factor of {design.spec.safety.hunting:g} allows."
+        )
+    text = f"Of {free.tried} simulated moves {restless(free)}: {probability(free)}. {settling(free)}"
+    if limit is None:
+        return (VERMILLION if free.missed else GREEN), f"{text}.{held}"
+    met = free.slower_than(0.05) <= limit
+    colour = VERMILLION if free.missed or not met else GREEN
+    return colour, f"{text}; {'as' if met else 'not as'} specified ({seconds(float(limit))}).{held}"
+
+
+def restless(outcome: MachineOutcomes) -> str:
+    """How many moves do not come to rest in the window, and how many of these swing."""
+    if not outcome.missed:
+        return "all come to rest in position"
+    count, swinging = outcome.missed, outcome.swinging
+    outcomes = f"{swinging} swing, {count - swinging} creep"
+    return f"{count} {'does' if count == 1 else 'do'} not come to rest in position ({outcomes})"
+
+
+def probability(outcome: MachineOutcomes) -> str:
+    """The interval of the probability that a move does not come to rest in position."""
+    low, high = outcome.interval
+    within = f"below {percent(high)}" if not outcome.missed else f"{percent(low)} to {percent(high)}"
+    return f"the probability that a move does not is {within} (with 95 % confidence)"
+
+
+def settling(outcome: MachineOutcomes) -> str:
+    """Within what time moves settle."""
+    half, most = outcome.slower_than(0.5), outcome.slower_than(0.05)
+    if not math.isfinite(half):
+        return "Fewer than half of them settle"
+    rest = f"95 % in {seconds(most)}" if math.isfinite(most) else "fewer than 95 % at all"
+    return f"Half of them settle in {seconds(half)}, {rest}"
+
+
+def edge(corners: Corners) -> str:
+    """Up to where the machine hunts, as what it does."""
+    low, high = corners.searched
+    if not corners.hunts:
+        return f"hunts in no corner at any crossover from {hertz(low)} to {hertz(high)}"
+    if not math.isfinite(corners.highest):
+        return f"hunts, in its worst corner, up to {hertz(high)} and beyond"
+    return f"hunts, in its worst corner, up to {hertz(corners.highest)}"
+
+
+def corner(corners: Corners, flat: Mapping[str, Any], number: int) -> str:
+    """The corner with a number."""
+    keys = corners.population.of(number)
+    units = {key: item.unit for key, item in numeric_keys(flat).items()}
+    order = sorted(keys, key=lambda key: (not key.startswith("friction."), key != "friction.static"))
+    return ", ".join(f"{in_sentence(key)} {trimmed(keys[key], units[key])}" for key in order)
+
+
+def gaps(corners: Corners, flat: Mapping[str, Any]) -> np.ndarray | None:
+    """Static less Coulomb friction in the corners [N], shape (n,); None of a friction law that has not both."""
+    if not {"friction.static", "friction.coulomb"} <= flat.keys():
+        return None
+    static, coulomb = (corners.population.over(flat)[f"friction.{name}"] for name in ("static", "coulomb"))
+    return np.broadcast_to(static - coulomb, (corners.population.count,))
+
+
+def refusal(failure: NoDesign) -> str:
+    """That no isolator is needed, where that is so; why no design meets a specification, and what to relax."""
+    if failure.need and not failure.need.isolator:
+        return f"{need_words(failure.need)}\nNor is there a design of one that meets the specification: {_why(failure)}"
+    return f"no design: {_why(failure)}"
+
+
+def _why(failure: NoDesign) -> str:
+    if not failure.relaxed:
+        tail = "no single requirement was found whose relaxation alone is enough: relax several"
+        return f"{failure.reason}\n  {tail}"
+    later = any(change.geometry for change in failure.relaxed)
+    tail = ["(each one alone; this concerns the leaf springs only, the later steps were not tried)"] if later else []
+    return "\n  ".join([failure.reason, *map(relaxation, failure.relaxed[:SHOWN]), *tail])
+
+
+def shortfall(design: Design) -> str:
+    """What of the specification the design does not meet."""
+    free = design.verification.free
+    missed = [f"of {free.tried} moves {restless(free)}"] if free.missed else []
+    return "; ".join([*missed, *map(relaxation, design.unmet)])
+
+
+def relaxation(change: Relaxation) -> str:
+    needed = outwards(change.needed, change.needed > change.value)
+    values = f"{trimmed(change.value, change.unit)} to {trimmed(needed, change.unit)}"
+    text = f"relax {change.key} from {values} ({change.requirement})"
+    if change.geometry is None:
+        return text
+    return f"{text}: then {leaf_words(change.geometry)} do"
+
+
+def trimmed(value: float, unit: str) -> str:
+    """A value with its unit, without zeros that say nothing: "70 mm", "0.3 N"."""
+    if unit.startswith("N") and abs(value) < 1000:
+        return f"{value:.4g} {pretty(unit)}"
+    factor, text = choose(np.array([value]), unit)
+    return f"{value * factor:.4g} {text if factor != 1 else pretty(unit)}".rstrip()
+
+
+def size(length: float) -> str:
+    """A length [m] in mm as it stands on a drawing."""
+    return f"{1e3 * length:.{4 if length >= 0.1 else 3}g}"
+
+
+def hertz(frequency: float) -> str:
+    return with_unit(frequency, "Hz") if math.isfinite(frequency) else "not found"
+
+
+def seconds(time: float) -> str:
+    """A settling time."""
+    return with_unit(time, "s") if math.isfinite(time) else "never"

@@ -1,0 +1,30 @@
+"""The JSON document of `friso export`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from friso.drives.gains import Gains
+from friso.questions.export.words import notes
+from friso.shown.documents import plain_json
+
+
+def export_document(gains: Gains) -> dict[str, Any]:
+    """The gains of a stage in all units, and the parameters of a drive (None: none was asked for)."""
+    return plain_json(
+        {
+            "stage": gains.stage.name,
+            "structure": gains.diagram.splitlines(),
+            "gains": [
+                {
+                    "name": row.name,
+                    "symbol": row.symbol,
+                    "values": [{"value": value, "unit": unit} for value, unit in row.values],
+                }
+                for row in gains.conversions
+            ],
+            "firmware": gains.kind.firmware if gains.kind else None,
+            "parameters": None if gains.parameters is None else dict(gains.parameters),
+            "notes": notes(gains),
+        }
+    )

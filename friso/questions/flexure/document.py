@@ -1,0 +1,50 @@
+"""The JSON document of a leaf-spring mechanism: SI, the unit in the key's suffix; what is not known is null."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from friso.leaf_springs.both_models import BothModels
+from friso.leaf_springs.evaluation import Evaluation
+from friso.questions.flexure.words import sentences
+from friso.shown.documents import plain_json
+
+
+def flexure_document(flexure: BothModels) -> dict[str, Any]:
+    """The main results, and those of the closed forms for comparison."""
+    head = {"conclusion": sentences(flexure)[0], "stage": flexure.stage.name, "failure": flexure.failure or None}
+    return {**head, **_evaluation(flexure.best), "closed_forms": _evaluation(flexure.closed)}
+
+
+def _evaluation(evaluation: Evaluation) -> dict[str, Any]:
+    first = evaluation.interfering
+    plain = {
+        "model": evaluation.model,
+        "stroke_m": evaluation.stroke,
+        "drive_stiffness_n_per_m": evaluation.drive[0],
+        "drive_stiffness_under_load_n_per_m": evaluation.loaded_drive,
+        "drive_stiffness_at_stroke_n_per_m": evaluation.drive[-1],
+        "nonlinearity": evaluation.nonlinearity,
+        "support_stiffness_n_per_m": {
+            axis: {"zero": support[0], "full": support[-1]}
+            for axis, support in (("x", evaluation.support_x), ("y", evaluation.support_y))
+        },
+        "eigenfrequencies_hz": [mode.frequency for mode in evaluation.modes],
+        "names": [mode.name for mode in evaluation.modes],
+        "interferes": [evaluation.interferes(mode) for mode in evaluation.modes],
+        "first_interfering_hz": None if first is None else first.frequency,
+        "max_stress_pa": evaluation.stress,
+        "clamp_stress_pa": evaluation.clamp_stress,
+        "stress_concentration": evaluation.mechanism.stress_concentration,
+        "yield_margin": evaluation.yield_margin,
+        "fatigue_margin": evaluation.fatigue_margin,
+        "shortening_m": evaluation.shortening,
+        "buckling_load_n": evaluation.buckling,
+        "buckling_load_per_leaf_n": evaluation.buckling / evaluation.mechanism.leaves,
+        "buckling_margin": evaluation.buckling_margin,
+        "stiffness_zero": evaluation.stiffness[0],
+        "stiffness_full": evaluation.stiffness[1],
+        "deflections_m": evaluation.deflections,
+        "forces_n": evaluation.forces,
+    }
+    return {key: plain_json(value) for key, value in plain.items()}

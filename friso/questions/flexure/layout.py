@@ -1,0 +1,135 @@
+"""Where the parts of a leaf-spring drawing stand on paper, at which scale."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+from friso.leaf_springs.mechanism import Mechanism
+from friso.questions.flexure.svg import SheetPoint
+
+WIDTH, ROOM = 210.0, 202.0
+"""Width of the sheet (A4 upright), and the height that the two views may take together [mm]."""
+
+LEFT, RIGHT = 30.0, 50.0
+"""Beside the views, for dimensions and notes [mm]."""
+
+ABOVE, BELOW = 15.0, 15.0
+"""A view's heading and note above it, and its dimensions beneath [mm]."""
+
+CLAMP, RIM, STOP = 6.0, 5.0, 4.0
+"""Clamps: their thickness and how far they reach beyond the leaves; height of a limiter stop [mm]."""
+
+LEAST_LEAF, LEAST_STROKE = 0.5, 1.6
+"""Thickness of a leaf and stroke as drawn [mm] where they would be less to scale."""
+
+BEYOND = 10.0
+"""How far the block of the stage may reach beyond all else upwards and downwards before it is cut off [mm]."""
+
+SCALES = tuple(factor * 10.0**power for power in range(3, -4, -1) for factor in (5, 2, 1))
+"""Scales of ISO 5455: 5:1, 2:1, 1:1, 1:2, 1:5 and so on."""
+
+FOOT = 26.0
+"""Height of the title block [mm]."""
+
+
+def block_size(mechanism: Mechanism) -> tuple[float, float, float]:
+    """Edges [m] along x, y, z of the block of the stage's mass and moments of inertia; 0 where there is none."""
+    x, y, z = (6 * float(moment) / float(mechanism.body.mass) for moment in mechanism.body.inertia)
+    return math.sqrt(max(0.0, y + z - x)), math.sqrt(max(0.0, x + z - y)), math.sqrt(max(0.0, x + y - z))
+
+
+@dataclass(frozen=True)
+class PaperDrawing:
+    """A mechanism on paper at a scale: places in paper millimetres, y downwards."""
+
+    mechanism: Mechanism
+    stroke: float
+    scale: float
+
+    @property
+    def fits(self) -> bool:
+        (left, right), tall = self.core, sum(high - low for low, high in self.spans[1:])
+        return LEFT + right - left + RIGHT <= WIDTH - 10 and tall + 2 * (ABOVE + BELOW) <= ROOM
+
+    @property
+    def travel(self) -> float:
+        """The stroke as drawn."""
+        return max(LEAST_STROKE, self.size(self.stroke))
+
+    @property
+    def leaf(self) -> float:
+        """The thickness of a leaf as drawn."""
+        return max(LEAST_LEAF, self.size(self.mechanism.thickness))
+
+    @property
+    def points(self) -> dict[str, tuple[float, float, float]]:
+        """Marked points [m] by their letter."""
+        mechanism = self.mechanism
+        places = {"A": mechanism.actuation, "S": mechanism.sensor, "C": mechanism.body.centre}
+        return {letter: tuple(float(coordinate) for coordinate in place) for letter, place in places.items()}  # type: ignore[misc]
+
+    @cached_property
+    def block(self) -> tuple[tuple[float, float], ...]:
+        """From where to where the block of the stage goes along x, z and y, from the origin, in paper millimetres."""
+        centre, edges = self.mechanism.body.centre, block_size(self.mechanism)
+        return tuple((self.size(centre[k] - edges[k] / 2), self.size(centre[k] + edges[k] / 2)) for k in (0, 2, 1))
+
+    @property
+    def core(self) -> tuple[float, float]:
+        """What must be seen along x: leaves, clamps and marked points."""
+        marked = [self.size(point[0]) for point in self.points.values()]
+        return min(-CLAMP, *marked), max(self.size(self.mechanism.length) + CLAMP, *marked)
+
+    @cached_property
+    def spans(self) -> tuple[tuple[float, float], ...]:
+        """What the views take along x, z and y: all that must be seen, and as much of the block as has room."""
+        low, high = self.core
+        room = WIDTH - 10 - LEFT - RIGHT - (high - low)
+        left = max(0.0, min(low - self.block[0][0], room / 3))
+        right = max(0.0, min(self.block[0][1] - high, room - left))
+        row = self.size(self.mechanism.depth) / 2 + RIM + self.travel + STOP
+        across = self.size(self.mechanism.width) / 2 + RIM
+        return (low - left, high + right), self._upwards(row, 2), self._upwards(across, 1)
+
+    def _upwards(self, half: float, axis: int) -> tuple[float, float]:
+        """What a view takes along its axis upwards: `half` to both sides, the marked points, a bit of the block."""
+        marked = [self.size(point[axis]) for point in self.points.values()]
+        low, high = min(-half, *marked), max(half, *marked)
+        bottom, top = self.block[3 - axis]
+        return min(low, max(bottom, low - BEYOND)), max(high, min(top, high + BEYOND))
+
+    def size(self, length: float) -> float:
+        return 1e3 * float(length) * self.scale
+
+    @property
+    def x0(self) -> float:
+        """Where x = 0 is on paper; the views stand in the middle of what notes leave free."""
+        left, right = self.spans[0]
+        return LEFT + 5 - left + max(0.0, (WIDTH - 10 - LEFT - RIGHT - (right - left)) / 2)
+
+    @property
+    def z0(self) -> float:
+        return 5 + ABOVE + self.spans[1][1]
+
+    @property
+    def y0(self) -> float:
+        return self.z0 - self.spans[1][0] + BELOW + ABOVE + self.spans[2][1]
+
+    @property
+    def foot(self) -> float:
+        """Where the legend begins."""
+        return self.y0 - self.spans[2][0] + BELOW
+
+    @property
+    def height(self) -> float:
+        return self.foot + 23 + FOOT
+
+    def side(self, x: float, z: float) -> SheetPoint:
+        """A place [m] in the view from the side."""
+        return self.x0 + self.size(x), self.z0 - self.size(z)
+
+    def top(self, x: float, y: float) -> SheetPoint:
+        """A place [m] in the view from above."""
+        return self.x0 + self.size(x), self.y0 - self.size(y)

@@ -1,0 +1,181 @@
+"""Pictures of the modes of a leaf-spring mechanism: leaves and stage at rest and deformed, seen where most moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from friso.leaf_springs.evaluation import Evaluation, Mode
+from friso.leaf_springs.mechanism import Mechanism
+from friso.questions.flexure.layout import block_size
+from friso.shown.drawing.figure import BLUE, LIGHT, VERMILLION, Array, Axis, Figure, Panel, Series
+from friso.shown.drawing.prefixes import with_unit
+
+SHOWN = 8
+"""Modes that are drawn."""
+
+LARGE = 0.16
+"""Amplitude of the largest motion over the size of the picture."""
+
+ASPECT = 1.45
+"""Width of a picture over its height."""
+
+HALF = 0.5
+"""Share of the energy from which on a mode can be drawn by what is known of it."""
+
+ENOUGH = 0.9
+"""Share of all motion from which on a view shows a mode."""
+
+FINE = 65
+"""Places along a leaf between which lines are drawn."""
+
+VIEWS = {"from the side": (0, 2), "from above": (0, 1), "along the leaves": (1, 2)}
+"""The two axes of each view, the more usual ones first."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Lines on the mechanism: their points [m] at rest, shape (n, 3), and how far a mode moves them."""
+
+    rest: Array
+    moved: Array
+
+
+def modes_figure(evaluation: Evaluation) -> Figure:
+    """The first modes, a panel each."""
+    modes = [mode for mode in evaluation.modes if mode.interferes or drawable_share(evaluation.mechanism, mode) > HALF][
+        :SHOWN
+    ]
+    panels = tuple(_panel(evaluation.mechanism, mode, mode is evaluation.modes[0] or mode.interferes) for mode in modes)
+    caption = (
+        "The first modes with the cart held and the leaves straight, enlarged to be visible. Grey: at rest. The stage "
+        "is "
+        "drawn as the block of its mass and moments of inertia. A mode that actuator and sensor both see limits the "
+        "crossover. Torsion of the leaves about their middle lines is not drawn."
+    )
+    return Figure("flexure_modes", "Modes", caption, panels, columns=2)
+
+
+def _panel(mechanism: Mechanism, mode: Mode, visible: bool) -> Panel:
+    view = best_view(mechanism, mode)
+    axes = VIEWS[view]
+    shapes = [*_leaves(mechanism, mode, axes), _block(mechanism, mode, axes)]
+    corners = np.concatenate([shape.rest[:, axes] for shape in shapes])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    largest = max(float(np.abs(shape.moved[:, axes]).max()) for shape in shapes)
+    size = float(np.max(high - low))
+    gain = LARGE * size / largest
+    colour, label = (VERMILLION, "seen by actuator and sensor") if visible else (BLUE, "not seen by both")
+    rest = _polyline([shape.rest[:, axes] for shape in shapes])
+    moved = _polyline([(shape.rest + gain * shape.moved)[:, axes] for shape in shapes])
+    lines = (Series(*rest, f"at rest, {view}", LIGHT, width=1.6), Series(*moved, label, colour, width=1.6))
+    x, y = _limits(low - LARGE * size * 1.1, high + LARGE * size * 1.1)
+    title = f"{mode.name}, {with_unit(mode.frequency, 'Hz')}"
+    return Panel(title, Axis("xyz"[axes[0]], "m", x), Axis("xyz"[axes[1]], "m", y), lines, equal=True)
+
+
+def best_view(mechanism: Mechanism, mode: Mode) -> str:
+    """The first view in which nearly all motion takes place, or the one with most of it."""
+    everything = np.concatenate([mode.leaves.reshape(-1, 3), _corners_moved(mechanism, mode)])
+    shares = np.sum(everything**2, axis=0) / max(float(np.sum(everything**2)), np.finfo(float).tiny)
+    spans = {view: float(sum(shares[axis] for axis in axes)) for view, axes in VIEWS.items()}
+    return next((view for view, share in spans.items() if share > ENOUGH), max(spans, key=spans.__getitem__))
+
+
+def drawable_share(mechanism: Mechanism, mode: Mode) -> float:
+    """Share of the kinetic energy that is in the stage and the middle lines: the rest is torsion of the leaves."""
+    speed = _rigid(mechanism, mode, _centre(mechanism)[None, :])[0]
+    stage = mechanism.body.mass * np.sum(speed**2) + np.sum(
+        np.array(mechanism.body.inertia, dtype=float) * mode.stage[3:] ** 2
+    )
+    middle = (mode.leaves[:, 1:] ** 2 + mode.leaves[:, :-1] ** 2).mean(axis=1) / 2
+    return float(stage + mechanism.leaf_mass * np.sum(middle))
+
+
+def _corners_moved(mechanism: Mechanism, mode: Mode) -> Array:
+    signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
+    return _rigid(mechanism, mode, _centre(mechanism) + signs * np.array(block_size(mechanism)) / 2)
+
+
+def _centre(mechanism: Mechanism) -> Array:
+    return np.array([float(coordinate) for coordinate in mechanism.body.centre])
+
+
+def _rigid(mechanism: Mechanism, mode: Mode, points: Array) -> Array:
+    """How points of the stage, (n, 3), move with it."""
+    arm = points - np.array([float(mechanism.length), 0.0, 0.0])
+    return mode.stage[:3] + np.cross(mode.stage[3:], arm)
+
+
+def _block(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> Shape:
+    """The outline of the stage, halfway through it."""
+    half = np.array(block_size(mechanism)) / 2
+    rest = np.tile(_centre(mechanism), (5, 1))
+    for axis, signs in zip(axes, ((-1, 1, 1, -1, -1), (-1, -1, 1, 1, -1)), strict=True):
+        rest[:, axis] += half[axis] * np.array(signs)
+    return Shape(rest, _rigid(mechanism, mode, rest))
+
+
+def _leaves(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> list[Shape]:
+    """Middle lines from the side, outlines from above, cross-sections along the leaves."""
+    draw = {(0, 2): _middle, (0, 1): _outline, (1, 2): _sections}[axes]
+    return [
+        shape
+        for k, offset in enumerate(mechanism.offsets)
+        for shape in draw(mechanism, mode, mode.leaves[k], float(offset))
+    ]
+
+
+def _middle(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
+    x, leaf = _smooth(mechanism, leaf)
+    return [Shape(np.stack([x, np.zeros_like(x), np.full_like(x, offset)], axis=1), leaf)]
+
+
+def _outline(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
+    """Both long edges and both ends: cross-sections turn as the middle line does."""
+    x, leaf = _smooth(mechanism, leaf)
+    turn = np.gradient(leaf[:, 1], x)
+    turn -= turn[0]  # what is left at the clamp is shear, of nearly the same size all along the leaf
+    sides = []
+    for y in (-mechanism.width / 2, mechanism.width / 2):
+        rest = np.stack([x, np.full_like(x, y), np.full_like(x, offset)], axis=1)
+        sides.append((rest, leaf + np.stack([-y * turn, 0 * turn, 0 * turn], axis=1)))
+    around = [np.concatenate([first, second[::-1], first[:1]]) for first, second in zip(*sides, strict=True)]
+    return [Shape(*around)]
+
+
+def _smooth(mechanism: Mechanism, leaf: Array) -> tuple[Array, Array]:
+    """More places along a leaf [m] and the displacement there, by a cubic spline."""
+    reported, fine = (np.linspace(0.0, float(mechanism.length), count) for count in (len(leaf), FINE))
+    return fine, CubicSpline(reported, leaf)(fine)
+
+
+def _sections(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
+    """A few cross-sections between cart and stage: they turn evenly more, up to the stage's own turn."""
+    shapes = []
+    for k in np.linspace(0, len(leaf) - 1, 5).astype(int):
+        share = k / (len(leaf) - 1)
+        ends = np.array(
+            [[share * float(mechanism.length), y, offset] for y in (-mechanism.width / 2, mechanism.width / 2)]
+        )
+        lift = share * mode.stage[3] * ends[:, 1]
+        shapes.append(Shape(ends, leaf[k] + np.stack([0 * lift, 0 * lift, lift], axis=1)))
+    return shapes
+
+
+def _polyline(lines: list[Array]) -> tuple[Array, Array]:
+    """All lines as one, with gaps between them, shapes (n,)."""
+    gap = np.full((1, 2), np.nan)
+    points = np.concatenate([part for line in lines for part in (line, gap)])
+    return points[:, 0], points[:, 1]
+
+
+def _limits(low: Array, high: Array) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Limits of both axes about what is drawn, wider than high by the usual aspect."""
+    width, height = high - low
+    middle = (low + high) / 2
+    half = np.array([max(width, ASPECT * height), max(height, width / ASPECT)]) / 2
+    (x1, y1), (x2, y2) = middle - half, middle + half
+    return (float(x1), float(x2)), (float(y1), float(y2))

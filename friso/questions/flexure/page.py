@@ -1,0 +1,67 @@
+"""The page of `friso flexure`: one file that opens offline, prints, and is the same bytes on every run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from markupsafe import Markup
+
+from friso.leaf_springs.both_models import BothModels
+from friso.materials import materials
+from friso.questions.flexure.drawing import drawing_svg
+from friso.questions.flexure.figures import COLOURS, flexure_figures
+from friso.questions.flexure.table import rows
+from friso.questions.flexure.words import assumptions, findings, warnings
+from friso.shown.drawing.figure import GREEN, VERMILLION, Figure
+from friso.shown.files import Content, pictures
+from friso.shown.pages import Report
+
+
+class Column(NamedTuple):
+    """A model at the head of the table."""
+
+    label: str
+    colour: str
+
+
+BASIS = (
+    "geometrically exact beams, corrected for what clamps do to a wide leaf, and closed forms (Soemers, Design "
+    "Principles for Precision Mechanisms; Awtar, Slocum and Sevincer, doi:10.1115/1.2717231). Modes with the cart held "
+    "and the leaves straight; a mode interferes with control where actuator and sensor both see it. The drawing is no "
+    "substitute for one with tolerances"
+)
+
+
+def flexure_files(flexure: BothModels) -> dict[str, Content]:
+    """The page, the drawing, and every figure in all formats."""
+    figures = flexure_figures(flexure)
+    images = pictures(figures)
+    return {
+        "flexure.html": flexure_html(flexure, figures),
+        "flexure_drawing.svg": drawing(flexure),
+        **images,
+    }
+
+
+def flexure_html(flexure: BothModels, figures: Sequence[Figure]) -> str:
+    """The whole page of a mechanism and its figures."""
+    joint, *further = findings(flexure)
+    return Report.of_stage(
+        "flexure",
+        flexure.stage,
+        figures,
+        verdicts=[(GREEN, joint), *((VERMILLION, warning) for warning in warnings(flexure))],
+        sentences=[*further, *assumptions(flexure.stage)],
+        drawing=Markup(drawing(flexure)),
+        columns=[Column(name, COLOURS[name]) for name in flexure.models],
+        rows=rows(flexure),
+        computed=f": {BASIS}",
+    ).html()
+
+
+def drawing(flexure: BothModels) -> str:
+    """The dimensioned drawing of the mechanism, SVG."""
+    data = materials().get(str(flexure.stage.flat().get("flexure.material")))
+    material = f"{data.name}, {data.grade}" if data else ""
+    return drawing_svg(flexure.mechanism, flexure.best.stroke, title=flexure.stage.name, material=material)

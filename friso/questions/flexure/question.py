@@ -1,0 +1,143 @@
+"""How good the leaf springs of a joint are: stiffness, modes, stress."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from friso.errors import InputError
+from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.inputs import Changes, StageLike, read_stage, text_of, wrong
+from friso.leaf_springs.both_models import BothModels
+from friso.leaf_springs.mechanism import Mechanism
+from friso.platform.extras import need
+from friso.progress import Progress, silent
+from friso.quantities import Quantity, positive, quoted
+from friso.stage import Stage
+
+if TYPE_CHECKING:
+    from friso.shown.drawing.figure import Figure
+    from friso.shown.files import Files
+
+STROKE = Quantity("m", positive, "1 mm")
+EXAMPLE = """[flexure]
+            leaves = 2
+            length = "70 mm"
+            width = "45 mm"
+            thickness = "0.35 mm"
+            spacing = "60 mm"
+            material = "stainless 1.4310\""""
+
+
+class FlexureAnswer(Answer):
+    """The leaf springs of a joint: `result` has the evaluations by beams and by closed forms."""
+
+    command = "flexure"
+
+    def __init__(self, result: BothModels) -> None:
+        self.result, self.axis_kind = result, result.stage.axis_kind
+
+    @property
+    def failure(self) -> str:
+        """Why the beam model found no solution."""
+        return f"the beam model found no solution: {self.result.failure}" if self.result.failure else ""
+
+    def sentences(self) -> Sequence[str]:
+        """What the joint is worth."""
+        from friso.questions.flexure.words import sentences
+
+        return sentences(self.result)
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """Stiffness, modes, stress and buckling by both models."""
+        from friso.questions.flexure.table import rows
+
+        return [AnswerTable(self.result.stage.name, list(self.result.models), rows(self.result))]
+
+    def figures(self) -> Sequence[Figure]:
+        """Stiffness over the stroke, stress, modes."""
+        from friso.questions.flexure.figures import flexure_figures
+
+        return flexure_figures(self.result)
+
+    def document(self) -> dict[str, Any]:
+        """The evaluations."""
+        from friso.questions.flexure.document import flexure_document
+
+        return flexure_document(self.result)
+
+    def files(self) -> Files:
+        """The page, the drawing, the figures."""
+        from friso.questions.flexure.page import flexure_files
+
+        return flexure_files(self.result)
+
+
+@question
+def flexure(
+    stage: StageLike, stroke: float | str | None = None, *, set: Changes = None, progress: Progress = silent
+) -> FlexureAnswer:
+    """How good are the leaf springs of a joint: stiffness, modes, stress, fatigue and buckling.
+
+    Parameters
+    ----------
+    stage : Stage, path or dict
+        The stage with a [flexure] table, its file, or the tables of one.
+    stroke : str or float, optional
+        Deflection to one side, "1 mm" or a number [m]; default: `joint.stroke`.
+    set : dict, optional
+        Keys to override, ``{"flexure.thickness": "0.3 mm"}``.
+    progress : Progress
+        Called once before the leaves are bent.
+
+    Returns
+    -------
+    FlexureAnswer
+        Evaluations by geometrically exact beams and by closed forms: ``answer.best``, ``answer.models``.
+
+    Raises
+    ------
+    InputError
+        For a stage without leaf springs, or a stroke that these cannot have.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.flexure(friso.example("thesis_leaves"))  # doctest: +SKIP
+    """
+    chosen = read_stage(stage, set, leaves_out=())
+    mechanism = _mechanism(chosen, "" if isinstance(stage, Stage | Mapping) else str(stage))
+    deflection = _stroke(stroke, chosen, mechanism)
+    need("design", "friso flexure")
+    progress(0, 0, "bending the leaves")
+    from friso.leaf_springs.both_models import both_models
+
+    return FlexureAnswer(both_models(chosen, mechanism, deflection))
+
+
+def _mechanism(stage: Stage, origin: str) -> Mechanism:
+    """The leaf springs of the stage. Raises InputError without [flexure]."""
+    if stage.flexure is None:
+        expected = "a table of leaf springs, from which joint.stiffness and [parasitic] follow (leave these out)"
+        raise InputError("flexure", "no [flexure]", expected, EXAMPLE, origin)
+    return Mechanism.of(stage.flat())
+
+
+def _stroke(entry: str | float | None, stage: Stage, mechanism: Mechanism) -> float:
+    """The stroke [m], of the option or else of the joint, which leaves can bend by. Raises InputError."""
+    if entry is None:
+        stroke = stage.joint and stage.joint.stroke
+        if stroke is None:
+            raise wrong("stroke", "nothing", "the stroke, because the joint has none", '"1 mm"')
+    else:
+        try:
+            stroke = STROKE.read(text_of(entry, "m"))
+        except InputError as error:
+            raise wrong("stroke", error.actual, error.expected, '"1 mm"') from None
+    if stroke > mechanism.length / 2:
+        expected = f"at most half the length of the leaves, {1e3 * mechanism.length / 2:g} mm"
+        actual = quoted(getattr(stroke, "text", stroke))
+        if entry is None:
+            raise InputError("joint.stroke", actual, expected, 'stroke = "1 mm"')
+        raise wrong("stroke", actual, expected, '"1 mm"')
+    return float(stroke)

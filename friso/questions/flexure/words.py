@@ -1,0 +1,207 @@
+"""What a leaf-spring mechanism is, allows and endangers, in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+from friso.leaf_springs.both_models import BothModels
+from friso.leaf_springs.evaluation import Evaluation
+from friso.leaf_springs.mechanism import AXES, GRAVITY
+from friso.quantities import percent
+from friso.questions.flexure.table import megapascals, newtons_per
+from friso.shown.drawing.prefixes import listed, with_unit
+from friso.stage import Stage
+
+RULE = 0.1
+"""Highest crossover over the first interfering frequency (thesis, Section 5: parasitic modes ten times higher)."""
+
+AGREE = 0.1
+"""Share by which the models may differ before that is said."""
+
+
+def sentences(flexure: BothModels) -> list[str]:
+    """All that is said, in order."""
+    joint, *further = findings(flexure)
+    return [joint, *warnings(flexure), *further, *assumptions(flexure.stage)]
+
+
+def findings(flexure: BothModels) -> list[str]:
+    """What the joint is, and what it allows."""
+    return [_joint(flexure.best), _control(flexure.best), _endurance(flexure.best)]
+
+
+def warnings(flexure: BothModels) -> list[str]:
+    """What is wrong with it."""
+    failed = f"The beam model found no solution: {flexure.failure.rstrip('.')}. All results are from the closed forms."
+    return [
+        *([failed] if flexure.beams is None else []),
+        *_borne(flexure.best),
+        *_loaded(flexure.best),
+        *_breaks_away(flexure),
+        *_against(flexure.best),
+        *_differences(flexure),
+    ]
+
+
+def assumptions(stage: Stage) -> list[str]:
+    """What stands in for keys that the stage file leaves out."""
+    flat = stage.flat()
+    parts = []
+    if "flexure.centre_x" not in flat:
+        parts.append("centre of mass in the middle of the leaf ends")
+    if not all(f"flexure.inertia_{axis}" in flat for axis in AXES):
+        parts.append(f"moments of inertia of an aluminium cube of {flat['masses.stage']:g} kg")
+    points = []
+    for point, place in (("actuation", "the centre of mass of the stage"), ("sensor", "the point of actuation")):
+        if f"flexure.{point}_x" not in flat:
+            partly = any(f"flexure.{point}_{axis}" in flat for axis in AXES)
+            points.append(f"{point}{' along x' if partly else ''} at {place}")
+    parts += [", ".join(points)] if points else []
+    if "flexure.load" not in flat:
+        parts.append("no load on the leaves, except the weight of the stage for the buckling margin")
+    return [f"Assumed, since [flexure] does not say: {'; '.join(parts)}."] if parts else []
+
+
+def _joint(evaluation: Evaluation) -> str:
+    mechanism, drive = evaluation.mechanism, evaluation.modes[0]
+    return (
+        f"The joint: {mechanism.leaves:g} leaves of {_size(mechanism.length)} x {_size(mechanism.width)} x "
+        f"{_size(mechanism.thickness)} mm, {newtons_per(evaluation.drive[0], 'mm')}; with the cart held the stage of "
+        f"{mechanism.body.mass:g} kg swings at {with_unit(drive.frequency, 'Hz')}. Over {_stroke(evaluation)} the "
+        f"force deviates from linear by {percent(evaluation.nonlinearity)} and takes "
+        f"{with_unit(evaluation.forces[-1], 'N')} at its end."
+    )
+
+
+def _control(evaluation: Evaluation) -> str:
+    first = evaluation.interfering
+    if first is None:
+        return (
+            f"None of the {len(evaluation.modes) - 1} known modes above the drive mode is seen by both "
+            f"actuator and sensor (highest: {with_unit(evaluation.modes[-1].frequency, 'Hz')}); the leaves set no "
+            "limit to the crossover."
+        )
+    return (
+        f"The first mode that interferes with control is {first.name}, at {with_unit(first.frequency, 'Hz')}: by the "
+        "thesis's rule (ten times the crossover) the crossover may be up to "
+        f"{with_unit(RULE * first.frequency, 'Hz')}."
+    )
+
+
+def _endurance(evaluation: Evaluation) -> str:
+    bent = f"The stress at the clamp is {megapascals(evaluation.clamp_stress)} at full stroke"
+    if math.isnan(evaluation.fatigue_margin):
+        return f"{bent}; the fatigue limit is not known (flexure.fatigue), so neither is the largest stroke."
+    largest = with_unit(evaluation.stroke * evaluation.fatigue_margin, "m")
+    half = with_unit(evaluation.mechanism.length / 2, "m")
+    bounds = f" A stroke of more than half the length, {half}, is beyond both models."
+    beyond = bounds if evaluation.stroke * evaluation.fatigue_margin > evaluation.mechanism.length / 2 else ""
+    return (
+        f"{bent}, and the fatigue limit is {megapascals(evaluation.mechanism.fatigue)}: "
+        f"fatigue allows a stroke of about {largest}.{beyond}"
+    )
+
+
+def _borne(evaluation: Evaluation) -> list[str]:
+    """Stresses and loads beyond what the leaves bear."""
+    lines, mechanism = [], evaluation.mechanism
+    if evaluation.yield_margin < 1:
+        lines.append(
+            f"The leaves yield: {megapascals(evaluation.clamp_stress)} at the clamp at {_stroke(evaluation)}, but the "
+            f"material bears {megapascals(mechanism.yield_strength)}. Longer or thinner leaves, or a smaller stroke, "
+            "would remedy this."
+        )
+    elif evaluation.fatigue_margin < 1:
+        lines.append(
+            f"The leaves fail by fatigue: {megapascals(evaluation.clamp_stress)} at the clamp at "
+            f"{_stroke(evaluation)}, above the fatigue limit of {megapascals(mechanism.fatigue)}. Longer or thinner "
+            "leaves, or a smaller stroke, would remedy this."
+        )
+    if evaluation.buckling_margin < 1:
+        lines.append(
+            f"A stage standing on its leaves would buckle them: it weighs {with_unit(mechanism.weight, 'N')} "
+            f"(g = {GRAVITY} m/s²), they bear {with_unit(evaluation.buckling, 'N')} along their length."
+        )
+    return lines
+
+
+def _loaded(evaluation: Evaluation) -> list[str]:
+    """What a load along the leaves does."""
+    load = float(evaluation.mechanism.load)
+    if not load:
+        return []
+    first = evaluation.modes[0].frequency * math.sqrt(max(evaluation.loaded_drive / evaluation.drive[0], 0.0))
+    close = (
+        f" That is {evaluation.buckling_margin:.2g} times below buckling, so the stiffness depends on it strongly."
+        if load > 0
+        else ""
+    )
+    return [
+        f"Under the load of {with_unit(load, 'N')} along the leaves the drive stiffness is "
+        f"{newtons_per(evaluation.loaded_drive, 'mm')} and the drive mode at {with_unit(first, 'Hz')}; all other "
+        f"results are without it.{close}"
+    ]
+
+
+def _breaks_away(flexure: BothModels) -> list[str]:
+    static, force = flexure.stage.flat().get("friction.static"), float(flexure.best.forces[-1])
+    if static is None or force <= static:
+        return []
+    return [
+        f"The cart breaks away inside the stroke: the leaves push with {with_unit(force, 'N')} at "
+        f"{_stroke(flexure.best)}, static friction holds {with_unit(static, 'N')}. The joint can use its stroke only "
+        f"up to about {with_unit(flexure.best.stroke * static / force, 'm')}."
+    ]
+
+
+def _against(evaluation: Evaluation) -> list[str]:
+    """Modes in which the sensor sees the opposite of what the actuator does."""
+    modes = [mode for mode in evaluation.modes if evaluation.interferes(mode) and mode.actuator * mode.sensor < 0]
+    if not modes:
+        return []
+    named = listed([f"{mode.name} ({with_unit(mode.frequency, 'Hz')})" for mode in modes], "and")
+    return [
+        f"In {named} actuator and sensor move in opposite directions. A controller cannot damp that by phase, and "
+        "[parasitic], which describes only the size of a mode, makes the loop look better than it is: actuate and "
+        "measure at the same point."
+    ]
+
+
+def _differences(flexure: BothModels) -> list[str]:
+    """Where the two models differ so much that one of them is beyond its range."""
+    if flexure.beams is None:
+        return []
+    shares = {name: get(flexure.closed) / get(flexure.beams) - 1 for name, get in _COMPARED.items()}
+    far = [f"{name} by {percent(share, signed=True)}" for name, share in shares.items() if abs(share) > AGREE]
+    if not far:
+        return []
+    return [
+        f"The closed forms differ from the beam model in {listed(far, 'and')}: there the leaves are outside the range "
+        "of the closed forms, and the beam model applies."
+    ]
+
+
+_COMPARED: Mapping[str, Callable[[Evaluation], float]] = {
+    "drive stiffness": lambda evaluation: float(evaluation.drive[0]),
+    "force at full stroke": lambda evaluation: float(evaluation.forces[-1]),
+    "support stiffness x": lambda evaluation: float(evaluation.support_x[0]),
+    "support stiffness x at full stroke": lambda evaluation: float(evaluation.support_x[-1]),
+    "support stiffness y": lambda evaluation: float(evaluation.support_y[0]),
+    "support stiffness y at full stroke": lambda evaluation: float(evaluation.support_y[-1]),
+    "drive frequency": lambda evaluation: evaluation.modes[0].frequency,
+    "first interfering frequency": lambda evaluation: (
+        evaluation.interfering.frequency if evaluation.interfering else math.nan
+    ),
+    "stress": lambda evaluation: evaluation.stress,
+    "buckling load": lambda evaluation: evaluation.buckling,
+}
+
+
+def _stroke(evaluation: Evaluation) -> str:
+    return f"a stroke of {with_unit(evaluation.stroke, 'm')}"
+
+
+def _size(length: float) -> str:
+    """A length [m] in mm as it stands on a drawing."""
+    return f"{1e3 * length:.4g}"

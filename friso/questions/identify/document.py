@@ -1,0 +1,72 @@
+"""The JSON document of an identification: SI, the unit in the key's suffix or beside; what is not known is null."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from friso.axis import axis_shown, unit_shown
+from friso.identification.kind import Source
+from friso.identification.logs.log import Log
+from friso.identification.method import Experiment, Identification, Prediction
+from friso.identification.sources import LogFile
+from friso.questions.identify.estimates import key_document
+from friso.questions.identify.kind_view import view_of
+from friso.questions.identify.laws import laws_document
+from friso.questions.identify.words import headline, prediction_view
+from friso.shown.documents import plain_json
+
+
+def identify_document(
+    identification: Identification, files: Sequence[LogFile], predictions: Sequence[Prediction]
+) -> dict[str, Any]:
+    """All but the files written."""
+    document = {
+        "conclusion": headline(identification)[0][1],
+        "stage": identification.stage.name if identification.stage else None,
+        "logs": [_log(file) for file in files],
+        "estimates": [key_document(estimate) for estimate in identification.estimates],
+        "experiments": [_experiment(experiment) for experiment in identification.experiments],
+        "predictions": [
+            {"log": prediction.log.name, **prediction_view(prediction).numbers(prediction.result)}
+            for prediction in predictions
+        ],
+        **({} if identification.laws is None else {"friction_laws": laws_document(identification.laws)}),
+        "failed": identification.failed,
+        "doubts": [axis_shown().text(doubt) for doubt in identification.doubts],
+        "warnings": [axis_shown().text(warning) for warning in identification.warnings],
+    }
+    return plain_json(document)
+
+
+def _log(file: LogFile) -> dict[str, Any]:
+    return {
+        "file": str(file.path),
+        "kind": file.kind,
+        "reason": file.reason,
+        "mapping_file": None if file.mapping_file is None else str(file.mapping_file),
+        **_content(file.source),
+        "read": list(file.source.read),
+    }
+
+
+def _content(source: Source) -> dict[str, Any]:
+    """What a file holds: signals over time, or a response."""
+    if not isinstance(source, Log):
+        return {"roles": {}, "lines": len(source.frequency), "unit": source.unit, "warnings": []}
+    return {
+        "roles": {role: unit_shown(source.unit(role)) for role in source.signals},
+        "samples": len(source.time),
+        "sample_time_s": source.sample_time,
+        "segments": len(source.segments),
+        "warnings": list(source.warnings),
+    }
+
+
+def _experiment(experiment: Experiment) -> dict[str, Any]:
+    return {
+        "kind": experiment.kind,
+        "logs": [log.name for log in experiment.logs],
+        **view_of(experiment.kind).numbers(experiment.result),
+        "estimates": [key_document(estimate) for estimate in experiment.estimates],
+    }

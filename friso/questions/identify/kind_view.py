@@ -1,0 +1,94 @@
+"""How kinds of experiment are shown: what a kind may declare of it, the registry of these, what their figures share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Generic, TypeVar
+
+from friso.identification.kind import Source
+from friso.identification.kinds import KINDS
+from friso.identification.logs.log import Log
+from friso.questions.identify.numbers import name_of, with_interval
+from friso.registry import Registry
+from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
+
+Facts = tuple[tuple[str, str], ...]
+"""Numbers in words, by name."""
+
+Result = TypeVar("Result")
+
+AREA = "#cfdfee"
+WAYS: Mapping[str, str] = MappingProxyType({"forward": BLUE, "backward": ORANGE})
+TIME = Axis("Time", "s")
+
+
+@dataclass(frozen=True)
+class PredictionView(Generic[Result]):
+    """How another log that a kind of experiment predicts is shown: the `worst` of its relative errors, a sentence of
+    them, its numbers as in the JSON document, and its figures, of which the number is that of the log."""
+
+    worst: Callable[[Result], float]
+    sentence: Callable[[Result], str]
+    numbers: Callable[[Result], dict[str, Any]]
+    figures: Callable[[Log, Result, int], list[Figure]] = lambda log, result, number: []
+
+
+@dataclass(frozen=True)
+class KindView(Generic[Result]):
+    """How results of a kind of experiment are shown.
+
+    Its `title`; `facts` and `sentences` for terminal and page, with `warnings`; `numbers` for the JSON document, SI,
+    the unit in the key's suffix or beside; `figures`, whose names begin with the text given. `headline` is a sentence
+    for the head of the page beside the estimates of keys, "" for none. `longest`: of a log with gaps, the longest
+    stretch without any is all that is used.
+    `opening` is the last part of the name of the figure that opens the page, "" for none.
+    """
+
+    title: str
+    facts: Callable[[Result], Facts]
+    numbers: Callable[[Result], dict[str, Any]]
+    figures: Callable[[Result, Sequence[Source], str], list[Figure]] = lambda result, logs, name: []
+    sentences: Callable[[Result], tuple[str, ...]] = lambda result: ()
+    warnings: Callable[[Any], tuple[str, ...]] = lambda result: result.warnings
+    headline: Callable[[Result], str] = lambda result: ""
+    longest: bool = False
+    opening: str = ""
+    prediction: PredictionView[Any] | None = None
+
+
+VIEWS: Registry[KindView[Any]] = Registry("friso.questions.identify.kinds", "VIEW")
+"""Every module of `friso/questions/identify/kinds/` declares one, under the name of its kind of experiment."""
+
+
+def view_of(kind: str) -> KindView[Any]:
+    """How results of a kind of experiment are shown: as its view declares, or else by its estimates and its logs."""
+    return VIEWS[kind] if kind in VIEWS else _by_estimates(kind)
+
+
+def _by_estimates(kind: str) -> KindView[Any]:
+    def facts(result: Any) -> Facts:
+        return tuple(
+            (name_of(estimate.name), with_interval(estimate)) for estimate in KINDS[kind].estimates(result, None)
+        )
+
+    def figures(result: Any, logs: Sequence[Source], name: str) -> list[Figure]:
+        records = [log for log in logs if isinstance(log, Log)]
+        return [log_figure(log, KINDS[kind].needed(log.signals), f"{name}_{i}") for i, log in enumerate(records, 1)]
+
+    def warnings(result: Any) -> tuple[str, ...]:
+        return getattr(result, "warnings", ())
+
+    return KindView(kind.replace("-", " ").capitalize(), facts, lambda result: {}, figures, warnings=warnings)
+
+
+def log_figure(log: Log, roles: Sequence[str], name: str) -> Figure:
+    """Some signals of a log, by role, over time."""
+    panels = tuple(
+        Panel(
+            "", TIME, Axis(role.replace("_", " ").capitalize(), log.unit(role)), (Series(log.time, log[role], "", INK),)
+        )
+        for role in roles
+    )
+    return Figure(name, log.name, "As logged.", panels)

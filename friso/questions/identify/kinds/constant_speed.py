@@ -1,0 +1,156 @@
+"""How constant speeds are shown."""
+
+from __future__ import annotations
+
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+
+from friso.identification.estimate import Estimate
+from friso.identification.experiments.constant_speed import FrictionAtSpeeds
+from friso.identification.readings.common import stribeck_curve
+from friso.identification.readings.friction_position import FrictionPosition
+from friso.identification.readings.friction_velocity import Direction, FrictionVelocity
+from friso.questions.identify.estimates import estimate_document
+from friso.questions.identify.kind_view import WAYS, Facts, KindView
+from friso.questions.identify.numbers import digits, estimates_in_words, with_interval, within
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PINK,
+    SKY,
+    VERMILLION,
+    Array,
+    Axis,
+    Figure,
+    Markers,
+    Panel,
+    Series,
+)
+
+
+def _facts(result: FrictionAtSpeeds) -> Facts:
+    facts = [(f"Friction {name}", _direction_text(side)) for name, side in result.velocity.directions.items()]
+    facts += [
+        ("Friction, both directions", _direction_text(result.velocity.both)),
+        ("Repeatability along the rail", with_interval(result.position.repeatability)),
+    ]
+    facts += [
+        (
+            f"Along the rail at {digits(stretch.velocity, 'm/s')}",
+            f"mean {with_interval(stretch.mean)}, standard deviation {digits(stretch.spread, 'N')}; "
+            f"correlation length {with_interval(stretch.correlation_length)}",
+        )
+        for stretch in (result.position.passes if result.position.repeats else ())
+    ]
+    return tuple(facts)
+
+
+def _direction_text(direction: Direction) -> str:
+    several = (*_friction(direction).values(),)
+    visible = [estimate for estimate in several if estimate.determined]
+    reasons = {estimate.reason: None for estimate in several if not estimate.determined}
+    names = [within(estimate.name) for estimate in several if not estimate.determined]
+    missing = f"not shown: {', '.join(names)} ({'; '.join(reasons)})" if names else ""
+    return "; ".join(text for text in (estimates_in_words(visible), missing) if text)
+
+
+def _numbers(result: FrictionAtSpeeds) -> dict[str, Any]:
+    sides = {**result.velocity.directions, "both": result.velocity.both}
+    passes = [
+        {
+            "velocity_m_per_s": stretch.velocity,
+            "mean": estimate_document(stretch.mean),
+            "spread_n": stretch.spread,
+            "correlation_length": estimate_document(stretch.correlation_length),
+            "steady": stretch.steady,
+        }
+        for stretch in result.position.passes
+    ]
+    return {
+        "directions": {name: _direction_numbers(side) for name, side in sides.items()},
+        "bias": estimate_document(result.velocity.bias),
+        "velocities_m_per_s": result.velocity.velocities,
+        "forces_n": result.velocity.forces,
+        "unsteady_m_per_s": result.velocity.unsteady,
+        "passes": passes,
+        "repeatability": estimate_document(result.position.repeatability),
+        "separated": result.position.separated,
+        "verdict": result.position.verdict,
+        "warnings": [*result.velocity.warnings, *result.position.warnings],
+    }
+
+
+def _direction_numbers(direction: Direction) -> dict[str, Any]:
+    return {name: estimate_document(estimate) for name, estimate in _friction(direction).items()}
+
+
+def _friction(direction: Direction) -> dict[str, Estimate]:
+    names = ("coulomb", "viscous", "static", "stribeck_velocity", "stribeck_exponent")
+    return {name: getattr(direction, name) for name in names}
+
+
+def _velocity(friction: FrictionVelocity, name: str) -> list[Figure]:
+    """Friction over velocity with intervals and the fit of each direction."""
+    if not len(friction.velocities):
+        return []
+    series, markers = [], []
+    for word, chosen in (("forward", friction.velocities > 0), ("backward", friction.velocities < 0)):
+        if not chosen.any():
+            continue
+        v, f, half = friction.velocities[chosen], friction.forces[chosen], friction.half_widths[chosen]
+        gap = np.full(len(v), np.nan)
+        bars = np.stack([v, v, gap], axis=1).ravel(), np.stack([f - half, f + half, gap], axis=1).ravel()
+        series += [Series(*bars, "", WAYS[word], width=1.2), *_fit(friction.directions[word], v, word)]
+        markers.append(Markers(v, f, f"{word}, with 95 % interval", WAYS[word]))
+    panel = Panel("", Axis("Velocity", "m/s"), Axis("Friction", "N"), tuple(series), tuple(markers))
+    caption = "Mean force less inertia over stretches of constant velocity."
+    if len(friction.unsteady):
+        caption += f" {len(friction.unsteady)} stretches were not steady and are left out."
+    return [Figure(f"{name}_velocity", "Friction over velocity", caption, (panel,))]
+
+
+def _fit(direction: Direction, velocities: Array, word: str) -> list[Series]:
+    """The curve fitted to one direction, over the velocities it was fitted to."""
+    if not (direction.coulomb.determined and direction.viscous.determined):
+        return []
+    size, curve = np.geomspace(np.abs(velocities).min(), np.abs(velocities).max(), 200), direction.curve
+    if curve is None:
+        dry = np.full_like(size, direction.coulomb.value)
+    else:
+        levels = (curve.coulomb, curve.static, curve.velocity, curve.exponent)
+        dry = stribeck_curve(size, *(level.value for level in levels))
+    friction = dry + direction.viscous.value * size
+    sign = 1.0 if word == "forward" else -1.0
+    return [Series(sign * size, sign * friction, f"fit, {word}", WAYS[word], "dashed")]
+
+
+def _position(friction: FrictionPosition, name: str) -> list[Figure]:
+    """Force over the place, pass by pass."""
+    if not friction.passes:
+        return []
+    colours = cycle((BLUE, ORANGE, GREEN, PINK, SKY, VERMILLION))
+    lines = tuple(
+        Series(
+            stretch.places,
+            np.sign(stretch.velocity) * stretch.force,
+            f"{digits(stretch.velocity, 'm/s')}{'' if stretch.steady else ', not steady'}",
+            colour,
+            width=1.0,
+        )
+        for stretch, colour in zip(friction.passes, colours, strict=False)
+    )
+    panel = Panel("", Axis("Position", "m"), Axis("Friction", "N"), lines)
+    return [Figure(f"{name}_position", "Friction along the rail", friction.verdict, (panel,))]
+
+
+VIEW = KindView[FrictionAtSpeeds](
+    "Constant speed",
+    _facts,
+    _numbers,
+    lambda result, logs, name: [*_velocity(result.velocity, name), *_position(result.position, name)],
+    sentences=lambda result: (result.position.verdict,),
+    warnings=lambda result: (*result.velocity.warnings, *result.position.warnings),
+)

@@ -1,0 +1,66 @@
+"""How motion before sliding is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from friso.identification.experiments.presliding import Presliding
+from friso.identification.kind import Source
+from friso.quantities import percent
+from friso.questions.identify.estimates import estimate_document
+from friso.questions.identify.kind_view import TIME, Facts, KindView
+from friso.questions.identify.numbers import with_interval
+from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
+
+
+def _facts(result: Presliding) -> Facts:
+    facts = [
+        ("Stiffness of the bristles", with_interval(result.stiffness)),
+        ("Damping of the bristles", with_interval(result.damping)),
+        ("Moving mass", with_interval(result.mass)),
+    ]
+    if len(result.time):
+        facts += [("Residual friction", f"{percent(result.unexplained, 3)} of its standard deviation")]
+    return tuple(facts)
+
+
+def _numbers(result: Presliding) -> dict[str, Any]:
+    several = {"stiffness": result.stiffness, "damping": result.damping, "mass": result.mass}
+    return {
+        **{name: estimate_document(estimate) for name, estimate in several.items()},
+        "unexplained": result.unexplained,
+        "warnings": list(result.warnings),
+    }
+
+
+def _figures(result: Presliding, logs: Sequence[Source], name: str) -> list[Figure]:
+    """Force and model, and the motion, over the last tenth of the record."""
+    if not len(result.model):
+        return []
+    return [Figure(f"{name}_force", "Motion before sliding", presliding_caption(result), presliding_panels(result))]
+
+
+def presliding_caption(result: Presliding) -> str:
+    """What the bristles are, and how much of the force they explain."""
+    return (
+        f"The last tenth of the record. Stiffness of the bristles: {with_interval(result.stiffness)}; damping: "
+        f"{with_interval(result.damping)}. {percent(result.unexplained, 3)} of the friction remains unexplained."
+    )
+
+
+def presliding_panels(result: Presliding) -> tuple[Panel, ...]:
+    """Force and model, and the motion, over the last tenth of the record."""
+    late = slice(-(len(result.time) // 10), None)
+    time, motion = result.time[late], result.position[late] - result.position[late].mean()
+    lines = (
+        Series(time, result.force[late], "force, low-passed", INK, width=1.6),
+        Series(time, result.model[late], "mass and bristles", ORANGE, "dashed", 1.2),
+    )
+    return (
+        Panel("", TIME, Axis("Force", "N"), lines),
+        Panel("", TIME, Axis("Position about its mean", "m"), (Series(time, motion, "", BLUE, width=1.0),)),
+    )
+
+
+VIEW = KindView[Presliding]("Motion before sliding", _facts, _numbers, _figures)

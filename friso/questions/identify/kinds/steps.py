@@ -1,0 +1,77 @@
+"""How position steps are shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from friso.identification.experiments.steps import StepStiffness
+from friso.identification.kind import Source
+from friso.questions.identify.estimates import estimate_document
+from friso.questions.identify.kind_view import AREA, TIME, Facts, KindView
+from friso.questions.identify.numbers import with_interval
+from friso.shown.drawing.figure import BLUE, INK, Axis, Band, Figure, Markers, Panel, Series
+
+
+def _facts(result: StepStiffness) -> Facts:
+    return (
+        ("Joint stiffness", with_interval(result.stiffness)),
+        ("Steps up", with_interval(result.up)),
+        ("Steps down", with_interval(result.down)),
+        ("Hysteresis", with_interval(result.hysteresis)),
+        ("Settled windows", str(len(result.windows))),
+    )
+
+
+def _sentences(result: StepStiffness) -> tuple[str, ...]:
+    """Whether the cart moved, where that was measured."""
+    fixed = {True: "The cart stood still.", False: "The cart moved.", None: ""}[result.cart_fixed]
+    return (fixed,) if fixed else ()
+
+
+def _numbers(result: StepStiffness) -> dict[str, Any]:
+    windows = [
+        {"start_s": w.start, "end_s": w.end, "deflection_m": w.position, "force_n": w.force} for w in result.windows
+    ]
+    several = {"stiffness": result.stiffness, "up": result.up, "down": result.down, "hysteresis": result.hysteresis}
+    estimates = {name: estimate_document(estimate) for name, estimate in several.items()}
+    return {**estimates, "windows": windows, "cart_fixed": result.cart_fixed, "warnings": list(result.warnings)}
+
+
+def _figures(result: StepStiffness, logs: Sequence[Source], name: str) -> list[Figure]:
+    """Deflection and force over time with the settled windows, and the one over the other."""
+    panels = []
+    for quantity, unit, values in (("Deflection", "m", result.position), ("Force", "N", result.force)):
+        low, high = float(values.min()), float(values.max())
+        room = 0.06 * (high - low)
+        bands = tuple(
+            Band(
+                np.array([w.start, w.end]),
+                np.full(2, low - room),
+                np.full(2, high + room),
+                "settled" if i == 0 else "",
+                AREA,
+            )
+            for i, w in enumerate(result.windows)
+        )
+        line = Series(result.time, values, quantity.lower() + ("" if unit == "m" else ", low-passed"), INK, width=1.0)
+        panels.append(Panel("", TIME, Axis(quantity, unit, (low - room, high + room)), (line,), bands=bands))
+    caption = "Shaded: settled windows, of which the means are used."
+    figures = [Figure(f"{name}_record", "Steps of the position", caption, tuple(panels))]
+    if len(result.windows) < 2:
+        return figures
+    x, y = np.array([[w.position, w.force] for w in result.windows]).T
+    lines = ()
+    if result.stiffness.determined:
+        ends = np.array([x.min(), x.max()])
+        line = y.mean() + result.stiffness.value * (ends - x.mean())
+        lines = (Series(ends, line, f"stiffness {with_interval(result.stiffness)}", BLUE),)
+    points = Markers(x, y, "settled windows", INK)
+    panel = Panel("", Axis("Deflection", "m"), Axis("Force", "N"), lines, (points,))
+    caption = f"Means of the settled windows. Hysteresis: {with_interval(result.hysteresis)}."
+    return [*figures, Figure(f"{name}_stiffness", "Force over deflection", caption, (panel,))]
+
+
+VIEW = KindView[StepStiffness]("Position steps", _facts, _numbers, _figures, sentences=_sentences)

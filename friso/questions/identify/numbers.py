@@ -1,0 +1,135 @@
+"""Numbers of an identification with their uncertainty, in words: as many digits as the interval allows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from friso.identification.estimate import Estimate
+from friso.questions.map.words import quantity
+from friso.shown.drawing.prefixes import NOTHING, choose, pretty
+
+DIGITS = 2
+"""Significant digits of half an interval that are shown, and so of its value."""
+
+MOST = 4
+"""Significant digits of a number without interval."""
+
+LARGE, SMALL = 4, 7
+"""Zeros before, and places behind the decimal point, from which on a number has an exponent."""
+
+EXACT = 15
+"""Digits behind the first one that a number has at all."""
+
+FORCES = (1e-2, 1e4)
+"""Between these, forces [N], and what is in newtons per something, have no prefix: they are compared with others."""
+
+_NAMES = {
+    "bias.cart": "Constant force on the cart",
+    "bias.stage": "Constant force on the stage",
+    "friction.viscous_asymmetry": "Asymmetry of viscous friction",
+    "viscous": "Viscous friction",
+    "coulomb": "Coulomb friction",
+    "viscous forward": "Viscous friction, forward",
+    "viscous backward": "Viscous friction, backward",
+    "coulomb forward": "Coulomb friction, forward",
+    "coulomb backward": "Coulomb friction, backward",
+    "static friction ratio": "Static over Coulomb friction",
+}
+
+
+def name_of(key: str) -> str:
+    """A key of the stage file, or another quantity found, in words."""
+    return _NAMES.get(key) or quantity(key)
+
+
+def within(key: str) -> str:
+    """The same inside a sentence: names of people stay as they are."""
+    name = name_of(key)
+    return name if name.startswith(("Coulomb", "Stribeck")) else name[0].lower() + name[1:]
+
+
+def unit_of(unit: str) -> str:
+    """A unit as prefixes know it: "N s/m" is "N*s/m", and ones are left out, "1 s^2/1" is "s^2"."""
+    top, *below = unit.split("/")
+    factors = [part for part in top.replace("*", " ").split() if part != "1"]
+    below = [part for part in below if part != "1"]
+    return "/".join(["*".join(factors) or ("1" if below else ""), *below])
+
+
+def value_text(estimate: Estimate) -> str:
+    """A value with its unit, e.g. "95.28 kg"; a dash where there is none."""
+    if not math.isfinite(estimate.value):
+        return NOTHING
+    factor, unit = _scale(estimate)
+    return f"{_written(estimate.value, factor, _places(estimate, factor))} {unit}".rstrip()
+
+
+def interval_text(estimate: Estimate) -> str:
+    """The interval, e.g. "94.84 to 95.72 kg"; of what the logs do not show, the range that they allow."""
+    low, high = math.isfinite(estimate.low), math.isfinite(estimate.high)
+    if not (low or high):
+        return NOTHING
+    factor, unit = _scale(estimate)
+    if low and high and 0 < estimate.low < 1e-2 * estimate.high:  # a range over decades: each end has digits of its own
+        return f"{digits(estimate.low, unit_of(estimate.unit))} to {digits(estimate.high, unit_of(estimate.unit))}"
+    places = _places(estimate, factor)
+    ends = [_written(number, factor, places) for number in (estimate.low, estimate.high)]
+    if low and high:
+        return f"{ends[0]} to {ends[1]} {unit}".rstrip()
+    return f"{'at least' if low else 'at most'} {ends[0] if low else ends[1]} {unit}".rstrip()
+
+
+def with_interval(estimate: Estimate) -> str:
+    """Both in a sentence, e.g. "95.28 kg (94.84 to 95.72)"."""
+    if not estimate.determined:
+        return f"not identified ({estimate.reason})"
+    unit = _scale(estimate)[1]
+    return f"{value_text(estimate)} ({interval_text(estimate).removesuffix(unit).rstrip()})"
+
+
+def estimates_in_words(estimates: Sequence[Estimate]) -> str:
+    """Several in a sentence, by name."""
+    return ", ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in estimates)
+
+
+def digits(value: float, unit: str) -> str:
+    """A value [unit] to three digits, with a prefix of its own: "2.1 µm"."""
+    if not math.isfinite(value):
+        return NOTHING
+    factor, text = choose(np.array([value]), unit)
+    return f"{value * factor:.3g} {text}".rstrip()
+
+
+def _scale(estimate: Estimate) -> tuple[float, str]:
+    """Factor and unit with prefix that suit the value, or else the range that is possible."""
+    finite = [estimate.low, estimate.high]
+    if math.isfinite(estimate.value):  # of a value next to 0, its interval tells the size
+        finite = [max(abs(estimate.value), estimate.half_width) if estimate.value else 0.0]
+    unit, size = unit_of(estimate.unit), max((abs(number) for number in finite if math.isfinite(number)), default=0.0)
+    if unit.startswith("N") and FORCES[0] < size < FORCES[1]:
+        return 1.0, pretty(unit)
+    return choose(np.array(finite), unit)
+
+
+def _places(estimate: Estimate, factor: float) -> int:
+    """Decimal places that the interval allows."""
+    half = estimate.half_width * factor
+    if not (math.isfinite(half) and half > 0):
+        finite = [
+            abs(number) * factor
+            for number in (estimate.value, estimate.low, estimate.high)
+            if math.isfinite(number) and number != 0
+        ]
+        return MOST - 1 - math.floor(math.log10(max(finite))) if finite else 0
+    return DIGITS - 1 - math.floor(math.log10(half))
+
+
+def _written(value: float, factor: float, places: int) -> str:
+    if math.isfinite(value) and not -LARGE <= places <= SMALL:
+        size = math.floor(math.log10(abs(value * factor))) if value * factor else 0
+        return f"{value * factor:.{max(MOST - 1, min(places + size, EXACT))}e}"
+    rounded = round(value * factor, places)
+    return f"{rounded + 0.0:.{max(places, 0)}f}"  # + 0.0: no minus before a zero

@@ -1,0 +1,70 @@
+"""What `friso identify` writes: the stage, the correlations beside it, a page that opens offline, and every figure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from friso.axis import axis_shown
+from friso.identification.method import Identification, Prediction
+from friso.identification.sources import LogFile
+from friso.identification.stage_file import with_origins
+from friso.questions.identify.figures import identify_figures
+from friso.questions.identify.kind_view import view_of
+from friso.questions.identify.words import (
+    COLUMNS,
+    estimate_rows,
+    headline,
+    labels,
+    prediction_line,
+    read_rows,
+    summaries,
+)
+from friso.shown.drawing.figure import Figure
+from friso.shown.files import Content, pictures
+from friso.shown.pages import Report
+from friso.stage.correlations import correlations_file, correlations_text
+
+STAGE = "identified.toml"
+
+
+def identify_files(
+    identification: Identification, logs: Sequence[LogFile], predictions: Sequence[Prediction]
+) -> dict[str, Content]:
+    """All files; a stage file and correlations of an earlier run go where there are none now."""
+    stage, correlations = identification.stage, None
+    if stage is not None and identification.correlations.keys:
+        correlations = correlations_text(identification.correlations, stage)
+    figures = identify_figures(identification, predictions)
+    images = pictures(figures)
+    return {
+        STAGE: None if stage is None else with_origins(stage.to_toml(), identification.origins),
+        correlations_file(Path(STAGE)).name: correlations,
+        "identify.html": identify_html(identification, logs, predictions, figures),
+        **images,
+    }
+
+
+def identify_html(
+    identification: Identification,
+    files: Sequence[LogFile],
+    predictions: Sequence[Prediction],
+    figures: Sequence[Figure],
+) -> str:
+    """The whole page of an identification and its figures."""
+    several = zip(identification.experiments, labels(identification), strict=True)
+    opening = [f"identify_{label}_{view_of(experiment.kind).opening}" for experiment, label in several]
+    return Report.of_stage(
+        "identify",
+        identification.stage,
+        figures,
+        ", ".join(file.path.name for file in files),
+        verdicts=headline(identification),
+        columns=COLUMNS,
+        rows=estimate_rows(identification),
+        files=read_rows(files),
+        parts=summaries(identification),
+        predicted=[prediction_line(prediction) for prediction in predictions],
+        warnings=[axis_shown().text(warning) for warning in identification.warnings],
+        opening=opening,
+    ).html()

@@ -1,0 +1,263 @@
+"""What is my machine: a stage file with uncertainties from measured logs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from collections.abc import Mapping as Keyed
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from friso.axis import LINEAR, AxisKind, speak_of
+from friso.errors import InputError
+from friso.identification.kind import AnalysisSettings
+from friso.identification.logs.log import Log
+from friso.identification.logs.mapping import Mapping
+from friso.identification.method import Identification, Prediction, around, axis_of_all, check_predictions
+from friso.identification.sources import LogFile, per_unit_of_force, read_all
+from friso.identification.stage_file import TOLD_BY_LOGS, completed
+from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.inputs import Changes, StageLike, changes_of, stage_of, tables_of, text_of
+from friso.intervals import Span
+from friso.platform.system import shell_word
+from friso.progress import Progress, silent
+from friso.quantities import Quantity, positive
+from friso.questions.logs.question import LogFiles, options_of, paths_of
+from friso.stage import Stage
+from friso.stage.stage import axis_written, changed
+
+if TYPE_CHECKING:
+    from friso.shown.drawing.figure import Figure
+    from friso.shown.files import Files
+
+_HERTZ, _SECONDS = Quantity("Hz", positive, "20 Hz"), Quantity("s", positive, "5 s")
+
+MappingKeeper = Callable[[dict[Path, Mapping]], object]
+"""What keeps for the next time what was said of logs."""
+
+
+class IdentifyAnswer(Answer):
+    """What logs show of a machine: `result` is an `Identification` with the estimates and, where the logs describe a
+    whole machine, the `stage`; `inputs` are the files read, `predictions` those of other logs."""
+
+    command = "identify"
+
+    def __init__(
+        self,
+        result: Identification,
+        inputs: Sequence[LogFile],
+        predictions: Sequence[Prediction],
+        axis_kind: AxisKind = LINEAR,
+    ) -> None:
+        self.result, self.inputs, self.predictions = result, tuple(inputs), tuple(predictions)
+        self.axis_kind = axis_kind
+
+    @property
+    def failure(self) -> str:
+        """Whether a model does not describe its log."""
+        return "a model does not describe its log" if self.result.failed else ""
+
+    def sentences(self) -> Sequence[str]:
+        """What was identified, how well other logs are predicted, and notes."""
+        from friso.questions.identify.words import sentences
+
+        return sentences(self.result, self.predictions)
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """The estimates with their intervals."""
+        from friso.questions.identify.words import COLUMNS, estimate_rows
+
+        rows = [(first, rest) for first, *rest in (row.texts for row in estimate_rows(self.result))]
+        return [AnswerTable("", COLUMNS[1:], rows)] if rows else []
+
+    def details(self) -> Sequence[str]:
+        """The experiments behind the estimates, and what was read."""
+        from friso.questions.identify.words import details
+
+        return details(self.result, self.inputs)
+
+    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
+        """The check of the stage that was identified."""
+        if self.result.stage is None or not files:
+            return []
+        draws = " --draws 1000" if self.result.stage.uncertain() else ""
+        return [f"friso check {shell_word(str(files[0]))}{draws}"]
+
+    def figures(self) -> Sequence[Figure]:
+        """Logs beside what the models say of them."""
+        from friso.questions.identify.figures import identify_figures
+
+        return identify_figures(self.result, self.predictions)
+
+    def document(self) -> dict[str, Any]:
+        """Estimates, experiments, logs."""
+        from friso.questions.identify.document import identify_document
+
+        return identify_document(self.result, self.inputs, self.predictions)
+
+    def files(self) -> Files:
+        """The stage file, correlations, the page, the figures."""
+        from friso.questions.identify.page import identify_files
+
+        return identify_files(self.result, self.inputs, self.predictions)
+
+
+@question
+def identify(
+    logs: LogFiles,
+    *,
+    stage: StageLike | None = None,
+    set: Changes = None,
+    as_: str | None = None,
+    map: Changes = None,
+    unit: Changes = None,
+    scale: Changes = None,
+    dt: str | float | None = None,
+    axis: str | None = None,
+    predict: LogFiles = (),
+    bandwidth: str | float | None = None,
+    band: str | None = None,
+    period: str | float | None = None,
+    laws: bool = False,
+    folder: Path = Path(),
+    keep: MappingKeeper | None = None,
+    progress: Progress = silent,
+) -> IdentifyAnswer:
+    """A stage with uncertainties from measured logs: mass, friction, stiffness, and what the logs cannot show.
+
+    Parameters
+    ----------
+    logs : path or list of paths
+        Files, in a format that `friso logs --help` lists.
+    stage : Stage, path or dict, optional
+        What is known beforehand: structure, controller, drive. Masses, friction and motion may be left out: where it
+        has no such tables, a log of moves tells them.
+    set : dict, optional
+        Keys of that stage to override.
+    as_ : str, optional
+        Kind of experiment; moves and frequency responses are recognised.
+    map, unit, scale : dict, optional
+        Roles and their channels, channels and their units, roles and their scales, as in `friso.logs`.
+    dt : str or float, optional
+        Sample time, "1 ms" or a number [s], if a file does not contain it.
+    axis : str, optional
+        "rotary" for angles, torques and moments of inertia; a stage file may state this instead.
+    predict : path or list of paths, optional
+        Other logs, simulated with the identified stage.
+    bandwidth : str or float, optional
+        Bandwidth of the moves, "20 Hz" or a number [Hz], for the filters.
+    band : str, optional
+        Band of the response: "3 Hz .. 20 Hz".
+    period : str or float, optional
+        Period of a periodic excitation, "5 s" or a number [s].
+    laws : bool
+        Whether to fit every friction law to the logs and to say which of them the record supports; needs a stage.
+    folder : Path
+        Where what was said of channels is looked for, if not beside the logs.
+    keep : callable, optional
+        Called with what was said of the channels of each file, to keep it.
+    progress : Progress
+        Called as experiments are analysed.
+
+    Returns
+    -------
+    IdentifyAnswer
+        The estimates with 95 % intervals, ``answer.stage`` and ``answer.estimates``.
+
+    Raises
+    ------
+    InputError
+        For a log that cannot be read or leaves something open, and for options that are not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.identify("log.csv", stage="my_stage.toml", scale={"force": "35.15 N/V"})  # doctest: +SKIP
+    """
+    if stage is None and set:
+        first = next(iter(f"{key}={value}" for key, value in set.items()) if isinstance(set, Keyed) else iter(set))
+        wanted = "a stage whose keys to override"
+        raise InputError("set", str(first), wanted, "--stage stage.toml (in Python stage=...)")
+    if stage is None and laws:
+        wanted = "the stage, for its masses and what lies before its guide"
+        raise InputError("--laws", "no stage", wanted, "--stage stage.toml")
+    tables = {} if stage is None else tables_of(stage)
+    lacking = [name for name in TOLD_BY_LOGS if name not in tables] if "controller" in tables else []
+    assumed = None if stage is None or lacking else stage_of(stage, set)
+    beside = None if stage is None else axis_written(tables)
+    if axis is None and beside is not None and beside != LINEAR:
+        axis = beside.name
+    settings, options = _settings(bandwidth, band, period), options_of(map, unit, scale, dt, as_, axis)
+    paths, other_paths = paths_of(logs), paths_of(predict)
+    inputs = read_all([*paths, *other_paths], options, folder)
+    if keep is not None:
+        keep({file.path: file.mapping for file in inputs})
+    inputs = [per_unit_of_force(file, beside) for file in inputs]
+    sources = [(file.source, file.kind) for file in inputs[: len(paths)]]
+    made_up: list[str] = []
+    if stage is not None and lacking:
+        made = around(sources)
+        assumed = stage_of(stage, set) if made is None else _whole(stage, tables, made, set)
+        made_up = [] if made is None else _made_up(lacking, made, set)
+    axis_kind = axis_of_all([file.source for file in inputs], assumed)
+    speak_of(axis_kind)
+    others = _logs_to_predict(inputs[len(paths) :])
+    check_predictions(sources, others, assumed)
+    from friso.identification.method import identify as identification
+    from friso.identification.method import predict as predicted
+    from friso.identification.method import with_laws
+
+    result = identification(sources, assumed, settings, progress, made_up)
+    if laws and assumed is not None:
+        result = with_laws(result, [source for source, _ in sources], assumed, progress)
+    reused = tuple(file.reused for file in inputs if file.reused)
+    result = replace(result, warnings=(*reused, *_taken_from_logs(made_up), *result.warnings))
+    predictions = [predicted(result, log, settings, assumed) for log in others]
+    return IdentifyAnswer(result, inputs, predictions, axis_kind)
+
+
+def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Changes) -> Stage:
+    """The stage of a file that lacks tables which a stage `made` up around a log has. Raises InputError."""
+    try:
+        return changed(completed(tables, made), changes_of(changes))
+    except InputError as error:
+        raise error if isinstance(source, Stage | Keyed) else error.found_in(str(source)) from None
+
+
+def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]:
+    """The keys of tables that a stage file lacks, of a stage `made` up around a log, but for those that are set."""
+    keys_set = changes_of(changes)
+    keys = [f"{name}.{key}" for name in lacking for key in made.as_written()[name]]
+    return [key for key in keys if key not in keys_set]
+
+
+def _taken_from_logs(made_up: Sequence[str]) -> list[str]:
+    """A sentence on the tables of keys that were made up around a log."""
+    if not made_up:
+        return []
+    listed = ", ".join(dict.fromkeys(f"[{key.partition('.')[0]}]" for key in made_up))
+    return [f"the stage file has no {listed}: begun from the log, and our choice where that does not tell"]
+
+
+def _settings(bandwidth: str | float | None, band: str | None, period: str | float | None) -> AnalysisSettings:
+    """What the user chose for the analyses. Raises InputError."""
+    values = []
+    for name, value, quantity in (("bandwidth", bandwidth, _HERTZ), ("period", period, _SECONDS)):
+        text = None if value is None else text_of(value, quantity.unit)
+        try:
+            values.append(None if text is None else float(quantity.read(text)))
+        except InputError as error:
+            raise error.found_in(f"--{name}") from None
+    try:
+        limits = None if band is None else Span(_HERTZ, "3 Hz .. 20 Hz").read(band)
+    except InputError as error:
+        raise error.found_in("--band") from None
+    return AnalysisSettings(values[0], None if limits is None else (limits.low, limits.high), values[1])
+
+
+def _logs_to_predict(inputs: Sequence[LogFile]) -> list[Log]:
+    """The logs to be predicted. Raises InputError."""
+    logs = [item.source for item in inputs if isinstance(item.source, Log)]
+    if len(logs) < len(inputs):
+        raise InputError("predict", "a measured frequency response", "a log over time", "predict=other.mat")
+    return logs

@@ -1,0 +1,192 @@
+"""The figures of a frequency response: Bode plot with bands and fits, noise and distortion, friction at its low end."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.identification.response.analysis import Bench
+from friso.identification.response.mass_line import StraightLine
+from friso.identification.response.response import FrequencyResponse
+from friso.quantities import percent
+from friso.questions.bode.figures import phases
+from friso.questions.identify.kind_view import AREA
+from friso.questions.identify.numbers import unit_of, with_interval
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PINK,
+    VERMILLION,
+    Array,
+    Axis,
+    Band,
+    Dash,
+    Figure,
+    Limit,
+    Panel,
+    Series,
+)
+
+FACTOR_COLOURS = (GREEN, BLUE, PINK)
+
+
+def response_figures(bench: Bench, name: str) -> list[Figure]:
+    """All figures of one bench; their names begin with this one."""
+    figures = [_bode(bench, name), *_levels(bench, name)]
+    if bench.departs is not None:
+        figures.append(_departure(bench, name))
+    if bench.explanation is not None:
+        figures.append(_amplitudes(bench, name))
+    return figures
+
+
+def _bode(bench: Bench, name: str) -> Figure:
+    """Magnitude over phase, a column for each output."""
+    outputs = [response for response in (bench.driven, bench.other) if response is not None]
+    columns = [_column(bench, response, number == 0) for number, response in enumerate(outputs)]
+    panels = tuple(column[row] for row in range(2) for column in columns)
+    caption = "Measured with its 95 % band; fits drawn over the band in which they were fitted."
+    if bench.lines:
+        caption += f" Mass line: {' and '.join(with_interval(line.value) for line in bench.lines)}."
+    if bench.departs is not None and bench.departs.frequency.determined:
+        caption += " Below their band the response departs from the linear model."
+    return Figure(f"{name}_bode", "Frequency response", caption, panels, columns=len(outputs))
+
+
+def _column(bench: Bench, response: FrequencyResponse, driven: bool) -> tuple[Panel, Panel]:
+    """Magnitude and phase of one output."""
+    hertz = response.frequency
+    inside = hertz[(hertz >= bench.band[0]) & (hertz <= bench.band[1])]
+    fine = np.geomspace(inside[0], inside[-1], 400)
+    curves: list[tuple[str, str, Dash, Array]] = []
+    if bench.two_masses is not None:
+        curves.append(("two masses", BLUE, "solid", bench.two_masses.predict(fine, driven)))
+    if driven and bench.modes is not None:
+        curves.append(("modes", ORANGE, "dashed", bench.modes.predict(fine)))
+    (angle,) = phases([response.response])
+    aligned = [_phase_turns(hertz, angle, fine, np.degrees(np.unwrap(np.angle(curve[3])))) for curve in curves]
+    band = response.band()
+    half = np.degrees((band.phase_high - band.phase_low) / 2)
+    lowest = 0.3 * float(np.abs(response.response).min())
+    area = Band(hertz, np.maximum(band.magnitude_low, lowest), band.magnitude_high, "", AREA)
+    measured = Series(hertz, np.abs(response.response), "measured", GREY, width=1.1)
+    lines = tuple(Series(fine, np.abs(values), label, colour, dash, 1.5) for label, colour, dash, values in curves)
+    masses = tuple(_mass_line(line, hertz, i == 0) for i, line in enumerate(bench.lines)) if driven else ()
+    frequency = Axis.of_frequency(hertz)
+    gain = Axis("Magnitude", _unit(response), log=True, prefixed=False)
+    above = Panel(_title(response), frequency, gain, (measured, *lines, *masses), bands=(area,))
+    phase = Series(hertz, angle, "", GREY, width=1.1)
+    fits = tuple(
+        Series(fine, values, "", colour, dash, 1.5)
+        for (_, colour, dash, _), values in zip(curves, aligned, strict=True)
+    )
+    bounded = np.clip(half, 0, 60)
+    shade = Band(hertz, angle - bounded, angle + bounded, "", AREA)
+    below = Panel("", frequency, Axis("Phase", "°", step=90.0), (phase, *fits), bands=(shade,))
+    return above, below
+
+
+def _phase_turns(hertz: Array, measured: Array, fine: Array, fitted: Array) -> Array:
+    """Phases of a fit [deg] in the turn in which the measured ones are."""
+    off = np.interp(fine, hertz, measured) - fitted
+    return fitted + 360 * np.round(np.median(off) / 360)
+
+
+def _mass_line(line: StraightLine, hertz: Array, named: bool) -> Series:
+    """A mass line over its band and an octave to each side."""
+    reach = np.array([max(line.low / 2, hertz[0]), min(line.high * 2, hertz[-1])])
+    label = line.kind if named else ""
+    return Series(reach, line.level.value / (2 * np.pi * reach) ** 2, label, INK, "dotted", 1.6)
+
+
+def _unit(response: FrequencyResponse, power: str = "") -> str:
+    """Of the response, its output divided by a power of time."""
+    return unit_of(f"{response.channels.output_unit}{power}/{response.channels.input_unit}")
+
+
+def _title(response: FrequencyResponse) -> str:
+    return f"{response.channels.output} over {response.channels.input}".replace("_", " ")
+
+
+def _around(*several: Array) -> tuple[float, float]:
+    """Limits of a logarithmic axis a little beyond all values above 0."""
+    values = np.concatenate([estimate[np.isfinite(estimate) & (estimate > 0)] for estimate in several])
+    return float(values.min()) / 1.2, float(values.max()) * 1.2
+
+
+def _levels(bench: Bench, name: str) -> list[Figure]:
+    """Response, noise and distortion, where the record shows these."""
+    outputs = [response for response in (bench.driven, bench.other) if response is not None]
+    panels = tuple(_level_panel(response) for response in outputs)
+    if min(len(panel.series) for panel in panels) < 2:
+        return []
+    caption = (
+        "Standard deviations of the mean response. Noise differs from period to period; nonlinear distortion, such as "
+        "that of friction, from realisation to realisation."
+    )
+    return [Figure(f"{name}_levels", "Noise and distortion", caption, panels, columns=len(panels))]
+
+
+def _level_panel(response: FrequencyResponse) -> Panel:
+    """The sizes of one output."""
+    rows = [("response", GREY, np.abs(response.response)), ("noise", BLUE, response.noise)]
+    rows.append(("nonlinear distortion", VERMILLION, response.distortion))
+    if not np.isfinite(response.noise).any():
+        rows.append(("deviation", INK, response.deviation))
+    lines = tuple(
+        Series(response.frequency, np.where(values > 0, values, np.nan), label, colour, width=1.2)
+        for label, colour, values in rows
+        if np.nan_to_num(values).max() > 0
+    )
+    gain = Axis("Magnitude", _unit(response), log=True, prefixed=False)
+    return Panel(_title(response), Axis.of_frequency(response.frequency), gain, lines)
+
+
+def _departure(bench: Bench, name: str) -> Figure:
+    """Response over model, and where it leaves it."""
+    departs = bench.departs
+    assert departs is not None
+    limits = _around(departs.excess)
+    line, bands = Series(departs.lines, departs.excess, "", GREY), ()
+    if departs.frequency.determined:
+        ends = np.array([departs.frequency.low, departs.frequency.high])
+        bands = (Band(ends, np.full(2, limits[0]), np.full(2, limits[1]), "", AREA),)
+    ratio = Axis("|G / G model|", "", limits, log=True)
+    panel = Panel("", Axis.of_frequency(departs.lines), ratio, (line,), limits=(Limit((1.0,), "", INK),), bands=bands)
+    text = with_interval(departs.frequency)
+    caption = f"The driven mass's response over that of the two-mass model; departure: {text}."
+    if departs.differ:
+        caption += " Below, realisations differ by more than noise: the machine is nonlinear there."
+    return Figure(f"{name}_departure", "Departure from the linear model", caption, (panel,))
+
+
+def _amplitudes(bench: Bench, name: str) -> Figure:
+    """Measured and simulated accelerations per input at low frequency."""
+    assert bench.explanation is not None
+    assert bench.drag is not None
+    top = max(response.frequency[-1] for response in bench.explanation.responses.values())
+    high = 2 * bench.departs.frequency.high if bench.departs else top
+    measured = _rising(bench.driven, high)
+    lines = [Series(*measured, "measured", INK, width=1.8)]
+    for (factor, response), colour in zip(bench.explanation.responses.items(), FACTOR_COLOURS, strict=False):
+        label = "simulated" if factor == 1 else f"simulated, {factor:g} times the input"
+        lines.append(Series(*_rising(response, high), label, colour, "solid" if factor == 1 else "dashed"))
+    level = Limit((1 / bench.drag.mass.value,), "mass line", GREY, "dotted")
+    limits, unit = _around(*(line.y for line in lines)), _unit(bench.driven, "/s^2")
+    size = Axis("Acceleration per input", unit, limits, log=True, prefixed=False)
+    panel = Panel("", Axis.of_frequency(measured[0]), size, tuple(lines), limits=(level,))
+    caption = (
+        f"A mass with a Coulomb friction of {with_interval(bench.drag.coulomb)} on a spring, simulated with the "
+        f"recorded input, a smaller and a larger one: it accounts for {percent(1 - bench.explanation.left, 3)} of the "
+        "departure. The response depends on the size of the input: it is not linear."
+    )
+    return Figure(f"{name}_amplitudes", "Friction at low frequency", caption, (panel,))
+
+
+def _rising(response: FrequencyResponse, high: float) -> tuple[Array, Array]:
+    """Frequencies [Hz] up to one, and the size of the acceleration per input there."""
+    chosen = (response.frequency > 0) & (response.frequency <= high)
+    hertz = response.frequency[chosen]
+    return hertz, np.abs(response.response[chosen]) * (2 * np.pi * hertz) ** 2

@@ -1,0 +1,286 @@
+"""An identification in words that the terminal and the page share."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.axis import KINDS as AXES
+from friso.axis import axis_shown, unit_shown
+from friso.identification.kinds import KINDS
+from friso.identification.logs.log import Log
+from friso.identification.method import nothing_learnt
+from friso.identification.stage_file import CHOSEN
+from friso.questions.identify.kind_view import Facts, PredictionView, view_of
+from friso.questions.identify.laws import TITLE, how, law_facts, law_sentence
+from friso.questions.identify.numbers import interval_text, name_of, value_text, with_interval, within
+from friso.shown.drawing.figure import GREEN, ORANGE, VERMILLION
+
+if TYPE_CHECKING:
+    from friso.identification.estimate import Estimate
+    from friso.identification.kind import Source
+    from friso.identification.method import Experiment, Identification, Prediction
+    from friso.identification.sources import LogFile
+
+COLUMNS = ("Quantity", "Value", "95 % interval", "Method, or reason")
+"""Columns of the table of estimates."""
+
+LEFT = "not identified"
+"""Stands for the value of what the logs do not show."""
+
+NO_STAGE = (
+    "No stage file is written: logs without moves do not describe a whole machine. Give the rest with --stage; the "
+    "identified values replace those in it."
+)
+
+NO_NEWTONS = "No stage file is written: its keys need the force in {}."
+"""Where the force of the only moves is in another unit."""
+
+NOTHING_HOLDS = "No stage file is written, since nothing in it would be identified."
+
+POOR = 0.5
+"""Relative error of the force, or of a response, from which on little of another log is predicted."""
+
+
+@dataclass(frozen=True)
+class ExperimentSummary:
+    """An experiment: `label`, of which the names of its figures are made, title, sentences, numbers by name, and
+    warnings."""
+
+    label: str
+    title: str
+    sentences: tuple[str, ...]
+    facts: Facts
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class EstimateRow:
+    """A line of the table of estimates: whether the value is shown, and the texts of `COLUMNS`."""
+
+    determined: bool
+    texts: tuple[str, ...]
+
+
+def headline(identification: Identification) -> list[tuple[str, str]]:
+    """What is identified, and what is not and why; each sentence with its colour."""
+    return [(colour, axis_shown().text(sentence)) for colour, sentence in _headline(identification)]
+
+
+def _headline(identification: Identification) -> list[tuple[str, str]]:
+    estimates = ordered(identification.estimates)
+    visible = [estimate for estimate in estimates if estimate.determined]
+    effects = [estimate for estimate in visible if not _absent(estimate)]
+    headlines = [view_of(experiment.kind).headline(experiment.result) for experiment in identification.experiments]
+    headlines = [sentence for sentence in headlines if sentence]
+    bounded = [one for one in estimates if not one.determined and 0 < one.low < one.high < np.inf]
+    doubts = [(VERMILLION if identification.failed else ORANGE, f"{doubt}.") for doubt in identification.doubts]
+    lines = doubts if identification.failed else []
+    if effects:
+        values = "; ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in effects)
+        lines.append((GREEN, f"Identified: {values}."))
+    elif bounded:
+        bounds = ", ".join(f"{within(one.name)} ({interval_text(one)})" for one in bounded)
+        lines.append((ORANGE, f"Known to lie in an interval too wide for a value: {bounds}."))
+    elif not headlines:
+        lines.append((VERMILLION, "These logs determine no key of the stage file."))
+    lines += [(GREEN, sentence) for sentence in headlines]
+    lines += [] if identification.failed else doubts
+    if len(effects) < len(visible):
+        absent = ", ".join(f"{within(one.name)} ({interval_text(one)})" for one in visible if _absent(one))
+        lines.append((GREEN, f"None found: {absent}."))
+    if identification.stage is None:
+        lines.append((ORANGE, _why_no_stage(identification)))
+    if len(visible) < len(estimates):
+        lines.append((ORANGE, f"Not identified: {missing(estimates)}."))
+        done = {experiment.kind for experiment in identification.experiments}
+        lines += [(ORANGE, f"What would show it: {ways}.") for ways in [_ways(estimates, done)] if ways]
+    return lines
+
+
+def _why_no_stage(identification: Identification) -> str:
+    if identification.failed or nothing_learnt(identification.estimates, False):
+        return NOTHING_HOLDS
+    shown = axis_shown()
+    if shown != AXES[shown.name]:
+        newtons = AXES[shown.name].force
+        return f'{NO_NEWTONS.format(newtons)} --scale force="NUMBER {newtons}/{shown.force}" tells it.'
+    logs = [log for experiment in identification.experiments for log in experiment.logs if isinstance(log, Log)]
+    around = any(KINDS[experiment.kind].around is not None for experiment in identification.experiments)
+    return NO_NEWTONS.format(unit_shown("N")) if around and any("force" in log.units for log in logs) else NO_STAGE
+
+
+ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
+"""Keys that are usually 0: an interval that holds that shows no such effect."""
+
+SHOWN_BY = {
+    "masses": "a frequency response (--as frequency; rehearsed by friso rig frf)",
+    "friction.coulomb": "moves in both directions at several speeds",
+    "friction.viscous": "constant speeds (--as constant-speed; rehearsed by friso rig constant-speed)",
+    "friction.static": "force ramps from rest (--as break-away) or slow motion that sticks and slips (--as stick-slip; "
+    "rehearsed by friso rig stiction)",
+    "friction.stribeck_velocity": "slow sliding (--as slow-sliding; rehearsed by friso rig constant-speed)",
+    "friction.bristle_stiffness": "small motion before sliding (--as presliding; rehearsed by friso rig presliding)",
+    "friction.bristle_damping": "small motion before sliding (--as presliding; rehearsed by friso rig presliding)",
+    "joint.stiffness": "steps with the cart fixed (--as steps; rehearsed by friso rig stiffness)",
+}
+"""The experiment that shows a key, or one of a table."""
+
+
+def _absent(estimate: Estimate) -> bool:
+    return estimate.name in ABSENT and estimate.low <= 0 <= estimate.high
+
+
+def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
+    """The experiments that would show what is not identified, but for a kind that alone was `done`: what that lacked
+    is in the reasons."""
+    names: dict[str, list[str]] = {}
+    for estimate in estimates:
+        way = SHOWN_BY.get(estimate.name) or SHOWN_BY.get(estimate.name.split(".")[0])
+        if way and not estimate.determined and done != {*re.findall(r"--as ([\w-]+)", way)}:
+            names.setdefault(way, []).append(within(estimate.name))
+    return "; ".join(f"{', '.join(group)}: {way}" for way, group in names.items())
+
+
+def missing(estimates: Sequence[Estimate]) -> str:
+    """What is not identified, with its reason, which several may share."""
+    names: dict[str, list[str]] = {}
+    for estimate in estimates:
+        if not estimate.determined:
+            names.setdefault(estimate.reason, []).append(within(estimate.name))
+    return "; ".join(f"{', '.join(group)} ({reason})" for reason, group in names.items())
+
+
+def prediction_view(prediction: Prediction) -> PredictionView[Any]:
+    """How the kind of experiment that predicts shows it."""
+    view = view_of(prediction.kind).prediction
+    assert view is not None, f"{prediction.kind} predicts logs, and its view does not show it"
+    return view
+
+
+def prediction_line(prediction: Prediction) -> tuple[str, str]:
+    """How well another log is predicted, with its colour."""
+    view = prediction_view(prediction)
+    colour = GREEN if view.worst(prediction.result) < POOR else VERMILLION
+    return colour, f"Prediction of {prediction.log.name}: {view.sentence(prediction.result)}"
+
+
+def estimate_rows(identification: Identification) -> list[EstimateRow]:
+    """The table of estimates, in words of `COLUMNS`."""
+    return [_row(estimate) for estimate in ordered(identification.estimates)]
+
+
+def ordered(estimates: Sequence[Estimate]) -> list[Estimate]:
+    """The estimates in the order of the stage file's tables; others last."""
+    tables = ("masses", "friction", "bias", "joint")
+    places = {name: number for number, name in enumerate(tables)}
+    return sorted(estimates, key=lambda estimate: places.get(estimate.name.split(".")[0], len(tables)))
+
+
+def _row(estimate: Estimate) -> EstimateRow:
+    value = value_text(estimate) if estimate.determined else LEFT
+    why = axis_shown().text(estimate.reason or estimate.method)
+    return EstimateRow(estimate.determined, (name_of(estimate.name), value, interval_text(estimate), why))
+
+
+def summaries(identification: Identification) -> list[ExperimentSummary]:
+    """The experiments, in words."""
+    several = zip(identification.experiments, labels(identification), strict=True)
+    experiments = [_summary(experiment, label) for experiment, label in several]
+    laws = identification.laws
+    return (
+        experiments
+        if laws is None
+        else [*experiments, ExperimentSummary("laws", TITLE, (how(laws),), law_facts(laws), ())]
+    )
+
+
+def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
+    view, result, axis = view_of(experiment.kind), experiment.result, axis_shown()
+    facts = tuple((name, axis.text(fact)) for name, fact in view.facts(result))
+    return ExperimentSummary(
+        label,
+        f"{view.title}: {', '.join(log.name for log in experiment.logs)}",
+        tuple(map(axis.text, view.sentences(result))),
+        (*facts, *(_used(experiment.logs) if view.longest else ())),
+        tuple(map(axis.text, view.warnings(result))),
+    )
+
+
+def _used(logs: Sequence[Source]) -> Facts:
+    """How much is used of logs with gaps, where an analysis takes the longest stretch without any."""
+    gapped = [log for log in logs if isinstance(log, Log) and len(log.segments) > 1]
+    if not gapped:
+        return ()
+    longest = [max(part.stop - part.start for part in log.segments) for log in gapped]
+    texts = [f"{most} of {len(log.time)}" for most, log in zip(longest, gapped, strict=True)]
+    return (("Samples used (longest stretch without gaps)", ", ".join(texts)),)
+
+
+def labels(identification: Identification) -> list[str]:
+    """A name for every experiment, of which those of its figures are made: its kind, numbered where there are more."""
+    kinds = [experiment.kind for experiment in identification.experiments]
+    return [
+        kind.replace("-", "_") + (str(kinds[: i + 1].count(kind)) if kinds.count(kind) > 1 else "")
+        for i, kind in enumerate(kinds)
+    ]
+
+
+def read_rows(files: Sequence[LogFile]) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
+    """For every file: what it counts as and why, what was read, and what to know before believing it."""
+    rows = []
+    for file in files:
+        read = file.source.read
+        if file.mapping_file is not None:
+            read = (*read, f"mapping kept in {file.mapping_file.name}")
+        rows.append((f"{file.path.name}: {file.kind} ({file.reason})", read, getattr(file.source, "warnings", ())))
+    return rows
+
+
+def answer(identification: Identification, files: Sequence[LogFile], predictions: Sequence[Prediction]) -> list[str]:
+    """All lines: the answer, the estimates, the experiments behind them, and what was read."""
+    rows = estimate_rows(identification)
+    estimates = ["", *_aligned(rows)] if rows else []
+    return [*sentences(identification, predictions), *estimates, *details(identification, files)]
+
+
+def sentences(identification: Identification, predictions: Sequence[Prediction]) -> list[str]:
+    """The answer, how well other logs are predicted, and notes."""
+    lines = [sentence for _, sentence in headline(identification)]
+    lines += [] if identification.laws is None else [law_sentence(identification.laws)]
+    lines += [prediction_line(prediction)[1] for prediction in predictions]
+    lines += _chosen(identification)
+    return lines + [f"note: {axis_shown().text(warning)}" for warning in identification.warnings]
+
+
+def _chosen(identification: Identification) -> list[str]:
+    """That a verdict on the stage rests on a controller that is none of the user's, if it does."""
+    table = "controller"
+    sources = {source for key, source in identification.origins.items() if key.startswith(f"{table}.")}
+    if identification.stage is None or sources != {CHOSEN}:
+        return []
+    return [f"The [{table}] of the stage file is our choice: put yours there before you ask whether the stage hunts."]
+
+
+def details(identification: Identification, files: Sequence[LogFile]) -> list[str]:
+    """The experiments behind the estimates, and what was read."""
+    lines = []
+    for part in summaries(identification):
+        lines += ["", part.title, *(f"  {sentence}" for sentence in part.sentences)]
+        lines += [f"  {name}: {text}" for name, text in part.facts]
+        lines += [f"  note: {warning}" for warning in part.warnings]
+    for title, read, warned in read_rows(files):
+        lines += ["", title, *(f"  {text}" for text in read), *(f"  note: {text}" for text in warned)]
+    return lines
+
+
+def _aligned(rows: Sequence[EstimateRow]) -> list[str]:
+    """Quantity, value and interval in columns; the reason where there is no value."""
+    table = [COLUMNS[:-1], *(row.texts[:-1] for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in table]

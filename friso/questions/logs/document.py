@@ -1,0 +1,51 @@
+"""The JSON document of what files of logs hold; numbers of channels in the units of the file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from friso.identification.contents import ChannelContent, LogContent
+from friso.questions.logs.words import conclusions, next_command
+from friso.shown.documents import plain_json
+
+
+def logs_document(contents: Sequence[LogContent]) -> dict[str, Any]:
+    """All files, but for those that are written."""
+    return plain_json({"logs": [_log(content) for content in contents]})
+
+
+def _log(content: LogContent) -> dict[str, Any]:
+    response = content.response
+    return {
+        "file": str(content.path),
+        "format": content.title,
+        "conclusion": conclusions(content)[0][1],
+        "kind": content.kind or None,
+        "reason": content.reason or None,
+        "channels": [_channel(channel) for channel in content.channels],
+        "response": None if response is None else {"lines": len(response.frequency), "unit": response.unit},
+        "open": [
+            {"about": gap.key, "actual": gap.actual, "expected": gap.expected, "example": gap.example or None}
+            for gap in content.gaps
+        ],
+        "command": next_command(content),
+        "read": list(content.read),
+        "warnings": list(content.warnings),
+    }
+
+
+def _channel(channel: ChannelContent) -> dict[str, Any]:
+    low, high = channel.range or (None, None)
+    return {
+        "name": channel.name,
+        "unit": channel.unit or None,
+        "role": channel.role or None,
+        "reason": channel.reason or None,
+        "samples": channel.values.size,
+        "sample_rate_Hz": channel.sample_rate,
+        "missing": channel.missing,
+        "low": low,
+        "high": high,
+        "course": channel.course(),
+    }

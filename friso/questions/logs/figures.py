@@ -1,0 +1,47 @@
+"""The channels of files of logs over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from friso.identification.contents import ChannelContent, LogContent
+from friso.identification.logs.signals import LARGEST
+from friso.questions.logs.words import title
+from friso.shown.drawing.figure import BLUE, Axis, Figure, Panel, Series
+
+MOST = 12
+"""Channels of a file that are drawn."""
+
+
+def logs_figures(contents: Sequence[LogContent]) -> list[Figure]:
+    """A figure for each file of channels are drawn, those with a role first."""
+    return [_figure(content, number) for number, content in enumerate(contents, 1) if content.channels]
+
+
+def _figure(content: LogContent, number: int) -> Figure:
+    channels = sorted((c for c in content.channels if c.role != "time"), key=lambda channel: not channel.role)
+    left = f" {MOST} of {len(channels)} channels are drawn, those with a role first." if len(channels) > MOST else ""
+    caption = f"As they stand in the file, in its own units.{left}"
+    panels = tuple(_panel(channel) for channel in channels[:MOST])
+    return Figure(f"logs_{number}", title(content), caption, panels, columns=2 if len(panels) > 1 else 1)
+
+
+def _panel(channel: ChannelContent) -> Panel:
+    time = channel.time
+    timed = time is not None and time.size == channel.values.size and not np.isnan(_within_range(time)).all()
+    x = _within_range(time) if timed and time is not None else np.arange(channel.values.size, dtype=float)
+    values = _within_range(channel.values)
+    role = channel.role.replace("_", " ")
+    words = f"{channel.name}: {role}" if role and role != channel.name else channel.name
+    if np.isnan(values[np.isfinite(channel.values)]).any():
+        words += f" (values beyond {LARGEST:g} not drawn)"
+    across = Axis("Time", "s", prefixed=False) if timed else Axis("Sample", "", prefixed=False)
+    return Panel(words, across, Axis("", channel.unit, prefixed=False), (Series(x, values, "", BLUE, width=1.0),))
+
+
+def _within_range(values: np.ndarray) -> np.ndarray:
+    """The values that a picture can show, which no instrument exceeds; NaN for others, 0 for what is next to it."""
+    sizes = np.abs(values)
+    return np.where(sizes <= LARGEST, np.where(sizes < 1 / LARGEST, 0.0, values), np.nan)

@@ -1,0 +1,45 @@
+"""The page of `friso logs`: one file that opens offline, prints, and is the same bytes on every run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from friso.identification.contents import LogContent
+from friso.questions.logs.figures import logs_figures
+from friso.questions.logs.words import COLUMNS, channel_rows, conclusions, next_command, open_questions
+from friso.shown.drawing.figure import Figure
+from friso.shown.files import Content, pictures
+from friso.shown.pages import Report
+
+
+def logs_files(contents: Sequence[LogContent]) -> dict[str, Content]:
+    """The page, and every figure in all formats."""
+    figures = logs_figures(contents)
+    images = pictures(figures)
+    return {"logs.html": logs_html(contents, figures), **images}
+
+
+def logs_html(contents: Sequence[LogContent], figures: Sequence[Figure]) -> str:
+    """The whole page of files of logs and their figures."""
+    files = [
+        {
+            "name": content.path.name,
+            "rows": channel_rows(content),
+            "open": open_questions(content),
+            "command": next_command(content),
+            "read": content.read,
+            "warnings": content.warnings,
+            "figure": f"logs_{number}",
+        }
+        for number, content in enumerate(contents, 1)
+    ]
+    return Report(
+        "logs",
+        ", ".join(content.path.name for content in contents),
+        figures,
+        values={
+            "verdicts": [sentence for content in contents for sentence in conclusions(content)],
+            "columns": COLUMNS,
+            "files": files,
+        },
+    ).html()

@@ -1,0 +1,170 @@
+"""What files of logs hold, before anything is identified."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from friso.errors import InputError
+from friso.identification.contents import LogContent, log_content
+from friso.identification.logs.mapping import from_options
+from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.inputs import Changes, text_of
+from friso.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from friso.shown.drawing.figure import Figure
+    from friso.shown.files import Files
+
+LogFiles = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
+"""A file of logs, or several."""
+
+
+class LogsAnswer(Answer):
+    """What files hold: `result` has a `LogContent` for each that could be read, `wrong` what is wrong with others."""
+
+    command = "logs"
+    status = 2
+
+    def __init__(self, contents: Sequence[LogContent], errors: Sequence[InputError]) -> None:
+        self.result, self.errors = list(contents), list(errors)
+
+    @property
+    def failure(self) -> str:
+        """What is wrong with the files that cannot be read."""
+        return str(unreadable(self.errors)) if self.errors else ""
+
+    def sentences(self) -> Sequence[str]:
+        """What each file is, and what is open."""
+        from friso.questions.logs.words import conclusions, open_questions
+
+        lines = []
+        for content in self.result:
+            lines += [sentence for _, sentence in conclusions(content)]
+            lines += [f"open: {line}" for line in open_questions(content)]
+            lines += [f"note: {line}" for line in (*content.lost, *content.warnings)]
+        return lines
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """The channels of each file."""
+        from friso.questions.logs.words import COLUMNS, channel_rows
+
+        return [AnswerTable(item.path.name, COLUMNS, channel_rows(item)) for item in self.result if item.channels]
+
+    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
+        """How each file is identified that can be."""
+        from friso.questions.logs.words import next_command
+
+        return [command for content in self.result if (command := next_command(content))]
+
+    def figures(self) -> Sequence[Figure]:
+        """The channels over time."""
+        from friso.questions.logs.figures import logs_figures
+
+        return logs_figures(self.result)
+
+    def document(self) -> dict[str, Any]:
+        """Channels, units, rates, ranges."""
+        from friso.questions.logs.document import logs_document
+
+        return logs_document(self.result)
+
+    def files(self) -> Files:
+        """The page."""
+        from friso.questions.logs.page import logs_files
+
+        return logs_files(self.result) if self.result else {}
+
+
+def options_of(
+    map: Changes,
+    unit: Changes,
+    scale: Changes,
+    dt: str | float | None,
+    kind: str | None = None,
+    axis: str | None = None,
+) -> Any:
+    """What is said of channels, from dictionaries or texts. Raises LogError."""
+    roles, units, scales = (
+        [f"{key}={text}" for key, text in item.items()] if isinstance(item, Mapping) else item or ()
+        for item in (map, unit, scale)
+    )
+    return from_options(roles, units, scales, None if dt is None else text_of(dt, "s"), kind, axis)
+
+
+def paths_of(logs: LogFiles) -> list[Path]:
+    """The files that are meant."""
+    return [Path(logs)] if isinstance(logs, str | os.PathLike) else [Path(log) for log in logs]
+
+
+@question
+def logs(
+    logs: LogFiles,
+    *,
+    map: Changes = None,
+    unit: Changes = None,
+    scale: Changes = None,
+    dt: str | float | None = None,
+    axis: str | None = None,
+    folder: Path | None = None,
+    partly: bool = False,
+    progress: Progress = silent,
+) -> LogsAnswer:
+    """What log files hold: channels, units, rates, ranges, and the role that friso gives each channel, with the reason.
+
+    Parameters
+    ----------
+    logs : path or list of paths
+        Files, in a format that `friso logs --help` lists.
+    map : dict, optional
+        Roles and their channels: ``{"position": "Axis1.ActPos"}``.
+    unit : dict, optional
+        Channels and their units: ``{"Axis1.ActPos": "mm"}``.
+    scale : dict, optional
+        Roles and their scales: ``{"force": "35.15 N/V"}``.
+    dt : str or float, optional
+        Sample time, "1 ms" or a number [s], if a file does not contain it.
+    axis : str, optional
+        "rotary" for angles, torques and moments of inertia.
+    folder : Path, optional
+        Where what was said of channels is kept, if not beside the logs.
+    partly : bool
+        Whether files that cannot be read are left to `errors` of the answer, instead of being raised.
+    progress : Progress
+        Called before each file.
+
+    Returns
+    -------
+    LogsAnswer
+        What each file holds.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.logs("log.csv", map={"position": "ActPos"})  # doctest: +SKIP
+    """
+    options, files = options_of(map, unit, scale, dt, axis=axis), paths_of(logs)
+    contents: list[LogContent] = []
+    wrong: list[InputError] = []
+    for number, path in enumerate(files):
+        progress(number, len(files), path.name)
+        try:
+            contents.append(log_content(path, options, folder))
+        except InputError as error:
+            wrong.append(error)
+    answer = LogsAnswer(contents, wrong)
+    if wrong and not partly:
+        raise unreadable(wrong)
+    return answer
+
+
+def unreadable(errors: Sequence[InputError]) -> InputError:
+    """One error for all files that cannot be read."""
+    return errors[0] if len(errors) == 1 else InputError("", "\n\n".join(map(str, errors)), "files that can be read")

@@ -1,0 +1,100 @@
+"""What a file of logs holds, in words that the terminal and the page share."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.identification.contents import ChannelContent, LogContent
+from friso.platform.system import shell_word
+from friso.shown.drawing.figure import GREEN, ORANGE
+from friso.shown.drawing.prefixes import NOTHING, range_with_unit, with_unit
+
+COLUMNS = ("Unit", "Role, and why", "Range", "Course", "Samples")
+"""Columns of the table of channels."""
+
+PLAIN = 1e7
+"""Numbers below this one stand without an exponent."""
+
+_BLOCKS = "▁▂▃▄▅▆▇█"
+
+
+def title(content: LogContent) -> str:
+    """The file and its format."""
+    return f"{content.path.name} ({content.title})"
+
+
+def conclusions(content: LogContent) -> list[tuple[str, str]]:
+    """What the file holds and what it counts as, or what is open; each sentence with its colour."""
+    holds = f"{title(content)} holds {_holds(content)}"
+    if content.kind:
+        return [(GREEN, f"{holds}. friso identify takes it as {content.kind}: {content.reason}.")]
+    things = f"{len(content.gaps)} things are" if len(content.gaps) > 1 else "one thing is"
+    return [(ORANGE, f"{holds}; {things} open before friso identify can use it.")]
+
+
+def open_questions(content: LogContent) -> list[str]:
+    """What has to be told, each in a sentence with the option that tells it."""
+    return [
+        f"{gap.key}: {gap.expected}; given: {gap.actual}" + (f"; for example {gap.example}" if gap.example else "")
+        for gap in content.gaps
+    ]
+
+
+def next_command(content: LogContent) -> str | None:
+    """The command that identifies the file, with the options given and those still needed; None where no option tells
+    what the file lacks."""
+    options = dict.fromkeys([*content.options, *(gap.example for gap in content.gaps)])
+    if "" in options:
+        return None
+    return " ".join(["friso identify", shell_word(str(content.path)), *options])
+
+
+def channel_rows(content: LogContent) -> list[tuple[str, list[str]]]:
+    """The channels by name, with the texts of `COLUMNS`."""
+    return [(channel.name, _cells(channel)) for channel in content.channels]
+
+
+def _cells(channel: ChannelContent) -> list[str]:
+    role = f"{channel.role.replace('_', ' ')}: {channel.reason}" if channel.role else channel.reason or NOTHING
+    return [channel.unit or NOTHING, role, _range(channel), sparkline(channel.course()), _samples(channel)]
+
+
+def _range(channel: ChannelContent) -> str:
+    """The least and the greatest number as they stand in the file."""
+    ends = channel.range
+    if ends is None:
+        return NOTHING
+    return " to ".join(_number(end) for end in dict.fromkeys(ends))
+
+
+def _number(value: float) -> str:
+    """Four digits, without an exponent where a plain number is as short to read."""
+    text = f"{value:.4g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < PLAIN else text
+
+
+def _samples(channel: ChannelContent) -> str:
+    rate = "" if channel.sample_rate is None else f" at {with_unit(channel.sample_rate, 'Hz', 4)}"
+    gaps = f", {channel.missing} not numbers" if channel.missing else ""
+    return f"{channel.values.size}{rate}{gaps}"
+
+
+def sparkline(values: np.ndarray) -> str:
+    """A line of blocks as high as the values, shape (n,), are between the least and the greatest; a space for NaN."""
+    values = values / max(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)), np.finfo(float).tiny)
+    finite = values[np.isfinite(values)]
+    low, span = (float(finite.min()), float(np.ptp(finite))) if finite.size else (0.0, 0.0)
+    heights = (values - low) / span if span > 0 else np.where(np.isfinite(values), 0.0, np.nan)
+    return "".join(_BLOCKS[min(int(8 * height), 7)] if np.isfinite(height) else " " for height in heights)
+
+
+def _holds(content: LogContent) -> str:
+    if content.response is not None:
+        frequency = content.response.frequency
+        ends = range_with_unit(float(frequency[0]), float(frequency[-1]), "Hz")
+        return f"a frequency response of {frequency.size} lines, {ends}, {content.response.unit or 'without a unit'}"
+    longest = max(content.channels, key=lambda channel: channel.values.size)
+    time = longest.time
+    lasts = "" if time is None or not time.size else f" over {with_unit(float(time[-1] - time[0]), 's', 4)}"
+    channels, samples = len(content.channels), longest.values.size
+    return f"{channels} channel{'s' * (channels != 1)}, {samples} sample{'s' * (samples != 1)}{lasts}"

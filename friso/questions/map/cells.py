@@ -1,0 +1,267 @@
+"""The cells of a map for drawing: axes in order, numbers, and the reasons why some cells have none."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.questions.map.words import (
+    CATEGORIES,
+    FAILED,
+    INFERRED,
+    INVALID,
+    NOT_RUN,
+    QUIET,
+    in_order,
+    no_number,
+    quantity,
+    unit_of,
+    variable,
+    word_category,
+    words_of,
+)
+from friso.shown.drawing.colours import ramp
+from friso.shown.drawing.figure import Array, Axis, Category
+from friso.shown.drawing.prefixes import choose
+from friso.studies.cells import CYCLE_UNITS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SAMPLE = "sample"  # the dimension of maps that are sampled, not gridded
+
+
+@dataclass(frozen=True)
+class CellAxis:
+    """A swept key: where its cells lie, shape (n,), ascending, and which index of the runs each of them is.
+
+    `positions` are SI values, or 0, 1, 2, ... where the cells are named by `words`.
+    """
+
+    key: str
+    quantity: str
+    unit: str
+    log: bool
+    positions: Array
+    words: tuple[str, ...]
+    places: np.ndarray
+
+    def axis(self, limits: tuple[float, float] | None) -> Axis:
+        """The axis of a panel."""
+        return Axis(self.quantity, self.unit, limits, self.log, self.words)
+
+    def text(self, position: int) -> str:
+        """The value of one cell, e.g. "Crossover 8 Hz"."""
+        return f"{self.quantity} {self.value(position)}"
+
+    def value(self, position: int) -> str:
+        """The same without the quantity."""
+        return self.words[position] if self.words else _value(self.positions[position], self.unit)
+
+    def span(self) -> str:
+        """All values in a few words, e.g. "1 to 16 Hz, 41 values"."""
+        if self.words:
+            return ", ".join(self.words) if len(self.words) <= 8 else f"{len(self.words)} values"
+        factor, unit = choose(self.positions, self.unit)
+        low, high = float(self.positions.min()) * factor, float(self.positions.max()) * factor
+        spacing = ", logarithmic" if self.log else ""
+        return f"{low:.4g} to {high:.4g} {unit}".rstrip() + f", {len(self.positions)} values{spacing}"
+
+    def position(self, value: object) -> float:
+        """Where a value [SI] or word lies. Raises ValueError for a word that is not on the axis."""
+        if not self.words:
+            return float(value)  # type: ignore[arg-type]
+        word = _word(self.key, value) if not isinstance(value, float | int) or isinstance(value, bool) else None
+        word = word or _value(float(value), self.unit)  # type: ignore[arg-type]
+        if word not in self.words:
+            raise ValueError(f"{self.key}: got {value!r}, expected one of {', '.join(self.words)}")
+        return float(self.words.index(word))
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a variable is coloured wherever it is shown: quantity and unit, range, scale, and its cells' categories.
+
+    `numbers` and `codes` have the dimensions of the runs; codes count in `categories`, NaN where a number counts.
+    """
+
+    quantity: str
+    unit: str
+    limits: tuple[float, float] | None
+    log: bool
+    colours: tuple[str, ...]
+    categories: tuple[Category, ...]
+    numbers: xr.DataArray
+    codes: xr.DataArray
+
+    @property
+    def scale(self) -> tuple[str, str, tuple[float, float] | None, bool, tuple[str, ...], tuple[Category, ...]]:
+        """What a map or a cloud of these cells is coloured by."""
+        return self.quantity, self.unit, self.limits, self.log, self.colours, self.categories
+
+
+def axes_of(runs: xr.Dataset) -> tuple[CellAxis, ...]:
+    """The swept axes in the order of the runs; of sampled runs the sampled keys. ValueError where there are none."""
+    if SAMPLE in runs.dims:
+        order = json.loads(runs.attrs.get("axes", "[]"))  # a store forgets the order of its coordinates
+        keys = [key for key in runs.coords if runs[key].dims == (SAMPLE,) and key != SAMPLE]
+        keys.sort(key=lambda key: order.index(key) if key in order else len(order))
+        return tuple(_sampled(runs, key) for key in keys)
+    dims = dims_of(runs)
+    if not dims:
+        raise ValueError("map: got runs without any dimension, expected those of a sweep, e.g. friso.sweep(...)")
+    return tuple(_gridded(runs, key) for key in dims)
+
+
+def cuts(runs: xr.Dataset) -> list[str]:
+    """The values at which a larger map was cut, e.g. "Crossover 8 Hz"."""
+    fixed = runs.coords.to_dataset()
+    return [_gridded(fixed.expand_dims(key), key).text(0) for key in fixed.coords if fixed[key].ndim == 0]
+
+
+def dims_of(runs: xr.Dataset) -> tuple[Hashable, ...]:
+    """The dimensions in the order of the variables; that of a dataset's own list may differ."""
+    return max((variable.dims for variable in runs.data_vars.values()), key=len, default=())
+
+
+def _gridded(runs: xr.Dataset, key: Hashable) -> CellAxis:
+    coordinate = runs[key]
+    unit, log = unit_of(coordinate), coordinate.attrs.get("scale") == "log"
+    if coordinate.dtype.kind not in "iuf":
+        words = tuple(_word(str(key), value) for value in coordinate.values)
+        return _axis_of_words(key, words, np.arange(len(words)))
+    values, places = np.unique(np.asarray(coordinate.values, dtype=float), return_index=True)
+    if log and values[0] <= 0:  # no logarithmic axis reaches zero: cells of equal width, each under its value
+        return _axis_of_words(key, tuple(_value(value, unit) for value in values), places)
+    return CellAxis(str(key), quantity(key), unit, log, values, (), places)
+
+
+def _axis_of_words(key: Hashable, words: tuple[str, ...], places: np.ndarray) -> CellAxis:
+    return CellAxis(str(key), quantity(key), "", False, np.arange(float(len(words))), words, places)
+
+
+def _sampled(runs: xr.Dataset, key: Hashable) -> CellAxis:
+    coordinate = runs[key]
+    places = np.arange(coordinate.size)
+    if coordinate.dtype.kind in "iuf":
+        values = np.asarray(coordinate.values, dtype=float)
+        log = coordinate.attrs.get("scale") == "log" and bool(np.all(values > 0))
+        return CellAxis(str(key), quantity(key), unit_of(coordinate), log, values, (), places)
+    words, positions = np.unique([_word(str(key), value) for value in coordinate.values], return_inverse=True)
+    return CellAxis(str(key), quantity(key), "", False, positions.astype(float), tuple(map(str, words)), places)
+
+
+def _word(key: str, value: object) -> str:
+    """A word or boolean as it is shown: a joint is locked or free, anything else as in the stage file."""
+    if isinstance(value, bool | np.bool_):
+        return ("locked" if value else "free") if key == "joint.locked" else ("true" if value else "false")
+    return str(value)
+
+
+def _value(value: float, unit: str) -> str:
+    factor, text = choose(np.array([value]), unit)
+    return f"{value * factor:.4g} {text}".rstrip()
+
+
+def plane_first(axes: Sequence[CellAxis]) -> list[CellAxis]:
+    """The two axes that span a map of many, then the further ones: numbers with more than one value come first."""
+    x, y, *_ = sorted(axes, key=lambda axis: (len(axis.places) == 1, bool(axis.words)))
+    return [x, y, *(axis for axis in axes if axis is not x and axis is not y)]
+
+
+def look(runs: xr.Dataset, metric: str) -> Look:
+    """How `metric` is coloured: a numeric variable, "outcome" or "verdict". ValueError for others."""
+    if metric not in metrics(runs):
+        raise ValueError(f"metric: got {metric!r}, expected one of {', '.join(metrics(runs))}")
+    if metric in CATEGORIES:
+        codes, words = words_of(runs, metric)
+        template = runs[metric]
+        numbers = template.copy(data=np.full(template.shape, np.nan))
+        word_categories = [word_category(metric, word) for word in words]
+        categories = in_order(word_categories)
+        table = np.array([categories.index(category) for category in word_categories], dtype=float)
+        return Look(variable(metric), "", None, False, (), categories, numbers, template.copy(data=table[codes]))
+    values = np.asarray(runs[metric].values, dtype=float)
+    categories, codes = _without_number(runs, metric, values)
+    numbers = np.where(np.isnan(codes), values, np.nan)
+    limits, log, colours = _range(metric, numbers)
+    arrays = (runs[metric].copy(data=numbers), runs[metric].copy(data=codes))
+    return Look(variable(metric), unit_of(runs[metric]), limits, log, colours, categories, *arrays)
+
+
+def metrics(runs: xr.Dataset) -> list[str]:
+    """The variables that a map can show, the words last."""
+    numeric = [str(name) for name, array in runs.data_vars.items() if array.dtype.kind in "iuf"]
+    return numeric + [name for name in CATEGORIES if name in runs]
+
+
+def _range(metric: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, bool, tuple[str, ...]]:
+    """Limits, whether they are logarithmic, and the colours of counted peaks (0 in the colour of rest, 1 next to it).
+
+    Positive numbers over more than three decades show on a logarithmic scale, of at most six decades: what a stage
+    at rest still moves is the noise of the solver.
+    """
+    finite = numbers[np.isfinite(numbers)]
+    if not finite.size:
+        return None, False, ()
+    low, high = float(finite.min()), float(finite.max())
+    if metric == "multiplier":
+        return (-1.0, 1.0), False, ()
+    if metric in ("peaks", "distinct_peaks"):
+        return None, False, (QUIET, *ramp(max(1, int(high)))[::-1])
+    positive = finite[finite > 0]
+    if low >= 0 and positive.size and high > 1e3 * float(positive.min()):
+        return (max(float(positive.min()), 1e-6 * high), high), True, ()
+    return (low, high), False, ()
+
+
+def _without_number(runs: xr.Dataset, metric: str, values: np.ndarray) -> tuple[tuple[Category, ...], np.ndarray]:
+    """The categories of the cells that have no number to show, and their codes; NaN where a number counts."""
+    shape, dims = runs[metric].shape, runs[metric].dims
+    outcome = _texts(runs, "outcome", dims)
+    status = _texts(runs, "status", dims)
+    pairs = [_state(word, reason) for word in outcome[1] for reason in status[1]]
+    attractor = _texts(runs, "attractor", dims) if metric in CYCLE_UNITS else (np.zeros((), dtype=int), [None])
+    none = [no_number(metric, word) for word in attractor[1]]
+    categories = in_order(category for category in (*pairs, *none) if category is not None)
+    table = np.array([np.nan if category is None else categories.index(category) for category in pairs], dtype=float)
+    codes = np.broadcast_to(table[outcome[0] * len(status[1]) + status[0]], shape)
+    reasons = np.array([categories.index(category) for category in none], dtype=float)[attractor[0]]
+    return categories, np.where(np.isnan(codes) & ~np.isfinite(values), reasons, codes)
+
+
+def _texts(runs: xr.Dataset, name: str, dims: tuple[Hashable, ...]) -> tuple[np.ndarray, Sequence[str | None]]:
+    """Codes and texts of a variable; a single unknown text where the runs do not have it."""
+    if name not in runs:
+        return np.zeros((), dtype=int), [None]
+    return words_of(runs.transpose(*dims), name)
+
+
+def _state(outcome: str | None, status: str | None) -> Category | None:
+    """Why a cell has no numbers of its own; None where it was run to its end."""
+    reason = status or ""
+    if reason.startswith("inferred"):
+        return INFERRED.get(outcome or "") or Category("inferred", "#eeeeee")
+    if outcome == "" or reason.startswith("not run"):
+        return NOT_RUN
+    if outcome == "invalid" or reason.startswith("invalid"):
+        return INVALID
+    if outcome == "failed" or (outcome is None and reason not in ("", "done")):
+        return FAILED
+    return None
+
+
+def pick(sizes: Sequence[int], most: int) -> tuple[np.ndarray, ...]:
+    """Evenly spread indices along dimensions of these sizes, of at most `most` combinations; the longest dimension
+    gives way first."""
+    counts = list(sizes)
+    while math.prod(counts) > most and max(counts) > 1:
+        counts[counts.index(max(counts))] -= 1
+    return tuple(
+        np.linspace(0, size - 1, number).round().astype(int) for size, number in zip(sizes, counts, strict=True)
+    )

@@ -1,0 +1,190 @@
+"""What a map page knows of its runs: axes, variables and colours, as the page's script reads them."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.axis import unit_shown
+from friso.errors import InputError
+from friso.hunting.measures import BANDS
+from friso.questions.check.traces import common_range
+from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, look, metrics, pick, plane_first
+from friso.questions.map.places import SHOWN
+from friso.questions.map.words import CATEGORIES, variable, words_of
+from friso.shown.drawing.colours import scale
+from friso.shown.drawing.drawable import colour_prefix
+from friso.shown.drawing.figure import Array, Cloud
+from friso.shown.drawing.prefixes import choose
+from friso.stage import Stage, loads
+from friso.studies.scalings import SCALINGS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from friso.studies.traces import Traces
+
+MOST = 250_000  # cells in a page: more would take a browser seconds to open and to colour
+
+NONE = 255  # in bytes of codes: no category, the number counts
+
+
+def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None) -> dict[str, Any]:
+    """Everything the page's script reads, ready for JSON; arrays are base64 of little-endian numbers, cell by cell in
+    the order of the axes, the last one fastest. `drawn`: the runs of all cells. Raises ValueError as `look` and
+    `axes_of` do."""
+    axes = axes_of(runs)
+    sampled = SAMPLE in runs.dims
+    chosen = picked(runs)
+    cells = _Cells(axes, chosen, sampled)
+    flat = dict.fromkeys(SCALINGS, 1.0) | stage.flat() if (stage := machine_of(runs)) else {}
+    order = list(axes) if sampled or len(axes) == 1 else plane_first(axes)
+    return {
+        "metric": metric,
+        "rerun": rerun,
+        "sampled": sampled,
+        "indices": [[int(i) for i in places] for places in cells.indices()],
+        "axes": [_axis(axis, positions, flat) for axis, positions in zip(axes, cells.positions(), strict=True)],
+        "machine": SHOWN,
+        "order": [axes.index(axis) for axis in order],
+        "variables": [_coloured(runs, name, cells) for name in metrics(runs)],
+        "lines": None if drawn is None else _lines(drawn, runs, cells),
+        "texts": [_text(runs, str(name), cells) for name, array in runs.data_vars.items() if array.dtype.kind in "OUT"],
+    }
+
+
+def machine_of(runs: xr.Dataset) -> Stage | None:
+    """The machine that was swept, if it is one of the stages swept over: not where keys are tied to others."""
+    if json.loads(runs.attrs.get("links", "{}")):
+        return None
+    try:
+        return loads(runs.attrs.get("stage", ""))
+    except InputError:  # of runs that are no study of friso's
+        return None
+
+
+def picked(runs: xr.Dataset) -> tuple[np.ndarray, ...]:
+    """Which positions along each axis (of samples: which samples) are in the page: all, or evenly picked ones."""
+    if SAMPLE in runs.dims:
+        return pick([runs.sizes[SAMPLE]], MOST)
+    return pick([len(axis.places) for axis in axes_of(runs)], MOST)
+
+
+class _Cells:
+    """The picked cells: takes them out of arrays of the runs."""
+
+    def __init__(self, axes: tuple[CellAxis, ...], chosen: tuple[np.ndarray, ...], sampled: bool) -> None:
+        self.axes, self.chosen, self.sampled = axes, chosen, sampled
+
+    def indices(self) -> list[np.ndarray]:
+        """Per dimension of the runs, the index of each picked cell."""
+        if self.sampled:
+            return list(self.chosen)
+        return [axis.places[at] for axis, at in zip(self.axes, self.chosen, strict=True)]
+
+    def positions(self) -> list[np.ndarray]:
+        """Per axis, the places (in the axis) of what the page needs: one per cell along it, or one per sample."""
+        return [self.chosen[0]] * len(self.axes) if self.sampled else list(self.chosen)
+
+    def take(self, array: xr.DataArray) -> np.ndarray:
+        """The values of the picked cells, shape (cells,)."""
+        dims = (SAMPLE,) if self.sampled else tuple(axis.key for axis in self.axes)
+        return np.asarray(array.transpose(*dims).values)[np.ix_(*self.indices())].ravel()
+
+
+FINEST = 2 * min(BANDS)
+"""The least range [m] over which a run is drawn."""
+
+HIGHEST = 250
+"""The largest of the bytes that stand for the heights of a drawn run; 255 stands for none."""
+
+
+def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
+    """The runs as lines: for each the range that shows what it does at its end, and heights in bytes, 0 to HIGHEST from
+    half a range below it to half a range above it, where lines are cut."""
+    outcome = runs["outcome"]
+    of_cell = cells.take(outcome.copy(data=np.arange(outcome.size).reshape(outcome.shape)))
+    deviations, late = drawn.deviations[of_cell], drawn.late[of_cell]
+    time = np.linspace(0.0, drawn.duration, deviations.shape[1])
+    ends = [common_range([line[time >= start]], FINEST) for line, start in zip(deviations, late, strict=True)]
+    low, high = np.array([end or (-FINEST, FINEST) for end in ends]).T[:, :, None]
+    shares = ((deviations - low) / (high - low) + 0.5) / 2
+    heights = np.where(np.isnan(shares), NONE, np.clip(np.round(HIGHEST * shares), 0, HIGHEST)).astype(np.uint8)
+    ranges = {"low": _base64(low.astype("<f4")), "high": _base64(high.astype("<f4"))}
+    return {"duration": drawn.duration, "unit": unit_shown("m"), "heights": _base64(heights), **ranges}
+
+
+def _axis(axis: CellAxis, positions: np.ndarray, flat: Mapping[str, Any]) -> dict[str, Any]:
+    """An axis; where the machine with the keys `flat` stands on it is null where that is beyond its ends."""
+    values = axis.positions[positions]
+    factor, unit = choose(axis.positions, axis.unit, log=axis.log)
+    own = None if axis.words else flat.get(axis.key)
+    inside = isinstance(own, float) and axis.positions.min() <= own <= axis.positions.max()
+    return {
+        "machine": _shortened(own * factor) if inside and own is not None else None,
+        "key": axis.key,
+        "label": axis.axis(None).quantity,
+        "unit": unit,
+        "log": axis.log,
+        "words": list(axis.words),
+        "values": [_shortened(value * factor) for value in values],
+    }
+
+
+def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
+    """A variable that the page can colour: its numbers, its categories, and its scale."""
+    colouring = look(runs, name)
+    numbers = colouring.numbers.values.ravel().astype(float)
+    none = np.zeros(numbers.size)
+    field = Cloud(
+        none, none, numbers, colouring.quantity, colouring.unit, colouring.limits, colouring.log, colouring.colours
+    )
+    factor, unit = colour_prefix(field)
+    limits = None if colouring.limits is None else (colouring.limits[0] * factor, colouring.limits[1] * factor)
+    scaled = scale(
+        Cloud(none, none, numbers * factor, colouring.quantity, unit, limits, colouring.log, colouring.colours)
+    )
+    codes = cells.take(colouring.codes)
+    stored = colouring.numbers if name in CATEGORIES else runs[name]
+    categories = [{"label": category.label, "colour": category.colour} for category in colouring.categories]
+    return {
+        "name": name,
+        "label": colouring.quantity,
+        "unit": unit,
+        "log": colouring.log,
+        "low": scaled.low,
+        "high": scaled.high,
+        "stops": [[_shortened(place), colour] for place, colour in scaled.stops],
+        "ticks": list(scaled.ticks),
+        "texts": list(scaled.texts),
+        "kinds": categories,
+        "codes": _base64(np.where(np.isnan(codes), NONE, codes).astype(np.uint8)),
+        "numbers": _base64(_short(cells.take(stored).astype(float) * factor)),
+    }
+
+
+def _text(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
+    """A variable of texts: each text once, and their numbers."""
+    codes, words = words_of(runs, name)
+    numbers = cells.take(runs[name].copy(data=codes)).astype("<u4")
+    return {"name": name, "label": variable(name), "words": words, "codes": _base64(numbers)}
+
+
+def _short(values: Array) -> np.ndarray:
+    """Six significant digits, as float32 (which holds seven)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.floor(np.log10(np.abs(values)))
+    scaled = 10.0 ** (5 - np.where(np.isfinite(size), size, 0.0))
+    return (np.round(values * scaled) / scaled).astype("<f4")
+
+
+def _shortened(value: float) -> float:
+    return float(f"{value:.6g}")
+
+
+def _base64(array: np.ndarray) -> str:
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

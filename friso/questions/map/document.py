@@ -1,0 +1,46 @@
+"""The JSON document of `friso map`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from friso.questions.map.findings import headline, loop_first
+from friso.questions.map.words import text_counts, word_counts
+from friso.shown.documents import plain_json
+from friso.studies.cells import SKETCH
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from friso.studies.study import Study
+
+
+def map_document(runs: xr.Dataset, study: Study, store: Path | None, metric: str) -> dict[str, Any]:
+    """The axes, what came out, and how much of it survives a tighter tolerance."""
+    criteria = {name: text for name in map(str, runs.data_vars) if (text := runs[name].attrs.get("criterion"))}
+    names = ("cells", "surviving", "rtol")
+    verified = {name: runs.attrs[f"verified_{name}"] for name in names if "verified_cells" in runs.attrs}
+    document = {
+        "stage": study.stage.name,
+        "store": str(store) if store else None,
+        "axes": {
+            axis.name: {
+                "points": len(axis.values),
+                "unit": axis.unit,
+                "first": axis.values[0].item(),
+                "last": axis.values[-1].item(),
+            }
+            for axis in study.axes
+        },
+        "cells": study.cells,
+        "rtol": study.rtol,
+        "conclusion": " ".join([*loop_first(study.stage), headline(runs, metric)]),
+        "outcomes": word_counts(runs, "outcome"),
+        "verdicts": word_counts(runs, "verdict") or None,
+        "sketched_verdicts": word_counts(runs, SKETCH) or None,
+        "attractors": text_counts(runs, "attractor") or None,
+        "criteria": criteria,
+        "verified": verified or None,
+    }
+    return plain_json(document)

@@ -1,0 +1,217 @@
+"""The figures of a map: one variable over the swept axes, from the runs of a sweep to plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.hunting.criteria import ATTRACTED, FAILED
+from friso.hunting.criteria import VERDICTS as VERDICT_WORDS
+from friso.questions.map.cells import SAMPLE, CellAxis, Look, axes_of, cuts, look, pick, plane_first
+from friso.questions.map.findings import statement
+from friso.questions.map.words import variable
+from friso.shown.drawing.drawable import cell_edges
+from friso.shown.drawing.figure import BLUE, INK, Axis, Cloud, Figure, Map, Markers, Panel, Series
+from friso.studies.cells import VERDICTS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SLICES = 9  # panels of a map over more than two axes
+RED = "#e3001b"  # the evaluation marker of the thesis
+
+_LISTED = 12  # left-out values named one by one
+
+
+def map_figure(runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, float] | None = None) -> Figure:
+    """One variable of a map: over one axis as a line, over two as cells, over more as slices; samples as points.
+
+    `runs`: what friso.sweep returns; `metric`: a numeric variable, "outcome" or "verdict"; `marker`: the evaluation
+    point, SI values (or words) by key. Raises ValueError for a metric that is not there, runs without dimensions, or a
+    marker that lacks an axis.
+    """
+    axes, colouring = axes_of(runs), look(runs, metric)
+    caption, columns = "", 1
+    if SAMPLE in runs.dims:
+        panels, caption = _samples(axes, colouring, marker)
+    elif len(axes) == 1:
+        panels = [_line(axes[0], colouring, marker)]
+    elif len(axes) == 2:
+        panels = [_cells(axes[0], axes[1], colouring, marker, "")]
+    else:
+        panels, caption = _slices(axes, colouring, marker)
+        columns = {1: 1, 2: 2, 4: 2}.get(len(panels), 3)
+    return Figure(
+        name=f"map-{metric}",
+        title=variable(metric),
+        caption=caption or ("Every cell is one stage." if metric in VERDICTS else "Every cell is one run."),
+        panels=tuple(panels),
+        columns=columns,
+        subject=str(runs.attrs.get("name", "")),
+        note=statement(runs, metric) + (f"\n{caption}" if caption else ""),
+    )
+
+
+def map_panel(
+    runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, float] | None = None, title: str | None = None
+) -> Panel:
+    """One variable over the two axes of a map, the first one to the right; for figures of several maps.
+
+    Arguments as for `map_figure`; the title is, unless given, the variable and the values at which a larger map was
+    cut. Raises ValueError for another number of axes than two, and as `map_figure` does.
+    """
+    axes = axes_of(runs)
+    if len(axes) != 2 or SAMPLE in runs.dims:
+        raise ValueError(
+            f"map_panel: got runs over {', '.join(map(str, runs.sizes))}, expected two axes; cut the others, "
+            'e.g. runs.sel({"joint.stroke": 1e-3}, method="nearest")'
+        )
+    if title is None:
+        title = ", ".join([variable(metric), *cuts(runs)])
+    return _cells(axes[0], axes[1], look(runs, metric), marker, title)
+
+
+def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float] | None, title: str) -> Panel:
+    """A map panel of arrays that have just the dimensions of x and y."""
+    z, codes = (
+        np.asarray(array.transpose(y.key, x.key).values)[np.ix_(y.places, x.places)]
+        for array in (colouring.numbers, colouring.codes)
+    )
+    points = _marked(marker, x, y)
+    return Panel(
+        title,
+        x.axis(_limits(x, [point.x for point in points])),
+        y.axis(_limits(y, [point.y for point in points])),
+        _edges(x, y, colouring, codes),
+        points,
+        maps=(Map(x.positions, y.positions, z, *colouring.scale, codes),),
+    )
+
+
+def _edges(x: CellAxis, y: CellAxis, colouring: Look, codes: np.ndarray) -> tuple[Series, ...]:
+    """The curve on which hunting begins and ends, half-way between cells of a map of verdicts in which something
+    attracts and those in which nothing does."""
+    attracted = [k for k, kind in enumerate(colouring.categories) if kind.label in ATTRACTED]
+    if min(codes.shape) < 2 or x.words or y.words or not attracted:
+        return ()
+    from contourpy import contour_generator
+
+    columns, rows = (np.log(axis.positions) if axis.log else axis.positions for axis in (x, y))
+    decided = [k for k, kind in enumerate(colouring.categories) if kind.label in VERDICT_WORDS and kind.label != FAILED]
+    cells = np.where(np.isin(codes, decided), np.isin(codes, attracted), np.nan)
+    lines: Any = contour_generator(columns, rows, np.ma.masked_invalid(cells)).lines(0.5)
+    if not lines:
+        return ()
+    right, up = np.concatenate([np.vstack([line, [np.nan, np.nan]]) for line in lines]).T
+    right, up = (np.exp(places) if axis.log else places for axis, places in ((x, right), (y, up)))
+    return (Series(right, up, "edge of hunting", INK, width=1.8),)
+
+
+def _limits(axis: CellAxis, points: Sequence[np.ndarray]) -> tuple[float, float]:
+    """From the first to the last edge of the cells, and on to a marker outside of them."""
+    values = np.concatenate([cell_edges(axis.positions, log=axis.log), *points])
+    return float(values.min()), float(values.max())
+
+
+def _marked(marker: Mapping[str, float] | None, x: CellAxis, y: CellAxis) -> tuple[Markers, ...]:
+    if marker is None:
+        return ()
+    lacking = [axis.key for axis in (x, y) if axis.key not in marker]
+    if lacking:
+        raise ValueError(
+            f"marker: got {', '.join(marker) or 'nothing'}, expected a value of {' and '.join(lacking)} too"
+        )
+    right, up = (np.array([axis.position(marker[axis.key])]) for axis in (x, y))
+    return (Markers(right, up, "evaluation point", RED, "target"),)
+
+
+def _slices(axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, float] | None) -> tuple[list[Panel], str]:
+    """Panels over the first two axes of numbers with more than one value, for values of the further ones; and which
+    of these values are left out."""
+    x, y, *further = plane_first(axes)
+    picked = pick([len(axis.places) for axis in further], SLICES)
+    panels = []
+    for positions in product(*picked):
+        where = list(zip(further, positions, strict=True))
+        cut = {axis.key: int(axis.places[i]) for axis, i in where}
+        sliced = replace(colouring, numbers=colouring.numbers.isel(cut), codes=colouring.codes.isel(cut))
+        elsewhere = marker and any(
+            axis.key in marker and axis.position(marker[axis.key]) != axis.positions[i] for axis, i in where
+        )
+        title = ", ".join(axis.text(i) for axis, i in where)
+        panels.append(_cells(x, y, sliced, None if elsewhere else marker, title))
+    left_out = [_left_out(axis, indices) for axis, indices in zip(further, picked, strict=True)]
+    return panels, " ".join(text for text in left_out if text)
+
+
+def _left_out(axis: CellAxis, indices: np.ndarray) -> str:
+    """Which values of an axis have no panel."""
+    missing = [i for i in range(len(axis.places)) if i not in indices]
+    if not missing:
+        return ""
+    texts = [axis.text(i).removeprefix(f"{axis.quantity} ") for i in missing]
+    listed = ", ".join(texts) if len(texts) <= _LISTED else f"{len(texts)} values from {texts[0]} to {texts[-1]}"
+    return f"Not shown: {axis.quantity} {listed}."
+
+
+def _line(x: CellAxis, colouring: Look, marker: Mapping[str, float] | None) -> Panel:
+    """One variable over a single axis: a line with its points, and patches under it where there is no number."""
+    numbers, codes = (np.asarray(array.values)[x.places] for array in (colouring.numbers, colouring.codes))
+    occurring = [i for i in range(len(colouring.categories)) if np.any(codes == i)]
+    if not np.isfinite(numbers).any():
+        return _rows(x, colouring, codes, occurring)
+    low, high = float(np.nanmin(numbers)), float(np.nanmax(numbers))
+    span = (high - low) or abs(high) or 1.0
+    markers = [Markers(x.positions, numbers, "", BLUE)]
+    for i in occurring:
+        where = x.positions[codes == i]
+        below = low * (low / high) ** 0.06 if colouring.log else low - 0.08 * span
+        markers.append(
+            Markers(
+                where,
+                np.full(len(where), below),
+                colouring.categories[i].label,
+                colouring.categories[i].colour,
+                "patch",
+            )
+        )
+    return Panel(
+        "",
+        x.axis(None),
+        Axis(colouring.quantity, colouring.unit, log=colouring.log),
+        (Series(x.positions, numbers, colouring.quantity, BLUE),),
+        tuple(markers),
+    )
+
+
+def _rows(x: CellAxis, colouring: Look, codes: np.ndarray, occurring: list[int]) -> Panel:
+    """Words over a single axis: a row of points for each word."""
+    names = tuple(colouring.categories[i].label for i in occurring)
+    markers = tuple(
+        Markers(
+            x.positions[codes == i],
+            np.full(int(np.sum(codes == i)), float(row)),
+            "",
+            colouring.categories[i].colour,
+            "patch",
+        )
+        for row, i in enumerate(occurring)
+    )
+    return Panel("", x.axis(None), Axis(colouring.quantity, "", (-0.5, len(names) - 0.5), words=names), markers=markers)
+
+
+def _samples(
+    axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, float] | None
+) -> tuple[list[Panel], str]:
+    """Samples over the first two of their keys; and what else was sampled."""
+    if len(axes) < 2:
+        raise ValueError(f"map: got samples of {len(axes)} key, expected at least two")
+    x, y, *further = axes
+    cloud = Cloud(x.positions, y.positions, colouring.numbers.values, *colouring.scale, colouring.codes.values)
+    panel = Panel("", x.axis(None), y.axis(None), markers=_marked(marker, x, y), clouds=(cloud,))
+    also = ", ".join(axis.quantity for axis in further)
+    return [panel], f"Sampled as well: {also}." if also else ""

@@ -1,0 +1,116 @@
+"""The page of a map: one file that opens offline, where a click on a cell shows its run and how to repeat it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+from friso.questions.map.cells import SAMPLE, axes_of
+from friso.questions.map.data import machine_of, page_data, picked
+from friso.questions.map.figures import map_figure
+from friso.questions.map.findings import caveats, failures, headline, meanings, verification
+from friso.questions.map.places import SHOWN, with_places
+from friso.questions.map.words import CATEGORIES, grouped, tally, variable
+from friso.shown.drawing.images import FORMATS, ON_PAGE, Image, draw_beforehand, save
+from friso.shown.drawing.packing import packed_json
+from friso.shown.files import Content
+from friso.shown.pages import Report, print_image, script
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from friso.shown.drawing.figure import Figure
+    from friso.studies.traces import Traces
+
+FORMS = (*FORMATS, "html")
+"""Suffixes of the files of a map."""
+
+PRINTED = ON_PAGE._replace(noted=False)
+"""What the page shows where it is printed."""
+
+
+def map_files(runs: xr.Dataset, metric: str, rerun: str, draw: Callable[[], Traces | None]) -> dict[str, Content]:
+    """The figure in all formats and the page of a map, by their suffixes in the order of `FORMS`; `rerun` as in
+    `map_html`, and `draw` makes the runs that are `drawn` there, beside which the figure is."""
+    figure = marked_figure(runs, metric)
+    draw_beforehand([figure], [*map(Image, FORMATS), PRINTED])
+    files: dict[str, Content] = {form: partial(save, figure) for form in FORMS[:-1]}
+    return {**files, FORMS[-1]: map_html(runs, metric, rerun, draw(), figure)}
+
+
+def map_html(
+    runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None, figure: Figure | None = None
+) -> str:
+    """The whole page of the runs of a sweep, which opens with the variable `metric`; `figure`: that of it, if there is
+    one already.
+
+    `drawn`: the runs of all cells, in C order; the page draws that of a cell that is chosen. `rerun`: the command that
+    repeats one run, with {indices} where the indices of its cell go, in the order of the axes: "friso simulate --cell
+    map.zarr {indices}". Raises ValueError where that is missing, and as `map_figure`.
+    """
+    if "{indices}" not in rerun:
+        raise ValueError(
+            f"rerun: got {rerun!r}, expected {{indices}} in it, e.g. 'friso simulate --cell x {{indices}}'"
+        )
+    figure = figure or marked_figure(runs, metric)
+    return Report(
+        "map",
+        runs.attrs.get("name") or "Unnamed stage",
+        stage_file=runs.attrs.get("stage", ""),
+        version=runs.attrs.get("friso", ""),
+        scripted=True,
+        values={
+            "headline": headline(runs, metric),
+            "verification": verification(runs),
+            "facts": _facts(runs, metric),
+            "thinned": _thinned(runs),
+            "undrawn": drawn is None,
+            "data": packed_json(page_data(runs, metric, rerun, drawn)),
+            "figure": figure,
+            "printed": print_image(figure, noted=PRINTED.noted),
+            "script": script("map"),
+            "rtol": f"{float(runs.attrs['rtol']):g}",
+        },
+    ).html()
+
+
+def marked_figure(runs: xr.Dataset, metric: str) -> Figure:
+    """The figure of a map, over two axes with the place of the machine that was swept."""
+    figure, stage = map_figure(runs, metric), machine_of(runs)
+    keys = [] if SAMPLE in runs.dims else [axis.key for axis in axes_of(runs)]
+    return with_places(figure, [(SHOWN, stage)], keys) if stage and len(keys) == 2 else figure
+
+
+def _facts(runs: xr.Dataset, metric: str) -> list[tuple[str, str]]:
+    """The table under the map: what was varied, how well it was computed, and what came out."""
+    facts = [("Stage", name)] if (name := str(runs.attrs.get("name", ""))) else []
+    facts += [(axis.quantity, f"{axis.span()} ({axis.key})") for axis in axes_of(runs)]
+    facts.append(("Relative tolerance", f"{float(runs.attrs['rtol']):g}"))
+    facts.append(("Verification", verification(runs)))
+    for name in CATEGORIES:
+        facts += [(variable(name), words)] if (words := tally(runs, name)) else []
+    facts += meanings(runs)
+    facts += [("Criterion", text)] if (text := runs[metric].attrs.get("criterion")) and metric not in CATEGORIES else []
+    facts += [("Note", " ".join(notes))] if (notes := caveats(runs, metric)) else []
+    links = json.loads(runs.attrs.get("links", "{}"))
+    facts += [("Links", "; ".join(f"{key} = {text}" for key, text in links.items()))] if links else []
+    facts += [(f"Without result: {grouped(number)}", reason) for reason, number in failures(runs).items()]
+    return facts
+
+
+def _thinned(runs: xr.Dataset) -> str:
+    """Which part of a map too large for a page is in it."""
+    sizes = [runs.sizes[SAMPLE]] if SAMPLE in runs.dims else [len(axis.places) for axis in axes_of(runs)]
+    names = ["samples"] if SAMPLE in runs.dims else [axis.quantity for axis in axes_of(runs)]
+    parts = [
+        f"{len(indices)} of the {size} values of {name}"
+        if name != "samples"
+        else f"{len(indices)} of the {size} samples"
+        for name, size, indices in zip(names, sizes, picked(runs), strict=True)
+        if len(indices) < size
+    ]
+    return (
+        f"In this page: {' and '.join(parts)}, evenly picked; the files of the map hold all of them." if parts else ""
+    )

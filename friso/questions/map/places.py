@@ -1,0 +1,38 @@
+"""Where machines stand in a figure over two keys."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.shown.drawing.figure import GREY, INK, Axis, Figure, Markers, Panel
+from friso.studies.scalings import SCALINGS
+
+if TYPE_CHECKING:
+    from friso.stage import Stage
+
+SHOWN = "this machine"
+"""What the machine is called that a figure is about; any other one is grey."""
+
+
+def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Sequence[str]) -> Figure:
+    """A figure over two keys with the places of some stages, by label, that have both, where they lie inside of it."""
+    places = []
+    for label, stage in stands:
+        right, up = ({**dict.fromkeys(SCALINGS, 1.0), **stage.flat()}.get(key) for key in keys)
+        if isinstance(right, float) and isinstance(up, float):
+            colour = INK if label == SHOWN else GREY
+            places.append(Markers(np.array([right]), np.array([up]), label, colour, "target"))
+
+    def marked(panel: Panel) -> Panel:
+        inside = [one for one in places if _is_on(panel.x, one.x[0]) and _is_on(panel.y, one.y[0])]
+        return replace(panel, markers=(*panel.markers, *inside))
+
+    return replace(figure, panels=tuple(map(marked, figure.panels)))
+
+
+def _is_on(axis: Axis, value: float) -> bool:
+    return axis.limits is None or axis.limits[0] <= value <= axis.limits[1]

@@ -1,0 +1,373 @@
+"""Where does it hunt: keys swept over ranges, in memory or in a store that an interrupted study resumes from."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.axis import speak_of
+from friso.errors import InputError, StoreError
+from friso.interface.answer import Answer, question
+from friso.interface.inputs import LOGGER, Changes, StageLike, mention_unstable_loop, read_stage, tolerance_of, wrong
+from friso.interface.output_folder import check_file, refuse_place, write
+from friso.platform.extras import need
+from friso.platform.system import MOST_PROCESSES, cause_of, path_of, shell_word, usable_cores
+from friso.progress import Progress, silent
+from friso.quantities import percent
+from friso.questions.map.study import (
+    Varied,
+    as_stored,
+    coloured_by,
+    drawn_runs,
+    export_files,
+    path_beside,
+    place_of_store,
+    refuse_overwriting,
+    stored_study,
+    study_for,
+    write_beside,
+)
+from friso.stage import Stage
+from friso.studies.axes import AxisValues
+from friso.studies.cells import SKETCH
+from friso.studies.execute import Crew, local_crew
+from friso.studies.samples import Samples
+from friso.studies.store import Store, check_store, holds_all, in_memory, read_store
+from friso.studies.store_folder import ReadOnlyStoreError
+from friso.studies.study import Study
+from friso.studies.sweep import fill, run_in_memory
+from friso.studies.verify import WANTED, checked_share, loosest_rtol, verify_cells
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from friso.shown.drawing.figure import Figure
+    from friso.shown.files import Content, Files
+
+LARGE = 10_000_000
+"""Cells from which on a study has to be confirmed: minutes of computation and a gigabyte."""
+
+
+class SweepAnswer(Answer):
+    """What the runs of a sweep do: `result` is an xarray.Dataset with a dimension per axis; `metric` colours its map,
+    `store` is the folder that it is in, or None."""
+
+    command = "map"
+
+    def __init__(
+        self, study: Study, runs: xr.Dataset, metric: str, store: Path | None, exports: Sequence[Path]
+    ) -> None:
+        self.study, self.result, self.metric, self.store, self.exports = study, runs, metric, store, tuple(exports)
+        self.axis_kind = study.stage.axis_kind
+
+    @property
+    def data(self) -> xr.Dataset:
+        """Outcome, peaks, amplitude, status, ... over the axes, whose coordinates are in SI."""
+        return self.result
+
+    @property
+    def drawable(self) -> bool:
+        """Whether there are few enough cells for a figure and a page."""
+        return self.study.cells <= LARGE
+
+    def cell(self, *numbers: int | str) -> Stage:
+        """The stage of a cell, by its numbers along the axes: ``answer.cell(3, 4)`` or ``answer.cell("3 4")``."""
+        parts = [int(part) for number in numbers for part in str(number).split()]
+        return self.study.cell_stage(parts)
+
+    def sentences(self) -> Sequence[str]:
+        """Which share of the runs swings at its end, and where."""
+        from friso.questions.map.findings import sentences
+
+        texts = sentences(self.result, self.study, self.metric)
+        return texts if self.store is None else [*texts, f"store: {self.store}"]
+
+    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
+        """How a cell is run by itself: that which swings farthest at its end."""
+        if self.store is None:
+            return []
+        swings = np.nan_to_num(self.result["peak_to_peak"].to_numpy(), nan=-np.inf)
+        cell = " ".join(map(str, np.unravel_index(swings.argmax(), swings.shape)))
+        return [f"friso simulate --cell {shell_word(str(self.store))} {cell}"]
+
+    def figures(self) -> Sequence[Figure]:
+        """The map."""
+        from friso.questions.map.figures import map_figure
+
+        return [map_figure(self.result, self.metric)] if self.drawable else []
+
+    def document(self) -> dict[str, Any]:
+        """The axes, what came out, and how much of it survives a tighter tolerance."""
+        from friso.questions.map.document import map_document
+
+        return map_document(self.result, self.study, self.store, self.metric)
+
+    def files(self, progress: Progress = silent) -> Files:
+        """The figure in all formats and the page, by name."""
+        return {f"map.{form}": content for form, content in self._views(progress).items()}
+
+    def files_beside(self, progress: Progress = silent) -> Mapping[Path, Content]:
+        """The figure and the page beside the store, unless there are too many cells for them, and the exports. The runs
+        that the page draws are made here, which `progress` is told."""
+        views = {} if self.store is None else self._views(progress)
+        beside = {path_beside(self.store, form): content for form, content in views.items() if self.store is not None}
+        return {**beside, **export_files(self.result, [*self.exports])}
+
+    def _views(self, progress: Progress) -> Files:
+        """The figure in all formats and the page, by the format; none of too many cells."""
+        from friso.questions.map.page import map_files
+
+        if not self.drawable:
+            return {}
+        again = 'friso.simulate(runs.cell("{indices}"))'
+        if self.store is not None:
+            again = f"friso simulate --cell {shell_word(str(self.store))} {{indices}}"
+        return map_files(self.result, self.metric, again, partial(drawn_runs, self.study, self.result, progress))
+
+
+@question
+def sweep(
+    stage: StageLike,
+    axes: Mapping[str, AxisValues] | None = None,
+    samples: int | Samples | None = None,
+    *,
+    x: str | None = None,
+    y: str | None = None,
+    axis: Iterable[str] = (),
+    link: Changes = None,
+    latin: bool = False,
+    log: bool = False,
+    set: Changes = None,
+    metric: str | None = None,
+    confirm: bool = False,
+    rtol: float | str | None = None,
+    verify: float = 0.0,
+    refine: bool = False,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    export: Iterable[str | os.PathLike[str]] = (),
+    out: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+    yes: bool = False,
+    beside: bool = False,
+    progress: Progress = silent,
+) -> SweepAnswer:
+    """Run every combination of the values of some keys: what `friso map` does.
+
+    Parameters
+    ----------
+    stage : Stage, path or dict
+        The stage, its file, or the tables of one; or the folder of a study that is to go on.
+    axes : dict, optional
+        Keys with their values: ``(np.linspace(1, 40, 41), "Hz")``, a range ``"1 Hz..40 Hz:41"`` (behind ":log",
+        logarithmic), or a list of texts with units, bare numbers, words or booleans, where the key takes these.
+    samples : int or Samples, optional
+        Number of Sobol points over the ranges, instead of a grid; or several keys that vary at once.
+    x, y, axis : str, optional
+        Axes as texts, as on the command line: ``x="controller.crossover=1 Hz..40 Hz:41"``.
+    link : dict, optional
+        SI expressions for keys that follow: ``{"masses.cart": "0.7 * mass"}``.
+    latin : bool
+        Whether samples are a Latin hypercube.
+    log : bool
+        Whether all ranges are logarithmic.
+    set : dict, optional
+        Keys to override.
+    metric : str, optional
+        What the map shows in colour. Of the stage: "sketch" (default), which tells whether it hunts by coarse return
+        maps, and by closed orbits where these are in doubt; "verdict", "multiplier", "amplitude", "period", by a search
+        of every cell. Of each run: "outcome", "peaks", ...
+    confirm : bool
+        Whether every cell of a map of verdicts is searched: metric "verdict" instead of "sketch".
+    rtol : float or "auto", optional
+        Relative tolerance, default 1e-6; "auto": the loosest safe one.
+    verify : float
+        Share of the cells that is run again at rtol/100; `verified_surviving` among the attributes counts the outcomes
+        that survived.
+    refine : bool
+        Whether the grid is made 4 times finer, and run only along its boundaries.
+    workers : int, optional
+        Number of processes to run in; default: the threads of this one.
+    scheduler : str, optional
+        Address of a Dask scheduler to run on.
+    export : list of paths, optional
+        Files ending in .nc or .csv that are written as well.
+    out : path, optional
+        Folder of a Zarr store, filled as results come, and resumed if it exists; default: results are kept in memory.
+    overwrite : bool
+        Whether the store of another study may be replaced, and figures and exports.
+    yes : bool
+        Whether a study of more than ten million cells is meant.
+    beside : bool
+        Whether the caller writes figure, page and exports (``answer.files_beside()``): that they can be is made sure
+        before anything is run. Default: exports are written, all of them or none.
+    progress : Progress
+        Called as cells are done.
+
+    Returns
+    -------
+    SweepAnswer
+        An xarray.Dataset with a dimension per axis, ``answer.data``: outcome, peaks, peak_to_peak [m], period [s],
+        settling_time [s], largest_force [N], status, ...; ``(answer.outcome == "swings").mean()``.
+
+    Raises
+    ------
+    InputError
+        For a stage, an axis, a link, a store or an option that is not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> runs = friso.sweep(friso.example("thesis_rig"), {"joint.stroke": "0.2 mm..1 mm:3"})
+    >>> runs.sizes["joint.stroke"]
+    3
+    """
+    exports, share = _checked_exports(export), checked_share(verify)
+    if confirm and metric not in (None, SKETCH, "verdict"):
+        raise InputError("confirm", f"--confirm and --metric {metric}", "one of the two: it searches for verdicts", "")
+    varied = Varied.of_texts(axes or {}, x, y, axis, link, samples, latin, log)
+    store = None if out is None else place_of_store(out)
+    if scheduler is not None:
+        need("cluster", "scheduler")
+    with _crew(workers, scheduler) as crew:
+        resumed = Path(stage) if isinstance(stage, str | os.PathLike) and Path(stage).is_dir() else None
+        if resumed is not None:
+            if varied != Varied() or set or rtol or refine or out or confirm:
+                raise _another_study(resumed)
+            store = place_of_store(resumed)
+            study, metric = stored_study(store, metric, None if yes else LARGE)
+        else:
+            metric = ("verdict" if confirm else SKETCH) if metric in (None, SKETCH) else metric
+            chosen = read_stage(stage, set)
+            study = study_for(chosen, varied, metric, refine, None if yes else LARGE, crew)
+            study = replace(study, rtol=_chosen_rtol(1e-6 if rtol is None else rtol, study, crew))
+            study = study if store is None else as_stored(study, store, metric, overwrite)
+        speak_of(study.stage.axis_kind)
+        if store is None:
+            for path in exports:
+                check_file("export", path, overwrite)
+            mention_unstable_loop(study.stage)
+            runs, can_note = run_in_memory([study], crew, share, progress)[0], False
+        else:
+            example = f"--out {shell_word(f'{store.stem}-2.zarr')}" if resumed is None else "--out figures"
+            refuse_overwriting(study, store, exports, overwrite, example if beside else "")
+            mention_unstable_loop(study.stage)
+            runs, can_note = _filled(study, store, crew, share, overwrite, metric, beside, progress)
+    held = in_memory(runs) if store is not None and study.cells <= LARGE else runs
+    if store is None:
+        write(export_files(held, exports), exports if overwrite else ())
+    elif exports and not beside:
+        write_beside(export_files(held, exports), store, overwrite, progress, can_note)
+    return SweepAnswer(study, held, coloured_by(study, metric), store, exports)
+
+
+def whole(store: str | os.PathLike[str]) -> dict[str, Any]:
+    """Whether a store is whole: blocks, how many are done, which are damaged or may not be read. Raises StoreError
+    where it cannot be read at all."""
+    state = check_store(Path(store))
+    damage = {"damaged": state.damaged, "damaged_files": state.files, "unreadable": state.unreadable}
+    return {"store": str(store), "blocks": state.blocks, "done": state.done, **damage}
+
+
+def _another_study(store: Path) -> InputError:
+    problem = "a store together with options that would make it another study"
+    resumed = f"friso map {shell_word(str(store))}"
+    return InputError(str(store), problem, "the store alone: it contains its study", resumed)
+
+
+def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
+    """The tolerance asked for; "auto" is chosen on a sample of the cells, and said."""
+    if entry != "auto":
+        return tolerance_of(entry)
+    rtol, shares, cells = loosest_rtol(study, crew)
+    surviving = f"of {cells} cells, " + ", ".join(
+        f"{percent(share, 3)} at {rtol_:g}" for rtol_, share in shares.items()
+    )
+    if shares.get(rtol, 0.0) >= WANTED:
+        LOGGER.warning(f"rtol {rtol:g} is the loosest at which {percent(WANTED)} of the outcomes survive ({surviving})")
+    else:
+        LOGGER.warning(
+            f"at no tolerance do {percent(WANTED)} of the outcomes survive ({surviving}); rtol {rtol:g} is used"
+        )
+    return rtol
+
+
+@contextmanager
+def _crew(workers: int | None, scheduler: str | None) -> Iterator[Crew]:
+    if workers is not None and scheduler is not None:
+        raise InputError("workers", "--workers and --scheduler", "one of the two", "workers=4")
+    most = min(usable_cores(), MOST_PROCESSES)
+    if workers is not None and not 1 <= workers <= most:
+        expected = f"1 worker or more, up to the {most} cores that may be used"
+        raise wrong("workers", str(workers), expected, "1")
+    if scheduler is not None:
+        from friso.studies.distribute import connected
+
+        with connected(scheduler) as crew:
+            yield crew
+    elif workers is not None:
+        from friso.studies.processes import processes
+
+        with processes(workers) as crew:
+            yield crew
+    else:
+        with local_crew() as crew:
+            yield crew
+
+
+def _filled(
+    study: Study, store: Path, crew: Crew, share: float, overwrite: bool, metric: str, beside: bool, progress: Progress
+) -> tuple[xr.Dataset, bool]:
+    """Run what the store lacks, and note there what is drawn of it; the runs, and whether anything can be noted there.
+    Whatever ends it early, the message says where the rest is. One in which nothing can be written is read, if it lacks
+    nothing, and unless figures are to be written `beside` it, which it has to note."""
+    stored = 0
+
+    def counted(done: int, total: int, what: str, /) -> None:
+        nonlocal stored
+        stored = done
+        progress(done, total, store.name)
+
+    try:
+        with Store.opened(store, study, overwrite) as opened:
+            opened.note(metric=opened.notes.get("metric", metric))
+            return fill(opened, crew, share, counted), True
+    except ReadOnlyStoreError as error:
+        if not holds_all(store, study):
+            raise
+        if beside:
+            elsewhere = f"friso map {shell_word(str(store))} --out figures"
+            raise StoreError(
+                "", error.actual, f"{error.expected}, or figures elsewhere", elsewhere, str(store)
+            ) from None
+        runs = read_store(store)
+        runs.attrs |= verify_cells(study, runs, crew, share)
+        return runs, False
+    except (KeyboardInterrupt, OSError, RuntimeError) as error:
+        far, resumed = f"{stored} of {study.cells} cells are stored", f"friso map {shell_word(str(store))}"
+        if isinstance(error, OSError):
+            actual = f"{cause_of(error)}: {path_of(error)}".removesuffix(": ")
+            raise StoreError(
+                "", f"{actual}; {far}", "a disk that can be written, to resume", resumed, str(store)
+            ) from None
+        if store.exists():
+            LOGGER.warning(f"{far}; to resume: {resumed}")
+        raise
+
+
+def _checked_exports(export: Iterable[str | os.PathLike[str]]) -> list[Path]:
+    files = [Path(os.path.realpath(path) if os.path.islink(path) else path) for path in export]  # a link stays one
+    for path in files:
+        refuse_place("export", path)
+        if path.suffix not in (".nc", ".csv") or path.is_dir():
+            raise wrong("export", str(path), "a file that ends in .nc or .csv", "map.nc")
+        if not (path.parent.is_dir() and os.access(path.parent, os.W_OK)):
+            raise wrong("export", str(path), "a file in an existing folder that can be written", "map.nc")
+    return files

@@ -1,0 +1,283 @@
+"""What a sweep is asked for and writes: the study, what it would cost, the files beside its store."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.errors import InputError, StoreError
+from friso.interface.inputs import Changes, axes_of, pairs_of, wrong
+from friso.interface.output_folder import check_file, check_store_folder, drafts_of, refuse_place, written
+from friso.platform.system import shell_word
+from friso.progress import Progress, silent
+from friso.quantities import quoted
+from friso.stage import Stage
+from friso.studies.axes import AxisValues
+from friso.studies.cells import BY_ATTRACTORS, CYCLE_UNITS, INFERRED, METRICS, USUAL, VERDICTS
+from friso.studies.execute import Crew
+from friso.studies.refine import FINER, SHARE, finer
+from friso.studies.request import Request
+from friso.studies.samples import Samples
+from friso.studies.study import Study, study_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from friso.shown.files import Content
+    from friso.studies.traces import Traces
+
+AXIS_EXAMPLE = 'masses.stage="0.2 kg..2 kg:41"'
+
+DRAWN = 4096
+"""Cells up to which a page holds the run of each of them."""
+
+BYTES = 8
+"""Bytes of a number in a store, before they are compressed."""
+
+
+@dataclass(frozen=True)
+class Varied:
+    """The options that say what is varied, as they were given."""
+
+    axes: Mapping[str, AxisValues] = field(default_factory=dict)
+    links: Mapping[str, str] = field(default_factory=dict)
+    samples: int | Samples | None = None
+    latin: bool = False
+    log: bool = False
+
+    @classmethod
+    def of_texts(
+        cls,
+        axes: Mapping[str, AxisValues],
+        x: str | None,
+        y: str | None,
+        more: Iterable[str],
+        link: Changes,
+        samples: int | Samples | None,
+        latin: bool,
+        log: bool,
+    ) -> Varied:
+        """The axes of a dictionary and those of texts KEY=RANGE, each once. Raises InputError."""
+        named = {"x": x, "y": y} | {f"axis {k + 1}": text for k, text in enumerate(more)}
+        return cls(
+            axes_of(axes, named, AXIS_EXAMPLE), pairs_of(link, "link", 'masses.cart="0.7 * mass"'), samples, latin, log
+        )
+
+
+def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int | None, crew: Crew) -> Study:
+    """The study asked for. Raises InputError, also if it has more than `most` cells: then with what it would cost."""
+    axes, links, samples = varied.axes, varied.links, varied.samples
+    if not axes and not isinstance(samples, Samples):
+        raise InputError("x", "no axis", "one axis or more", f"x={AXIS_EXAMPLE}")
+    if isinstance(samples, int):
+        if len(axes) == 1:
+            raise InputError("samples", "samples of one key", "two keys or more; for one, a range with its points")
+        axes, samples = {}, Samples(axes, samples, "latin" if varied.latin else "sobol")
+    elif varied.latin:
+        raise InputError("latin", "no --samples beside it", "how many samples", "--samples 1024 --latin")
+    _check_metric(metric, METRICS)
+    request = Request(stage, axes, samples, links, varied.log)
+    runs = int(request.size() * (SHARE * FINER ** len(axes) if refine else 1))
+    if most is not None and runs > most:
+        raise _too_large(runs, request.trial(), crew)
+    metrics = (*USUAL, *CYCLE_UNITS) if metric in (*BY_ATTRACTORS, "period") else USUAL
+    metrics = (*metrics, metric) if metric in VERDICTS else metrics
+    study = request.study(metrics)
+    return finer(study) if refine else study
+
+
+def stored_study(store: Path, metric: str | None, most: int | None) -> tuple[Study, str]:
+    """The study of a store that is gone on with, and what colours its map: the `metric`, or what the store was made
+    for. Raises InputError, also where runs of a study of more than `most` cells are left."""
+    from friso.studies.metadata import checked_metadata
+    from friso.studies.store import Store, read_store
+
+    with read_store(store) as runs:
+        study = study_of(runs)
+    if most is not None and study.cells > most and not Store(store, study).is_done:
+        actual = f"{study.cells:.3g} cells in {store}, not all of which were run"
+        raise InputError("yes", actual, "--yes, if so many are meant; nothing was run", "yes=True")
+    metric = metric or str(checked_metadata(store).notes.get("metric", "outcome"))
+    if metric in METRICS and metric not in study.metrics:
+        actual, expected = f"{metric}, which {store} does not hold", "one that it holds, or a new map"
+        example = f"friso map STAGE.toml ... --metric {metric} --out {shell_word(f'{store.stem}-{metric}.zarr')}"
+        raise InputError("metric", actual, expected, example)
+    _check_metric(metric, study.metrics)
+    return study, metric
+
+
+def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
+    """The study with all that the store holds, where that is the same but for measures beyond those asked for. Raises
+    InputError where the store lacks just some of them and is not to be replaced."""
+    from friso.studies.store import read_store
+    from friso.studies.store_folder import remove_leftovers
+
+    remove_leftovers(store)  # one that was being replaced is put back
+    try:
+        with read_store(store) as runs:
+            stored, equations = study_of(runs), str(runs.attrs.get("equations"))
+    except StoreError:  # there is none, or it will be refused
+        return study
+    if replace(study, metrics=stored.metrics).differences(stored, equations):
+        return study
+    lacking = [name for name in study.metrics if name not in stored.metrics]
+    if lacking and not overwrite:
+        actual = f"{store}, which holds no {metric if metric in lacking else ', '.join(lacking)}"
+        raise InputError(
+            "--out", actual, "another --out, or --overwrite", f"--out {shell_word(f'{store.stem}-{metric}.zarr')}"
+        )
+    return study if lacking else stored
+
+
+def _check_metric(metric: str, possible: Sequence[str]) -> None:
+    """Raises InputError for a metric that there is not."""
+    names = [name for name in possible if name != "status"]
+    if metric not in names:
+        raise InputError("metric", quoted(metric), f"one of {', '.join(names)}", "metric=peak_to_peak")
+
+
+def coloured_by(study: Study, metric: str) -> str:
+    """The variable that colours the map: "period" is that of the hunting cycle, where the study has it."""
+    return "cycle_period" if metric == "period" and study.cycles else metric
+
+
+def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
+    """What a study of so many runs would cost, by a trial of a few of its cells."""
+    from friso.studies.execute import run_scattered
+
+    run_scattered(trial, np.arange(crew.size), crew)  # has the kernels compiled
+    start = time.perf_counter()
+    run_scattered(trial, np.arange(trial.cells), crew)
+    hours = (time.perf_counter() - start) / trial.cells * runs / 3600
+    gigabytes = BYTES * len(trial.metrics) * runs / 1e9
+    size = f"{runs:.3g} runs: about {hours:.2g} hours on this machine, and up to {gigabytes:.2g} GB of disk"
+    return InputError("yes", size, "--yes, or fewer points; nothing was run", "yes=True")
+
+
+def drawn_runs(study: Study, runs: xr.Dataset, progress: Progress = silent) -> Traces | None:
+    """The runs of the cells that were not inferred, for the page to draw; None of more than DRAWN cells."""
+    from friso.studies.traces import traces
+
+    if study.cells > DRAWN:
+        return None
+    inferred = np.array([str(status).startswith(INFERRED) for status in runs["status"].values.ravel()])
+    return traces(study, inferred, progress)
+
+
+def place_of_store(folder: str | os.PathLike[str]) -> Path:
+    """The folder of a store, by a name of its own also where it is "." or "..". Raises InputError where it can have
+    none."""
+    path = Path(folder)
+    path = path if path.name not in ("", "..") else Path(os.path.abspath(path))
+    if not path.name:
+        raise wrong("out", str(path), "the folder of a store, with a name", "map.zarr")
+    refuse_place("out", path)
+    return path
+
+
+def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
+    """The study as NetCDF or CSV, by the suffix."""
+    from friso.studies.export import export
+
+    return dict.fromkeys(paths, partial(export, runs))
+
+
+def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite: bool, beside: str = "") -> None:
+    """Refuse to write over what is no earlier result of this study, nor, where figure and page are written `beside` the
+    store, over such of others: with this example. Raises InputError, StoreError where another study is in its store."""
+    from friso.studies.metadata import is_store
+    from friso.studies.store import refuse_other
+
+    if store in exports:
+        raise wrong("export", f"{store}, which is the store", "another name", "map.nc")
+    check_store_folder(store)
+    if not overwrite and is_store(store):
+        refuse_other(store, study)
+    own = _own_files(store, exports)
+    for view in _views(store) if beside else ():
+        check_file("--out", view, overwrite, [store], is_own=view in own, example=beside)
+    for path in exports:
+        check_file("--export", path, overwrite, [store], is_own=path in own)
+
+
+def write_beside(
+    files: Mapping[Path, Content], store: Path, overwrite: bool, progress: Progress, can_note: bool = True
+) -> list[Path]:
+    """Write figure, page and exports of a store, all of them or none; their paths. Of what is there by then, only what
+    the store wrote gives way, unless `overwrite`; that it writes these, it notes first, if it can.
+
+    Raises StoreError where another process holds the store, or nothing can be noted after all, OSError where a file
+    cannot be written.
+    """
+    from friso.studies.metadata import annotate_metadata
+    from friso.studies.store_folder import lock_store
+
+    with drafts_of(files, progress) as drafts, lock_store(store, PATIENCE) if can_note else nullcontext():
+        own = _own_files(store, files)
+        if can_note:
+            digests = {
+                path.name: sorted({str(_digest(file)) for file in ([draft, path] if path in own else [draft])})
+                for draft, path in drafts.drafts
+                if draft is not None
+            }
+            annotate_metadata(store, notes={"views": {**_noted_digests(store), **digests}})
+        drafts.put_in_place([*files] if overwrite else own)
+    return written(files)
+
+
+PATIENCE = 10.0
+"""How long [s] another process is waited for that is noting something in a store."""
+
+
+def _views(store: Path) -> list[Path]:
+    """The figure in all formats and the page beside a store."""
+    from friso.questions.map.page import FORMS
+
+    return [path_beside(store, form) for form in FORMS]
+
+
+def _own_files(store: Path, exports: Iterable[Path]) -> list[Path]:
+    """Those among the figure and the page beside a store, and its exports, that are as it wrote files of these names,
+    by the digests that it notes."""
+    noted = _noted_digests(store)
+    named = {path: noted[path.name] for path in (*_views(store), *exports) if path.name in noted}
+    return [path for path, earlier in named.items() if (digest := _digest(path)) is not None and digest in earlier]
+
+
+def _noted_digests(store: Path) -> dict[str, list[object]]:
+    """The digests that a store notes, which may be of others, by the names of the files."""
+    from friso.studies.metadata import checked_metadata
+
+    try:
+        noted = checked_metadata(store).notes.get("views")
+    except StoreError:
+        return {}
+    digests = noted if isinstance(noted, dict) else {}
+    return {name: digest for name, digest in digests.items() if isinstance(digest, list)}
+
+
+def _digest(file: Path) -> str | None:
+    from friso.studies.store_files import digest_of
+
+    try:
+        return digest_of(file, _MOST_OF_A_FILE)
+    except PermissionError:
+        return None
+
+
+_MOST_OF_A_FILE = 1 << 30
+"""Bytes of a figure, a page or an export at most that is known again."""
+
+
+def path_beside(store: Path, form: str) -> Path:
+    """The path of the figure or the page of a store, by its format."""
+    stem = store.with_suffix("") if store.suffix == ".zarr" else store
+    return stem.with_name(f"{stem.name}.{form}")

@@ -1,0 +1,205 @@
+"""What constant speed on the rig shows of dynamic friction, and what it does not (thesis, Fig. 21)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from friso.identification.estimate import Estimate
+from friso.questions.identify.kinds.slow_sliding import slow_sliding_caption, slow_sliding_panels
+from friso.questions.identify.numbers import with_interval
+from friso.questions.rig.outcome_view import OutcomeView
+from friso.shown.drawing.figure import BLUE, GREEN, ORANGE, PINK, VERMILLION, Axis, Figure, Markers, Panel, Series
+from friso.shown.drawing.prefixes import listed, with_unit
+from friso.studies.rig.experiments.constant_speed import ConstantSpeedResult, Passes
+from friso.studies.rig.many_speeds import ManySpeeds, PlaceOnRail
+from friso.studies.rig.outcome import Outcome, RigLog
+from friso.studies.rig.slow_sliding import Slow
+
+COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
+"""Colours of the places."""
+
+
+def sentences(outcome: Outcome) -> list[str]:
+    """Friction along the rail, its truth, and what many speeds and slow sliding show."""
+    result: ConstantSpeedResult = outcome.result
+    lines = [f"Joint {case.name}: {case.place.verdict}" for case in result.cases]
+    for case in result.cases:
+        coulomb = case.velocity.both.coulomb
+        level = with_unit(coulomb.value, "N") if coulomb.determined else f"not shown ({coulomb.reason})"
+        lines.append(f"Joint {case.name}: Coulomb friction {level}.")
+    true = listed(
+        [
+            f"{with_unit(float(force), 'N')} at {with_unit(speed, 'm/s')}"
+            for force, speed in zip(result.cases[0].true, result.speeds, strict=True)
+        ],
+        "and",
+    )
+    return [*lines, f"The true mean dynamic friction along the travel is {true}.", *_many(result), *_slow(result)]
+
+
+def _slow(result: ConstantSpeedResult) -> list[str]:
+    """What slow sliding shows."""
+    if not result.slow:
+        return []
+    head = "Slow sliding, joint locked, at the edge of steady motion, with the true mass and bristles:"
+    return [head, *map(_slow_place, result.slow)]
+
+
+def _slow_place(sliding: Slow) -> str:
+    names = ("Coulomb friction", "static friction", "the Stribeck velocity")
+    flat = sliding.log.stage.flat()
+    true = [*sliding.true, flat["friction.stribeck_velocity"]]
+    estimates = [
+        with_interval(estimate) if estimate.determined else f"not shown ({estimate.reason})"
+        for estimate in sliding.result.estimates
+    ]
+    texts = [
+        f"{name} {text} (true: {with_unit(float(value), unit)})"
+        for name, text, value, unit in zip(names, estimates, true, ("N", "N", "m/s"), strict=True)
+    ]
+    return f"From {_start(sliding.log)} on: {'; '.join(texts)}."
+
+
+def _start(log: RigLog) -> str:
+    """The place where a log begins."""
+    places = log.true.get("cart_position", log.true["position"])
+    return with_unit(float(places[0]), "m") if len(places) else "nowhere"
+
+
+def _many(result: ConstantSpeedResult) -> list[str]:
+    """What the many speeds show, at each place."""
+    crossover = with_unit(result.many.crossover, "Hz")
+    head = f"Many speeds, joint locked, crossover {crossover}:"
+    return [head, *(_place(number, place) for number, place in enumerate(result.many.places, start=1))]
+
+
+def _place(number: int, place: PlaceOnRail) -> str:
+    both, reached = place.velocity.both, np.abs(place.velocity.velocities)
+    named = (("Coulomb friction", both.coulomb), ("viscous friction", both.viscous))
+    named += (("static friction", both.static), ("the Stribeck velocity", both.stribeck_velocity))
+    certain = [f"{words} {with_interval(estimate)}" for words, estimate in named if estimate.determined]
+    hidden = {
+        estimate.reason: [words for words, named_estimate in named if named_estimate.reason == estimate.reason]
+        for _, estimate in named
+    }
+    unknown = [f"not shown: {listed(words, 'and')} ({reason})" for reason, words in hidden.items() if reason]
+    ends = [with_unit(float(end(reached)), "m/s") for end in (np.min, np.max) if len(reached)]
+    passed = f"{len(reached)} steady passes{' from ' if ends else ''}{' to '.join(ends)}"
+    head = f"Place {number}, from {_start(place.log)} on, {passed}"
+    stopped = [f"the log stopped {place.log.failure}"] if place.log.failure else []
+    return f"{head}: {'; '.join([*stopped, *certain, *unknown])}."
+
+
+def figures(outcome: Outcome) -> list[Figure]:
+    """Force against position at both speeds, a column for each state of the joint."""
+    result: ConstantSpeedResult = outcome.result
+    panels = tuple(
+        Panel(
+            f"joint {case.name}",
+            Axis("Position", "m"),
+            Axis("Force", "N"),
+            tuple(_lines(case, result.speeds)),
+        )
+        for case in result.cases
+    )
+    caption = "Commanded force of the forward pass, averaged over places; the log also has the return."
+    title = "Force at constant speed"
+    return [
+        Figure("rig_constant_speed", title, caption, panels, columns=1, subject=outcome.stage.name),
+        _over_velocity(outcome),
+        *_in_slow_sliding(outcome),
+    ]
+
+
+def _in_slow_sliding(outcome: Outcome) -> list[Figure]:
+    """The friction at the first place."""
+    result: ConstantSpeedResult = outcome.result
+    places = [sliding.result for sliding in result.slow if len(sliding.result.model)]
+    if not places:
+        return []
+    caption, panels = slow_sliding_caption(places[0]), slow_sliding_panels(places[0])
+    return [Figure("rig_slow_sliding", "Friction in slow sliding", caption, panels, subject=outcome.stage.name)]
+
+
+def _over_velocity(outcome: Outcome) -> Figure:
+    """Friction of the many speeds against the speed, and as it truly is, for each place."""
+    many: ManySpeeds = outcome.result.many
+    lines, points = [], []
+    for number, (place, colour) in enumerate(zip(many.places, COLOURS, strict=False), start=1):
+        lines.append(Series(place.speeds, place.true, f"true, place {number}", colour))
+        points.append(Markers(np.abs(place.velocity.velocities), place.friction, f"place {number}", colour))
+    return Figure(
+        "rig_friction_over_velocity",
+        "Friction over velocity, joint locked",
+        f"Crossover {with_unit(many.crossover, 'Hz')}. Mean commanded force of each steady pass, there and back, "
+        "without the force of inertia and the constant pull of the cables; the lines are the true friction, including "
+        "the drag of the cables, averaged over the stretch that all passes share. Speeds without a mark were not "
+        "steady.",
+        (Panel("", Axis("Speed", "m/s", log=True), Axis("Friction", "N"), tuple(lines), markers=tuple(points)),),
+        subject=outcome.stage.name,
+    )
+
+
+def _lines(passes: Passes, speeds: tuple[float, ...]) -> list[Series]:
+    """The forward passes."""
+    forward = [record for record in passes.place.passes if record.velocity > 0]
+    return [
+        Series(record.places, record.force, with_unit(speed, "m/s"), colour)
+        for record, speed, colour in zip(forward, speeds, (BLUE, VERMILLION), strict=False)
+    ]
+
+
+def numbers(outcome: Outcome) -> dict[str, Any]:
+    """As JSON."""
+    result: ConstantSpeedResult = outcome.result
+    return {"speeds_m_per_s": [*result.speeds], "cases": {case.name: _numbers(case) for case in result.cases}} | {
+        "many_speeds": {
+            "crossover_hz": result.many.crossover,
+            "places": [_place_numbers(place) for place in result.many.places],
+        },
+        "slow_sliding": [_estimates_document(sliding.result.estimates) for sliding in result.slow],
+    }
+
+
+def _place_numbers(place: PlaceOnRail) -> dict[str, Any]:
+    velocity = place.velocity
+    both = (velocity.both.coulomb, velocity.both.viscous, velocity.both.static, velocity.both.stribeck_velocity)
+    return {
+        "velocities_m_per_s": velocity.velocities.tolist(),
+        "forces_n": velocity.forces.tolist(),
+        "friction_n": place.friction.tolist(),
+        "true_speeds_m_per_s": place.speeds.tolist(),
+        "true_dynamic_friction_n": place.true.tolist(),
+        **_estimates_document(both),
+    }
+
+
+def _estimates_document(estimates: Sequence[Estimate]) -> dict[str, Any]:
+    return {
+        "shown": {
+            e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in estimates if e.determined
+        },
+        "not_shown": {estimate.name: estimate.reason for estimate in estimates if not estimate.determined},
+    }
+
+
+def _numbers(passes: Passes) -> dict[str, Any]:
+    coulomb = passes.velocity.both.coulomb
+    return {
+        "separated": passes.place.separated,
+        "verdict": passes.place.verdict,
+        "repeatability": passes.place.repeatability.value,
+        "passes": [
+            {"velocity_m_per_s": record.velocity, "mean_force_n": record.mean.value, "deviation_n": record.spread}
+            for record in passes.place.passes
+        ],
+        "coulomb_n": coulomb.value,
+        "coulomb_reason": coulomb.reason,
+        "true_dynamic_friction_n": np.asarray(passes.true).tolist(),
+    }
+
+
+VIEW = OutcomeView(sentences, figures, numbers)

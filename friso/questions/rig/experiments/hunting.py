@@ -1,0 +1,258 @@
+"""What `friso rig hunting` shows: Fig. 24 and 25 of the thesis, and the share of rails with counted peaks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from friso.axis import axis_shown
+from friso.hunting.criteria import COUNTED_ABOVE, DISTINCT_CRITERION, PEAK_CRITERION
+from friso.hunting.criteria import OUTCOME_CRITERION as OUTCOME
+from friso.quantities import percent
+from friso.questions.rig.outcome_view import OutcomeView
+from friso.shares import Share
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PINK,
+    SKY,
+    VERMILLION,
+    Axis,
+    Band,
+    Figure,
+    Limit,
+    Panel,
+    Series,
+)
+from friso.shown.drawing.prefixes import with_unit
+from friso.studies.rig.experiments.hunting import HuntingResult, Trace
+from friso.studies.rig.moves_on_rails import BAND, RailRuns
+from friso.studies.rig.outcome import Outcome
+
+TIME = Axis("Time", "s")
+COLOURS = {"locked": VERMILLION, "free": BLUE}
+AREAS = {"locked": "#f6dccb", "free": "#cfdfee"}
+LINES = (GREY, GREEN, VERMILLION, ORANGE, PINK, SKY, BLUE, INK, GREY)
+AFTERWARDS = 5.0
+"""From where on [s] what is left of the move decides the height of a panel."""
+
+
+def rails_text(share: Share, count: int) -> str:
+    """A share of rails with its interval, in words."""
+    return f"{round(share.probability * count)} of {count} rails ({percent(share.low)} to {percent(share.high)})"
+
+
+def sentences(outcome: Outcome) -> list[str]:
+    """Where peaks are counted and what swings on, by crossover, on the stage's own rail and on repeated ones."""
+    moves: HuntingResult = outcome.result
+    first = moves.plotted[0]
+    count = len(moves.rails)
+    return [
+        f"After a move of {with_unit(moves.distance, 'm')} at {moves.crossovers[first]:.3g} Hz peaks are counted on "
+        f"{rails_text(moves.shares('locked')[first], count)} with the joint locked, and on "
+        f"{rails_text(moves.shares('free')[first], count)} with it free (95 % intervals).",
+        _swings(moves),
+        f"Joint locked: {_limit(moves, 'locked')} Joint free: {_limit(moves, 'free')}",
+        *_started(moves),
+    ]
+
+
+def _swings(moves: HuntingResult) -> str:
+    """The swings at the stage's own crossover with the joint locked."""
+    runs = moves.cases["locked"]
+    swings, counted = runs.swings[moves.plotted[0]], int(runs.counted[moves.plotted[0]].sum())
+    if not swings.any():
+        return "With the joint locked the stage swings on no rail when the run ends."
+    swing, period = runs.swing[moves.plotted[0]][swings], runs.period[moves.plotted[0]][swings]
+    return (
+        f"With the joint locked the stage still swings at the end of the run on {int(swings.sum())} rails (peaks are "
+        f"counted on {counted}), {with_unit(float(np.median(swing)), 'm')} peak to peak with a period "
+        f"of {with_unit(float(np.median(period)), 's')} (medians)."
+    )
+
+
+def _limit(moves: HuntingResult, case: str) -> str:
+    """Up to where peaks are counted, on any rail and on the one shown."""
+    last, on_rail = moves.limit(case), moves.limit(case, moves.rail)
+    if np.isnan(last):
+        return f"no peaks are counted from {moves.crossovers[0]:.3g} to {moves.crossovers[-1]:.3g} Hz."
+    above = moves.crossovers[moves.crossovers > last]
+    bound = moves.shares(case)[-1].high
+    beyond = (
+        f"none from {above[0]:.3g} Hz on (at most {percent(bound)} of all rails)" if len(above) else "none tried above"
+    )
+    name = f"rail {moves.rails[moves.rail]:.0f}" if len(moves.rails) > 1 else "it"
+    reach = f"on {name} up to {on_rail:.3g} Hz" if np.isfinite(on_rail) else f"none on {name}"
+    return f"peaks are counted on some rails up to {last:.3g} Hz, {beyond}; {reach}."
+
+
+def _started(moves: HuntingResult) -> list[str]:
+    """What a release starts that the move does not."""
+    counts = [
+        f"{int(moves.cases['locked'].counted[row].sum())} and {int(moves.can_start[row].sum())} of {len(moves.rails)} "
+        f"at {moves.crossovers[row]:.3g} Hz"
+        for row in moves.plotted
+    ]
+    listed = ", ".join(with_unit(displacement, "m") for displacement in moves.displacements)
+    texts = [
+        f"Rails with counted peaks, joint locked, after the move, and after it or a release from {listed}: "
+        f"{'; '.join(counts)}."
+    ]
+    if moves.startable is not None:
+        texts.append(
+            f"At {moves.startable.crossover:.3g} Hz no peaks are counted{_rail(moves, moves.startable.rail, ' on')} "
+            "after the move, but released from "
+            f"{with_unit(moves.startable.displacement, 'm')} the stage swings to the end: a run that rests does not "
+            "prove that the stage cannot hunt."
+        )
+    return texts
+
+
+def figures(outcome: Outcome) -> list[Figure]:
+    """Fig. 24, Fig. 25, a start by release, and the share of rails over the crossover."""
+    moves: HuntingResult = outcome.result
+    figures = [_locked_and_free(moves), _crossovers(moves), _shares(moves)]
+    return [*figures, _startable(moves)] if moves.startable is not None else figures
+
+
+def _locked_and_free(moves: HuntingResult) -> Figure:
+    row = moves.plotted[0]
+    lines = tuple(
+        Series(t.time, t.deviation + moves.distance, f"joint {case}", COLOURS[case])
+        for case, t in ((case, moves.traces[case, row]) for case in COLOURS)
+    )
+    reach = _reach([moves.traces[case, row] for case in COLOURS])
+    zoom = (moves.distance - reach, moves.distance + reach)
+    return Figure(
+        "hunting_locked_and_free",
+        f"Move of {with_unit(moves.distance, 'm')} at {moves.crossovers[row]:.3g} Hz{_on(moves)}",
+        "The position that the drive logs (Fig. 24).",
+        (
+            Panel("A: position", TIME, Axis("Position", "m"), lines),
+            Panel(
+                "B: about its end",
+                TIME,
+                Axis("Position", "m", zoom),
+                lines,
+                limits=(Limit((moves.distance,), "reference", INK, "dotted"),),
+            ),
+        ),
+        columns=2,
+    )
+
+
+def _on(moves: HuntingResult) -> str:
+    return _rail(moves, moves.rail, ",")
+
+
+def _rail(moves: HuntingResult, number: int, before: str) -> str:
+    """A rail by its name, where there are several; a stage file without [rail] has one without a name."""
+    return f"{before} rail {moves.rails[number]:.0f}" if len(moves.rails) > 1 else ""
+
+
+def _reach(traces: list[Trace]) -> float:
+    """Half the height [m] of a panel that shows what remains after the move."""
+    late = [np.abs(t.deviation[t.time >= AFTERWARDS]).max() for t in traces]
+    return 1.6 * max(float(np.nanmax(late)), 2 * COUNTED_ABOVE)
+
+
+def _crossovers(moves: HuntingResult) -> Figure:
+    """One panel for each case, a line for each crossover of the thesis and the one beyond which no peaks are
+    counted."""
+    panels = []
+    reach = _reach([moves.traces["locked", row] for row in moves.plotted])
+    for case in COLOURS:
+        lines = tuple(
+            Series(t.time, t.deviation, f"{moves.crossovers[row]:.3g} Hz", LINES[number + 1])
+            for number, row in enumerate(moves.plotted)
+            for t in (moves.traces[case, row],)
+        )
+        axis = Axis("Position minus reference", "m", (-reach, reach))
+        panels.append(Panel(f"joint {case}", TIME, axis, lines))
+    return Figure(
+        "hunting_crossovers",
+        f"The same move at other crossovers{_on(moves)}",
+        "The error that remains after the move (Fig. 25 shows the joint locked).",
+        tuple(panels),
+        columns=2,
+    )
+
+
+def _shares(moves: HuntingResult) -> Figure:
+    bands, lines = [], []
+    for case, colour in COLOURS.items():
+        shares = moves.shares(case)
+        low, high = (np.array([getattr(share_of_case, end) for share_of_case in shares]) for end in ("low", "high"))
+        share = np.array([share_of_case.probability for share_of_case in shares])
+        bands.append(Band(moves.crossovers, low, high, f"95 % interval, {case}", AREAS[case]))
+        lines.append(Series(moves.crossovers, share, f"joint {case}", colour))
+    swings = moves.cases["locked"].swings.mean(axis=1)
+    lines.append(Series(moves.crossovers, swings, "locked, swings at the end", VERMILLION, "dashed"))
+    lines.append(Series(moves.crossovers, moves.can_start.mean(axis=1), "locked, after it or a release", INK, "dotted"))
+    panel = Panel("", Axis("Crossover", "Hz"), Axis("Share of rails", "", (-0.03, 1.03)), tuple(lines))
+    return Figure(
+        "hunting_shares",
+        f"Share of {len(moves.rails)} rails with counted peaks after the move",
+        axis_shown().text(f"{PEAK_CRITERION[0].upper()}{PEAK_CRITERION[1:]}."),
+        (Panel(panel.title, panel.x, panel.y, panel.series, bands=tuple(bands[:1])),),
+    )
+
+
+def _startable(moves: HuntingResult) -> Figure:
+    startable = moves.startable
+    assert startable is not None
+    both = (
+        (startable.after_move, "after the move", BLUE),
+        (startable.after_release, f"released from {with_unit(startable.displacement, 'm')}", VERMILLION),
+    )
+    lines = tuple(Series(t.time, t.deviation, label, colour) for t, label, colour in both)
+    reach = _reach([startable.after_move, startable.after_release])
+    return Figure(
+        "hunting_started",
+        f"{startable.crossover:.3g} Hz, joint locked{_rail(moves, startable.rail, ',')}: swinging once started",
+        "The same machine twice.",
+        (Panel("", TIME, Axis("Position minus reference", "m", (-reach, reach)), lines),),
+    )
+
+
+CRITERIA = {"outcome": OUTCOME, "band_m": BAND, "distinct_peaks": DISTINCT_CRITERION}
+
+
+def runs_document(runs: RailRuns) -> dict[str, Any]:
+    """What became of runs, as a document: arrays of the shape of the runs."""
+    return {
+        "distinct_peaks": runs.peaks.tolist(),
+        "outcome": runs.outcome.tolist(),
+        "peak_to_peak_m": runs.swing,
+        "period_s": runs.period,
+    }
+
+
+def share_document(share: Share) -> dict[str, float]:
+    """A share and its 95 % interval."""
+    return {"share": share.probability, "low": share.low, "high": share.high}
+
+
+def numbers(outcome: Outcome) -> dict[str, Any]:
+    """All results."""
+    moves: HuntingResult = outcome.result
+    cases = {
+        case: {**runs_document(runs), "counted": [share_document(share) for share in moves.shares(case)]}
+        for case, runs in moves.cases.items()
+    }
+    started = {"displacements_m": moves.displacements}
+    return {
+        "criteria": {**CRITERIA, "distinct_peaks": axis_shown().text(DISTINCT_CRITERION)},
+        "distance_m": moves.distance,
+        "crossovers_hz": moves.crossovers,
+        "rail_seeds": moves.rails,
+        "cases": cases,
+        "releases": started | runs_document(moves.started),
+    }
+
+
+VIEW = OutcomeView(sentences, figures, numbers)

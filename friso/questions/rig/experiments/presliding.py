@@ -1,0 +1,91 @@
+"""What small motion on the rig shows of the bearing's bristles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from friso.identification.experiments.presliding import Presliding
+from friso.quantities import percent
+from friso.questions.identify.kinds.presliding import presliding_caption, presliding_panels
+from friso.questions.identify.numbers import with_interval
+from friso.questions.rig.outcome_view import OutcomeView
+from friso.shown.drawing.figure import BLUE, Axis, Figure, Panel, Series
+from friso.shown.drawing.prefixes import with_unit
+from friso.studies.rig.experiments.presliding import LOOPS, Bristles
+from friso.studies.rig.outcome import Outcome
+
+ROWS = 4
+"""Rows of loops in their figure."""
+
+
+def sentences(outcome: Outcome) -> list[str]:
+    """The results in sentences."""
+    result: Bristles = outcome.result
+    lines = [f"Place {number}: {_place(place)}." for number, place in enumerate(result.by_place, start=1)]
+    stiffness, damping = with_unit(result.stiffness, "N/m", 4), with_unit(result.damping, "N*s/m", 4)
+    loops = (
+        f"{len(result.loops)} loops of force over displacement, to {percent(LOOPS[0])} up to {percent(LOOPS[-1])} of "
+        "static friction, tell friction laws apart: friso identify --laws."
+    )
+    return [*lines, f"True bristles: stiffness {stiffness}, damping {damping}.", loops]
+
+
+def _place(result: Presliding) -> str:
+    estimates = {"stiffness": result.stiffness, "damping": result.damping, "moving mass": result.mass}
+    return "; ".join(
+        f"{words} {with_interval(estimate)}" if estimate.determined else f"{words} not shown ({estimate.reason})"
+        for words, estimate in estimates.items()
+    )
+
+
+def figures(outcome: Outcome) -> list[Figure]:
+    """Force and model at the first place that shows the bristles, and the loops."""
+    bristles: Bristles = outcome.result
+    result = next((place for place in bristles.by_place if len(place.model)), None)
+    small = [] if result is None else [_small(result, outcome)]
+    return [*small, _loops(bristles, outcome)]
+
+
+def _small(result: Presliding, outcome: Outcome) -> Figure:
+    title = "Small motion before sliding"
+    return Figure(
+        "rig_presliding", title, presliding_caption(result), presliding_panels(result), subject=outcome.stage.name
+    )
+
+
+def _loops(bristles: Bristles, outcome: Outcome) -> Figure:
+    """Force over displacement, from the smallest loop on."""
+    panels = []
+    for share, log in zip(LOOPS, bristles.loops, strict=True):
+        displacement = log.logged["position"] - log.logged["position"][:1]
+        line = Series(displacement, log.logged["force"], "", BLUE, width=1.0)
+        title = f"To {percent(share)} of static friction"
+        panels.append(Panel(title, Axis("Displacement", "m"), Axis("Force", "N"), (line,)))
+    caption = "Commanded force over displacement at one place, four turns each. One far wider than others broke away."
+    columns = len(LOOPS) // ROWS
+    return Figure(
+        "rig_presliding_loops", "Loops before sliding", caption, tuple(panels), columns, subject=outcome.stage.name
+    )
+
+
+def numbers(outcome: Outcome) -> dict[str, Any]:
+    """As JSON."""
+    bristles: Bristles = outcome.result
+    places = [
+        {
+            "stiffness_n_per_m": [result.stiffness.value, result.stiffness.low, result.stiffness.high],
+            "damping_n_s_per_m": [result.damping.value, result.damping.low, result.damping.high],
+            "mass_kg": [result.mass.value, result.mass.low, result.mass.high],
+            "unexplained": result.unexplained,
+        }
+        for result in bristles.by_place
+    ]
+    return {
+        "places": places,
+        "true_stiffness_n_per_m": bristles.stiffness,
+        "true_damping_n_s_per_m": bristles.damping,
+        "loops_share_of_static": [*LOOPS],
+    }
+
+
+VIEW = OutcomeView(sentences, figures, numbers)

@@ -1,0 +1,59 @@
+"""The files of a log of the rig: as its drive writes it, how it is to be read, and the truth behind it."""
+
+from __future__ import annotations
+
+from collections import abc
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from friso.axis import LINEAR, unit_shown
+from friso.identification.logs.mapping import Mapping, mapping_text, sidecar
+from friso.shown.files import Content
+from friso.stage import Stage
+from friso.studies.rig.outcome import RigLog
+
+UNITS = {"force": "N", "disturbance": "N", "velocity": "m/s", "cart_velocity": "m/s"}
+"""Units of the signals that are no lengths."""
+
+
+def log_files(log: RigLog, stage: Stage) -> dict[str, Content]:
+    """The log as the drive writes it, how to read it beside it, and the truth behind it in a folder of its own."""
+    heading, name = f"friso rig, seed {log.seed}", f"{log.name}.csv"
+    csv = partial(write_csv, interval=log.interval)
+    files: dict[str, Content] = {name: partial(csv, signals=log.logged, heading=heading)}
+    if log.kind is not None:
+        axis = None if stage.axis_kind == LINEAR else stage.axis_kind.name
+        mapping = Mapping(experiment=log.kind, axis=axis, setup=_setup(log.stage, stage))
+        files[sidecar(Path(name)).name] = mapping_text(mapping)
+    files[f"truth/{name}"] = partial(csv, signals=log.true, heading=f"{heading}: the truth behind {name}")
+    files[f"truth/{log.name}.toml"] = stage_text(log.stage, log.seed)
+    return files
+
+
+def _setup(machine: Stage, stage: Stage) -> dict[str, str]:
+    """What of joint and controller was set otherwise for a log than in the stage file, as texts with units."""
+    before, after = stage.as_written(), machine.as_written()
+    return {
+        f"{table}.{key}": text
+        for table in ("joint", "controller")
+        for key, text in after.get(table, {}).items()
+        if isinstance(text, str) and text != before.get(table, {}).get(key)
+    }
+
+
+def stage_text(stage: Stage, seed: int) -> str:
+    """The stage file that a log or the truth is of, its seed above it."""
+    return f"# friso rig, seed {seed}\n{stage.to_toml()}"
+
+
+def write_csv(path: Path, interval: float, signals: abc.Mapping[str, np.ndarray], heading: str) -> None:
+    """Write signals of shape (n,) by role, every `interval` [s], below a line of comment (OSError where that is
+    impossible). Twelve digits: a nanometre in a kilometre."""
+    names = ["time [s]", *(f"{role} [{unit_shown(UNITS.get(role, 'm'))}]" for role in signals)]
+    count = len(next(iter(signals.values())))
+    columns = np.column_stack([np.arange(count) * interval, *signals.values()])
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(f"# {heading}\n{','.join(names)}\n")
+        np.savetxt(file, columns, fmt="%.12g", delimiter=",")

@@ -1,0 +1,174 @@
+"""What a run does: the time response of a stage to its motion, or of a cell of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from friso.engine.arrays import Status
+from friso.engine.simulate import RTOL
+from friso.errors import InputError
+from friso.hunting.measures import Measures, measured_run
+from friso.interface.answer import Answer, question
+from friso.interface.inputs import (
+    Changes,
+    StageLike,
+    mention_unstable_loop,
+    read_stage,
+    seconds_of,
+    stage_of,
+    stem_of,
+    tolerance_of,
+)
+from friso.progress import Progress, silent
+from friso.stage import Stage
+
+if TYPE_CHECKING:
+    import os
+
+    import xarray as xr
+
+    from friso.shown.drawing.figure import Figure
+    from friso.shown.files import Files
+
+
+class SimulateAnswer(Answer):
+    """A time response: `result` is the Dataset over `time` [s], ``answer["position"]`` a variable of it."""
+
+    command = "simulate"
+
+    def __init__(self, stage: Stage, response: xr.Dataset, name: str, of_cell: bool = False) -> None:
+        self.stage, self.result, self.name, self.of_cell = stage, response, name, of_cell
+        self.axis_kind = stage.axis_kind
+
+    @property
+    def data(self) -> xr.Dataset:
+        """The response: position, error, force, friction, ... over time."""
+        return self.result
+
+    @cached_property
+    def measures(self) -> Measures:
+        """What the run does at its end."""
+        return measured_run(self.stage, self.result.attrs["rtol"])
+
+    @property
+    def failure(self) -> str:
+        """Whether the run stopped early."""
+        done = self.result.attrs["status"] == Status.DONE.text
+        return "" if done else "the computation could not be completed; see the status above"
+
+    def sentences(self) -> Sequence[str]:
+        """What the run does."""
+        from friso.questions.simulate.words import conclusion
+
+        deviation = (self.result["position"] - self.result["reference"]).to_numpy()
+        return [conclusion(self.name if self.of_cell else self.stage.name or self.name, self.measures, deviation)]
+
+    def details(self) -> Sequence[str]:
+        """How the solver fared."""
+        return [f"{self.result.attrs['steps']} steps of the solver, {self.result.attrs['rejected']} rejected"]
+
+    def figures(self) -> Sequence[Figure]:
+        """The response."""
+        from friso.questions.check.figures import response_figure
+
+        return [response_figure(self.result)]
+
+    def document(self) -> dict[str, Any]:
+        """What the run does, and how the solver fared."""
+        from friso.questions.simulate.document import simulate_document
+
+        return simulate_document(self.result, self.measures, self.stage.name, self.sentences()[0])
+
+    def files(self) -> Files:
+        """NetCDF, CSV and the figure; of a cell, its stage file too."""
+        from friso.questions.simulate.page import simulate_files
+
+        files = simulate_files(self.result, f"{self.name}_response")
+        return {**files, f"{self.name}.toml": self.stage.to_toml()} if self.of_cell else files
+
+
+@question
+def simulate(
+    stage: StageLike | Sequence[int | str] | None = None,
+    rtol: float | str | None = None,
+    sample_time: float | str | None = None,
+    *,
+    set: Changes = None,
+    cell: str | os.PathLike[str] | None = None,
+    progress: Progress = silent,
+) -> SimulateAnswer:
+    """Time response of a stage to its motion.
+
+    Parameters
+    ----------
+    stage : Stage, path or dict
+        The stage, its file, or the tables of one; with `cell`, the numbers of the cell: ``[3, 4]``.
+    rtol : float, optional
+        Relative tolerance of the solver; default: 1e-9, or that of the study.
+    sample_time : str or float, optional
+        Sampling interval, "1 ms" or a number [s]; default: a 20 000th of the duration.
+    set : dict, optional
+        Keys to override, ``{"joint.locked": True}``.
+    cell : path, optional
+        The store of a study, a cell of which is run again by itself.
+    progress : Progress
+        Not called: a run is quick.
+
+    Returns
+    -------
+    SimulateAnswer
+        The response over `time` [s], an xarray.Dataset: ``answer["position"]``, ``answer.data``.
+
+    Raises
+    ------
+    InputError
+        For a stage, a cell or an option that is not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> response = friso.simulate(friso.example("lugre_stick_slip"), sample_time="10 ms")
+    >>> response["position"].attrs["units"]
+    'm'
+    """
+    interval = None if sample_time is None else seconds_of(sample_time, "sample_time")
+    tolerance = None if rtol is None else tolerance_of(rtol)
+    if cell is None:
+        source: Any = stage
+        if isinstance(stage, list | tuple) and len(stage) == 1:
+            source = stage[0]  # as the command line has it
+        if source is None or isinstance(source, list | tuple):
+            raise InputError(
+                "STAGE.toml", " ".join(map(str, source or [])), "one stage file", "friso simulate rig.toml"
+            )
+        chosen, name, usual = read_stage(source, set), stem_of(source), RTOL
+    else:
+        if not isinstance(stage, list | tuple | None):
+            raise InputError(
+                "STAGE.toml", "a stage beside --cell", "the numbers of a cell", "friso.simulate([3, 4], cell=...)"
+            )
+        index = list(stage or ())
+        chosen, name, usual = _cell(Path(cell), [str(number) for number in index], set)
+    from friso.engine.simulate import simulate as simulated
+
+    mention_unstable_loop(chosen)
+    response = simulated(chosen, tolerance or usual, interval)
+    return SimulateAnswer(chosen, response, name, cell is not None)
+
+
+def _cell(store: Path, numbers: list[str], changes: Changes) -> tuple[Stage, str, float]:
+    """The stage of a cell, a name for it, and the tolerance it was run at. Raises InputError."""
+    from friso.studies.store import read_store
+    from friso.studies.study import study_of
+
+    study = study_of(read_store(store))
+    sizes = ", ".join(f"{name} 0 to {size - 1}" for name, size in zip(study.names, study.shape, strict=True))
+    index = [int(text) if text.isascii() and text.isdigit() else -1 for text in numbers]
+    inside = len(index) == len(study.shape) and all(0 <= k < n for k, n in zip(index, study.shape, strict=True))
+    if not inside:
+        raise InputError(f"--cell {store}", " ".join(numbers), f"one number per axis: {sizes}", "3 4")
+    name = f"{store.with_suffix('').name}_cell_{'_'.join(numbers)}"
+    return stage_of(study.cell_stage(index), changes), name, study.rtol

@@ -1,0 +1,62 @@
+"""A time response in one sentence: what the run does."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.engine.arrays import Status
+from friso.hunting.criteria import BAND, CREEPS, RESTS, SWINGS
+from friso.hunting.measures import BANDS, WINDOW, Measures
+from friso.shown.drawing.prefixes import plus_minus, with_unit
+
+GROWN = 1.1
+"""How many times as far as before a run is off its reference in its last quarter that goes ever farther."""
+
+
+def conclusion(name: str, measures: Measures, deviation: np.ndarray) -> str:
+    """What the run of the stage of that name does, with samples of its deviation [m], evenly over time, shape (n,)."""
+    before, late = np.split(np.abs(deviation), [int(WINDOW * len(deviation))])
+    grows = bool(late.max() > GROWN * before.max(initial=0.0))
+    clauses = {
+        SWINGS: lambda: (
+            f"swings {plus_minus(_value(measures.peak_to_peak) / 2, 'm')} every "
+            f"{with_unit(_value(measures.period), 's')} at the end of the run{', and ever farther' if grows else ''}"
+        ),
+        CREEPS: lambda: _restless(float(late.max()), float(late[-1]), _value(measures.peak_to_peak), grows),
+        RESTS: lambda: f"rests {_settling(measures)}",
+    }
+    outcome = str(measures.outcome[0])
+    if outcome not in clauses:
+        return f"{name}: the run was not completed ({Status(int(measures.status[0])).text})."
+    return f"{name}: {clauses[outcome]()}."
+
+
+def _restless(farthest: float, final: float, moved: float, grows: bool) -> str:
+    """A run that is off its reference at the end, by so much [m], and did not swing: in its last quarter it `moved`
+    by so much [m], and was off by the `farthest` [m]."""
+    if grows:
+        return (
+            f"goes ever farther off its reference, by up to {with_unit(farthest, 'm')} in the last quarter of the run"
+        )
+    end = f"{with_unit(final, 'm')} off its reference at the end of the run, without a lasting swing"
+    return f"creeps: {end}" if moved < final else f"does not come to rest: {end}"
+
+
+def _settling(measures: Measures) -> str:
+    """How long after the corners of the reference at which it comes to stand the stage stays within the bands."""
+    (fine, coarse), (last_fine, last_coarse) = (
+        tuple(map(_value, times)) for times in (measures.settling_time, measures.in_the_end)
+    )
+    text = f"within {with_unit(BAND, 'm')} of its reference, {with_unit(last_coarse, 's')} after its last corner"
+    if not np.isnan(last_fine):
+        text = f"{text}; within {with_unit(BANDS[0], 'm')} after {with_unit(last_fine, 's')}"
+    if np.isnan(coarse):
+        return f"{text}; not within {with_unit(BAND, 'm')} at the far end before it returned"
+    if np.isnan(fine) and not np.isnan(last_fine):
+        return f"{text}; not within {with_unit(BANDS[0], 'm')} at the far end before it returned"
+    far = f"{with_unit(coarse, 's')} and {with_unit(fine, 's')}" if fine > last_fine else with_unit(coarse, "s")
+    return f"{text} (at the far end {far})" if coarse > last_coarse or fine > last_fine else text
+
+
+def _value(array: np.ndarray) -> float:
+    return float(array[0])

@@ -1,0 +1,84 @@
+"""Remedies as a JSON document."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from friso.questions.tune.words import answer, changes, failing, unsure_why, why_unmet
+from friso.remedies.method import Advice
+from friso.remedies.verified import Performance, RemedyOutcome
+from friso.shown.documents import plain_json
+
+
+def tune_document(tuning: Advice) -> dict[str, Any]:
+    """The JSON document: SI units, the unit in the key's suffix; a time is null that is never, and the upper
+    end of its interval also where the machines are too few to bound it."""
+    goal = tuning.goal
+    first, *further = answer(tuning)
+    return plain_json(
+        {
+            "conclusion": first,
+            "details": [*further, *failing(tuning)],
+            "stage": tuning.stage.name,
+            "interrupted": tuning.interrupted,
+            "needed": tuning.needed,
+            "least_change": tuning.least.remedy.name if tuning.least else None,
+            "seed": tuning.seed,
+            "machines": tuning.machines.count,
+            "goal": {
+                "within_m": goal.within,
+                "settle_s": goal.settle,
+                "force_limit_n": goal.force_limit,
+                "bandwidth_limit_hz": goal.bandwidth_limit,
+                "modulus_margin": goal.margin,
+                "distance": goal.distance,
+                "share": goal.share,
+            },
+            "as_is": _performance(tuning.present, tuning) | {"verdict": tuning.case.verdict},
+            "ways": {outcome.remedy.name: _remedy(outcome, tuning) for outcome in tuning.outcomes},
+            "edge_moved_by_1_percent": dict(tuning.sensitivities.ranked()) if tuning.sensitivities else {},
+            "relaxed": [
+                {
+                    "way": relaxed.remedy.name,
+                    "values": {relaxation.key: relaxation.needed for relaxation in relaxed.relaxations},
+                    "factor": relaxed.factor,
+                }
+                for relaxed in tuning.relaxed
+            ],
+        }
+    )
+
+
+def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:
+    if outcome.stage is None or outcome.measured is None:
+        why = unsure_why(outcome) if outcome.interrupted else why_unmet(outcome, tuning)
+        return {"works": outcome.certainty, "why": why}
+    judgement = outcome.case.judgement if outcome.case else None
+    edge = judgement.margin if judgement else None
+    return {
+        "works": outcome.certainty,
+        "doubts": [*outcome.doubts],
+        "changes": changes(tuning.stage, outcome.stage),
+        "keys_changed": tuning.size(outcome).keys,
+        "factor": tuning.size(outcome).factor,
+        "verdict": outcome.case.verdict if outcome.case else None,
+        "certain": bool(judgement and judgement.hunting.certain),
+        "edge_factor": None if edge is None else edge.factor,
+        "windows": [asdict(window) for window in outcome.windows],
+        **_performance(outcome.measured, tuning),
+    }
+
+
+def _performance(measured: Performance, tuning: Advice) -> dict[str, Any]:
+    goal = tuning.goal
+    return {
+        "meets_goal": asdict(measured.share(goal)),
+        "slowest_twentieth_s": measured.slowest(goal),
+        "slowest_twentieth_interval_s": measured.slowest_interval(goal),
+        "median_s": measured.median,
+        "force_n": measured.force(goal),
+        "modulus_margin": measured.least_margin(goal),
+        "own_margin": measured.own_margin,
+        "stiffness_n_per_m": measured.stiffness,
+    }

@@ -1,0 +1,186 @@
+"""Remedies, drawn: the same move before and after, settling times of the machines, and loops."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from friso.engine.simulate import simulate
+from friso.equations.motion import last_corner
+from friso.frequency.drive import DriveTiming
+from friso.frequency.loops import response
+from friso.frequency.members import limit_cases
+from friso.remedies.method import Advice, slowest
+from friso.remedies.verified import RemedyOutcome
+from friso.shown.drawing.figure import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PINK,
+    SKY,
+    VERMILLION,
+    Axis,
+    Dash,
+    Figure,
+    Markers,
+    Panel,
+    Series,
+)
+from friso.shown.drawing.prefixes import with_unit
+from friso.stage import Stage
+from friso.stage.controllers import CONTROLLER
+from friso.studies.compare.options import linear_flat
+
+COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)
+"""Of the remedies that have settings, in their order; more than these begin again, dashed."""
+
+SAMPLES = 4000
+"""Samples of a time response."""
+
+SHOWN = 3.0
+"""The responses are drawn for so many times as long as the slowest twentieth of machines takes with what works."""
+
+RTOL = 1e-7
+"""Relative tolerance of the responses that are drawn."""
+
+
+def figures(tuning: Advice) -> list[Figure]:
+    """The response, the settling times and the sensitivities."""
+    lines = drawn_stages(tuning)
+    panels = (_response(tuning, lines), _settling(tuning, lines), _sensitivity(tuning, lines), *_windows(tuning))
+    caption = (
+        "Deviation of the stage of the file from its reference after the last corner of its own motion; the share of "
+        f"fresh machines in position within {with_unit(tuning.goal.within, 'm')}; the sensitivity of the loop in its "
+        "limit cases, whose largest value is one over the modulus margin; the numbers between which the least change "
+        "works, each varied by itself. Drawn are what changes least and what settles soonest, with the controller "
+        "alone and with a joint; the table has all."
+    )
+    return [Figure("tune", "Before and after", caption, panels, subject=tuning.stage.name)]
+
+
+class RemedyLine(NamedTuple):
+    """How what is drawn of a stage is named and drawn."""
+
+    label: str
+    colour: str
+    dash: Dash
+
+
+ShownRemedy = tuple[Stage, RemedyOutcome | None, RemedyLine]
+Lines = Sequence[ShownRemedy]
+
+
+def drawn_stages(tuning: Advice) -> list[ShownRemedy]:
+    """The stages that are drawn: as it is, and those that change least and settle soonest with the controller alone,
+    and with a joint; where none works, those that are not sure to."""
+    lines: list[ShownRemedy] = [(tuning.stage, None, RemedyLine("as it is", INK, "solid"))]
+    for outcome in _shown(tuning):
+        assert outcome.stage is not None
+        again, number = divmod(len(lines) - 1, len(COLOURS))
+        line = RemedyLine(_name(outcome), COLOURS[number], "dashed" if again else "solid")
+        lines.append((outcome.stage, outcome, line))
+    return lines
+
+
+def _shown(tuning: Advice) -> list[RemedyOutcome]:
+    """The remedies that are drawn."""
+    if not tuning.working:
+        return [outcome for outcome in tuning.outcomes if outcome.stage is not None]
+    listed: list[RemedyOutcome] = []
+    for joint in (False, True):
+        some = [outcome for outcome in tuning.working if outcome.remedy.buys_joint == joint]
+        if some:
+            soonest = min(some, key=lambda outcome: slowest(outcome, tuning.goal))
+            listed += [some[0]] if soonest is some[0] else [some[0], soonest]
+    return listed
+
+
+def _name(outcome: RemedyOutcome) -> str:
+    return outcome.remedy.name if outcome.certainty == "works" else f"{outcome.remedy.name} (not sure)"
+
+
+def _response(tuning: Advice, lines: Lines) -> Panel:
+    flat = tuning.stage.flat()
+    corner, series, shown_to = float(last_corner(flat)), [], 20 * tuning.goal.within
+    for stage, outcome, line in lines:
+        trace = simulate(stage, RTOL, flat["motion.duration"] / SAMPLES)
+        after = np.asarray(trace["time"]) >= corner
+        off = np.asarray(trace["position"] - trace["reference"])[after]
+        series.append(Series(np.asarray(trace["time"])[after] - corner, off, *line))
+        if outcome is None:  # what it does in the end is to be seen
+            shown_to = max(shown_to, 1.2 * float(np.abs(off[len(off) // 2 :]).max()))
+    y = Axis("Deviation", "m", (-shown_to, shown_to))
+    settled = [slowest(outcome, tuning.goal) for _, outcome, _ in lines if outcome]
+    end = min(
+        flat["motion.duration"] - corner, SHOWN * max((time for time in settled if np.isfinite(time)), default=np.inf)
+    )
+    return Panel("The same move", Axis("Time after the move", "s", (0.0, end)), y, tuple(series))
+
+
+def _settling(tuning: Advice, lines: Lines) -> Panel:
+    flat = tuning.stage.flat()
+    drawn = [(outcome.measured if outcome else tuning.present, line) for _, outcome, line in lines]
+    longest = max(
+        np.max(measured.moves.settling, where=np.isfinite(measured.moves.settling), initial=0.0)
+        for measured, _ in drawn
+        if measured
+    )
+    end = max(flat["motion.duration"] - float(last_corner(flat)), float(longest))  # the way there may take longer
+    start = 1e-3 * end
+    series = []
+    for measured, line in drawn:
+        if measured is not None:
+            times = measured.moves.settling[0]
+            ordered = np.maximum(np.sort(times[np.isfinite(times)]), start)
+            x = np.concatenate([[start], np.repeat(ordered, 2), [end]])
+            series.append(Series(x, np.repeat(100 * np.arange(len(ordered) + 1) / len(times), 2), *line))
+    axis = Axis("Time after the move", "s", (start, end), log=True, prefixed=False)
+    return Panel("In position to stay", axis, Axis("Share of machines", "%", (-3.0, 103.0)), tuple(series))
+
+
+def _windows(tuning: Advice) -> list[Panel]:
+    """The window of each number of the least change, as factors of what it is tuned to."""
+    least = tuning.least
+    if least is None or not least.windows:
+        return []
+    tuned = [float(v.at(share)) for v, share in zip(least.remedy.variables, least.shares, strict=True)]
+    ends = [(window.low / at, window.high / at) for window, at in zip(least.windows, tuned, strict=True)]
+    rows = tuple(window.name.removeprefix(f"{CONTROLLER}.") for window in least.windows)
+    series = tuple(
+        Series(np.array(pair), np.full(2, float(row)), "works" * (row == 0), BLUE, width=6)
+        for row, pair in enumerate(ends)
+    )
+    marks = (Markers(np.ones(len(rows)), np.arange(len(rows), dtype=float), "as tuned", INK),)
+    reach = 1.2 * max(1.2, *(max(high, 1 / low) for low, high in ends))
+    x, y = Axis("Factor of the tuned number", "", (1 / reach, reach), log=True), (-0.5, len(rows) - 0.5)
+    return [Panel("Where the least change works", x, Axis("Setting", "", y, words=rows), series, marks)]
+
+
+def _sensitivity(tuning: Advice, lines: Lines) -> Panel:
+    """Of the loops behind the drive as built, up to half its sampling rate, as the margins are computed."""
+    omega, series = np.geomspace(1.0, 2e4, 600), []
+    for stage, _, line in lines:
+        built = tuning.complete(stage)
+        flat = linear_flat(built, built.flat())
+        drive = DriveTiming.of(flat)
+        within = omega[omega <= drive.highest]
+        loops = [response(flat, case, drive)(within) for case in limit_cases(flat).values()]
+        worst = np.max([1 / np.abs(1 + loop) for loop in loops], axis=0)
+        series.append(Series(within / (2 * np.pi), worst, *line))
+    limit = Series(
+        np.array([omega[0], omega[-1]]) / (2 * np.pi),
+        np.full(2, 1 / tuning.goal.margin),
+        f"margin of {tuning.goal.margin:g}",
+        GREY,
+        "dashed",
+    )
+    return Panel(
+        "Loops: the largest sensitivity of the limit cases",
+        Axis.of_frequency(omega / (2 * np.pi)),
+        Axis("Sensitivity", "", (0.05, 5.0), log=True),
+        (*series, limit),
+    )

@@ -1,0 +1,88 @@
+"""The page of `friso tune`, its figures, and a stage file for every remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from friso.questions.tune.figures import figures as tune_figures
+from friso.questions.tune.gain_words import gain_facts
+from friso.questions.tune.sensitivity_words import sensitivity_sentences
+from friso.questions.tune.words import COLUMNS, answer, assumptions, failing, rows, window_facts
+from friso.remedies.method import Advice
+from friso.shown.drawing.figure import Figure
+from friso.shown.files import Content, pictures
+from friso.shown.pages import Report
+from friso.stage import Stage
+from friso.stage.correlations import correlations_file, correlations_text
+
+NOT_SURE = "-not-sure"
+"""End of the names of stage files with remedies that are not sure to work."""
+
+OF_LEAVES = "-of-leaf-springs"
+"""End of the names of stage files with joints made of leaf springs."""
+
+
+def tune_files(tuning: Advice) -> dict[str, Content]:
+    """The stage files, the page, and every figure in all formats; `tuned.toml` is the least change that works."""
+    figures = tune_figures(tuning)
+    images = pictures(figures)
+    return {**stage_files(tuning), "tune.html": page(tuning, figures), **images}
+
+
+def stage_files(tuning: Advice) -> dict[str, Content]:
+    """A stage file for every remedy for which there are settings; one that is not sure to work is named so."""
+    files: dict[str, Content] = {}
+    for outcome in tuning.outcomes:
+        if outcome.stage is None:
+            continue
+        slug = outcome.remedy.name.replace(",", "").replace(":", "").replace(" ", "-")
+        unsure = "" if outcome.certainty == "works" else NOT_SURE
+        files |= _stage_file(tuning, f"tuned-{slug}{unsure}.toml", outcome.stage)
+    least = tuning.least
+    return {**_stage_file(tuning, "tuned.toml", least.stage if least else None), **files}
+
+
+def _stage_file(tuning: Advice, name: str, stage: Stage | None) -> dict[str, Content]:
+    """A stage file, and beside it how its uncertain keys hang together; what there is not is None."""
+    beside = correlations_file(Path(name)).name
+    if stage is None:
+        return {name: None, beside: None}
+    correlations = tuning.correlations.among(stage.uncertain())
+    return {
+        name: tuning.complete(stage).to_toml(),
+        beside: correlations_text(correlations, stage) if correlations.keys else None,
+    }
+
+
+class Behind(NamedTuple):
+    """What stands behind a title: sentences, and facts by name; `open` where it is seen at once."""
+
+    title: str
+    sentences: Sequence[str]
+    facts: Sequence[tuple[str, str]] = ()
+    open: bool = False
+
+
+def page(tuning: Advice, figures: Sequence[Figure]) -> str:
+    """The page with its figures."""
+    behind = [
+        Behind("What does not work, and why", failing(tuning), open=True),
+        Behind("The numbers to type in, in the terms of drives (friso export gains)", (), gain_facts(tuning)),
+        Behind(
+            "Where each number may lie on the machines of the search, the others as tuned", (), window_facts(tuning)
+        ),
+        Behind("What matters for the edge of hunting", sensitivity_sentences(tuning)),
+        Behind("What is assumed, and how machines were drawn", assumptions(tuning)),
+    ]
+    return Report.of_stage(
+        "tune",
+        tuning.stage,
+        figures,
+        sentences=answer(tuning),
+        details=[more for more in behind if more.sentences or more.facts],
+        columns=COLUMNS,
+        rows=rows(tuning),
+        computed=f", seed {tuning.seed}",
+    ).html()

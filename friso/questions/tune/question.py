@@ -1,0 +1,237 @@
+"""What stops it: the least change of controller or joint that settles machines like this one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.inputs import (
+    LOGGER,
+    Changes,
+    StageLike,
+    Whole,
+    choice,
+    correlations_of,
+    mention_unstable_loop,
+    read_stage,
+    text_of,
+    whole_number,
+    wrong,
+)
+from friso.platform.extras import install, missing
+from friso.platform.system import shell_word
+from friso.progress import Progress, silent
+from friso.quantities import Bound, Quantity, positive, quoted
+from friso.remedies import Changeable
+from friso.remedies.goal import Goal
+from friso.stage import Stage
+
+if TYPE_CHECKING:
+    from friso.remedies.method import Advice
+    from friso.shown.drawing.figure import Figure
+    from friso.shown.files import Files
+
+MOST_SEED = 2**31 - 1
+
+_IN_POSITION = Bound("greater than 0 and at most 1", lambda value: (value > 0) & (value <= 1))
+"""Deviations [m or rad] that may count as in position."""
+
+
+class TuneAnswer(Answer):
+    """The remedies, the least change first: `result` is the `Advice`."""
+
+    command, status = "tune", 2
+
+    def __init__(self, result: Advice) -> None:
+        self.result, self.axis_kind = result, result.stage.axis_kind
+
+    @property
+    def failure(self) -> str:
+        """Whether a change is needed and none works."""
+        if not self.result.needed or self.result.working:
+            return ""
+        so_far = "before it was interrupted, " if self.result.interrupted else ""
+        return f"{so_far}no change that was tried works for certain"
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the search was."""
+        return self.result.interrupted
+
+    def sentences(self) -> Sequence[str]:
+        """What to change, what it brings and costs, and why the other remedies do not work."""
+        from friso.questions.tune.words import answer, failing
+
+        return [*answer(self.result), *failing(self.result)]
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """The remedies beside each other."""
+        from friso.questions.tune.words import COLUMNS, rows
+
+        return [AnswerTable(self.result.stage.name, COLUMNS, rows(self.result))]
+
+    def details(self) -> Sequence[str]:
+        """Gains in the terms of drives, how far the numbers may be off, and what is assumed."""
+        from friso.questions.tune.gain_words import gain_lines
+        from friso.questions.tune.sensitivity_words import sensitivity_sentences
+        from friso.questions.tune.words import assumptions, window_lines
+
+        advice = self.result
+        return [*gain_lines(advice), *window_lines(advice), *sensitivity_sentences(advice), *assumptions(advice)]
+
+    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
+        """What leaf springs do, and their design for an isolator, where `friso design` knows the controller."""
+        from friso.design_method.prepare import check_designable
+        from friso.questions.tune.page import NOT_SURE, OF_LEAVES
+
+        try:
+            check_designable(self.result.stage)
+        except InputError:
+            return []
+        isolators = [
+            file
+            for file in files
+            if file.name.startswith("tuned-isolator") and file.suffixes == [".toml"] and NOT_SURE not in file.name
+        ]
+        return [
+            f"friso {'flexure' if file.stem.endswith(OF_LEAVES) else 'design'} {shell_word(str(file))}"
+            for file in isolators
+        ]
+
+    def figures(self) -> Sequence[Figure]:
+        """Responses, settling times, sensitivities."""
+        from friso.questions.tune.figures import figures
+
+        return figures(self.result)
+
+    def document(self) -> dict[str, Any]:
+        """The remedies with their numbers."""
+        from friso.questions.tune.document import tune_document
+
+        return tune_document(self.result)
+
+    def files(self) -> Files:
+        """A stage file for every remedy, the page, the figures."""
+        from friso.questions.tune.page import tune_files
+
+        return tune_files(self.result)
+
+
+@question
+def tune(
+    stage: StageLike,
+    *,
+    within: float | str | None = None,
+    settle: float | str | None = None,
+    force_limit: float | str | None = None,
+    bandwidth_limit: float | str | None = None,
+    margin: float | str | None = None,
+    only: Changeable | None = None,
+    keep: Changeable | None = None,
+    seed: Whole = 1,
+    set: Changes = None,
+    progress: Progress = silent,
+) -> TuneAnswer:
+    """What stops the hunting: the least change of controller or joint that settles 95 % of machines like this one.
+
+    Parameters
+    ----------
+    stage : Stage, path or dict
+        The stage, its file, or the tables of one.
+    within : str or float, optional
+        Deviation that counts as in position, "1 um" or a number [m].
+    settle : str or float, optional
+        Time after the move in which 95 % of the machines are in position, "0.3 s" or a number [s].
+    force_limit : str or float, optional
+        Largest force of the actuator during the moves, "50 N" or a number [N].
+    bandwidth_limit : str or float, optional
+        Highest bandwidth that modes missing from the stage file allow, "25 Hz" or a number [Hz].
+    margin : float or str, optional
+        Least modulus margin of 95 % of the machines, between 0 and 1; 0.5 if not given.
+    only, keep : str, optional
+        The part to change alone, and the part to leave unchanged: "controller" or "joint".
+    seed : int
+        Seed of the draws: the same one gives the same machines.
+    set : dict, optional
+        Keys to override.
+    progress : Progress
+        Called as remedies are tried.
+
+    Returns
+    -------
+    TuneAnswer
+        The remedies, ``answer.result.working``, each with its `stage`.
+
+    Raises
+    ------
+    InputError
+        For a stage or an option that is not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.tune(friso.example("thesis_rig"), only="controller", within="2 um")  # doctest: +SKIP
+    """
+    chosen = read_stage(stage, set, leaves_out=("rail", "cable", "floor"), uncertain_too=True)
+    goal = _goal(chosen, within, settle, force_limit, bandwidth_limit, margin, only, keep)
+    whole_number(seed, "seed", 0, MOST_SEED, "1")
+    correlations = correlations_of(stage, chosen)
+    if missing("design"):
+        LOGGER.warning(f"no leaf springs are sized for a joint: that takes {install('design')}")
+    from friso.remedies.method import tune as tuned
+
+    begins = partial(mention_unstable_loop, chosen)
+    return TuneAnswer(tuned(chosen, goal, seed, correlations, progress=progress, begins=begins))
+
+
+def _goal(
+    stage: Stage,
+    within: float | str | None,
+    settle: float | str | None,
+    force_limit: float | str | None,
+    bandwidth_limit: float | str | None,
+    margin: float | str | None,
+    only: Changeable | None,
+    keep: Changeable | None,
+) -> Goal:
+    """The goal of the options. Raises InputError."""
+    for name, part in (("only", only), ("keep", keep)):
+        if part is not None:
+            choice(part, name, get_args(Changeable), f"{name}=controller")
+    if only is not None and only == keep:
+        raise InputError("keep", str(keep), f"something else than --only {only}, or nothing is left to change", "")
+
+    def read(name: str, value: float | str | None, unit: str, example: str, bound: Bound = positive) -> float | None:
+        quantity = Quantity(unit, bound, example).on(stage.axis_kind)
+        text = None if value is None else text_of(value, quantity.unit)
+        try:
+            return None if text is None else float(quantity.read(text))
+        except InputError as error:
+            raise wrong(name, error.actual, error.expected, error.example) from None
+
+    return Goal(
+        within=read("within", within, "m", "1 um", _IN_POSITION) or Goal.within,
+        settle=read("settle", settle, "s", "0.3 s"),
+        force_limit=read("force_limit", force_limit, "N", "50 N"),
+        bandwidth_limit=read("bandwidth_limit", bandwidth_limit, "Hz", "25 Hz"),
+        margin=Goal.margin if margin is None else _margin(margin),
+        controller=only != "joint" and keep != "controller",
+        joint=only != "controller" and keep != "joint",
+    )
+
+
+def _margin(number: float | str) -> float:
+    """A modulus margin. Raises InputError."""
+    try:
+        margin = float(number)
+    except ValueError:
+        margin = np.nan
+    if not 0 < margin < 1:
+        raise wrong("margin", quoted(number), "a modulus margin between 0 and 1", "0.5")
+    return margin

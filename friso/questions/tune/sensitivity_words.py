@@ -1,0 +1,35 @@
+"""What matters most, in words."""
+
+from __future__ import annotations
+
+from friso.quantities import percent
+from friso.remedies.method import Advice
+from friso.remedies.sensitivities import Sensitivities
+from friso.shown.drawing.prefixes import with_unit
+
+MOST, LEAST = 4, 0.02
+"""Keys that are named at most, and how much of what the first one does they have to do at least."""
+
+
+def sensitivity_sentences(tuning: Advice) -> list[str]:
+    """How far 1 % of each key moves the edge of hunting of the stage as it is."""
+    return ranked_sentences(tuning.sensitivities) if tuning.sensitivities else []
+
+
+def ranked_sentences(sensitivities: Sensitivities) -> list[str]:
+    """The same of sensitivities, what matters most first; none where there are none."""
+    ranked = sensitivities.ranked()
+    if not ranked or ranked[0][1] == 0:
+        return []
+    largest = abs(ranked[0][1])
+    named = [(key, move) for key, move in ranked[:MOST] if abs(move) >= LEAST * largest]
+    unit = "Hz" if sensitivities.stage.controller.bandwidth_key else ""
+    parts = [f"1 % more of {key} moves it by {_signed(move, unit)}" for key, move in named]
+    return [f"What matters for the edge of hunting, most first: {'; '.join(parts)}."]
+
+
+def _signed(move: float, unit: str) -> str:
+    """By how much, upward or downward; of a controller that states no bandwidth in percent of that."""
+    if not unit:
+        return f"{percent(move, signed=True)} of the bandwidth"
+    return f"{'+' if move > 0 else '-'}{with_unit(abs(move), unit, 2)}"

@@ -1,0 +1,592 @@
+"""The remedies in words: what to change, what it brings and costs, what else would do, and what cannot work and why."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from friso.design_method.geometry import Geometry
+from friso.equations.bandwidth import bandwidth
+from friso.equations.breakaway import breakaway, least_breakaway
+from friso.frequency.bandwidth import bandwidths_at
+from friso.frequency.crossover import WANTED
+from friso.leaf_springs.joint import first_interfering
+from friso.leaf_springs.mechanism import Mechanism
+from friso.platform.extras import install
+from friso.quantities import Quantity, percent, positive
+from friso.questions.design.words import leaf_words
+from friso.remedies.change import ChangeSize
+from friso.remedies.goal import Goal
+from friso.remedies.least import LEAST
+from friso.remedies.method import Advice
+from friso.remedies.relax import REASONABLE, RelaxedGoal
+from friso.remedies.search import TriedPoints
+from friso.remedies.trials import LOOSER
+from friso.remedies.variables import BANDWIDTH
+from friso.remedies.verified import Performance, RemedyOutcome
+from friso.remedies.window import VariableWindow
+from friso.shown.drawing.prefixes import (
+    NOTHING,
+    digits_that_differ,
+    listed,
+    range_with_unit,
+    share_with_interval,
+    with_unit,
+)
+from friso.shown.loop_words import unstable_loop
+from friso.shown.machine_words import spread_sentences
+from friso.stage import Stage, numeric_keys
+from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
+from friso.stage.transmission import leading_friction
+
+DOUBTS = {
+    "verdict": "friso check does not say that it settles",
+    "certain": "friso check is not certain that nothing attracts it",
+    "given up": "friso check gave up the search for its edge of hunting",
+    "distance": "its edge of hunting is closer than wanted",
+    "bandwidth": "its bandwidth is above your limit, or not known",
+    "window": "something attracts it at a bandwidth nearby",
+    "own margin": "a settled state of the stage itself has less margin than wanted",
+    "hunting": "something attracts too many of the machines, or may",
+    "settling": "too many of the machines are not in position in time",
+    "margin": "too many of the machines have less modulus margin than wanted",
+    "force": "too many of the machines take more force than there is",
+    "together": "too many of the machines miss one part of the goal or another",
+}
+"""Why a remedy is not sure to work."""
+
+COLUMNS = (
+    "Works",
+    "Machines that meet the goal",
+    "Slowest twentieth settles in",
+    "Median",
+    "Largest force",
+    "Modulus margin",
+    "Stiffness under load",
+)
+
+OPTIONS = {
+    "within": "--within",
+    "settle": "--settle",
+    "force_limit": "--force-limit",
+    "bandwidth_limit": "--bandwidth-limit",
+    "margin": "--margin",
+}
+"""Options that state the parts of a goal."""
+
+ABSENT = "never"
+
+NONE_FOUND = "none was found that surely works"
+"""What is said of a remedy some of whose settings meet the goal on the machines of the search, and were not taken."""
+
+LOCKED = "joint.locked"
+
+
+def time(seconds: float) -> str:
+    """A settling time, which may never come."""
+    return with_unit(seconds, "s") if math.isfinite(seconds) else ABSENT
+
+
+def slowest_time(measured: Performance, goal: Goal) -> str:
+    """The settling time of the slowest twentieth, with its interval."""
+    low, high = measured.slowest_interval(goal)
+    alone = time(measured.slowest(goal))
+    if not math.isfinite(low):
+        return alone
+    between = range_with_unit(low, high, "s") if math.isfinite(high) else f"{with_unit(low, 's')} or longer"
+    if alone == ABSENT:
+        return f"{between}, possibly {ABSENT}"
+    return alone if between == alone else f"{alone} ({between})"
+
+
+def changes(before: Stage, after: Stage) -> list[str]:
+    """The keys that differ, with their values before and after; words and keys that go are those of the controller."""
+    old, new = before.flat(), after.flat()
+    keys = numeric_keys(new)
+    numbers = [_change(key, old.get(key), new[key], keys[key].unit) for key in new if _changes(key, old, new, keys)]
+    own = [key for key in {**new, **old} if key.startswith(f"{CONTROLLER}.")]
+    words = [f'{key} = "{new[key]}"' for key in own if isinstance(new.get(key), str) and new[key] != old.get(key)]
+    if old.get(LOCKED) and not new.get(LOCKED):
+        words.append(f"{LOCKED} = false (was true)")
+    return [*words, *numbers, *(f"{key} left out" for key in own if key not in new)]
+
+
+def _changes(key: str, old: Mapping[str, Any], new: Mapping[str, Any], keys: Mapping[str, Any]) -> bool:
+    if key not in keys:
+        return False
+    return key not in old or not math.isclose(old[key], new[key], rel_tol=1e-9)
+
+
+def _change(key: str, old: Any, new: float, unit: str) -> str:
+    text = f"{key} = {number(new, unit)}"
+    return text if old is None else f"{text} (was {number(old, unit)})"
+
+
+def number(value: float, unit: str) -> str:
+    """A value of a key with its unit, if it has one."""
+    return with_unit(value, unit, 4) if unit else f"{value:.4g}"
+
+
+def answer(tuning: Advice) -> list[str]:
+    """The answer, first of all that is said: the least change that works, what it brings and costs; the next best."""
+    lines = [*unstable_loop(tuning.case.unstable), *_interrupted(tuning)]
+    if not tuning.needed:
+        return [
+            *lines,
+            f"The stage meets the goal as it is: {goal_words(tuning.goal)}. {_brings(tuning.present, tuning)}.",
+        ]
+    if not tuning.working:
+        return [*lines, *_nothing(tuning)]
+    least, fastest = tuning.least, tuning.fastest
+    assert least is not None
+    lines += _works(least, tuning, _least_words(tuning))
+    if fastest is not None and fastest is not least:
+        lines += _works(fastest, tuning, "What settles soonest")
+    elif len(tuning.working) > 1:
+        lines += _works(tuning.working[1], tuning, "The next best")
+    return [*lines, f"The goal: {goal_words(tuning.goal)}.{_of_the_drive(tuning)}", *unknown(tuning)]
+
+
+def _least_words(tuning: Advice) -> str:
+    """What the least change of those that work is: where the search for it was not reached, or did not end, settings
+    that were tuned to settle soonest."""
+    sought = [outcome for outcome in tuning.outcomes if outcome.remedy.name.endswith(LEAST)]
+    if not tuning.interrupted:
+        given_up = any(outcome.certainty == "given up" for outcome in sought)
+        smaller = " (the search for a smaller one was given up, as it takes too much computing)" * given_up
+        return f"The least change that works{smaller}"
+    if any(not outcome.interrupted for outcome in sought):
+        return "The least change so far that works"
+    return "This works, but was tuned to settle soonest and is not the least change, which was not sought yet"
+
+
+def _of_the_drive(tuning: Advice) -> str:
+    """For what the drive of the file counts."""
+    has = {"sample_time", "delay", "current_bandwidth"} & {*tuning.as_built.get("drive", ())}
+    return " The [drive] of the file counts for the margin alone, not for moves and hunting." if has else ""
+
+
+def unknown(tuning: Advice) -> list[str]:
+    """What limits a machine that neither the stage file nor an option tells, and what is assumed instead."""
+    stage, goal, flat = tuning.stage, tuning.goal, tuning.stage.flat()
+    lines = []
+    if stage.parasitic is None and not stage.flexure and goal.bandwidth_limit is None:
+        lines.append(
+            "Not known: modes of the machine. None is assumed; they make fast controllers unstable, so state "
+            '[parasitic], or the highest bandwidth that the machine allows (--bandwidth-limit "25 Hz").'
+        )
+    if goal.force_limit is None and FORCE_LIMIT not in flat:
+        example = Quantity("N", positive, "200 N").on(stage.axis_kind).example
+        lines.append(
+            f'Not known: the force of the actuator. No limit is assumed; state one (--force-limit "{example}").'
+        )
+    return lines
+
+
+def goal_words(goal: Goal) -> str:
+    """The goal in words."""
+    late = "" if goal.settle is None else f", in {with_unit(goal.settle, 's')}"
+    force = "" if goal.force_limit is None else f" with at most {with_unit(goal.force_limit, 'N')}"
+    most = goal.bandwidth_limit
+    limit = "" if most is None else f" and a bandwidth of at most {with_unit(most, 'Hz')}"
+    return (
+        f"{percent(goal.share)} of the machines in position within {with_unit(goal.within, 'm')}{late}{force}, with a "
+        f"modulus margin of {goal.margin:g}{limit}, and nothing that attracts them down to {1 / goal.distance:.2f} of "
+        "their bandwidth"
+    )
+
+
+def _interrupted(tuning: Advice) -> list[str]:
+    if not tuning.interrupted:
+        return []
+    return [
+        "Interrupted: this is the best so far. Options that are not named were not tried, and one may be unfinished."
+    ]
+
+
+def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> list[str]:
+    """What to set, and what that brings and costs."""
+    assert outcome.stage is not None
+    assert outcome.measured is not None
+    return [
+        f"{what}: set {listed(changes(tuning.stage, outcome.stage), 'and')} ({outcome.remedy.name}; "
+        f"{size_words(tuning.size(outcome))}).",
+        f"{_brings(outcome.measured, tuning)}. {price(outcome.measured, tuning, outcome.remedy.buys_joint)}",
+        *_made_of_leaves(outcome, tuning),
+    ]
+
+
+UNMADE = {
+    "rotary": "leaf springs of friso guide along a line, and this axis turns",
+    "mode": (
+        "the stage file states a parasitic mode of the machine, and a stage has no second one for the leaves; friso "
+        "design designs without it"
+    ),
+    "extra": f"that takes {install('design')}",
+    "none": (
+        "none of the sizes that friso init --spec begins with has this stiffness and bears this stroke; friso design "
+        "takes other sizes"
+    ),
+}
+"""Why no leaf springs make the joint of a remedy."""
+
+
+def _made_of_leaves(outcome: RemedyOutcome, tuning: Advice) -> Iterator[str]:
+    """Of what leaf springs the joint of a remedy can be made, and whether that works; or why there are none."""
+    made = tuning.made_of_leaves(outcome)
+    if made is not None:
+        flat = made.remedy.stage.flat()
+        disturbs = float(first_interfering(Mechanism.of(flat)))
+        mode = (
+            f"first interfering frequency {with_unit(disturbs, 'Hz')}"
+            if math.isfinite(disturbs)
+            else "no interfering mode"
+        )
+        yield (
+            f"Leaf springs for its joint: {leaf_words(Geometry.of_stage(flat))}; "
+            f"{with_unit(flat['joint.stiffness'], 'N/m')}, {mode}{_replaced(tuning.stage)}. {_verified(made, tuning)}"
+        )
+    elif outcome.remedy.name in tuning.unmade:
+        yield f"No leaf springs were sized for its joint: {UNMADE[tuning.unmade[outcome.remedy.name]]}."
+
+
+def _replaced(stage: Stage) -> str:
+    """Of what mode the leaf springs of a remedy take the place: that of the joint which the stage file has."""
+    if stage.parasitic is None or stage.flexure is not None:
+        return ""
+    return f", in place of the parasitic mode of the file ({with_unit(stage.flat()['parasitic.frequency'], 'Hz')})"
+
+
+def _verified(made: RemedyOutcome, tuning: Advice) -> str:
+    """Whether the stage still meets the goal with leaf springs and their parasitic mode."""
+    if made.certainty == "works":
+        assert made.measured is not None
+        return f"With them, {share_with_interval(made.measured.share(tuning.goal))} of the machines meet the goal."
+    if made.certainty == "unsure":
+        return f"With them, it is not sure to work: {unsure_why(made)}."
+    result = "the search was given up" if made.certainty == "given up" else "it does not work"
+    return f"With them, {result}. {why_unmet(made, tuning)}"
+
+
+def size_words(size: ChangeSize) -> str:
+    """How large a change is."""
+    keys = [f"{size.keys} key{'s' * (size.keys != 1)} of the controller"] if size.keys else []
+    some = "" if size.scaled == size.keys else f"{'one' if size.scaled == 1 else size.scaled} of them "
+    average = f"{' each' * (not some)} on average" if size.scaled > 1 else ""
+    factor = f", {some}by a factor of {factor_text(size.mean)}{average}" if size.factor > 1 else ""
+    return f"{' and '.join([*(['a joint'] if size.bought else []), *keys])}{factor}"
+
+
+def _brings(measured: Performance, tuning: Advice) -> str:
+    before = slowest_time(tuning.present, tuning.goal)
+    present = percent(tuning.present.share(tuning.goal).probability)
+    met = f" ({present} of the machines meet the goal)" * (before == ABSENT)
+    as_is = "" if measured is tuning.present else f"; as it is: {before}{met}"
+    meet = share_with_interval(measured.share(tuning.goal))
+    when = (
+        f"after {slowest_time(measured, tuning.goal)}" if measured.slowest(tuning.goal) else "once the reference stands"
+    )
+    return (
+        f"Of {measured.count} fresh machines and moves, {meet} meet the goal; "
+        f"the slowest twentieth is in position {when}{as_is}"
+    )
+
+
+def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
+    """What a remedy costs against the stage as it is."""
+    goal, before = tuning.goal, tuning.present
+    force = _against(measured.force(goal), before.force(goal), "force", "N")
+    resists = "stiffness against a load before the integral acts"
+    stiffness = _against(measured.stiffness, before.stiffness, resists, "N/m")
+    margin, margin_before = (f"{performance.least_margin(goal):.2f}" for performance in (measured, before))
+    before_it = " as before" if margin == margin_before else f" instead of {margin_before}"
+    still = (
+        " Standstill was not computed: on a floor that shakes, a stage on a joint moves more (friso rig in-position)."
+        if buys_joint
+        else ""
+    )
+    return f"Its price: {force}, a modulus margin of {margin}{before_it}, {stiffness}.{still}"
+
+
+def _against(now: float, before: float, what: str, unit: str) -> str:
+    """What there is now of something, against what there was before."""
+    if not before > 0 or not math.isfinite(now / before):
+        return f"a {what} of {with_unit(now, unit)}"
+    factor = factor_text(now / before)
+    return (
+        f"{'' if factor == '1' else f'{factor} times '}the {'same ' * (factor == '1')}{what} ({with_unit(now, unit)})"
+    )
+
+
+def factor_text(factor: float) -> str:
+    """A factor with three digits, without an exponent."""
+    return f"{float(f'{factor:.3g}'):.15g}"
+
+
+def _nothing(tuning: Advice) -> list[str]:
+    """That nothing is sure to work, what is not sure to, and what to relax."""
+    unsure = [outcome for outcome in tuning.outcomes if outcome.certainty == "unsure"]
+    lines = [f"No option was found that certainly meets the goal: {goal_words(tuning.goal)}."]
+    lines += [
+        f"{outcome.remedy.name} might work ({listed(changes(tuning.stage, outcome.stage), 'and')}), but "
+        f"{unsure_why(outcome)}."
+        for outcome in unsure
+        if outcome.stage is not None
+    ]
+    lines += [_relax(relaxed, tuning.stage) for relaxed in tuning.relaxed]
+    if not (tuning.goal.controller and tuning.goal.joint):
+        lines.append(f"Changes of the {'joint' if tuning.goal.controller else 'controller'} were not tried, as told.")
+    if not tuning.relaxed and not tuning.interrupted:
+        lines.append(_no_relaxation(tuning))
+    return lines
+
+
+def _no_relaxation(tuning: Advice) -> str:
+    """That no relaxation was found, or that none was sought."""
+    if tuning.outcomes and not any(outcome.remedy.verifiable for outcome in tuning.outcomes):
+        return "Relaxations of the goal were not sought: no cycle verifies a stage with dither."
+    return (
+        "No relaxation of up to three parts of the goal was found with which an option meets it (of the limit of "
+        f"the bandwidth up to {REASONABLE:g} times, of the tolerance up to {LOOSER:g})."
+    )
+
+
+def _relax(relaxed: RelaxedGoal, before: Stage) -> str:
+    """What of the goal to relax, and what would then be set."""
+    crossing = {"bandwidth_limit": ", at which the loop last crosses 0 dB,"}
+    parts = [
+        f"{OPTIONS.get(part.key, part.requirement)} of {number(part.needed, part.unit)}{crossing.get(part.key, '')} "
+        f"instead of {number(part.value, part.unit)}"
+        for part in relaxed.relaxations
+    ]
+    return (
+        f"With a {listed(parts, 'and')}, {relaxed.remedy.name} would work on the machines tried "
+        f"({listed(changes(before, relaxed.stage), 'and')}; not verified by cycles: run friso tune again with it)."
+    )
+
+
+def unsure_why(outcome: RemedyOutcome) -> str:
+    """Why a remedy is not sure to work."""
+    if outcome.interrupted and not outcome.doubts:
+        return "it was not verified: the search was interrupted"
+    if not outcome.remedy.verifiable:
+        return "its dither keeps the stage moving, so that no cycle can verify it"
+    return listed([DOUBTS[doubt] for doubt in outcome.doubts], "and")
+
+
+def failing(tuning: Advice) -> list[str]:
+    """What cannot work, and why; and what is not sure to."""
+    lines = []
+    for outcome in tuning.outcomes:
+        if outcome.stage is None and not outcome.interrupted:
+            lines.append(f"{outcome.remedy.name}: {_verdict(outcome, tuning)}. {why_unmet(outcome, tuning)}")
+        elif outcome.certainty == "unsure" and tuning.working:
+            lines.append(f"{outcome.remedy.name}: not sure to work: {unsure_why(outcome)}.")
+    return lines
+
+
+def _met_by_another(outcome: RemedyOutcome, tuning: Advice) -> bool:
+    """Whether no setting of the bandwidth was found that works, although another remedy that works changes nothing
+    else."""
+    key = tuning.stage.controller.bandwidth_key
+    if outcome.stage is not None or key is None or [v.name for v in outcome.remedy.variables] != [BANDWIDTH]:
+        return False
+    before, stages = tuning.stage.flat(), (one.stage.flat() for one in tuning.working if one.stage is not None)
+    return any(after.keys() == before.keys() and _differing(before, after) == [key] for after in stages)
+
+
+def _verdict(outcome: RemedyOutcome, tuning: Advice) -> str:
+    """Whether a remedy works, in a few words."""
+    if _met_by_another(outcome, tuning):
+        return "see the others"
+    some = outcome.points is not None and bool(outcome.points.meets(tuning.goal).any())
+    return NONE_FOUND if some and outcome.certainty == "does not work" else outcome.certainty
+
+
+def _differing(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
+    return [key for key, value in before.items() if not np.array_equal(after[key], value)]
+
+
+def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
+    """Why no setting of a remedy meets the goal."""
+    if _met_by_another(outcome, tuning):
+        return "Its own search found no setting, but that of another option did, which changes the bandwidth alone."
+    if outcome.points is None:
+        return "Its motions take too much computing."
+    points, goal = outcome.points, tuning.goal
+    sentence = next(_reasons(points, outcome, goal))
+    edges = _edges(tuning) if [v.name for v in outcome.remedy.variables] == [BANDWIDTH] else ""
+    cut = " The search was given up there, as it takes too much computing: others may work." if outcome.cut else ""
+    return f"{sentence}{edges}{cut}"
+
+
+def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterator[str]:
+    """The first constraint that leaves nothing of the settings that meet those before."""
+    broken, left = points.broken(goal), np.ones(len(points.margin), bool)
+    margin, best = f"a modulus margin of {goal.margin:g}", float(points.margin.max(initial=0.0))
+    some = bool(broken["margin"].any())  # lack the margin: nothing is said of these
+    tried = f"No setting{f' that keeps {margin}' * some} (of {len(left)} tried)"
+    brings, still_settles = f"{tried} brings", f"{tried} still settles"
+    if len(left) == 1:  # nothing varies
+        brings, still_settles = "It does not bring", "It does not settle any more"
+    settle = f"All settings that {'keep the margin and ' * some}settle"
+    sentences = {
+        "margin": f"No setting keeps {margin} on {percent(goal.share)} of the machines: the best has "
+        f"{best:.{digits_that_differ((best, goal.margin))}g}.",
+        "settling": f"{brings} {percent(goal.share)} of the machines to rest in position in time.",
+        "distance": f"{still_settles} in time at {1 / goal.distance:.2f} of its bandwidth: hunting may be too close.",
+        "force": f"{settle} take more force than there is.",
+        "settle": f"{settle} do so too late.",
+        "bandwidth": f"Only settings above your limit of the bandwidth do all of that{_lowest(points, goal)}.",
+    }
+    for name, sentence in sentences.items():
+        left = left & ~broken[name]
+        if not left.any():
+            yield sentence
+    meet = f"Of {len(left)} settings tried {left.sum()} meet the rest of the goal on the machines of the search"
+    if outcome.cut and not outcome.attracted:
+        yield f"{meet}; of none it is known whether something attracts these."
+    else:
+        yield (
+            f"{meet}; of those looked at further ({outcome.attracted} surveyed) none surely meets it on fresh machines"
+            f"{'' if outcome.cut else ', others may'}."
+        )
+
+
+def _lowest(points: TriedPoints, goal: Goal) -> str:
+    """The lowest bandwidth of the settings that meet all else."""
+    others = np.all([~broken for name, broken in points.broken(goal).items() if name != "bandwidth"], axis=0)
+    lowest = np.nanmin(points.bandwidth[others], initial=np.inf)
+    return (
+        f", the slowest of which last crosses 0 dB at {with_unit(float(lowest), 'Hz')}" if np.isfinite(lowest) else ""
+    )
+
+
+def _edges(tuning: Advice) -> str:
+    """Where hunting ends in bandwidth, and up to where there is margin."""
+    edge, comfortable, stage = tuning.case.judgement.margin, tuning.limits.highest_comfortable, tuning.stage
+    parts = []
+    if edge is not None:
+        factors = (edge.quiet, tuning.goal.distance * edge.quiet)
+        ends, needed = (with_unit(float(hertz), "Hz") for hertz in bandwidths_at(stage, factors))
+        parts.append(f"hunting of the machine in the file ends at {ends} (it needs {needed}, others more)")
+    if comfortable is not None and np.isfinite(comfortable) and comfortable < tuning.limits.searched[1]:
+        again = [low for low, _ in tuning.limits.comfortable if low > comfortable][:1]
+        own = bandwidth(stage.flat()) or 1.0
+        hertz = [with_unit(float(at), "Hz") for at in bandwidths_at(stage, np.array([comfortable, *again]) / own)]
+        parts.append(
+            f"a modulus margin of {WANTED:g} is kept up to {' and again from '.join(hertz)}{' on' * len(again)}"
+        )
+    if tuning.goal.bandwidth_limit is not None:
+        parts.append(f"your limit is {with_unit(tuning.goal.bandwidth_limit, 'Hz')}")
+    return f" In bandwidth (where the loop last crosses 0 dB) {listed(parts, 'and')}." if parts else ""
+
+
+def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
+    """The remedies side by side, the stage as it is first."""
+    shown = [("as it is", tuning.present, "no" if tuning.needed else "yes")]
+    words = {"works": "yes", "unsure": "not sure", NONE_FOUND: "none found", "does not work": "no"}
+    table = [(name, _row(measured, tuning, works)) for name, measured, works in shown]
+    for outcome in tuning.outcomes:
+        works = words.get(verdict := _verdict(outcome, tuning), verdict)
+        cells = [works, *[NOTHING] * (len(COLUMNS) - 1)]
+        if outcome.measured is not None:
+            cells = _row(outcome.measured, tuning, works)
+            cells[1] = cells[1] if outcome.remedy.verifiable else NOTHING
+        table.append((outcome.remedy.name, cells))
+    return table
+
+
+def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
+    goal = tuning.goal
+    return [
+        works,
+        share_with_interval(measured.share(goal)),
+        slowest_time(measured, goal),
+        time(measured.median),
+        with_unit(measured.force(goal), "N"),
+        f"{measured.least_margin(goal):.2f}",
+        with_unit(measured.stiffness, "N/m"),
+    ]
+
+
+def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
+    """Where a number may lie, all else being as tuned: of the bandwidth the key that states it, or else where the loop
+    last crosses 0 dB."""
+    stage, name, ends = outcome.stage, window.name, np.array([window.low, window.high])
+    assert stage is not None
+    if name == BANDWIDTH:
+        pairs = zip(outcome.remedy.variables, outcome.shares, strict=True)
+        tuned = next(variable.at(share) for variable, share in pairs if variable.name == name)
+        stated = bandwidth(stage.flat())
+        ends = bandwidths_at(stage, ends / tuned) if stated is None else stated * ends / tuned
+        name = stage.controller.bandwidth_key or name
+    keys = stage.numeric_keys()
+    unit = "Hz" if name == BANDWIDTH else keys[name].unit if name in keys else ""
+    first, last = (number(float(value), unit) for value in ends)
+    first = f"{first} (the least tried)" if window.open_below else first
+    last = f"{last} (the most tried)" if window.open_above else last
+    return f"{name}: from {first} to {last}"
+
+
+def window_lines(tuning: Advice) -> list[str]:
+    """The windows of the least change that works."""
+    least = tuning.least
+    if least is None or not least.remedy.variables:
+        return []
+    if not least.windows:
+        return [
+            f"No window is given for {least.remedy.name}: on the machines of the search it misses the goal itself, or "
+            "what attracts these takes too much computing."
+        ]
+    return [
+        f"{least.remedy.name} meets the goal on the few machines of the search with each number varied separately, for "
+        f"{'; '.join(_windows(least))}. Near the ends, more of other machines may miss it."
+    ]
+
+
+def window_facts(tuning: Advice) -> list[tuple[str, str]]:
+    """The windows of every remedy that works."""
+    return [(outcome.remedy.name, "; ".join(_windows(outcome))) for outcome in tuning.working if outcome.windows]
+
+
+def _windows(outcome: RemedyOutcome) -> list[str]:
+    return [window_words(window, outcome) for window in outcome.windows]
+
+
+def _without_friction(flat: Mapping[str, Any], goal: Goal) -> Iterator[str]:
+    """What was not tried on a stage with friction because its laws declare too little of it."""
+    if leading_friction(flat)["friction.model"] == "none":
+        return
+    if breakaway(flat) <= 0:
+        yield "No settings against friction were tried: the friction law declares no break-away force to size them by."
+    if goal.joint and least_breakaway(flat) <= 0:
+        yield (
+            "No isolator was tried: the friction of the guide does not hold the cart against the force of a joint and "
+            "the bias force."
+        )
+
+
+def assumptions(tuning: Advice) -> list[str]:
+    """What is not known of the machine, what is assumed instead, and how the machines were drawn."""
+    lines, stage, machines = [], tuning.stage, tuning.machines
+    lines += _without_friction(stage.flat(), tuning.goal)
+    if any(outcome.remedy.of_setting for outcome in tuning.outcomes) and any(
+        not outcome.remedy.buys_joint for outcome in tuning.working
+    ):
+        lines.append("Settings against friction were not tried together with the bandwidth, as less than both works.")
+    lines.append(
+        "Margins include sampling, delay and current loop of the file; hunting and moves are those of a controller in "
+        f"continuous time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), "
+        "each with a move of a quarter of the travel or more."
+    )
+    lines += spread_sentences(machines.from_file, machines.spreads)
+    held = [key for key in tuning.complete(stage).uncertain() if key.startswith("drive.")]
+    if held:
+        lines.append(f"In the middle of its range on all machines: {listed(held, 'and')}.")
+    if machines.left_out:
+        lines.append(f"{machines.left_out} draws that no stage may have were replaced by others.")
+    return lines

@@ -1,0 +1,53 @@
+"""How the cases of a check are named and coloured: the same in every figure, sentence and table."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from friso.axis import axis_shown
+from friso.hunting.measures import BANDS as SETTLING_BANDS
+from friso.shown.drawing.figure import BLUE, GREEN, VERMILLION
+
+if TYPE_CHECKING:
+    from friso.hunting import Case
+    from friso.stage import Stage
+
+COLOURS = {"given": BLUE, "locked": VERMILLION, "free": GREEN}
+LABELS = {"given": "As given", "locked": "Locked", "free": "Free"}
+BANDS = dict(zip(SETTLING_BANDS, ("1 µm", "10 µm"), strict=True))
+
+
+def band_text(band: float) -> str:
+    """A band of settling in words."""
+    return axis_shown().text(BANDS[band])
+
+
+@dataclass(frozen=True)
+class ShownCase:
+    """One case as the figures and the report show it: always under this label, in this colour."""
+
+    key: str
+    label: str
+    colour: str
+    case: Case
+
+
+def shown_cases(cases: Mapping[str, Case]) -> tuple[ShownCase, ...]:
+    """The cases, each once: where "given" repeats the locked or the free case, that one says "(as given)"."""
+    labels = _labels([*cases], cases["given"].stage if "given" in cases else None)
+    return tuple(ShownCase(key, label, COLOURS[key], cases[key]) for key, label in labels.items())
+
+
+def case_labels(stage: Stage) -> dict[str, str]:
+    """The names of the cases of a stage that are shown, to what they are called."""
+    return _labels([*stage.variants()], stage)
+
+
+def _labels(names: Collection[str], stage: Stage | None) -> dict[str, str]:
+    joint = stage.joint if stage else None
+    variant = "locked" if joint and joint.locked else "free"
+    twin = variant if joint and variant in names else None
+    listed = [name for name in COLOURS if name in names and not (name == "given" and twin)]
+    return {name: LABELS[name] + (" (as given)" if name == twin else "") for name in listed}

@@ -1,0 +1,23 @@
+"""The program that draws figures beside a command (`friso.shown.drawing.images`): ``python -m
+friso.shown.drawing.artist``. It is asked for images of a figure, and answers their bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from friso.axis import AxisKind, speaking_of
+from friso.platform.helper_process import answer_questions
+from friso.shown.drawing.figure import Figure
+from friso.shown.drawing.images import Image
+from friso.shown.drawing.matplotlib_renderer import image
+
+
+def drawn(asked: tuple[Figure, AxisKind, Sequence[Image]]) -> dict[Image, bytes]:
+    """The images of a figure, in the units of an axis of that kind."""
+    figure, axis, images = asked
+    with speaking_of(axis):
+        return {wanted: image(figure, *wanted) for wanted in images}
+
+
+if __name__ == "__main__":
+    answer_questions(drawn, orphaned=False)

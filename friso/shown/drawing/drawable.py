@@ -1,0 +1,164 @@
+"""From a figure in SI units to the arrays that are drawn: prefixed, thinned, limits laid out.
+
+Both renderers start here, so that they draw the same arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from friso.escapes import escaped
+from friso.shown.drawing.figure import Array, Axis, Category, Coloured, Figure, Limit, Markers, Panel, Series
+from friso.shown.drawing.prefixes import choose, pretty
+from friso.shown.drawing.thinning import thin
+
+Field = TypeVar("Field", bound=Coloured)
+
+
+LONGEST_TEXT = 1000
+"""Characters of a text in a figure at most: the longest caption has half of them."""
+
+
+def drawable(figure: Figure) -> Figure:
+    """The figure with prefixed units, thinned series, limits as series, and markers that can be drawn."""
+    return _escaped_part(replace(figure, panels=tuple(_panel(panel) for panel in figure.panels)))
+
+
+def _escaped_part(part: Any) -> Any:
+    """A part of a figure whose texts are escaped, and no longer than can be drawn: they may come from a file."""
+    if isinstance(part, str):
+        text = escaped(part)
+        return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}..."
+    if isinstance(part, tuple):
+        return tuple(map(_escaped_part, part))
+    if is_dataclass(part) and not isinstance(part, type):
+        return replace(part, **{field.name: _escaped_part(getattr(part, field.name)) for field in fields(part)})
+    return part
+
+
+def cell_edges(centres: Array, *, log: bool = False) -> Array:
+    """Edges, shape (n + 1,), of the cells around ascending centres, shape (n,): halfway, on a logarithmic axis by
+    ratio. A single cell reaches half its value (or 0.5) to both sides, a logarithmic one a factor of two."""
+    if log:
+        return np.exp(cell_edges(np.log(centres))) if len(centres) > 1 else np.array([centres[0] / 2, centres[0] * 2])
+    if len(centres) == 1:
+        half = abs(centres[0]) / 2 or 0.5
+        return np.array([centres[0] - half, centres[0] + half])
+    inner = (centres[1:] + centres[:-1]) / 2
+    return np.concatenate(([2 * centres[0] - inner[0]], inner, [2 * centres[-1] - inner[-1]]))
+
+
+def colour_prefix(field: Coloured) -> tuple[float, str]:
+    """Factor and unit with prefix for the numbers of a map or cloud: its limits decide, or all its numbers."""
+    return choose(field.z if field.limits is None else np.array(field.limits), field.unit, log=field.log)
+
+
+def colour_key(figure: Figure) -> tuple[list[Category], list[Markers]]:
+    """The categories that occur, and the markers, of all panels with maps or clouds: each once, in one legend."""
+    panels = [panel for panel in figure.panels if panel.coloured]
+    categories = [
+        field.categories[int(code)]
+        for panel in panels
+        for field in panel.coloured
+        for code in np.unique(_finite(np.empty(0) if field.codes is None else field.codes.ravel()))
+    ]
+    markers = {(item.label, item.colour, item.symbol): item for panel in panels for item in panel.markers}
+    order = [category for panel in panels for field in panel.coloured for category in field.categories]
+    return sorted(dict.fromkeys(categories), key=order.index), list(markers.values())
+
+
+def line_key(figure: Figure) -> list[Series]:
+    """The lines of these panels that have a label, each once, for the same legend."""
+    lines = [line for panel in figure.panels if panel.coloured for line in panel.series if line.label]
+    return list({(line.label, line.colour, line.dash): line for line in lines}.values())
+
+
+WORDS = 12
+"""Words at an axis at most."""
+
+
+def word_ticks(axis: Axis) -> tuple[list[int], list[str]]:
+    """Positions and words written at an axis of words: all, or every second, third, ... so that `WORDS` do at most."""
+    positions = list(range(0, len(axis.words), -(-len(axis.words) // WORDS)))
+    return positions, [axis.words[position] for position in positions]
+
+
+def _panel(panel: Panel) -> Panel:
+    limits = _finite([value for limit in panel.limits for value in limit.values])
+    points = (*panel.series, *panel.markers, *panel.coloured)
+    xs = _gather(panel.x, [item.x for item in (*points, *panel.bands)])
+    sides = [side for band in panel.bands for side in (band.low, band.high)]
+    ys = _gather(panel.y, [*(item.y for item in points), *sides])
+    x_factor, x_unit = _prefix(panel.x, xs)
+    y_factor, y_unit = _prefix(panel.y, ys if panel.y.limits else np.concatenate((ys, limits)))
+    extent = (float(xs.min()), float(xs.max())) if xs.size else (0.0, 1.0)
+    lines = [_thinned(line) for line in panel.series] + [_limit(limit, extent) for limit in panel.limits]
+    return replace(
+        panel,
+        x=_axis(panel.x, x_factor, x_unit),
+        y=_axis(panel.y, y_factor, y_unit),
+        series=tuple(replace(line, x=line.x * x_factor, y=line.y * y_factor) for line in lines),
+        markers=tuple(_markers(marker, x_factor, y_factor) for marker in panel.markers),
+        maps=tuple(_coloured(field, x_factor, y_factor) for field in panel.maps),
+        clouds=tuple(_coloured(cloud, x_factor, y_factor) for cloud in panel.clouds),
+        bands=tuple(
+            replace(band, x=band.x * x_factor, low=band.low * y_factor, high=band.high * y_factor)
+            for band in panel.bands
+        ),
+        limits=(),
+    )
+
+
+def _gather(axis: Axis, arrays: Iterable[Array]) -> Array:
+    """The values that decide the prefix of an axis: its limits when given, else all finite data."""
+    if axis.limits is not None:
+        return np.array(axis.limits)
+    values = _finite(np.concatenate([np.empty(0), *(np.asarray(array, dtype=float) for array in arrays)]))
+    return values[values > 0] if axis.log else values
+
+
+def _prefix(axis: Axis, values: Array) -> tuple[float, str]:
+    """Factor and unit with prefix."""
+    return choose(values, axis.unit, log=axis.log) if axis.prefixed else (1.0, pretty(axis.unit))
+
+
+def _finite(values: Iterable[float] | Array) -> Array:
+    array = np.asarray(values, dtype=float)
+    return array[np.isfinite(array)]
+
+
+def _axis(axis: Axis, factor: float, unit: str) -> Axis:
+    limits = None if axis.limits is None else (axis.limits[0] * factor, axis.limits[1] * factor)
+    step = None if axis.step is None else axis.step * factor
+    return replace(axis, unit=unit, limits=limits, step=step)
+
+
+def _thinned(line: Series) -> Series:
+    """A broken or infinite sample becomes a gap in both directions; then the line is thinned."""
+    broken = ~(np.isfinite(line.x) & np.isfinite(line.y))
+    x, y = np.where(broken, np.nan, line.x), np.where(broken, np.nan, line.y)
+    x, y = thin(x, y)
+    return replace(line, x=x, y=y)
+
+
+def _limit(limit: Limit, extent: tuple[float, float]) -> Series:
+    """All lines of a limit as one series, with gaps between them."""
+    x = np.array([*extent, np.nan] * len(limit.values))
+    y = np.array([entry for value in limit.values for entry in (value, value, np.nan)])
+    return Series(x, y, limit.label, limit.colour, limit.dash, width=1.0)
+
+
+def _markers(markers: Markers, x_factor: float, y_factor: float) -> Markers:
+    finite = np.isfinite(markers.x) & np.isfinite(markers.y)
+    return replace(markers, x=markers.x[finite] * x_factor, y=markers.y[finite] * y_factor)
+
+
+def _coloured(field: Field, x_factor: float, y_factor: float) -> Field:
+    z = np.where(np.isfinite(field.z), field.z, np.nan)
+    factor, unit = colour_prefix(field)
+    limits = None if field.limits is None else (field.limits[0] * factor, field.limits[1] * factor)
+    return replace(field, x=field.x * x_factor, y=field.y * y_factor, z=z * factor, unit=unit, limits=limits)

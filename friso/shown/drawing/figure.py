@@ -1,0 +1,232 @@
+"""A figure as plain data, before anybody draws it.
+
+An analysis answers with a `Figure`; a renderer draws it. All data stand in the unit named on their axis, an
+SI unit when the figure is made; `friso.shown.drawing.drawable` picks the prefix and thins the lines, once for both
+renderers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Dash = Literal["solid", "dashed", "dotted"]
+Symbol = Literal["circle", "triangle", "cross", "target", "patch"]
+
+# Okabe & Ito, "Color universal design" (2008): distinguishable with any colour vision.
+BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
+SKY, ORANGE, PINK = "#56B4E9", "#E69F00", "#CC79A7"
+INK, GREY, LIGHT = "#222222", "#767676", "#c9c9c9"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis: `quantity` and `unit` make its label, `limits` [unit] its range (None: from the data).
+
+    An axis of words has the positions 0, 1, 2, ..., named by `words`, and no unit. Ticks stand at multiples of `step`
+    [unit], if that is given: angles are read in quarters of a turn. The unit has no prefix unless it is `prefixed`.
+    """
+
+    quantity: str
+    unit: str
+    limits: tuple[float, float] | None = None
+    log: bool = False
+    words: tuple[str, ...] = ()
+    step: float | None = None
+    prefixed: bool = True
+
+    @classmethod
+    def of_frequency(cls, hertz: Array) -> Axis:
+        """A logarithmic axis over increasing frequencies [Hz], from the first to the last."""
+        return cls("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)
+
+    @property
+    def label(self) -> str:
+        """What is written at the axis, e.g. "Time [s]"."""
+        return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
+
+
+@dataclass(frozen=True)
+class Series:
+    """A line through the points x, y, both of shape (n,); NaN breaks it."""
+
+    x: Array
+    y: Array
+    label: str
+    colour: str
+    dash: Dash = "solid"
+    width: float = 1.4
+
+    def __post_init__(self) -> None:
+        _same_length(self.label, self.x, self.y)
+
+
+@dataclass(frozen=True)
+class Markers:
+    """Single points x, y, both of shape (n,), never thinned (counted peaks, an evaluation point)."""
+
+    x: Array
+    y: Array
+    label: str
+    colour: str
+    symbol: Symbol = "circle"
+
+    def __post_init__(self) -> None:
+        _same_length(self.label, self.x, self.y)
+
+
+@dataclass(frozen=True)
+class Band:
+    """What lies between `low` and `high` over x, all finite and of shape (n,), filled and never thinned."""
+
+    x: Array
+    low: Array
+    high: Array
+    label: str
+    colour: str
+
+    def __post_init__(self) -> None:
+        _same_length(self.label, self.x, self.low)
+        _same_length(self.label, self.x, self.high)
+        if not np.isfinite([self.x, self.low, self.high]).all():
+            raise ValueError(f"{self.label}: x, low and high are not all finite; a band has no gaps")
+
+    @property
+    def outline(self) -> tuple[Array, Array]:
+        """The closed line around it, each of shape (2 n + 1,): there along the top, back along the bottom."""
+        there_and_back = np.concatenate([self.x, self.x[::-1], self.x[:1]])
+        return there_and_back, np.concatenate([self.high, self.low[::-1], self.high[:1]])
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Horizontal lines at `values` [unit of the y axis] across the panel, under one label."""
+
+    values: tuple[float, ...]
+    label: str
+    colour: str = GREY
+    dash: Dash = "dashed"
+
+
+@dataclass(frozen=True)
+class Category:
+    """What has a word instead of a number (a verdict, or the reason why there is no number): one flat colour."""
+
+    label: str
+    colour: str
+
+
+@dataclass(frozen=True)
+class Coloured:
+    """Points x, y coloured by the number z [unit] or, where there is one, by their category.
+
+    `limits` [unit] is the range of the colours (None: from z), on a logarithmic scale if `log`; `colours`, if given,
+    are those of the whole numbers 0, 1, 2, ... instead. `codes`, of the shape of z, numbers the `categories`; it is NaN
+    where z counts.
+    """
+
+    x: Array
+    y: Array
+    z: Array
+    quantity: str
+    unit: str
+    limits: tuple[float, float] | None = None
+    log: bool = False
+    colours: tuple[str, ...] = ()
+    categories: tuple[Category, ...] = ()
+    codes: Array | None = None
+
+    def __post_init__(self) -> None:
+        if self.codes is not None and np.shape(self.codes) != np.shape(self.z):
+            raise ValueError(
+                f"map of {self.quantity}: codes have the shape {np.shape(self.codes)}, expected that of z, "
+                f"{np.shape(self.z)}"
+            )
+
+    @property
+    def label(self) -> str:
+        """What is written at the colour bar."""
+        return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
+
+    @property
+    def has_numbers(self) -> bool:
+        """Whether colour encodes a number anywhere; without that there is no colour bar."""
+        return bool(np.isfinite(self.z).any())
+
+
+@dataclass(frozen=True)
+class Map(Coloured):
+    """A field z of shape (len(y), len(x)) over cell centres x and y, ascending; NaN cells of no category stay empty."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if np.shape(self.z) != (len(self.y), len(self.x)):
+            raise ValueError(
+                f"map of {self.quantity}: z has the shape {np.shape(self.z)}, expected "
+                f"(len(y), len(x)) = {(len(self.y), len(self.x))}"
+            )
+
+
+@dataclass(frozen=True)
+class Cloud(Coloured):
+    """Single places x, y with their z, all of shape (n,)."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _same_length(self.quantity, self.x, self.y)
+        _same_length(self.quantity, self.x, self.z)
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes with what is drawn in it: maps and clouds lowest, then bands, limits, lines and markers.
+
+    With `equal`, a unit is as long on the one axis as on the other, and both have limits.
+    """
+
+    title: str
+    x: Axis
+    y: Axis
+    series: tuple[Series, ...] = ()
+    markers: tuple[Markers, ...] = ()
+    limits: tuple[Limit, ...] = ()
+    maps: tuple[Map, ...] = ()
+    clouds: tuple[Cloud, ...] = ()
+    bands: tuple[Band, ...] = ()
+    equal: bool = False
+
+    @property
+    def coloured(self) -> tuple[Coloured, ...]:
+        """Maps and clouds: what needs a colour bar or a legend of colours."""
+        return (*self.maps, *self.clouds)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """Panels in `columns` columns, row by row. `name` serves as file name, `subject` is the stage.
+
+    The caption stands next to the figure on a page; the note is part of the figure itself.
+    """
+
+    name: str
+    title: str
+    caption: str
+    panels: tuple[Panel, ...]
+    columns: int = 1
+    subject: str = ""
+    note: str = ""
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of panels."""
+        return -(-len(self.panels) // self.columns)
+
+
+def _same_length(label: str, x: Sequence[float] | Array, y: Sequence[float] | Array) -> None:
+    if np.ndim(x) != 1 or np.shape(x) != np.shape(y):
+        raise ValueError(f"{label}: x has the shape {np.shape(x)}, y {np.shape(y)}; expected one length")

@@ -1,0 +1,135 @@
+"""The images of figures, for files and pages. A command that writes files has them drawn in processes of their own
+(`friso.shown.drawing.artist`), beside what it does meanwhile: a figure takes up to half a second, and matplotlib as
+long to load."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from pathlib import Path
+from typing import NamedTuple
+
+from friso.axis import AxisKind, axis_shown
+from friso.platform.helper_process import HelperProcess
+from friso.platform.system import usable_cores
+from friso.shown.drawing.figure import Figure
+
+FORMATS = ("png", "svg", "pdf")
+
+PROGRAM, MOST = "friso.shown.drawing.artist", 2
+"""What a process runs that draws, and how many do at a time."""
+
+
+class Image(NamedTuple):
+    """A form of a figure: its format, one of FORMATS, and whether it has its heading and its note, or is cut off below
+    and above them."""
+
+    form: str
+    headed: bool = True
+    noted: bool = True
+
+
+ON_PAGE = Image("svg", headed=False)
+"""What a page shows of most figures where it is printed, or no script runs."""
+
+
+def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:
+    """An image of a figure, as `Image`. Raises ValueError for a format that is none of FORMATS."""
+    if artists := _ARTISTS.get():
+        drawn = artists.drawn(figure, Image(form, headed, noted))
+        if drawn is not None:
+            return drawn
+    from friso.shown.drawing import matplotlib_renderer
+
+    return matplotlib_renderer.image(figure, form, headed, noted)
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure to a path, in the format of its suffix (ValueError for others than FORMATS)."""
+    path.write_bytes(image(figure, path.suffix.removeprefix(".").lower()))
+
+
+def draw_beforehand(figures: Iterable[Figure], images: Iterable[Image]) -> None:
+    """Begin to draw images of figures that will be asked for, where that is done beside."""
+    if artists := _ARTISTS.get():
+        artists.begin(figures, tuple(images))
+
+
+@contextmanager
+def drawing_beside() -> Iterator[Artists | None]:
+    """Within, figures that are known beforehand are drawn in other processes, the first of which loads what it needs
+    from now on; without a second core nothing is."""
+    if usable_cores() < 2:
+        yield None
+        return
+    artists = Artists()
+    token = _ARTISTS.set(artists)
+    try:
+        yield artists
+    finally:
+        _ARTISTS.reset(token)
+        artists.end()
+
+
+_Job = Future[dict[Image, bytes]]
+
+
+class Artists:
+    """Processes that draw, and what they are drawing."""
+
+    def __init__(self) -> None:
+        self.processes = [_artist()]
+        self._free = [*self.processes]
+        self._threads = ThreadPoolExecutor(MOST, thread_name_prefix="friso-artist")
+        self._begun: dict[tuple[int, Image], tuple[Figure, _Job]] = {}
+        self._ended = False
+
+    def begin(self, figures: Iterable[Figure], images: tuple[Image, ...]) -> None:
+        """Begin to draw images of figures, but for those that were begun."""
+        for figure in figures:
+            new = [wanted for wanted in images if (id(figure), wanted) not in self._begun]
+            if new:
+                job = self._threads.submit(self._draw, figure, axis_shown(), new)
+                self._begun |= {(id(figure), wanted): (figure, job) for wanted in new}
+
+    def drawn(self, figure: Figure, wanted: Image) -> bytes | None:
+        """An image that was begun, once it is there; None for any other, and where the process that drew it ended."""
+        begun = self._begun.get((id(figure), wanted))
+        return begun[1].result().get(wanted) if begun else None
+
+    def end(self) -> None:
+        """End everything: what is being drawn is not begun again by another process."""
+        self._ended = True
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        for artist in self.processes:
+            artist.kill()
+        self._threads.shutdown()
+        for artist in self.processes:
+            artist.end()
+
+    def _draw(self, figure: Figure, axis: AxisKind, images: Sequence[Image]) -> dict[Image, bytes]:
+        for artist in self._candidates():
+            with suppress(EOFError):
+                drawn = artist.ask((figure, axis, images))
+                self._free.append(artist)
+                return drawn
+        return {}
+
+    def _candidates(self) -> Iterator[HelperProcess]:
+        """Those that are free, which may have waited for too long, and ended; then a new one."""
+        with suppress(IndexError):
+            while True:
+                yield self._free.pop()
+        if not self._ended:
+            self.processes.append(_artist())
+            yield self.processes[-1]
+
+
+def _artist() -> HelperProcess:
+    return HelperProcess(PROGRAM, paths=sys.path)
+
+
+_ARTISTS: ContextVar[Artists | None] = ContextVar("artists", default=None)

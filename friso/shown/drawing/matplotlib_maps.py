@@ -1,0 +1,137 @@
+"""Maps and clouds on paper: their cells, colour bars, and the legend and note beneath a figure."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PathCollection, QuadMesh
+from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap, Normalize
+from matplotlib.figure import Figure as Canvas
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from friso.shown.drawing.colours import ColourScale, painted, scale
+from friso.shown.drawing.drawable import cell_edges, colour_key, line_key
+from friso.shown.drawing.figure import GREY, INK, Array, Coloured, Figure, Map, Panel
+
+LINE = 0.17  # [inch] one line of the legend or the note
+LETTERS = 15.5  # to the inch, at their size
+_VECTORS = 1000  # more cells than these become a picture inside an SVG or PDF, which else is slow to draw and to open
+
+
+def draw_coloured(axes: Axes, panel: Panel) -> None:
+    """The maps and clouds of a panel: first what shows a number, then what shows a category."""
+    for field in panel.coloured:
+        colour_scale = scale(field)
+        _add(axes, panel, field, painted(field), _colour_map(colour_scale), (colour_scale.low, colour_scale.high))
+        if field.codes is not None and field.categories:
+            categories = ListedColormap([category.colour for category in field.categories])
+            _add(axes, panel, field, field.codes, categories, (-0.5, len(field.categories) - 0.5))
+    if panel.maps:
+        axes.grid(visible=False)
+
+
+def _add(
+    axes: Axes, panel: Panel, field: Coloured, values: Array, colours: Colormap, limits: tuple[float, float]
+) -> QuadMesh | PathCollection:
+    """One layer of a map or cloud; places without a value stay empty."""
+    style = {"cmap": colours, "norm": Normalize(*limits), "rasterized": np.size(values) > _VECTORS}
+    if isinstance(field, Map):
+        x, y = cell_edges(field.x, log=panel.x.log), cell_edges(field.y, log=panel.y.log)
+        seams = {} if style["rasterized"] else {"edgecolors": "face", "linewidth": 0.2}  # else white hairlines in SVG
+        return axes.pcolormesh(x, y, np.ma.masked_invalid(values), **seams, **style)
+    finite = np.isfinite(values)
+    edge = {"s": 20, "linewidths": 0.3, "edgecolors": GREY}
+    return axes.scatter(field.x[finite], field.y[finite], c=values[finite], **edge, **style)
+
+
+def add_colour_bars(canvas: Canvas, axes: Sequence[Axes], panels: Sequence[Panel]) -> None:
+    """A colour bar for every panel that shows numbers; a single one where all of them share one scale."""
+    fields = {i: field for i, panel in enumerate(panels) for field in panel.coloured if field.has_numbers}
+    bars = {i: (scale(field), field.label) for i, field in fields.items()}
+    if len(set(bars.values())) == 1:
+        shared = [axes[i] for i, panel in enumerate(panels) if panel.coloured]
+        _bar(canvas, shared, *next(iter(bars.values())))
+        return
+    for i, (colour_scale, label) in bars.items():
+        _bar(canvas, [axes[i]], colour_scale, label)
+
+
+def _bar(canvas: Canvas, axes: list[Axes], colour_scale: ColourScale, label: str) -> None:
+    mappable = ScalarMappable(Normalize(colour_scale.low, colour_scale.high), _colour_map(colour_scale))
+    bar = canvas.colorbar(
+        mappable, ax=axes, ticks=list(colour_scale.ticks) or None, fraction=0.05, pad=0.015, aspect=28
+    )
+    if colour_scale.texts:
+        bar.set_ticklabels(list(colour_scale.texts))
+    bar.minorticks_off()
+    bar.set_label(label, parse_math=False)
+
+
+def _colour_map(colour_scale: ColourScale) -> Colormap:
+    if colour_scale.steps:
+        return ListedColormap(list(colour_scale.colours))
+    return LinearSegmentedColormap.from_list("friso", list(colour_scale.colours))
+
+
+def note_lines(figure: Figure, width: float) -> list[str]:
+    """The note of a figure in lines that fit into `width` [inch]."""
+    return [line for part in figure.note.splitlines() for line in textwrap.wrap(part, int(LETTERS * (width - 0.3)))]
+
+
+def footer_height(figure: Figure, width: float) -> float:
+    """Height [inch] that legend and note take beneath the panels."""
+    rows = _key_rows(figure, width) + len(note_lines(figure, width))
+    return LINE * rows + 0.08 if rows else 0.0
+
+
+def add_footer(
+    canvas: Canvas, figure: Figure, symbols: dict[str, dict[str, Any]], dashes: dict[str, Any], width: float
+) -> None:
+    """Legend of all maps and clouds, and under it the note, in the strip that `footer_height` asked for."""
+    height = float(canvas.get_figheight())
+    categories, markers = colour_key(figure)
+    lines = note_lines(figure, width)
+    handles = [
+        Patch(facecolor=category.colour, edgecolor=GREY, linewidth=0.6, label=category.label) for category in categories
+    ]
+    handles += [
+        Line2D([], [], linestyle="none", label=item.label, color=item.colour, **symbols[item.symbol])
+        for item in markers
+    ]
+    handles += [
+        Line2D([], [], linestyle=dashes[line.dash], label=line.label, color=line.colour, linewidth=line.width)
+        for line in line_key(figure)
+    ]
+    if handles:
+        place = {"loc": "lower left", "bbox_to_anchor": (0.006, (LINE * len(lines) + 0.03) / height)}
+        legend = canvas.legend(
+            handles=handles,
+            ncols=-(-len(handles) // _key_rows(figure, width)),
+            columnspacing=1.4,
+            labelspacing=0.25,
+            borderaxespad=0,
+            borderpad=0.1,
+            handlelength=2.2 if line_key(figure) else 1.4,
+            **place,
+        )
+        legend.set_in_layout(False)
+        for text in legend.get_texts():
+            text.set_parse_math(False)
+    for number, line in enumerate(reversed(lines)):
+        y = (LINE * number + 0.06) / height
+        canvas.text(0.01, y, line, fontsize=8, color=INK, parse_math=False, in_layout=False)
+
+
+def _key_rows(figure: Figure, width: float) -> int:
+    """Rows of the legend: columns are as wide as the longest text and its patch."""
+    labels = [item.label for group in (*colour_key(figure), line_key(figure)) for item in group]
+    if not labels:
+        return 0
+    columns = max(1, int(LETTERS * (width - 0.3) / (max(map(len, labels)) + 6)))
+    return -(-len(labels) // columns)

@@ -1,0 +1,357 @@
+"""Figures on paper: PNG, SVG and PDF through matplotlib, the same bytes on every run.
+
+The user's matplotlibrc does not matter: everything is drawn under matplotlib's defaults and the style below.
+Texts are drawn as they stand: a dollar sign in a stage's name starts no formula.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from functools import cached_property
+from threading import RLock
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+from matplotlib.ticker import (
+    FuncFormatter,
+    Locator,
+    LogLocator,
+    MaxNLocator,
+    MultipleLocator,
+    NullFormatter,
+    ScalarFormatter,
+)
+from matplotlib.transforms import Bbox
+
+from friso.errors import InputError
+from friso.shown.drawing.drawable import drawable, word_ticks
+from friso.shown.drawing.figure import GREY, INK, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.images import FORMATS
+from friso.shown.drawing.matplotlib_maps import LINE, add_colour_bars, add_footer, draw_coloured, footer_height
+
+WIDTH = 9.0  # [inch]
+ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
+LEGEND_ROWS, LEGEND_ROW = 3, 13  # rows of a legend that this has room for, and [point] what each takes
+MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: both axes matter equally
+EQUAL_HEIGHTS = {1: 5.9, 2: 3.6}  # [inch] the same of panels with equal scales, which need height for their width
+HEADER_HEIGHT = 0.35  # [inch] the figure's own title
+DOTS, FINER = 150, 2  # dots to the inch, and how many times as many where a file of lines holds a picture
+
+# No dates and no version numbers in the files, so that a rerun gives the same bytes.
+_METADATA = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+_STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",  # comes with matplotlib
+    "font.size": 9,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": GREY,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.xmargin": 0.01,
+    "axes.ymargin": 0.06,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.7,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "lines.solid_joinstyle": "round",
+    "svg.hashsalt": "friso",
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,
+}
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_DASHES = {"solid": "-", "dashed": (0, (5, 2.5)), "dotted": (0, (1.2, 1.6))}
+_SYMBOLS: dict[str, dict[str, Any]] = {
+    "circle": {"marker": "o", "markersize": 6},
+    "triangle": {"marker": "v", "markersize": 6},
+    "cross": {"marker": "x", "markersize": 6},
+    "target": {"marker": "o", "markersize": 9, "markeredgecolor": "white", "markeredgewidth": 1.6},
+    "patch": {"marker": "s", "markersize": 6, "markeredgecolor": GREY, "markeredgewidth": 0.6},
+}
+
+
+def render(figure: Figure) -> Canvas:
+    """The figure on a matplotlib canvas; its lines carry the arrays of `drawable(figure)`, in its order."""
+    with _style():
+        prepared = drawable(figure)
+        heading = ": ".join(text for text in (prepared.subject, prepared.title) if text)
+        footer = footer_height(prepared, WIDTH)
+        height = _row_height(prepared) * prepared.rows + (HEADER_HEIGHT if heading else 0) + footer
+        canvas = Canvas(figsize=(WIDTH, height), layout="constrained", facecolor="white")
+        area = (0, footer / height, 1, 1 - footer / height)
+        canvas.get_layout_engine().set(w_pad=0.08, h_pad=0.08, rect=area)  # type: ignore[union-attr]
+        if heading:
+            canvas.suptitle(heading, x=0.01, ha="left", fontsize=11.5, fontweight="bold", parse_math=False)
+        for number, panel in enumerate(prepared.panels):
+            axes = canvas.add_subplot(prepared.rows, prepared.columns, number + 1)
+            _draw(axes, panel, WIDTH / prepared.columns)
+        add_colour_bars(canvas, list(canvas.axes), prepared.panels)
+        add_footer(canvas, prepared, _SYMBOLS, _DASHES, WIDTH)
+        return canvas
+
+
+def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
+    """Draw the panels on the axes of somebody's figure, one each, or on a figure of pyplot that is made for them; their
+    axes. Raises InputError for other than one axes per panel."""
+    prepared = drawable(figure)
+    if axes is None:
+        from matplotlib import pyplot
+
+        size = (WIDTH, _row_height(prepared) * prepared.rows)
+        canvas = pyplot.figure(figsize=size, layout="constrained")
+        places = [canvas.add_subplot(prepared.rows, prepared.columns, k + 1) for k in range(len(prepared.panels))]
+    else:
+        places = [axes] if isinstance(axes, Axes) else [*axes]
+    if len(places) != len(prepared.panels):
+        expected = f"{len(prepared.panels)}, one per panel of the figure"
+        raise InputError("axes", f"{len(places)} axes", expected, f"plt.subplots({len(prepared.panels)})[1]")
+    with _style():
+        for place, panel in zip(places, prepared.panels, strict=True):
+            _draw(place, panel, WIDTH / prepared.columns)
+    return places
+
+
+def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:
+    """The figure as the bytes of a file, with its heading or cut off below it, with its note or cut off above it;
+    `form` is one of FORMATS (ValueError otherwise)."""
+    if form not in FORMATS:
+        raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(FORMATS)}, e.g. 'png'")
+    with _style():
+        return _laid_out(figure).image(form, headed, noted)
+
+
+class _LaidOut:
+    """A figure on a canvas whose parts have their places."""
+
+    def __init__(self, figure: Figure) -> None:
+        self.figure, self.canvas = figure, render(figure)
+        if engine := self.canvas.get_layout_engine():
+            engine.execute(self.canvas)
+        self.canvas.set_layout_engine(None)  # with any, each format is drawn twice
+        self.heading = self.canvas._suptitle  # type: ignore[attr-defined]
+        self.notes = [text for text in self.canvas.texts if text is not self.heading]
+
+    def image(self, form: str, headed: bool, noted: bool) -> bytes:
+        """As `image`. The page and the file show one drawing of the same lines and letters."""
+        height = self.canvas.get_figheight()
+        low = 0.0 if noted else LINE * len(self.notes)
+        high = height - (HEADER_HEIGHT if self.heading and not headed else 0.0)
+        if form == "svg":
+            return _cut(self.lines, height, low, high)
+        for text in self.canvas.texts:
+            text.set_visible(headed if text is self.heading else noted)
+        return self._printed(form, None if headed and noted else Bbox([[0, low], [WIDTH, high]]))
+
+    @cached_property
+    def lines(self) -> bytes:
+        """The whole figure as SVG."""
+        for text in self.canvas.texts:
+            text.set_visible(True)
+        return _LINE.sub(_rounded, self._printed("svg", None))
+
+    def _printed(self, form: str, area: Bbox | None) -> bytes:
+        stream = io.BytesIO()
+        with _letters_alone() if form == "pdf" else nullcontext():
+            dots = DOTS if form == "png" else FINER * DOTS  # of pictures inside
+            self.canvas.savefig(stream, format=form, metadata=_METADATA[form], bbox_inches=area, dpi=dots)
+        return stream.getvalue()
+
+
+_LINE, _LONG, _FRAME = (
+    re.compile(rb' (?:d|x|y)="[^"]+"|translate\([^)]+\)'),
+    re.compile(rb"-?\d+\.\d{3,}"),
+    re.compile(rb'height="[^"]*" viewBox="[^"]*"'),
+)
+
+
+def _rounded(line: re.Match[bytes]) -> bytes:
+    """A line of an SVG, or where a part of it stands, to a hundredth of a point."""
+    return _LONG.sub(lambda place: f"{float(place[0]):.2f}".rstrip("0").rstrip(".").encode(), line[0])
+
+
+def _cut(lines: bytes, height: float, low: float, high: float) -> bytes:
+    """What lies from `low` to `high` of an SVG of this height, all [inch] from below."""
+    if (low, high) == (0.0, height):
+        return lines
+    seen = 72 * (high - low)
+    frame = f'height="{seen:g}pt" viewBox="0 {72 * (height - high):g} {72 * WIDTH:g} {seen:g}"'
+    return _FRAME.sub(frame.encode(), lines, count=1)
+
+
+@contextmanager
+def _letters_alone() -> Iterator[None]:
+    """Fonts are embedded without the tables by which letters find their places, as they have them: to cut these down to
+    the letters that occur takes two thirds of the time of a PDF. Matplotlib makes the options of FontTools."""
+    from fontTools import subset
+
+    usual = subset.Options
+
+    class LettersAlone(usual):
+        def __init__(self, **options: object) -> None:
+            super().__init__(**options)
+            self.drop_tables = [*self.drop_tables, "GDEF", "GPOS", "GSUB"]
+
+    subset.Options = LettersAlone
+    try:
+        yield
+    finally:
+        subset.Options = usual
+
+
+def _laid_out(figure: Figure) -> _LaidOut:
+    """The last figures are kept for their next format: a page shows them, and they are files as well."""
+    for kept in tuple(_last):
+        if kept.figure is figure:
+            return kept
+    laid_out = _LaidOut(figure)
+    _last.append(laid_out)
+    return laid_out
+
+
+_last: deque[_LaidOut] = deque(maxlen=6)
+
+_one_at_a_time = RLock()
+"""Matplotlib's parameters are those of the process, and a canvas may be kept, but friso app draws in threads."""
+
+
+@contextmanager
+def _style() -> Iterator[None]:
+    with _one_at_a_time, mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        yield
+
+
+def _row_height(figure: Figure) -> float:
+    if any(panel.equal for panel in figure.panels):
+        return EQUAL_HEIGHTS.get(figure.columns, ROW_HEIGHT)
+    mapped = any(panel.coloured for panel in figure.panels)
+    height = MAP_HEIGHTS.get(figure.columns, ROW_HEIGHT) if mapped else ROW_HEIGHT
+    rows = max(_legend_rows(_labels(panel), WIDTH / figure.columns) for panel in figure.panels)
+    return height + LEGEND_ROW / 72 * max(0, rows - LEGEND_ROWS)
+
+
+def _draw(axes: Axes, panel: Panel, width: float) -> None:
+    """Everything of one panel, which is `width` [inch] wide."""
+    _scale(axes, panel)
+    draw_coloured(axes, panel)
+    handles: list[Artist] = []
+    for band in panel.bands:
+        handles += axes.fill(*band.outline, color=band.colour, linewidth=0)
+    for line in panel.series:
+        style = {"color": line.colour, "linestyle": _DASHES[line.dash], "linewidth": line.width}
+        handles += axes.plot(line.x, line.y, **style)
+    for marker in panel.markers:
+        style = {"color": marker.colour, "linestyle": "none", "zorder": 3, **_SYMBOLS[marker.symbol]}
+        handles += axes.plot(marker.x, marker.y, **style)
+    if panel.x.limits:
+        axes.set_xlim(panel.x.limits)
+    if panel.y.limits:
+        axes.set_ylim(panel.y.limits)
+    if panel.equal:
+        axes.set_aspect("equal")
+    _ticks(axes, panel, width)
+    _annotate(axes, panel, handles, width)
+
+
+def _scale(axes: Axes, panel: Panel) -> None:
+    axes.set_xscale("log" if panel.x.log else "linear")
+    axes.set_yscale("log" if panel.y.log else "linear")
+    if panel.markers and panel.x.limits is None:
+        axes.margins(x=0.03)
+
+
+def _ticks(axes: Axes, panel: Panel, width: float) -> None:
+    """Ticks of what is drawn: plain numbers, never a factor or an offset beside the axis."""
+    bins = (min(9, int(2 * width)), [1, 2, 5, 10]), (6, [1, 2, 2.5, 5, 10])
+    for axis, declared, (most, steps) in zip((axes.xaxis, axes.yaxis), (panel.x, panel.y), bins, strict=True):
+        if declared.words:
+            positions, words = word_ticks(declared)
+            axis.set_ticks(positions, words, parse_math=False)
+        elif declared.log:
+            _decades(axis, MaxNLocator(nbins=most, steps=steps))
+        else:
+            plain = ScalarFormatter(useOffset=False)
+            plain.set_scientific(False)
+            even = MaxNLocator(nbins=most, steps=steps)
+            axis.set_major_formatter(plain)
+            axis.set_major_locator(MultipleLocator(declared.step) if declared.step else even)
+
+
+def _decades(axis: Any, even: Locator) -> None:
+    """Ticks of a logarithmic axis: at powers of ten, also at 2 and 5 over a few decades, even ones within a decade."""
+    low, high = axis.get_view_interval()
+    few = high < 1000 * low
+    fine = even if high < 10 * low else LogLocator(subs=(1.0, 2.0, 5.0))
+    axis.set_major_locator(fine if few else LogLocator(numticks=8))
+    axis.set_major_formatter("{x:g}" if few else FuncFormatter(_power_of_ten))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _power_of_ten(value: float, _: int | None = None) -> str:
+    """The label of a tick at a power of ten, in letters: formulas take a tenth of the time of a figure."""
+    return "10" + str(round(math.log10(value))).translate(_RAISED)
+
+
+def _annotate(axes: Axes, panel: Panel, handles: list[Artist], width: float) -> None:
+    """Labels, and title over legend above the axes, where the legend covers no data."""
+    axes.set_xlabel(panel.x.label, parse_math=False)
+    axes.set_ylabel(panel.y.label, parse_math=False)
+    labels = [item.label for item in _items(panel)]
+    handles = [handle for handle, label in zip(handles, labels, strict=True) if label]
+    labels = [label for label in labels if label]
+    rows = _legend_rows(_labels(panel), width)
+    if rows:
+        columns = -(-len(labels) // rows)  # matplotlib fills them one after the other
+        place = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.1, "borderpad": 0.2}
+        legend = axes.legend(handles, labels, ncols=columns, columnspacing=1.4, labelspacing=0.25, **place)
+        for text in legend.get_texts():
+            text.set_parse_math(False)
+    axes.set_title(panel.title, pad=5 + LEGEND_ROW * rows, parse_math=False)
+
+
+def _items(panel: Panel) -> list[Band | Series | Markers]:
+    """What the legend of a panel names, in its order."""
+    return [*panel.bands, *panel.series, *panel.markers]
+
+
+def _labels(panel: Panel) -> list[str]:
+    """The labels in the legend of a panel; none where there is no legend."""
+    labels = [item.label for item in _items(panel) if item.label]
+    return labels if len(labels) > 1 and not panel.coloured else []
+
+
+def _legend_rows(labels: list[str], width: float) -> int:
+    """How many rows the legend with these labels has in `width` [inch]."""
+    return -(-len(labels) // _legend_columns(labels, width)) if labels else 0
+
+
+def _legend_columns(labels: list[str], width: float) -> int:
+    """As many columns as fit into `width` [inch]: 12 letters to the inch, 7 of them for line and gap."""
+    room = 12 * (width - 0.9)
+    for columns in range(len(labels), 1, -1):
+        rows = -(-len(labels) // columns)
+        if sum(max(map(len, labels[i : i + rows])) + 7 for i in range(0, len(labels), rows)) <= room:
+            return columns
+    return 1

@@ -1,0 +1,141 @@
+"""Maps and clouds on a page: their traces, colour bars, and the legend and note beneath a figure."""
+
+from __future__ import annotations
+
+import html
+import math
+import textwrap
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from friso.shown.drawing.colours import ColourScale, painted, scale
+from friso.shown.drawing.drawable import cell_edges, colour_key, line_key
+from friso.shown.drawing.figure import GREY, INK, Array, Axis, Coloured, Figure, Map, Panel
+
+BAR = 0.085  # width of a panel's own colour bar with its numbers and label, as a fraction of the width
+LINE = 17  # [px] one line of the note
+KEY_ROW, KEY_SPACE = 19, 11  # [px] a row of a legend, and what lies about the one beneath a figure
+KEY_LETTER, KEY_MARK = 6.6, 45  # [px] one letter of a legend, and the sign of an entry
+_LETTER = 6.1  # [px] of the note
+
+DASHES = {"solid": "solid", "dashed": "6px,4px", "dotted": "2px,3px"}
+SYMBOLS: dict[str, dict[str, Any]] = {
+    "circle": {"symbol": "circle", "size": 9},
+    "triangle": {"symbol": "triangle-down", "size": 9},
+    "cross": {"symbol": "x-thin-open", "size": 9},
+    "target": {"symbol": "circle", "size": 12, "line": {"color": "white", "width": 2}},
+    "patch": {"symbol": "square", "size": 9, "line": {"color": GREY, "width": 1}},
+}
+
+
+def bar_panels(panels: Sequence[Panel]) -> tuple[set[int], bool]:
+    """The panels that have a colour bar, and whether it is a single one, for all of them."""
+    bars = {
+        number: (scale(field), field.label)
+        for number, panel in enumerate(panels)
+        for field in panel.coloured
+        if field.has_numbers
+    }
+    shared = len(set(bars.values())) == 1 and all(panel.coloured for panel in panels)
+    return ({min(bars)} if shared else set(bars)), shared
+
+
+def coloured_traces(panel: Panel, place: dict[str, Any], bar: dict[str, Any] | None) -> list[Any]:
+    """The maps and clouds of a panel: first what shows a number (with the colour bar `bar`), then the categories."""
+    traces: list[Any] = []
+    for field in panel.coloured:
+        colouring = _colouring(scale(field), bar if field.has_numbers else None, field.label)
+        traces.append(_layer(panel, field, painted(field), colouring, place))
+        if field.codes is not None and field.categories:
+            categories = ColourScale(
+                -0.5, len(field.categories) - 0.5, tuple(category.colour for category in field.categories), steps=True
+            )
+            traces.append(_layer(panel, field, field.codes, _colouring(categories, None, ""), place))
+    return traces
+
+
+def _layer(panel: Panel, field: Coloured, values: Array, colouring: dict[str, Any], place: dict[str, Any]) -> Any:
+    """One layer of a map or cloud; places without a value stay empty."""
+    where = f"{_hover('x', panel.x)}, {_hover('y', panel.y)}"
+    if values is not field.codes:
+        where += f": %{{customdata:.4~g}} {html.escape(field.unit)}"
+    text = {"hovertemplate": f"{where}<extra></extra>", "showlegend": False}
+    if isinstance(field, Map):
+        x, y = _cells(field.x, panel.x), _cells(field.y, panel.y)
+        numbers_shown = None if values is field.codes else field.z
+        cells = {"type": "heatmap", "x": x, "y": y, "z": values, "customdata": numbers_shown}
+        return {**cells, **colouring, **text, **place}
+    numbers_shown = np.isfinite(values)
+    names = {"zmin": "cmin", "zmax": "cmax"}
+    marker = {names.get(name, name): value for name, value in colouring.items()}
+    marker |= {"color": values[numbers_shown], "size": 6, "line": {"color": GREY, "width": 0.4}}
+    numbers = {"x": field.x[numbers_shown], "y": field.y[numbers_shown], "customdata": field.z[numbers_shown]}
+    return {"type": "scatter", "mode": "markers", "marker": marker, **numbers, **text, **place}
+
+
+def _cells(centres: Array, axis: Axis) -> Array:
+    """plotly finds the edges between centres as `cell_edges` does, but knows nothing of a single cell's."""
+    return cell_edges(centres, log=axis.log) if len(centres) == 1 else centres
+
+
+def _hover(name: str, axis: Axis) -> str:
+    return f"%{{{name}}}" if axis.words else f"%{{{name}:.5~g}} {html.escape(axis.unit)}"
+
+
+def _colouring(colour_scale: ColourScale, bar: dict[str, Any] | None, label: str) -> dict[str, Any]:
+    colouring = {
+        "colorscale": colour_scale.stops,
+        "zmin": colour_scale.low,
+        "zmax": colour_scale.high,
+        "showscale": bar is not None,
+    }
+    if bar is None:
+        return colouring
+    ticks = (
+        {"tickmode": "array", "tickvals": colour_scale.ticks, "ticktext": colour_scale.texts}
+        if colour_scale.ticks
+        else {}
+    )
+    title = {"text": html.escape(label), "side": "right"}
+    return colouring | {"colorbar": {"title": title, "thickness": 14, "outlinewidth": 0, **ticks, **bar}}
+
+
+def key_traces(figure: Figure, legend: str) -> list[dict[str, Any]]:
+    """Traces without points that fill the common legend of all maps and clouds."""
+    categories, markers = colour_key(figure)
+    square = {"symbol": "square", "size": 11, "line": {"color": GREY, "width": 1}}
+    entries = [(category.label, square | {"color": category.colour}) for category in categories]
+    entries += [(item.label, SYMBOLS[item.symbol] | {"color": item.colour}) for item in markers]
+    styles = [(label, {"mode": "markers", "marker": marker}) for label, marker in entries]
+    for line in line_key(figure):
+        style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash]}
+        styles.append((line.label, {"mode": "lines", "line": style}))
+    unseen = {"type": "scatter", "x": [None], "y": [None], "legend": legend}
+    return [{**unseen, "name": html.escape(label), **style} for label, style in styles]
+
+
+def key_rows(labels: Sequence[str], width: int) -> int:
+    """Rows of a legend of these entries that is so wide [px]: they stand in columns as wide as the longest."""
+    entry = KEY_MARK + KEY_LETTER * max(map(len, labels), default=0)
+    return math.ceil(len(labels) / max(1, int(width / entry)))
+
+
+def footer(figure: Figure, legend: str, width: int) -> tuple[int, dict[str, Any], list[dict[str, Any]]]:
+    """Height [px] of the area below the panels, its legend by name, and the note, broken at a width [px], as
+    annotations."""
+    lines = [line for part in figure.note.splitlines() for line in textwrap.wrap(part, int(width / _LETTER))]
+    note = LINE * len(lines) + 6 if lines else 0
+    below = {"x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "xref": "paper", "yref": "paper"}
+    text = "<br>".join(html.escape(line) for line in lines)
+    font = {"size": 11, "color": INK}
+    annotations = [{"text": text, "align": "left", "showarrow": False, "font": font, **below}] if lines else []
+    labels = [item.label for items in (*colour_key(figure), line_key(figure)) for item in items]
+    if not labels:
+        return note, {}, annotations
+    key = KEY_SPACE + KEY_ROW * key_rows(labels, width)
+    for annotation in annotations:
+        annotation["yshift"] = -key
+    style = {"orientation": "h", "x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "itemclick": False}
+    return note + key, {legend: style | {"itemdoubleclick": False, "bgcolor": "rgba(0,0,0,0)"}}, annotations

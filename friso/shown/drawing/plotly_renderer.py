@@ -1,0 +1,332 @@
+"""Figures on a page: interactive HTML through plotly, readable without a network.
+
+A page holds plotly's script once (`script()`) and any number of fragments (`fragment(figure)`), whose
+elements are named after the figure, so that the same figures give the same bytes. Both are compressed; `page.js`
+unpacks and draws them in the browser.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import math
+import textwrap
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.offline import get_plotlyjs
+
+from friso.shown.drawing.drawable import drawable, word_ticks
+from friso.shown.drawing.figure import GREY, INK, Axis, Band, Figure, Markers, Panel, Series
+from friso.shown.drawing.packing import packed, packed_json
+from friso.shown.drawing.plotly_maps import (
+    BAR,
+    DASHES,
+    KEY_ROW,
+    SYMBOLS,
+    bar_panels,
+    coloured_traces,
+    footer,
+    key_rows,
+    key_traces,
+)
+
+WIDE, NARROW = 540, 290  # [px] for all columns of axes: the least of a wide page, and of a telephone
+TITLE, SPACE = 17, 18  # [px] a line of the title, and what lies about it and the legend
+TITLE_LETTER = 7.6  # [px] one letter of it
+PLOT = 230  # [px] height of the axes
+MAP_PLOTS = {1: 430, 2: 320}  # [px] the same of one or two columns of maps: both axes matter equally
+EQUAL_PLOTS = {1: 520, 2: 290}  # [px] the same of panels with equal scales
+FOOTER = 54  # [px] tick labels and axis label
+LEFT, RIGHT, TOP = 72, 14, 26  # [px]; the buttons stand in the top margin
+GAP = 0.09  # between two panels of a row, as a fraction of the width
+
+# The buttons are listed, since plotly's own choice has one that sends the data to a server.
+_BUTTONS = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]]
+_CONFIG = {
+    "displaylogo": False,
+    "responsive": False,  # page.js sees to that
+    "modeBarButtons": _BUTTONS,
+    "showSendToCloud": False,
+    "plotlyServerURL": "",
+}
+
+
+@cache
+def script() -> str:
+    """plotly.js of the installed package, packed, to stand once in a page."""
+    return packed(get_plotlyjs())
+
+
+def fragment(figure: Figure) -> str:
+    """The figure as an HTML element of its height, and beside it, packed, what plotly draws into it, and the layout on
+    a narrow screen with the places of the colour bars there."""
+    narrow = narrow_parts(figure)  # its traces are those of the wide one but for their colour bars' places
+    narrow["layout"] = _checked([], narrow["layout"]).to_plotly_json()["layout"]
+    drawn = _on_both(render(figure).to_plotly_json(), narrow)
+    return (
+        f'<div id="figure-{figure.name}" style="height: {drawn["layout"]["height"]}px"></div>\n'
+        f'<script type="application/gzip" class="figure">{packed_json({**_single(drawn), "config": _CONFIG})}</script>'
+    )
+
+
+def parts_of_both(figure: Figure) -> dict[str, Any]:
+    """`parts`, and beside them what is otherwise on a narrow screen: the layout, and the places of the colour bars."""
+    prepared = drawable(figure)
+    return _on_both(_laid_out(prepared, WIDE), _laid_out(replace(prepared, columns=1), NARROW))
+
+
+def _on_both(wide: dict[str, Any], narrow: dict[str, Any]) -> dict[str, Any]:
+    return {**wide, "narrow": narrow["layout"], "bars": [_bar(trace) for trace in narrow["data"]]}
+
+
+def _bar(trace: dict[str, Any]) -> dict[str, Any] | None:
+    """Where the colour bar of a trace stands; None where it has none."""
+    bar = trace.get("colorbar") or trace.get("marker", {}).get("colorbar")
+    return {name: bar[name] for name in ("x", "y", "len")} if bar else None
+
+
+def _single(part: Any) -> Any:
+    """Arrays with the precision of a screen: half as long as those with the engine's, and the first bytes of all their
+    numbers before the second, which packs better (`page.js` puts them together). What is not finite is null."""
+    if isinstance(part, dict) and part.get("dtype") == "f8":
+        numbers = np.frombuffer(base64.b64decode(part["bdata"]), "<f8").astype("<f4")
+        planes = base64.b64encode(numbers.view(np.uint8).reshape(-1, 4).T.tobytes()).decode("ascii")
+        return {"planes": planes, "shape": part.get("shape", "")}
+    if isinstance(part, dict):
+        return {name: _single(value) for name, value in part.items()}
+    if isinstance(part, list | tuple | np.ndarray):  # plotly leaves an empty array as it is
+        return [_single(value) for value in (part.tolist() if isinstance(part, np.ndarray) else part)]
+    return None if isinstance(part, float) and not math.isfinite(part) else part
+
+
+def render(figure: Figure) -> go.Figure:
+    """The figure for plotly; its traces carry the arrays of `drawable(figure)`, in the same order."""
+    plain = parts(figure)
+    return _checked(plain["data"], plain["layout"])
+
+
+def _checked(traces: list[Any], layout: dict[str, Any]) -> go.Figure:
+    """What plotly draws as a figure of its own, which has checked it."""
+    return go.Figure(traces, {"template": "none", **layout})
+
+
+def narrow_parts(figure: Figure) -> dict[str, Any]:
+    """The same for a narrow screen: panels one below the other."""
+    return parts(replace(figure, columns=1), NARROW)
+
+
+def parts(figure: Figure, width: int = WIDE) -> dict[str, Any]:
+    """What plotly draws, traces and layout, as plain dictionaries that hold NumPy arrays; not checked by plotly, which
+    takes ten times as long as to make them. `width`: the least [px] that there is for the axes of all columns."""
+    return _laid_out(drawable(figure), width)
+
+
+def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
+    plot = _plot_height(prepared, width)
+    heads = [_Head.of(panel, width, prepared.columns) for panel in prepared.panels]
+    header = max(head.height for head in heads)
+    row = header + plot + FOOTER
+    height = row * prepared.rows
+    key = f"legend{len(prepared.panels) + 1}"  # the panels have the numbers before
+    below, legend, note = footer(prepared, key, width)
+    layout: dict[str, Any] = {
+        "height": height + TOP + below,
+        "margin": {"l": LEFT, "r": RIGHT, "t": TOP, "b": below},
+        "font": {"family": "system-ui, sans-serif", "size": 12, "color": INK},
+        "hovermode": "closest",
+        "annotations": note,
+        **legend,
+    }
+    traces: list[Any] = []
+    links: dict[Axis, str] = {}
+    with_bar, shared_bar = bar_panels(prepared.panels)
+    for number, panel in enumerate(prepared.panels):
+        top = height - (number // prepared.columns) * row
+        y_domain = ((top - header - plot) / height, (top - header) / height)
+        x_domain = _columns(number % prepared.columns, prepared.columns)
+        bar = None
+        if shared_bar and number in with_bar:
+            bar = {"x": 1.0, "y": (FOOTER + height - header) / 2 / height, "len": 1 - (FOOTER + header) / height}
+        elif number in with_bar:
+            x_domain = (x_domain[0], x_domain[1] - BAR)
+            bar = {"x": x_domain[1], "y": sum(y_domain) / 2, "len": y_domain[1] - y_domain[0]}
+        _add_panel(layout, panel, number, x_domain, y_domain, links)
+        if heads[number].rows:
+            layout[f"legend{_suffix(number)}"] = heads[number].over(x_domain[0], y_domain[1])
+        elif heads[number].lines:
+            layout["annotations"].append(heads[number].alone(x_domain[0], y_domain[1]))
+        traces += _traces(panel, number, bar)
+    return {"data": traces + key_traces(prepared, key), "layout": layout}
+
+
+@dataclass(frozen=True)
+class _Head:
+    """What stands above the axes of a panel: the lines of its title, and below them the rows of its legend, whose
+    entries stand one below the other where they are `stacked`."""
+
+    lines: tuple[str, ...]
+    rows: int
+    stacked: bool
+
+    @classmethod
+    def of(cls, panel: Panel, width: int, panels: int) -> _Head:
+        """As title and legend are broken where so many panels share this width [px]: entries stand in columns as wide
+        as the longest. Plotly breaks a row at the width of the figure alone, so beside other panels entries of more
+        than a row are stacked."""
+        labels, own = _labels(panel), width // panels
+        rows = key_rows(labels, own)
+        stacked = panels > 1 and rows > 1
+        lines = textwrap.wrap(panel.title, int(own / TITLE_LETTER))
+        return cls(tuple(lines), len(labels) if stacked else rows, stacked)
+
+    @property
+    def height(self) -> int:
+        """Of all of it [px]."""
+        return TITLE * len(self.lines) + KEY_ROW * self.rows + SPACE
+
+    def over(self, left: float, top: float) -> dict[str, Any]:
+        """The legend as plotly takes it, above axes that begin and end there, in shares of the figure, with the title
+        above its entries: those take fewer rows where there is more room."""
+        place = {"x": left, "xanchor": "left", "y": top, "yanchor": "bottom", "bgcolor": "rgba(0,0,0,0)"}
+        kind = {"orientation": "v", "maxheight": 1} if self.stacked else {"orientation": "h"}
+        return {**kind, **place, **({"title": {**self._text, "side": "top"}} if self.lines else {})}
+
+    def alone(self, left: float, top: float) -> dict[str, Any]:
+        """The title as plotly takes it where there is no legend, above axes that begin and end there, in shares of the
+        figure."""
+        place = {"x": left, "xref": "paper", "xanchor": "left", "y": top, "yref": "paper", "yanchor": "bottom"}
+        return {**self._text, "showarrow": False, **place, "yshift": SPACE - 4, "align": "left"}
+
+    @property
+    def _text(self) -> dict[str, Any]:
+        return {"text": f"<b>{'<br>'.join(map(html.escape, self.lines))}</b>", "font": {"size": 13}}
+
+
+def _labels(panel: Panel) -> list[str]:
+    """The entries of the legend of a panel: none where there is a single one, or where colours tell numbers."""
+    labels = [item.label for item in (*panel.bands, *panel.series, *panel.markers) if item.label]
+    return labels if len(labels) > 1 and not panel.coloured else []
+
+
+def _plot_height(figure: Figure, width: int) -> int:
+    if any(panel.equal for panel in figure.panels):
+        return min(EQUAL_PLOTS.get(figure.columns, PLOT), max(width, PLOT))
+    mapped = any(panel.coloured for panel in figure.panels)
+    return MAP_PLOTS.get(figure.columns, PLOT) if mapped else PLOT
+
+
+def _columns(column: int, columns: int) -> tuple[float, float]:
+    """Left and right end of a column, as fractions of the width."""
+    width = (1 - GAP * (columns - 1)) / columns
+    left = column * (width + GAP)
+    return left, min(1.0, left + width)
+
+
+def _add_panel(
+    layout: dict[str, Any],
+    panel: Panel,
+    number: int,
+    x_domain: tuple[float, float],
+    y_domain: tuple[float, float],
+    links: dict[Axis, str],
+) -> None:
+    """The axes of a panel; panels with equal x axes are zoomed together."""
+    suffix = _suffix(number)
+    shape = {"constrain": "domain"} if panel.equal else {}
+    x_axis = _axis(panel.x) | {"domain": x_domain, "anchor": f"y{suffix}"} | shape
+    if panel.x in links:
+        x_axis["matches"] = links[panel.x]
+    links.setdefault(panel.x, f"x{suffix}")
+    layout[f"xaxis{suffix}"] = x_axis
+    shape |= {"scaleanchor": f"x{suffix}"} if panel.equal else {}
+    layout[f"yaxis{suffix}"] = _axis(panel.y) | {"domain": y_domain, "anchor": f"x{suffix}"} | shape
+
+
+def _axis(axis: Axis) -> dict[str, Any]:
+    settings: dict[str, Any] = {
+        "title": {"text": html.escape(axis.label), "standoff": 8},
+        "type": "log" if axis.log else "linear",
+        "exponentformat": "power" if axis.log else "none",
+        "gridcolor": "#e3e3e3",
+        "zeroline": False,
+        "showline": True,
+        "linecolor": GREY,
+        "ticks": "outside",
+        "tickcolor": GREY,
+    }
+    if axis.words:
+        positions, words = word_ticks(axis)
+        settings |= {"tickmode": "array", "tickvals": positions, "ticktext": [html.escape(word) for word in words]}
+        settings["automargin"] = True  # words are of any length
+    if axis.log:
+        settings |= _log_ticks(axis.limits)
+    if axis.step:
+        settings |= {"tick0": 0, "dtick": axis.step}
+    if axis.limits:
+        settings["range"] = [math.log10(limit) for limit in axis.limits] if axis.log else list(axis.limits)
+    return settings
+
+
+def _log_ticks(limits: tuple[float, float] | None) -> dict[str, Any]:
+    """Decades; between them 2 and 5, or more, where they are too few: plotly alone writes 0.5 as "5". Where even these
+    are too few, about five round numbers."""
+    decades = math.log10(limits[1] / limits[0]) if limits else math.inf
+    if limits is None or decades >= 2:
+        return {"dtick": 1}
+    steps = (1, 2, 5) if decades >= 1 else (1, 1.5, 2, 3, 4, 5, 7)
+    exponents = range(math.floor(math.log10(limits[0])), math.ceil(math.log10(limits[1])) + 1)
+    values = [step * 10.0**exponent for exponent in exponents for step in steps]
+    low, high = limits
+    if low < high and sum(low <= value <= high for value in values) < 3:
+        unit = 10.0 ** math.floor(math.log10((high - low) / 4))
+        step = unit * next((size for size in (5, 2) if size * unit <= (high - low) / 4), 1)
+        values = [number * step for number in range(math.ceil(low / step), math.floor(high / step) + 1)]
+    return {"tickmode": "array", "tickvals": values, "ticktext": [f"{value:.10g}" for value in values]}
+
+
+def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
+    """What is drawn in a panel, maps first, in the order of `drawable`."""
+    suffix = _suffix(number)
+    place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
+    key = bool(_labels(panel))
+    named = place | {"legend": f"legend{suffix}"}
+    return [
+        *coloured_traces(panel, place, bar),
+        *(_area(band, named | {"showlegend": key and bool(band.label)}) for band in panel.bands),
+        *(_line(line, panel, named | {"showlegend": key and bool(line.label)}) for line in panel.series),
+        *(_points(marker, panel, named | {"showlegend": key and bool(marker.label)}) for marker in panel.markers),
+    ]
+
+
+def _area(band: Band, place: dict[str, Any]) -> dict[str, Any]:
+    x, y = band.outline
+    style = {"mode": "lines", "line": {"width": 0}, "fill": "toself", "fillcolor": band.colour, "hoverinfo": "skip"}
+    return {"type": "scatter", "x": x, "y": y, "name": html.escape(band.label), **style, **place}
+
+
+def _line(line: Series, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
+    style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash], "simplify": False}
+    drawn = {"type": "scatter", "x": line.x, "y": line.y, "mode": "lines", "line": style, "connectgaps": False}
+    return {**drawn, **_text(line.label, panel), **place}
+
+
+def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
+    style = {"color": marker.colour, **SYMBOLS[marker.symbol]}
+    drawn = {"type": "scatter", "x": marker.x, "y": marker.y, "mode": "markers", "marker": style}
+    return {**drawn, **_text(marker.label, panel), **place}
+
+
+def _text(label: str, panel: Panel) -> dict[str, Any]:
+    """Name and hover text; plotly reads both as HTML."""
+    x_unit, y_unit = html.escape(panel.x.unit), html.escape(panel.y.unit)
+    hover = f"%{{x:.5~g}} {x_unit}, %{{y:.5~g}} {y_unit}"
+    return {"name": html.escape(label), "hovertemplate": hover}
+
+
+def _suffix(number: int) -> str:
+    """plotly counts axes x, x2, x3, ..."""
+    return "" if number == 0 else str(number + 1)

@@ -1,0 +1,144 @@
+"""Numbers as they are read: the SI prefix that suits them, ranges, shares in percent."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.axis import axis_shown, unit_shown
+from friso.quantities import NOTHING, percent
+from friso.shown.drawing.figure import Array
+
+if TYPE_CHECKING:
+    from friso.shares import Share
+
+# Prefixes by exponent of ten, and the smallest and largest exponent of the units that take them: lengths beyond metres,
+# times beyond seconds and slow frequencies are read best as they are.
+_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_PREFIXED = {"m": (-9, 0), "rad": (-9, 0), "s": (-9, 0), "N": (-9, 9), "Hz": (0, 9)}
+_SIGNS = str.maketrans({"*": "·"})
+_POWERS = {"^2": "²", "^3": "³", "**2": "²", "**3": "³"}
+
+SOLVED = 1e-9
+"""Length [m] below which a motion that was simulated is not distinguished from rest."""
+
+
+def choose(values: Array, unit: str, *, log: bool = False) -> tuple[float, str]:
+    """Factor and unit with prefix for `values` [unit]: prefixed value = factor * value.
+
+    The unit is shown as it is on the axis that is spoken of: "m" as "rad" on a rotary one. The largest magnitude falls
+    between 1 and 1000 where a prefix allows it; on a logarithmic axis the middle of the range does. Units without
+    prefix (kg, m^2) keep the factor 1. Only finite values count.
+    """
+    unit = unit_shown(unit)
+    symbol = unit.replace("**", "^").replace("/", "*").split("*")[0]
+    text = pretty(unit)
+    magnitudes = np.abs(values[np.isfinite(values) & (values != 0)])
+    if symbol not in _PREFIXED or magnitudes.size == 0:
+        return 1.0, text
+    size = float(np.max(magnitudes))
+    if log:
+        size = math.sqrt(size) * math.sqrt(float(np.min(magnitudes)))
+    # 1e-9 of slack: a largest value of 0.001 m is 1 mm although 0.001 * 1000 may fall short of 1
+    exponent = 3 * math.floor((math.log10(size) + 1e-9) / 3)
+    smallest, largest = _PREFIXED[symbol]
+    exponent = min(max(exponent, smallest), largest)
+    return 10.0**-exponent, _PREFIXES[exponent] + text
+
+
+def pretty(unit: str) -> str:
+    """A unit as it is printed: "N*s/m^2" becomes "N·s/m²", and as it is on the axis that is spoken of."""
+    unit = unit_shown(unit)
+    for plain, raised in _POWERS.items():
+        unit = unit.replace(plain, raised)
+    return unit.translate(_SIGNS)
+
+
+def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
+    """A value [unit] for a table or a sentence, e.g. "0.52 mm"; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return NOTHING
+    factor, text = choose(np.array([value]), unit)
+    number = value * factor
+    if number == 0 or 1e-3 <= abs(number) < 1e5:
+        return f"{_significant(number, digits)} {text}"
+    return f"{number:.{digits - 1}e} {text}"
+
+
+def length_at_rest(value: float) -> str:
+    """How far [m] something still moves; below a nanometre the digits would be those of the solver."""
+    return axis_shown().text("< 1 nm") if value < SOLVED else with_unit(value, "m")
+
+
+def digits_that_differ(values: Sequence[float]) -> int:
+    """Significant digits with which numbers that differ look different: three, or as many as that takes."""
+    return next(digits for digits in range(3, 18) if len({f"{x:.{digits - 1}e}" for x in values}) == len({*values}))
+
+
+def rounded_up(value: float, digits: int = 3) -> float:
+    """A positive value rounded to so many significant digits, never downward."""
+    unit = 10.0 ** (math.floor(math.log10(value) + 1e-12) - digits + 1)
+    return math.ceil(value / unit - 1e-9) * unit
+
+
+def rounded_down(value: float, digits: int = 3) -> float:
+    """A positive value rounded to so many significant digits, never upward."""
+    unit = 10.0 ** (math.floor(math.log10(value) + 1e-12) - digits + 1)
+    return math.floor(value / unit + 1e-9) * unit
+
+
+def range_with_unit(low: float, high: float, unit: str, digits: int = 3) -> str:
+    """A range [unit] for a table or a sentence, e.g. "1.72 to 10.8 mm"; a wide one has two prefixes, and one whose ends
+    have the same digits is a single number."""
+    factor, text = choose(np.array([low, high]), unit)
+    if 0 < low * factor < 0.01:
+        return f"{with_unit(low, unit, digits)} to {with_unit(high, unit, digits)}"
+    first, last = _significant(low * factor, digits), _significant(high * factor, digits)
+    return f"{first} {text}" if first == last else f"{first} to {last} {text}"
+
+
+def window_with_unit(low: float, high: float, searched: tuple[float, float], unit: str) -> str:
+    """Part of a range [unit] that was searched, in words; a part that ends with what was searched is open there."""
+    if (low, high) == searched:
+        return f"all from {range_with_unit(low, high, unit)}"
+    if low == searched[0]:
+        return f"up to {with_unit(high, unit)}"
+    return f"from {with_unit(low, unit)} on" if high == searched[1] else range_with_unit(low, high, unit)
+
+
+def plus_minus(half: float, unit: str, digits: int = 3) -> str:
+    """Half a range [unit] with the prefix that suits the whole of it, e.g. "±0.52 mm"."""
+    factor, text = choose(np.array([2 * half]), unit)
+    return f"±{half * factor:.{digits}g} {text}"
+
+
+def share_with_interval(share: Share) -> str:
+    """A share and its interval in percent; what is not 0 or 100 % does not look like that."""
+    middle = f"{percentage(share.probability)} %" if math.isfinite(share.probability) else "unknown"
+    return f"{middle} ({percentage(share.low)} to {percentage(share.high)} %)"
+
+
+def percent_range(low: float, high: float) -> str:
+    """Two shares in percent, with one sign."""
+    return f"{percent(low).removesuffix(' %')} to {percent(high)}"
+
+
+def percentage(part: float) -> str:
+    """A part of one in percent, without the sign, to a tenth; to a hundredth next to 0 and 100."""
+    return f"{100 * part:.{1 if part in (0, 1) or 0.001 <= part <= 0.999 else 2}f}"
+
+
+def listed(parts: Sequence[str], word: str) -> str:
+    """ "a", "a or b", "a, b or c" with the word "or"."""
+    return f" {word} ".join(part for part in (", ".join(parts[:-1]), *parts[-1:]) if part)
+
+
+def _significant(number: float, digits: int) -> str:
+    """`digits` significant digits without an exponent: 1234.5 stays 1234 rather than become 1.23e+03."""
+    if number == 0:
+        return "0"
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(number)) + 1e-12))
+    return f"{number:.{decimals}f}"

@@ -1,0 +1,33 @@
+"""The files of a command: names to what they hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from pathlib import Path
+
+from friso.shown.drawing.figure import Figure
+from friso.shown.drawing.images import FORMATS, ON_PAGE, Image, draw_beforehand, save
+
+Content = str | bytes | Callable[[Path], object] | None
+"""A text, bytes, or what writes the file to the path that it is called with; None: one of an earlier run is deleted."""
+
+Files = Mapping[str, Content]
+"""Names, relative to the folder of the command, to contents; in the order in which they are listed."""
+
+
+def pictures(figures: Iterable[Figure], forms: Iterable[str] | None = None) -> dict[str, Content]:
+    """Every figure in all forms ("png", "svg", "pdf"), each drawn when it is written, or as it goes on a page, at the
+    latest."""
+    forms = FORMATS if forms is None else (*forms,)
+    several = [image_files(figure, figure.name, forms, shown=[ON_PAGE]) for figure in figures]
+    return {name: content for images in several for name, content in images.items()}
+
+
+def image_files(
+    figure: Figure, stem: str, forms: Iterable[str] = FORMATS, shown: Iterable[Image] = ()
+) -> dict[str, Content]:
+    """A figure in some forms, in files that begin with a stem; it is also `shown` as such images on a page."""
+    forms = [*forms]
+    draw_beforehand([figure], [*shown, *map(Image, forms)])
+    return {f"{stem}.{form}": partial(save, figure) for form in forms}

@@ -1,0 +1,77 @@
+"""The glossary on pages: a word that it explains is linked, where it first stands, to its meaning at the page's end."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+
+from markupsafe import Markup, escape
+
+from friso.escapes import escaped
+
+_ROW = re.compile(r"^\| ([^|]+) \| (.+) \|$", flags=re.MULTILINE)
+_HEADING = "word"
+
+
+@dataclass(frozen=True)
+class Explained:
+    """A row of the glossary: its words, and what they mean."""
+
+    words: tuple[str, ...]
+    meaning: str
+
+    @property
+    def name(self) -> str:
+        """All its words."""
+        return ", ".join(self.words)
+
+    @property
+    def place(self) -> str:
+        """Its anchor on a page."""
+        return "word-" + re.sub(r"\W+", "-", self.words[0].lower())
+
+
+@cache
+def entries() -> Mapping[str, Explained]:
+    """What the glossary explains, by its words in small letters.
+
+    Words that mean this in one context only stand there as "slope (of the return map)": they are left out, since pages
+    use them in others too.
+    """
+    text = (resources.files("friso.shown") / "templates" / "glossary.md").read_text(encoding="utf-8")
+    plain = re.sub(r"[*`]", "", text)
+    rows = [Explained(tuple(words.split(", ")), meaning) for words, meaning in _ROW.findall(plain) if "(" not in words]
+    return {word.lower(): entry for entry in rows for word in entry.words if word != _HEADING}
+
+
+@cache
+def _any_word() -> re.Pattern[str]:
+    """Any of the words, or its plural; longer ones first."""
+    words = sorted(entries(), key=len, reverse=True)
+    return re.compile(rf"(?<![\w-])({'|'.join(map(re.escape, words))})s?(?![\w-])", flags=re.IGNORECASE)
+
+
+class Glossary:
+    """What one page explains: the entries `used` on it, in the order of their first words."""
+
+    def __init__(self) -> None:
+        self.used: dict[str, Explained] = {}
+
+    def linked(self, text: str) -> Markup:
+        """The text, escaped, with links from words that are new on the page."""
+        parts, end = [], 0
+        text = escaped(text)
+        for match in _any_word().finditer(text):
+            entry = entries()[match[1].lower()]
+            if entry.name not in self.used:
+                self.used[entry.name] = entry
+                parts += [escape(text[end : match.start()]), self._link(match[0], entry)]
+                end = match.end()
+        return Markup("").join([*parts, escape(text[end:])])
+
+    @staticmethod
+    def _link(word: str, entry: Explained) -> Markup:
+        return Markup('<a class="word" href="#{}" title="{}">{}</a>').format(entry.place, entry.meaning, word)

@@ -1,0 +1,172 @@
+"""Every page that friso writes: one skeleton, the answer first, which a template of a command may change."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from friso.escapes import escaped
+from friso.shown.drawing import plotly_renderer
+from friso.shown.drawing.figure import Figure
+from friso.shown.drawing.images import ON_PAGE, draw_beforehand, image
+from friso.shown.drawing.prefixes import listed
+from friso.shown.glossary import Glossary
+from friso.stage.foreign import foreign
+from friso.version import VERSION
+
+if TYPE_CHECKING:
+    from friso.stage import Stage
+
+
+def made_with() -> str:
+    """The version of friso, and what other packages bring to it."""
+    return " with ".join([VERSION, *filter(None, [listed(foreign(), "and")])])
+
+
+OWN_TEMPLATES = "friso.shown"
+"""The package with friso's own templates, which those of others extend."""
+
+CONTENTS: Mapping[str, Any] = MappingProxyType(
+    {"verdicts": (), "sentences": (), "notes": (), "columns": (), "rows": (), "computed": ""}
+)
+"""What every page shows of its values, where it has them: sentences with a colour, and others; notes below them; a
+table, whose columns are texts or have a label and a colour, and whose rows are a text and a list of texts; and how it
+was `computed`, after the version of friso, without the full stop."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """The page of a `command`: the name at its head, its figures, the stage file and its source, and its contents by
+    name, `values`: those of `CONTENTS`, and what else its template names.
+
+    A template of the command's name, if there is one, extends `page.html`, and changes its blocks: answer, table,
+    figures, footer. It stands in the folder templates of a package, `templates`. `scripted` pages load plotly without
+    figures of their own kind.
+    """
+
+    command: str
+    name: str
+    figures: Sequence[Figure] = ()
+    stage_file: str = ""
+    source: str = ""
+    version: str = field(default_factory=made_with)
+    scripted: bool = False
+    templates: str = OWN_TEMPLATES
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of_stage(
+        cls,
+        command: str,
+        stage: Stage | None,
+        figures: Sequence[Figure],
+        name: str = "Unnamed stage",
+        templates: str = OWN_TEMPLATES,
+        **values: Any,
+    ) -> Report:
+        """The page about a stage, or about none; `name` stands at the head where the stage has none."""
+        if stage is None:
+            return cls(command, name, figures, templates=templates, values=values)
+        about = (stage.to_toml(), stage.source)
+        return cls(command, stage.name or name, figures, *about, templates=templates, values=values)
+
+    def html(self) -> str:
+        """The page: it opens offline, prints, and is the same bytes on every run."""
+        draw_beforehand(self.figures, [ON_PAGE])
+        figures = [(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in self.figures]
+        scripts = plotly_renderer.script() if figures or self.scripted else None
+        values: dict[str, Any] = {"figures": figures, "plotly": scripts, "page_script": script("page")}
+        values |= {name: getattr(self, name) for name in ("command", "name", "stage_file", "source", "version")}
+        assert not values.keys() & self.values.keys()  # a value of a command's page may not stand in for these
+        template = environment(self.templates).select_template([f"{self.command}.html", "page.html"])
+        return template.render(**{**values, **CONTENTS, **self.values})
+
+
+def script(name: str) -> Markup:
+    """A script of friso/shown/templates, to stand in a page."""
+    return Markup((resources.files("friso.shown") / "templates" / f"{name}.js").read_text(encoding="utf-8"))
+
+
+def environment(package: str = OWN_TEMPLATES) -> Environment:
+    """The templates of a package, and those of friso/shown/templates, for one page: texts are escaped, a name without a
+    value is an error, and words of `explained` texts are linked to what the `glossary` says of them."""
+    templates = Environment(
+        loader=ChoiceLoader([PackageLoader(name) for name in dict.fromkeys((package, OWN_TEMPLATES))]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        finalize=_escaped_text,
+    )
+    templates.tests["starting"] = str.startswith
+    glossary = Glossary()
+    templates.filters["explained"], templates.globals["glossary"] = glossary.linked, glossary
+    return templates
+
+
+def _escaped_text(value: Any) -> Any:
+    """What a template puts into a page: texts escaped, markup of friso's own as it is."""
+    return value if isinstance(value, Markup) or not isinstance(value, str) else escaped(value)
+
+
+def print_image(figure: Figure, form: str = "svg", noted: bool = True) -> Markup:
+    """The figure as a data address, to stand in quotation marks: what is printed, and what is seen without scripts."""
+    content = image(figure, form, headed=False, noted=noted)
+    if form == "svg":
+        return Markup(f"data:image/svg+xml,{_plain(content.decode())}")
+    return Markup(f"data:image/{form};base64,{base64.b64encode(content).decode('ascii')}")
+
+
+def _plain(svg: str) -> str:
+    """An SVG as it may stand in an address in quotation marks: half of what base64 takes."""
+    element = re.sub(r"\s+", " ", _UNSEEN.sub("", svg[svg.index("<svg") :]))
+    return _PATH.sub(_shortened, element).translate(_IN_ADDRESSES)
+
+
+_UNSEEN = re.compile(r'<!--.*?-->|<metadata>.*?</metadata>|(?<=<g) id="[^"]*"', re.DOTALL)
+"""What nothing shows or refers to, names of groups among it."""
+
+_PATH, _SPACED = re.compile(r'(?<= d=")[^"]*'), re.compile(r" ?([A-Za-z]) ?")
+"""The lines of an element, and their commands, which need no blanks."""
+
+_STRAIGHT = re.compile(r"(?:[ML] -?[\d.]+ -?[\d.]+ ?|z ?)+")
+"""Lines of straight pieces alone."""
+
+TENTHS = 10
+"""Places of a line, to a point of 1/72 inch: finer than printers' dots."""
+
+
+def _shortened(path: re.Match[str]) -> str:
+    """Lines in less text: straight ones from each place to the next, to a tenth of a point."""
+    if not _STRAIGHT.fullmatch(path[0]):
+        return _SPACED.sub(r"\1", path[0])
+    parts, here, last = [], (0, 0), ""
+    for command, x, y in re.findall(r"([MLz])(?: (-?[\d.]+) (-?[\d.]+))?", path[0]):
+        if command == "z":
+            parts.append("z")
+        else:
+            there = round(TENTHS * float(x)), round(TENTHS * float(y))
+            step = there if command == "M" else (there[0] - here[0], there[1] - here[1])
+            if command == last == "L" and step == (0, 0):
+                continue
+            letter = "M" if command == "M" else "" if last == "L" else "l"
+            parts.append(letter + "".join(map(_tenths, step, (not letter, True))))
+            here = there
+        last = command
+    return "".join(parts)
+
+
+def _tenths(number: int, apart: bool) -> str:
+    """A number of tenths; `apart` from a number before it, where its sign is not."""
+    text = f"{number / TENTHS:g}".replace("0.", ".", 1) if abs(number) < TENTHS else f"{number / TENTHS:g}"
+    return f" {text}" if apart and number >= 0 else text
+
+
+_IN_ADDRESSES = str.maketrans({"'": "&amp;apos;", '"': "'", "&": "&amp;", "%": "%25", "#": "%23"})

@@ -1,0 +1,212 @@
+"""The guideline as a page with its charts, and its edges as a table."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from friso.evidence import findings_on_file, value
+from friso.frequency.crossover import WANTED
+from friso.quantities import percent
+from friso.shown.files import Content, pictures
+from friso.shown.pages import environment
+from friso.version import VERSION
+from friso_thesis.questions.guideline.figures import guideline_figures
+from friso_thesis.questions.guideline.words import formulas, log_error, number, parasitic_edges, parasitic_sentences
+from friso_thesis.studies.guideline import Guideline
+from friso_thesis.studies.guideline.checks import ABOVE, BELOW, MOVES, PERIODS
+from friso_thesis.studies.guideline.claims import judged_claims
+from friso_thesis.studies.guideline.edges import KINDS, ROUNDS, STEP
+from friso_thesis.studies.guideline.groups import GROUPS, LIMITER_OVER_BRISTLES, values_of
+from friso_thesis.studies.guideline.laws import FOLDS, GAIN, Errors
+from friso_thesis.studies.guideline.parasitic import DRIVE
+from friso_thesis.studies.guideline.persistence import DISTANCES
+from friso_thesis.studies.guideline.sweeps import FREE_GRID, JOINT_BOX, LOCKED_BOX, LOCKED_GRID, Sweep
+from friso_thesis.studies.guideline.thesis_rig import ThesisCase, plain_rig
+from friso_thesis.studies.guideline.worked import CLAIMED_AT, GAPS, MARGIN, STATIC, STUDIED
+
+PAGE, TABLE = "guideline.md", "guideline_edges.csv"
+
+
+FAR = 1.5
+"""Factor from which an edge counts as far off the law."""
+
+RESOLVED = max(float(grid[1] / grid[0]) ** 0.5**ROUNDS - 1 for grid in (LOCKED_GRID, FREE_GRID))
+"""Width of the last step of a bisection, over the edge in it."""
+
+CONSTANTS: Mapping[str, Any] = {
+    "below": BELOW,
+    "above": ABOVE,
+    "distances": len(DISTANCES),
+    "moves": MOVES,
+    "periods": PERIODS,
+    "folds": FOLDS,
+    "gain": GAIN,
+    "limiter": LIMITER_OVER_BRISTLES,
+    "static": STATIC,
+    "gaps": GAPS,
+    "margin": MARGIN,
+    "at": CLAIMED_AT,
+    "step": f"{percent(STEP - 1)}",
+    "apart": f"{percent(DISTANCES[1] / DISTANCES[0] - 1)}",
+    "resolved": f"{percent(RESOLVED, 1)}",
+    "largest_gap": LOCKED_BOX["gap"][1],
+    "far": FAR,
+    "comfortable": WANTED,
+}
+"""Settings of the computation that the page states."""
+
+
+def guideline_files(guideline: Guideline) -> dict[str, Content]:
+    """The page, the table of edges, and the charts."""
+    charts = pictures(guideline_figures(guideline), ("png",))
+    return {PAGE: guideline_page(guideline), TABLE: edges_table(guideline), **charts}
+
+
+def guideline_page(guideline: Guideline) -> str:
+    """The page in Markdown; its charts and the table stand beside it."""
+    template = environment("friso_thesis.shown").overlay(autoescape=False).get_template("guideline.md.j2")
+    return template.render(
+        guideline=guideline,
+        locked=guideline.locked,
+        free=guideline.free,
+        steps=guideline.worked,
+        formulas=formulas(guideline),
+        groups=group_rows(guideline),
+        figures={figure.name: figure for figure in guideline_figures(guideline)},
+        claims=judged_claims(guideline.worked),
+        parasitic=guideline.parasitic,
+        parasitic_words=parasitic_sentences(guideline.parasitic),
+        parasitic_edges=parasitic_edges(guideline.worked.studies["parasitic"]),
+        rough_minutes=value("guideline.minutes", "rough"),
+        rough_day=findings_on_file()["guideline.minutes"].day,
+        drive=DRIVE,
+        kinds=KINDS,
+        errors_of=_errors(guideline),
+        number=number,
+        span=_span_text,
+        log_error=log_error,
+        studied=STUDIED,
+        rows=_rows,
+        worst=_worst(guideline),
+        finite=math.isfinite,
+        minutes=guideline.seconds / 60,
+        constants=CONSTANTS,
+        grids={"locked": LOCKED_GRID, "free": FREE_GRID},
+        version=VERSION,
+    )
+
+
+ONE_WINDOW = "with one window (a diagnosis)"
+"""Name of the rows of samples in which a cycle attracts up to the edge without a break."""
+
+
+def _errors(guideline: Guideline) -> list[tuple[str, Errors]]:
+    """Errors on held-out samples, by which they are."""
+    rows = [
+        ("joint locked", guideline.locked.on_test),
+        (f"of these {ONE_WINDOW}", guideline.held_out(False, _one_window)),
+        *(
+            (f"omega_slip/omega_drop {_between(part.low, part.high)}", part.errors)
+            for part in guideline.held_out_by_rates()
+        ),
+        ("joint free, all by law", guideline.free.on_test),
+        (f"of these {ONE_WINDOW}", guideline.held_out(True, _one_window)),
+        ("joint free, locked edge as computed", guideline.free.on_computed_edge),
+    ]
+    return [(name, errors) for name, errors in rows if errors is not None]
+
+
+def _one_window(sweep: Sweep) -> np.ndarray:
+    return sweep.edges.windows == 1
+
+
+def _worst(guideline: Guideline) -> dict[str, Any] | None:
+    """Among the samples, fitted and held out, whose locked edge is off the law by more than a factor: how many, the
+    ends of their gap and stribeck groups, and how many of which kind; None without any."""
+    used = guideline.locked.sweep.usable
+    off = np.abs(np.log(used.edge / guideline.locked.law.edge(used.values)))
+    far = used.take(off > np.log(FAR))
+    if not len(far.edge):
+        return None
+    kinds = Counter(far.edges.kind.astype(str))
+    ends = {name: _span(far.values[name]) for name in ("gap", "stribeck")}
+    words = ", ".join(f"{kind} ({count})" for kind, count in kinds.most_common())
+    return {"count": len(far.edge), "of": len(used.edge), "factor": FAR, "kinds": words, **ends}
+
+
+def _between(low: float, high: float) -> str:
+    return f"below {high:g}" if low == 0 else f"above {low:g}" if math.isinf(high) else f"{low:g} to {high:g}"
+
+
+def group_rows(guideline: Guideline) -> list[dict[str, Any]]:
+    """One row per group: how it is written, what it means, its range in the sweeps, and its value for the thesis's
+    rig."""
+    ranges = dict(LOCKED_BOX) | {name: ends for name, ends in JOINT_BOX.items() if name in GROUPS}
+    used = guideline.free.sweep.usable
+    ranges["joint"] = _span(used.values["joint"])
+    edges = (guideline.locked.sweep.usable.edge, used.edge)
+    ranges["crossover"] = _span(np.concatenate(edges))
+    thesis_values = values_of(plain_rig("joint"))
+    return [
+        {
+            "name": name,
+            "written": group.written,
+            "meaning": group.meaning,
+            "part": group.part,
+            "range": ranges.get(name),
+            "thesis": thesis_values.get(name),
+        }
+        for name, group in GROUPS.items()
+    ]
+
+
+def _span(x: np.ndarray) -> tuple[float, float]:
+    return float(x.min()), float(x.max())
+
+
+def _span_text(ends: tuple[float, float]) -> str:
+    """The ends of a range, or the number that it is."""
+    low, high = (number(end) for end in ends)
+    return low if low == high else f"{low} to {high}"
+
+
+def _rows(name: str, cases: tuple[ThesisCase, ...]) -> list[tuple[float, float, float]]:
+    """What a study varies, the edge by the law, and that computed."""
+    return [(STUDIED[name](case.changes), case.law, case.computed) for case in cases]
+
+
+def edges_table(guideline: Guideline) -> str:
+    """All samples with their groups and edges, as CSV; four digits, which is more than edges are known to."""
+    sweeps = {
+        ("locked", "fit"): guideline.locked.fit,
+        ("locked", "held out"): guideline.locked.test,
+        ("free", "fit"): guideline.free.fit,
+        ("free", "held out"): guideline.free.test,
+    }
+    names = [name for name in GROUPS if name in guideline.free.fit.values]
+    after = ["locked edge", "edge", "law", "kind", "multiplier inside", "outside", "windows"]
+    lines = [",".join(["joint state", "half", *names, *after])]
+    for (state, half), sweep in sweeps.items():
+        law = guideline.locked.law.edge(sweep.values)
+        law = guideline.free.law.edge(sweep.values, law) if state == "free" else law
+        lines += [",".join([state, half, *row]) for row in _cells(sweep, law, names)]
+    return "\n".join(lines) + "\n"
+
+
+def _cells(sweep: Sweep, law: np.ndarray, names: list[str]) -> list[list[str]]:
+    count = len(sweep.edge)
+    empty = np.full(count, np.nan)
+    edges = sweep.edges
+    numbers = [sweep.values.get(name, empty) for name in names] + [sweep.locked, sweep.edge, law]
+    texts = [[_cell(value) for value in column] for column in numbers]
+    after = [[_cell(value) for value in column] for column in (edges.inside, edges.outside, edges.windows)]
+    return [list(row) for row in zip(*texts, edges.kind.astype(str).tolist(), *after, strict=True)]
+
+
+def _cell(value: float) -> str:
+    return f"{value:.4g}" if np.isfinite(value) else ""

@@ -1,0 +1,143 @@
+"""The JSON document of `friso reproduce`: the claims of the thesis with their judgements."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+from friso.shown.documents import plain_json
+from friso.shown.drawing.prefixes import listed
+from friso.version import VERSION
+from friso_thesis.questions.reproduce.laws import laws_document
+from friso_thesis.questions.reproduce.words import numbers
+from friso_thesis.studies.thesis import CONVENTIONS, thesis_rig
+from friso_thesis.studies.thesis.space import OPEN, SEED
+from friso_thesis.studies.thesis.ways import COUNT, CYCLE, SWING
+
+if TYPE_CHECKING:
+    from friso.shares import Share
+    from friso_thesis.studies.thesis import ClaimVerdict, Reproduction
+    from friso_thesis.studies.thesis.claims import ClaimJudgement, Part
+    from friso_thesis.studies.thesis.laws import ConclusionsByLaw
+    from friso_thesis.studies.thesis.plausible import ClaimInSpace, Plausible
+    from friso_thesis.studies.thesis.space import OpenValue
+
+
+def conclusion(reproduction: Reproduction) -> str:
+    """How many claims of the thesis hold."""
+    counts = Counter(verdict.judgement for verdict in reproduction.verdicts)
+    parts = [
+        f"{counts[judgement]} {singular if counts[judgement] == 1 else plural}"
+        for judgement, singular, plural in _VERBS
+        if counts[judgement]
+    ]
+    return f"Of {len(reproduction.verdicts)} claims of the thesis {listed(parts, 'and')}."
+
+
+_VERBS: tuple[tuple[ClaimJudgement, str, str], ...] = (
+    ("holds", "holds", "hold"),
+    ("holds in part", "holds in part", "hold in part"),
+    ("differs", "does not hold", "do not hold"),
+    ("not yet covered", "is not covered", "are not covered"),
+)
+"""The judgements as said of one claim, and of several."""
+
+
+def reproduce_document(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> dict[str, Any]:
+    """All claims with their judgements, ready for JSON; how they were judged stands before them. With those under each
+    friction law, where they were asked."""
+    tolerances = sorted(reproduction.tolerances)
+    verdicts, counts = reproduction.changed
+    document = {
+        "conclusion": conclusion(reproduction),
+        "source": thesis_rig().source,
+        "friso": VERSION,
+        "points": reproduction.points,
+        "points_judged": reproduction.judged_points,
+        "rtol": reproduction.rtol,
+        "conventions": CONVENTIONS,
+        "figure_14b": {"rtol": tolerances, "verdicts_changed": verdicts, "counts_changed": counts}
+        if tolerances
+        else None,
+        "cycles": {name: vars(cycles.comparison) for name, cycles in reproduction.cycles.items()},
+        "ways": [COUNT, SWING, CYCLE],
+        "unstated_values": [_open(value) for value in OPEN],
+        "draws": [{"seed": [SEED, draw.number], "values": dict(draw.values)} for draw in reproduction.plausible.draws],
+        "best_fit": _fit(reproduction.plausible),
+        "claims": [_entry(verdict) for verdict in reproduction.verdicts],
+        **({"friction_laws": laws_document(laws)} if laws else {}),
+    }
+    return plain_json(document)
+
+
+def _entry(verdict: ClaimVerdict) -> dict[str, Any]:
+    table = verdict.finding.table if verdict.finding else None
+    return {
+        "id": verdict.claim.id,
+        "where": verdict.claim.where,
+        "claim": verdict.claim.text,
+        "quotes": verdict.claim.quotes,
+        "judgement": verdict.judgement,
+        "figure": verdict.figure or None,
+        "number": numbers(verdict) or None,
+        "criterion": "; ".join(part.criterion for part in verdict.finding.judged) if verdict.finding else None,
+        "section": verdict.claim.section,
+        "parts": [_part(part) for part in verdict.finding.judged] if verdict.finding else [],
+        "table": {"columns": table.columns, "rows": table.rows} if table else None,
+        "self_tests": [_part(part) for part in verdict.finding.parts if part.self_test] if verdict.finding else [],
+        "ways": {way: finding.judgement for way, finding in verdict.ways.items()},
+        "reason": verdict.reason or None,
+        "contradiction": verdict.contradiction or None,
+        "hangs_on_undrawn": verdict.undrawn or None,
+        "method": list(verdict.turned.values()),
+        "read_otherwise": {name: finding.judgement for name, finding in verdict.reread.items()},
+        "space": _space(verdict.space) if verdict.space else None,
+    }
+
+
+def _part(part: Part) -> dict[str, Any]:
+    return {
+        "criterion": part.criterion,
+        "holds": part.holds,
+        "number": part.number,
+        "why": part.why or None,
+        "printed": part.printed,
+        "read": part.read,
+    }
+
+
+def _space(space: ClaimInSpace) -> dict[str, Any]:
+    """A claim over the joint draws."""
+    return {
+        "draws": space.draws,
+        "undecided": space.undecided,
+        "failures": {str(number): text for number, text in space.failures.items()},
+        "holds": space.count,
+        "share": _share(space.holds),
+        "by_way": {way: _share(share) for way, share in space.by_way.items()},
+        "parts": [_share(share) for share in space.parts],
+        "hangs_on": [vars(item) for item in space.hangs_on],
+        "seeds": [list(seed) for seed in space.seeds],
+    }
+
+
+def _share(share: Share) -> dict[str, float]:
+    return {"share": share.probability, "low": share.low, "high": share.high}
+
+
+def _open(value: OpenValue) -> dict[str, Any]:
+    keep = ("name", "low", "high", "unit", "scale", "baseline", "reason")
+    return {name: getattr(value, name) for name in keep} | {"keys": sorted(value.keys)}
+
+
+def _fit(plausible: Plausible) -> dict[str, Any] | None:
+    fit = plausible.fit
+    if fit is None:
+        return None
+    return {
+        "draw": fit.draw.number,
+        "values": dict(fit.draw.values),
+        "misfit": fit.misfit,
+        "misfit_at_baseline": fit.at_baseline,
+        "numbers": [vars(item) for item in fit.numbers],
+    }

@@ -1,0 +1,151 @@
+"""The figures of the thesis in its own arrangement, from a reproduction to plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER, PEAK_RULE, counted_peaks
+from friso.quantities import percent
+from friso.questions.boundary.figures import DASHES
+from friso.questions.check.figures import SHARES
+from friso.questions.map.figures import map_panel
+from friso.questions.map.findings import statement
+from friso.shown.drawing.figure import GREY, INK, PINK, VERMILLION, Axis, Figure, Limit, Markers, Panel, Series
+from friso_thesis.questions.reproduce.loops import loop_figures
+from friso_thesis.questions.reproduce.rig_figures import rig_figures
+from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE
+from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from friso_thesis.studies.thesis import Reproduction
+    from friso_thesis.studies.thesis.cycles import Edge
+
+_TITLES = {
+    "11": "Path; crossover and mass (joint locked)",
+    "12": "Friction forces; alpha and beta (joint locked)",
+    "14": "Isolator: stiffness and limiter damping, each with the stroke",
+    "15": "Isolator: masses; friction forces",
+    "16": "Isolator: crossover and stroke at two stiffnesses",
+}
+MARKER = (
+    "The marker is friso's evaluation point: crossover, friction, stiffness and masses as the thesis prints them; "
+    "alpha, beta, path, stroke and limiter damping by friso's choice, since its own markers are not printed in numbers."
+)
+"""What stands below every map."""
+
+_HUNTING = ("edge of the attracting cycle", VERMILLION)
+_PAIR = ("edge of asymmetric cycles at its basin", PINK)
+_SHOWN_FROM = 6.0  # [s] the return move is over by then, at the paths of Fig. 5 and 13
+
+
+def reproduction_figures(reproduction: Reproduction) -> dict[str, Figure]:
+    """The figures by their number in the thesis, in its order, those whose studies were run."""
+    figures = {**_in_time(reproduction), **loop_figures(reproduction)}
+    if reproduction.experiments is not None:
+        figures |= rig_figures(reproduction.experiments, reproduction.experimented)
+    figures |= {number: _maps(reproduction, number) for number in _TITLES}
+    return {number: figures[number] for number in sorted(figures, key=int) if figures[number].panels}
+
+
+def _maps(reproduction: Reproduction, number: str) -> Figure:
+    """The maps of one figure side by side, each with its evaluation point."""
+    panels, statements, zeros = [], [], []
+    for study in STUDIES.values():
+        if study.panel[:-1] != number or study.name not in reproduction.maps:
+            continue
+        letter = study.panel[-1]
+        for title, runs in _runs_shown(reproduction, study, letter).items():
+            panels.append(_with_edges(map_panel(runs, "peaks", study.marker, title), reproduction, study))
+            statements.append(f"{title}. {statement(runs, 'peaks')}".replace("\n", " "))
+        zeros += [f"{letter}: {study.zeros}"] if study.zeros else []
+    zeros.append(MARKER)
+    if number == "14" and reproduction.tolerances:
+        verdicts, counts = reproduction.changed
+        zeros.append(
+            f"B: at the thesis's relative tolerance {percent(verdicts, 3)} of the cells have counted peaks "
+            "where the tight one "
+            f"has none, or the other way round, and {percent(counts, 3)} another count."
+        )
+    return Figure(
+        f"figure-{number}",
+        f"Figure {number}: {_TITLES[number]}",
+        " ".join((*statements, *zeros)),
+        tuple(panels),
+        2,
+        note="\n".join(statements),
+    )
+
+
+def _with_edges(panel: Panel, reproduction: Reproduction, study: ThesisStudy) -> Panel:
+    """The map with the curves on which the hunting cycle stops attracting, and on which asymmetric ones appear."""
+    figures = reproduction.cycles.get(study.name)
+    if figures is None:
+        return panel
+    lines = tuple(_line(edge) for edge in figures.edges)
+    return replace(panel, series=(*panel.series, *lines))
+
+
+def _line(edge: Edge) -> Series:
+    name, colour = _HUNTING if edge.symmetric else _PAIR
+    return Series(edge.x, edge.y, f"{name} ({edge.kind})", colour, DASHES[edge.kind], 2.2)
+
+
+def _runs_shown(reproduction: Reproduction, study: ThesisStudy, letter: str) -> Mapping[str, xr.Dataset]:
+    """The maps of a study by title: one, or Fig. 14B at the two tolerances."""
+    if study.panel == "14B":
+        return {f"{letter}: {study.title}, rtol {rtol:g}": runs for rtol, runs in reproduction.tolerances.items()}
+    return {f"{letter}: {study.title}": reproduction.maps[study.name]}
+
+
+def _in_time(reproduction: Reproduction) -> dict[str, Figure]:
+    """The figures of single runs, of those that were made."""
+    made = reproduction.responses.keys()
+    figures = {"5": _response(reproduction)} if "locked" in made else {}
+    return figures | ({"13": _shares(reproduction)} if {WIDE, NARROW} <= made else {})
+
+
+def _response(reproduction: Reproduction) -> Figure:
+    """Position of the locked rig after the return move, with the counted peaks."""
+    response = reproduction.responses["locked"]
+    trace = response.trace
+    time = trace["time"].values
+    late = time >= _SHOWN_FROM
+    deviation = (trace["position"] - trace["reference"]).values
+    turns = [trace[name].values for name in ("turning_time", "turning_deviation")]
+    (peaks,) = counted_peaks(turns[0][None], turns[1][None], np.array([turns[0].size]))
+    markers = ()
+    if peaks.any():
+        markers = (Markers(turns[0][peaks], turns[1][peaks], f"counted peaks: {peaks.sum()}", INK, "triangle"),)
+    panel = Panel(
+        "Position after the return move",
+        Axis("Time", "s", (_SHOWN_FROM, float(time[-1]))),
+        Axis("Position", "m"),
+        (Series(time[late], deviation[late], "joint locked", VERMILLION),),
+        markers,
+        (Limit((COUNTED_ABOVE,), "peaks count above", GREY, "dotted"),),
+    )
+    caption = f"The rig with its joint locked. Peaks count {PEAK_RULE}."
+    return Figure("figure-5", "Figure 5: position of the locked rig after the return move", caption, (panel,))
+
+
+def _shares(reproduction: Reproduction) -> Figure:
+    """P, I and D shares of the force on the locked rig, the wide gap above the narrow one."""
+    panels = []
+    for name in (WIDE, NARROW):
+        trace = reproduction.responses[name].trace
+        time = trace["time"].values
+        late = time >= COUNTED_AFTER
+        lines = [(key, *look, 1.8) for key, look in SHARES.items()] + [("force", "total", INK, 0.9)]
+        series = tuple(
+            Series(time[late], trace[key].values[late], label, colour, width=width)
+            for key, label, colour, width in lines
+        )
+        panels.append(Panel(f"F_s 4 N, {name}", Axis("Time", "s"), Axis("Force", "N"), series))
+    caption = f"Shares of the controller's force from {COUNTED_AFTER:g} s on, joint locked."
+    return Figure("figure-13", "Figure 13: PID actions at two gaps of the friction forces", caption, tuple(panels))

@@ -1,0 +1,137 @@
+"""The page of `friso reproduce`, and its files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup
+
+from friso.shown.drawing import plotly_renderer
+from friso.shown.drawing.figure import GREEN, GREY, ORANGE, VERMILLION, Figure
+from friso.shown.files import Content, pictures
+from friso.shown.pages import Report, print_image
+from friso_thesis.questions.reproduce import words
+from friso_thesis.questions.reproduce.document import conclusion, reproduce_document
+from friso_thesis.questions.reproduce.figures import reproduction_figures
+from friso_thesis.questions.reproduce.laws import laws_rows, laws_sentences
+from friso_thesis.questions.reproduce.questions import method_rows, question_rows
+from friso_thesis.questions.reproduce.summary import save_summary
+from friso_thesis.studies.thesis import CONVENTIONS, STUDIES, thesis_rig
+
+if TYPE_CHECKING:
+    from friso_thesis.studies.thesis import ClaimVerdict, Reproduction
+    from friso_thesis.studies.thesis.laws import ConclusionsByLaw
+
+COLOURS = {"holds": GREEN, "holds in part": ORANGE, "differs": VERMILLION, "not yet covered": GREY}
+
+
+@dataclass(frozen=True)
+class FigureSection:
+    """One item of the thesis with the verdicts on what it claims there; `figure` is None where the evidence is no
+    drawing."""
+
+    key: str
+    title: str
+    figure: Figure | None
+    verdicts: tuple[ClaimVerdict, ...]
+
+
+def reproduce_files(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> dict[str, Content]:
+    """The page, a summary of one sheet, the claims, and every figure as PNG and SVG in a folder of its own."""
+    text = json.dumps(reproduce_document(reproduction, laws), indent=2, ensure_ascii=False, allow_nan=False)
+    figures = pictures(reproduction_figures(reproduction).values(), ("png", "svg"))
+    return {
+        "reproduction.html": reproduce_html(reproduction, laws),
+        "summary.pdf": partial(save_summary, reproduction.verdicts, conclusion(reproduction), COLOURS),
+        "claims.json": text + "\n",
+        **{f"figures/{name}": content for name, content in figures.items()},
+    }
+
+
+def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> str:
+    """The whole page: all claims at a glance, then item by item in the order of the thesis. It opens offline."""
+    verdicts = words.in_order(reproduction.verdicts)
+    numbered = reproduction_figures(reproduction)
+    parts = sections(numbered, verdicts)
+    figures = [section.figure for section in parts if section.figure]
+    keys = {section.figure.name: section.key for section in parts if section.figure}
+    return Report(
+        "reproduce",
+        "Reproduction of the thesis",
+        stage_file=thesis_rig().to_toml(),
+        source=thesis_rig().source,
+        scripted=bool(figures),
+        templates="friso_thesis.shown",
+        values={
+            "verdicts": verdicts,
+            "counts": _counts(verdicts),
+            "colours": COLOURS,
+            "words": words,
+            "places": {verdict.claim.id: s.key for s in parts for verdict in s.verdicts},
+            "sections": parts,
+            "figure_links": [(number, keys[figure.name]) for number, figure in numbered.items()],
+            "images": {figure.name: _printed(figure) for figure in figures},
+            "interactive": {
+                figure.name: Markup(plotly_renderer.fragment(replace(figure, note=""))) for figure in figures
+            },
+            "conventions": CONVENTIONS,
+            "law_names": laws.laws if laws else (),
+            "law_rows": laws_rows(laws) if laws else [],
+            "law_sentences": laws_sentences(laws) if laws else [],
+            "cycles": [(STUDIES[name], edges.comparison) for name, edges in reproduction.cycles.items()],
+            "self_tests": words.self_tests(verdicts),
+            "open_rows": words.open_rows(),
+            "fit_sentence": words.fit_sentence(reproduction.plausible),
+            "fit_rows": words.fit_rows(reproduction.plausible),
+            "questions": question_rows(),
+            "method_rows": method_rows(reproduction),
+            "draws": len(reproduction.plausible.draws),
+            "points": reproduction.points,
+            "judged_points": reproduction.judged_points,
+            "rtol": f"{reproduction.rtol:g}",
+        },
+    ).html()
+
+
+def sections(figures: Mapping[str, Figure], verdicts: Iterable[ClaimVerdict]) -> tuple[FigureSection, ...]:
+    """The items in the order of the verdicts, each figure where its first claim stands, those of no claim at the end;
+    claims that are not covered stand in the table alone. A panel's claims, such as those of "11A", stand with the
+    figure."""
+    groups: dict[str, list[ClaimVerdict]] = {}
+    for verdict in verdicts:
+        if verdict.finding:
+            groups.setdefault(verdict.figure.rstrip("ABCD"), []).append(verdict)
+    groups |= {number: [] for number in figures if number not in groups}
+    return tuple(
+        FigureSection(
+            f"section-{place}",
+            figures[number].title if number in figures else _titled(number, group),
+            figures.get(number),
+            tuple(group),
+        )
+        for place, (number, group) in enumerate(groups.items())
+    )
+
+
+def _titled(place: str, group: Iterable[ClaimVerdict]) -> str:
+    """An item without a figure of its own, by where the thesis makes its claims, and what they are about."""
+    if place.isdigit():
+        return f"Figure {place}"
+    return place if place.startswith("Sec. ") else ", ".join(dict.fromkeys(item.claim.where for item in group))
+
+
+def _printed(figure: Figure) -> Markup:
+    """The figure for paper as a data address; maps as pixels, since thousands of cells make megabytes of lines."""
+    if not any(panel.maps for panel in figure.panels):
+        return print_image(figure)
+    return print_image(figure, "png", noted=False)
+
+
+def _counts(verdicts: Iterable[ClaimVerdict]) -> dict[str, int]:
+    """How many claims got each judgement, those that occur."""
+    parts = [verdict.judgement for verdict in verdicts]
+    return {judgement: parts.count(judgement) for judgement in COLOURS if judgement in parts}

@@ -1,0 +1,146 @@
+"""The thesis's figures and claims, computed again and judged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.inputs import tolerance_of
+from friso.platform.extras import need
+from friso.progress import Progress, silent
+from friso_thesis.studies.thesis.plausible import DRAWS
+from friso_thesis.studies.thesis.reproduce import POINTS, Reproduction
+
+if TYPE_CHECKING:
+    from friso.shown.drawing.figure import Figure
+    from friso.shown.files import Files
+    from friso_thesis.studies.thesis.laws import ConclusionsByLaw
+
+
+class ReproduceAnswer(Answer):
+    """The thesis recomputed: `result` is a `Reproduction` with maps, responses and a verdict per claim; `laws`, where
+    asked, how its conclusions are judged under each friction law."""
+
+    command = "reproduce"
+
+    def __init__(self, result: Reproduction, laws: ConclusionsByLaw | None = None) -> None:
+        self.result, self.laws = result, laws
+
+    @cached_property
+    def _document(self) -> dict[str, Any]:
+        from friso_thesis.questions.reproduce.document import reproduce_document
+
+        return reproduce_document(self.result, self.laws)
+
+    def sentences(self) -> Sequence[str]:
+        """How many of the claims hold, which draw fits best, and how many survive other friction laws."""
+        from friso_thesis.questions.reproduce.laws import laws_sentences
+        from friso_thesis.questions.reproduce.words import fit_sentence
+
+        fit = fit_sentence(self.result.plausible)
+        return [
+            self._document["conclusion"],
+            *([fit] if fit else []),
+            *(laws_sentences(self.laws) if self.laws else []),
+        ]
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """The conclusions under each law."""
+        from friso_thesis.questions.reproduce.laws import TITLE, laws_rows
+
+        return [AnswerTable(TITLE, self.laws.laws, laws_rows(self.laws))] if self.laws else []
+
+    def details(self) -> Sequence[str]:
+        """Every claim with its judgement, and the cycles behind the maps."""
+        claims = [
+            f"{claim['id']:5} {claim['judgement']:14} {_drawn(claim['space'])}{claim['number']}"
+            for claim in self._document["claims"]
+            if claim["judgement"] != "not yet covered"
+        ]
+        cycles = [
+            f"{name}: in {cells['counted_only']} of {cells['cells']} cells peaks are counted although no cycle "
+            f"attracts; in {cells['attracted_only']} none are counted although one does"
+            for name, cells in self._document["cycles"].items()
+        ]
+        return [*claims, *cycles]
+
+    def figures(self) -> Sequence[Figure]:
+        """The figures of the thesis."""
+        from friso_thesis.questions.reproduce.figures import reproduction_figures
+
+        return [*reproduction_figures(self.result).values()]
+
+    def document(self) -> dict[str, Any]:
+        """The claims with their judgements."""
+        return self._document
+
+    def files(self) -> Files:
+        """The page, the claims, the figures."""
+        from friso_thesis.questions.reproduce.page import reproduce_files
+
+        return reproduce_files(self.result, self.laws)
+
+
+def _drawn(space: dict[str, Any] | None) -> str:
+    """In how many joint draws a claim holds, where any were made."""
+    return f"[{space['holds']} of {space['draws']} draws] " if space else ""
+
+
+@question
+def reproduce(
+    names: Iterable[str] | None = None,
+    points: int = POINTS,
+    rtol: float | str = 1e-6,
+    *,
+    only: Iterable[str] | None = None,
+    draws: int = DRAWS,
+    laws: bool = False,
+    folder: Path | None = None,
+    progress: Progress = silent,
+) -> ReproduceAnswer:
+    """Every figure and claim of the thesis that computation can decide, judged.
+
+    Parameters
+    ----------
+    names : list of str, optional
+        Studies of Table 3; default: all of them.
+    points : int
+        Values per axis of every map.
+    rtol : float
+        Relative tolerance of the solver.
+    only : list of str, optional
+        Claims, such as "F15B", that alone are judged, with what they need; default: all of them.
+    draws : int
+        Joint draws of the values that the thesis does not state, in each of which every claim is judged.
+    laws : bool
+        Whether to judge the conclusions of the thesis under every friction law too.
+    folder : Path, optional
+        Where finished pieces are kept, from which an interrupted run resumes.
+    progress : Progress
+        Called as pieces are done.
+
+    Returns
+    -------
+    ReproduceAnswer
+        Maps and responses by name, and ``answer.verdicts`` on the claims.
+
+    Raises
+    ------
+    InputError
+        For an unknown study or claim, too few points, or too many.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.reproduce(["isolator-crossover"], points=21)  # doctest: +SKIP
+    """
+    need("design", "friso reproduce")
+    from friso_thesis.studies.thesis.kept import Kept
+    from friso_thesis.studies.thesis.laws import conclusions_by_law
+    from friso_thesis.studies.thesis.reproduce import reproduce as reproduced
+
+    result = reproduced(names, points, tolerance_of(rtol), progress, draws=draws, only=only, kept=Kept(folder))
+    return ReproduceAnswer(result, conclusions_by_law(result, progress) if laws else None)

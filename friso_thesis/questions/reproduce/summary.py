@@ -1,0 +1,69 @@
+"""The summary of `friso reproduce` for print: all claims on one sheet."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from friso.version import VERSION
+from friso_thesis.questions.reproduce import words
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from friso_thesis.studies.thesis import ClaimVerdict
+
+_A4 = 8.27, 11.69
+_COLUMNS = {"id": 0.05, "where": 0.105, "text": 0.22, "word": 0.71, "met": 0.80, "share": 0.87}
+_LETTERS = 84
+_TOP, _BOTTOM = 0.915, 0.035
+_BETWEEN = 0.6
+"""Space between two rows, in lines."""
+
+
+def save_summary(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Mapping[str, str], path: Path) -> None:
+    """Write the sheet. Raises OSError."""
+    metadata = {"CreationDate": None, "Creator": None, "Producer": None}
+    summary_sheet(verdicts, conclusion, colours).savefig(path, format="pdf", metadata=metadata)
+
+
+def summary_sheet(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Mapping[str, str]) -> Figure:
+    """Every claim, its whole text, with the word of agreement, criteria met, and the draws in which it holds; rows are
+    as high as their texts need."""
+    from matplotlib.backends.backend_pdf import FigureCanvasPdf
+    from matplotlib.figure import Figure
+
+    sheet = Figure(figsize=_A4)
+    FigureCanvasPdf(sheet)
+    sheet.text(0.05, 0.965, "Reproduction of the thesis of J. A. Fix (Univ. of Twente)", size=12, weight="bold")
+    sheet.text(0.05, 0.948, conclusion, size=8)
+    heads = {"id": "claim", "where": "where", "text": "what the thesis claims, in short", "word": "agreement",
+             "met": "criteria", "share": "holds in draws"}  # fmt: skip
+    for name, head in heads.items():
+        sheet.text(_COLUMNS[name], 0.925, head, size=6.5, weight="bold")
+    rows = [(verdict, textwrap.wrap(verdict.claim.text, _LETTERS)) for verdict in words.in_order(verdicts)]
+    line = (_TOP - _BOTTOM) / max(1.0, sum(len(text) + _BETWEEN for _, text in rows))
+    y = _TOP
+    for verdict, text in rows:
+        middle = y - (len(text) + _BETWEEN) / 2 * line
+        y -= (len(text) + _BETWEEN) * line
+        space = verdict.space
+        cells = {
+            "id": verdict.claim.id,
+            "where": verdict.claim.where,
+            "text": "\n".join(text),
+            "met": words.met(verdict),
+            "share": f"{space.count} of {space.draws}" if space else "",
+        }
+        for name, cell in cells.items():
+            sheet.text(_COLUMNS[name], middle, cell.replace("$", r"\$"), size=6, va="center", linespacing=1.05)
+        sheet.text(
+            _COLUMNS["word"], middle, words.AGREEMENT[verdict.judgement], size=6.5, va="center",
+            color=colours[verdict.judgement], weight="bold" if verdict.finding else "normal",
+        )  # fmt: skip
+    sheet.text(
+        0.05, 0.02, f"friso {VERSION}: friso reproduce. Criteria and numbers: reproduction.html, claims.json.", size=6
+    )
+    return sheet

@@ -1,0 +1,163 @@
+"""What `friso reproduce` says of a claim: what was found, and what agrees, in short and in full."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from friso.quantities import percent
+from friso.shown.drawing.prefixes import listed
+from friso_thesis.studies.thesis.plausible import POINTS
+from friso_thesis.studies.thesis.space import OPEN, draw_name
+from friso_thesis.studies.thesis.verdicts import ClaimVerdict
+
+if TYPE_CHECKING:
+    from friso_thesis.studies.thesis.claims import Part
+    from friso_thesis.studies.thesis.plausible import Plausible
+
+SHORT = 160
+"""Letters of a number in short."""
+
+AGREEMENT = {"holds": "agrees", "holds in part": "in part", "differs": "contradicts", "not yet covered": "not computed"}
+"""The judgements as the word of agreement."""
+
+
+def in_order(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:
+    """The verdicts in the order in which the thesis makes the claims."""
+    return sorted(verdicts, key=lambda verdict: verdict.claim.place)
+
+
+def short(text: str) -> str:
+    """The first statements of a number, as many as stand within `SHORT` characters, but one at least."""
+    first = text.split(". Assumed", 1)[0]
+    ends = [match.start() for match in re.finditer(r"; |\. (?=[A-Z])|$", first)]
+    return first[: max((end for end in ends if end <= SHORT), default=ends[0])]
+
+
+def numbers(verdict: ClaimVerdict) -> str:
+    """The numbers of all parts in one line; empty for a claim that is not covered."""
+    return "; ".join(part.number for part in verdict.finding.judged) if verdict.finding else ""
+
+
+def met(verdict: ClaimVerdict) -> str:
+    """How many criteria are met."""
+    if verdict.finding is None:
+        return ""
+    pattern = verdict.finding.pattern
+    return f"{sum(pattern)} of {len(pattern)}"
+
+
+def share(verdict: ClaimVerdict) -> str:
+    """In how many draws it holds, and the interval of the share."""
+    if verdict.space is None:
+        return ""
+    space = verdict.space
+    interval = f"{percent(space.holds.low)} to {percent(space.holds.high)}".replace(" %", "\u00a0%")
+    return f"{space.count} of {space.draws} ({interval})"
+
+
+def in_draws(verdict: ClaimVerdict, part: int) -> str:
+    """In how many draws one of several criteria is met; empty of a single one, which the claim's own share tells."""
+    space = verdict.space
+    if space is None or len(space.parts) < 2:
+        return ""
+    return f"met in {space.met(part)} of {space.draws} draws"
+
+
+def ways(verdict: ClaimVerdict) -> list[tuple[str, str]]:
+    """The word of agreement by each way of judging, where there are several."""
+    if len(verdict.ways) < 2:
+        return []
+    return [(way, AGREEMENT[finding.judgement]) for way, finding in verdict.ways.items()]
+
+
+def reasons(verdict: ClaimVerdict) -> list[str]:
+    """Why it does not hold, the first sentence of each reason, of several criteria with those to which it belongs; the
+    rest is among the details."""
+    if not verdict.reason:
+        return []
+    parts = verdict.finding.judged if verdict.finding else ()
+    places: dict[str, list[str]] = {}
+    for place, part in enumerate(parts, 1):
+        if not part.holds and part.why:
+            places.setdefault(_first_sentence(part.why), []).append(str(place))
+    if not places or len(parts) == 1:
+        return [_first_sentence(verdict.reason)]
+    return [f"Criteri{'a' if len(of) > 1 else 'on'} {listed(of, 'and')}: {why}" for why, of in places.items()]
+
+
+def _first_sentence(text: str) -> str:
+    return re.split(r"(?<=\.) (?=[A-Z])", text, maxsplit=1)[0]
+
+
+def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
+    """What stands below an item, by its name: numbers and reasons that are shortened above, draws that decide nothing,
+    and what another grid or tolerance changes."""
+    parts = verdict.finding.judged if verdict.finding else ()
+    rows = [
+        (f"Criterion {place}", part.number) for place, part in enumerate(parts, 1) if short(part.number) != part.number
+    ]
+    longer = any(not part.holds and _first_sentence(part.why) != part.why for part in parts)
+    rows += [("Reason", verdict.reason)] if longer else []
+    failures = verdict.space.failures if verdict.space else {}
+    rows += [(f"{draw_name(number).capitalize()}, undecided", text) for number, text in failures.items()]
+    return rows + [("Method", text) for text in verdict.turned.values()]
+
+
+def self_tests(verdicts: Iterable[ClaimVerdict]) -> list[tuple[str, Part]]:
+    """The parts by which friso only tests itself, with the claim they stand at."""
+    return [
+        (verdict.claim.id, part)
+        for verdict in verdicts
+        if verdict.finding
+        for part in verdict.finding.parts
+        if part.self_test
+    ]
+
+
+def open_rows() -> list[Sequence[str]]:
+    """The values that the thesis leaves open: range, how it is drawn, friso's own, and the reason."""
+    drawn = {"even": "evenly", "log": "evenly in the logarithm", "either": "one of the two"}
+    return [
+        (
+            value.name,
+            f"{value.low:g} to {value.high:g} {value.unit}".rstrip(),
+            drawn[value.scale],
+            f"{value.baseline:g} {value.unit}".rstrip(),
+            value.reason,
+        )
+        for value in OPEN
+    ]
+
+
+def fit_sentence(plausible: Plausible) -> str:
+    """Which draw, or friso's own choice, fits the printed numbers best, and which numbers these are."""
+    fit = plausible.fit
+    if fit is None:
+        return ""
+    units = {value.name: value.unit for value in OPEN}
+    values = ", ".join(f"{name} {value:.3g} {units[name]}".rstrip() for name, value in fit.draw.values.items())
+    count, claims = len(fit.numbers), ", ".join(dict.fromkeys(item.claim for item in fit.numbers))
+    compared = f"{count} printed number{'s' if count > 1 else ''} ({claims}), all on maps of {POINTS} x {POINTS}"
+    off = f"off by a factor of {math.exp(fit.misfit):.2f} (RMS of the logarithm)"
+    tried = f"Of friso's own choice and {len(plausible.draws)} joint draws"
+    if fit.draw.number < 0:
+        return f"{tried}, friso's own choice fits best: {off}, by {compared}."
+    own = (
+        f"friso's own choice by {math.exp(fit.at_baseline):.2f}"
+        if math.isfinite(fit.at_baseline)
+        else "at friso's own choice not all of them are found"
+    )
+    return f"{tried}, {fit.draw.name} fits best: {off}, by {compared}; {own}. Its values: {values}."
+
+
+def fit_rows(plausible: Plausible) -> list[Sequence[str]]:
+    """The printed numbers, beside those of the best draw."""
+    if plausible.fit is None:
+        return []
+    return [
+        (item.claim, item.criterion, f"{item.printed:g}", f"{item.read:.3g}", f"{item.read / item.printed:.2f}")
+        for item in plausible.fit.numbers
+    ]
