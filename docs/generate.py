@@ -17,6 +17,7 @@ from typer.core import TyperGroup
 import friso
 from friso.cli.app import command_line
 from friso.cli.command import COMMANDS, QUESTIONS
+from friso.settings import settings_classes
 
 WIDTH = 100
 """Columns of the help of a command."""
@@ -29,11 +30,23 @@ def write_reference(folder: Path) -> None:
         "stage_file": schema_page("stage"),
         "specification": schema_page("specification"),
         "commands": commands_page(),
+        "settings": settings_page(),
     }
     for name, text in pages.items():
         path = folder / f"{name}.md"
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
+
+
+def settings_page() -> str:
+    """Every setting of every room, with its value, unit and reason."""
+    lines = []
+    for settings in settings_classes():
+        room = settings.__module__.removesuffix(".settings")
+        lines += [f"## {settings.__name__} (`{room}`)", "", "| setting | value | unit | why |", "|---|---|---|---|"]
+        lines += [f"| `{row.name}` | {row.value} | {row.unit} | {row.reason} |" for row in settings.rows()]
+        lines.append("")
+    return "\n".join(lines)
 
 
 def schema_page(of: str) -> str:

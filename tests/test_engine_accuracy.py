@@ -15,7 +15,7 @@ from variants import HOLD, PARASITIC, TOUCHING, VARIANTS, lugre, stage, step, va
 import friso
 from benchmarks.truth.by_hand import by_hand
 from benchmarks.truth.draws import draw
-from friso.engine.arrays import Results, Settings, Status, new_queue
+from friso.engine.arrays import BatchOptions, Results, Status, new_queue
 from friso.engine.batch import RunOptions, prepare, run_chunks
 from friso.engine.kernel import empty_results, kernel
 from friso.equations import motion
@@ -58,7 +58,7 @@ def fixed_steps(h: float, interval: float, changes: dict[str, Any]) -> tuple[Res
     batch.tolerances[:] = 1e9
     samples = int(flat["motion.duration"] / interval * (1 + 1e-12)) + 1
     results = empty_results(1, 512, samples, len(shape.states))
-    settings = Settings(1e-2, 1e6, 1e-6, 1e-5, 0.0, interval, np.zeros(1, np.int64))
+    settings = BatchOptions(1e-2, 1e6, 1e-6, 1e-5, 0.0, interval, np.zeros(1, np.int64))
     shape.run(new_queue(), batch, settings, results)
     assert results.statuses[0] == Status.DONE
     assert results.statistics[0, 6] == 0

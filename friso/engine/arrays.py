@@ -42,7 +42,7 @@ class Batch(NamedTuple):
     tables: Tables = NO_TABLES
 
 
-class Settings(NamedTuple):
+class BatchOptions(NamedTuple):
     """What all runs share: relative tolerance, step budget, the two bands of settling [m], the time [s] from which
     turning points are kept, the sampling interval [s], and a flag, shape (1,), that is set to have no further run
     begun."""

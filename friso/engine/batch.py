@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from friso.engine.allowance import current_allowance
-from friso.engine.arrays import STATISTICS, Batch, Results, Settings, Status, new_queue
+from friso.engine.arrays import STATISTICS, Batch, BatchOptions, Results, Status, new_queue
 from friso.engine.kernel import Kernel, columns, empty_results
 from friso.engine.layout import LANES
 from friso.engine.overtaken import current_flag, go_on
@@ -218,9 +218,9 @@ def _empty_like(results: Results, runs: int) -> Results:
     return empty_results(runs, results.turn_times.shape[1], *results.samples.shape[1:])
 
 
-def options_of(options: RunOptions) -> Settings:
+def options_of(options: RunOptions) -> BatchOptions:
     """The options as the kernel takes them."""
-    return Settings(
+    return BatchOptions(
         rtol=float(options.rtol),
         budget=float(options.budget),
         inner=float(options.bands[0]),
@@ -231,7 +231,7 @@ def options_of(options: RunOptions) -> Settings:
     )
 
 
-def run_batch(kernel: Kernel, batch: Batch, settings: Settings, results: Results, threads: int | None) -> None:
+def run_batch(kernel: Kernel, batch: Batch, settings: BatchOptions, results: Results, threads: int | None) -> None:
     """Have threads take the runs of a chunk from a queue; the kernel runs without the interpreter's lock. Raises
     Overtaken where nobody waits for them any more."""
     go_on()

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.engine.arrays import STATISTICS, Batch, Results, Settings, new_queue
+from friso.engine.arrays import STATISTICS, Batch, BatchOptions, Results, new_queue
 from friso.engine.building import built_entries
 from friso.engine.cache import CodeRequest, Compiled
 from friso.engine.kinds import CompiledKind, argument_kind
@@ -60,7 +60,7 @@ class Kernel:
         step = "".join(_STEP.findall(self.source))
         return STEP + OPERATION * len(_OPERATIONS.findall(step)) + CALL * len(_CALLS.findall(step))
 
-    def run(self, queue: np.ndarray, batch: Batch, settings: Settings, results: Results) -> None:
+    def run(self, queue: np.ndarray, batch: Batch, settings: BatchOptions, results: Results) -> None:
         """Run the runs of the batch that this thread gets from the queue; write the results."""
         self.loops(self._buffer(), self.layout, queue, batch, settings, results)
 
@@ -303,6 +303,6 @@ def driver_kinds() -> list[CompiledKind]:
     """The kinds of the driver's arguments."""
     flat, square = np.zeros(1), np.zeros((1, 1))
     batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64), square, flat)
-    settings = Settings(1.0, 1.0, 1.0, 1.0, 0.0, 1.0, np.zeros(1, np.int64))
+    settings = BatchOptions(1.0, 1.0, 1.0, 1.0, 0.0, 1.0, np.zeros(1, np.int64))
     layout = ModelLayout(*(np.zeros(1, np.int64) if name in LOOKED_UP else 0 for name in ModelLayout._fields))
     return list(map(argument_kind, (flat, layout, new_queue(), batch, settings, empty_results(1, 1, 1, 1))))

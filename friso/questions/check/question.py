@@ -29,8 +29,8 @@ from friso.stage.correlations import Correlations, draw
 from friso.studies.draws import MOST, Draws
 
 if TYPE_CHECKING:
-    from friso.hunting.criteria import Verdict
     from friso.hunting import ParameterMargin
+    from friso.hunting.criteria import Verdict
     from friso.remedies.suggestion import Suggestion
     from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files

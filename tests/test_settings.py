@@ -1,0 +1,99 @@
+"""Settings: every tuning number is a field with its unit and reason, other values can be given for a block of code."""
+
+import ast
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+import friso
+import friso_thesis
+from friso.settings import Settings, setting, settings_classes
+
+LITERALS = {
+    "friso/app": 19,
+    "friso/cli": 8,
+    "friso/design_method": 56,
+    "friso/drives": 10,
+    "friso/engine": 49,
+    "friso/equations": 27,
+    "friso/frequency": 74,
+    "friso/hunting": 262,
+    "friso/identification": 378,
+    "friso/interface": 4,
+    "friso/leaf_springs": 26,
+    "friso/platform": 11,
+    "friso/questions": 107,
+    "friso/remedies": 68,
+    "friso/shown": 36,
+    "friso/stage": 14,
+    "friso/studies": 142,
+    "friso/virtual_rig": 10,
+    "friso": 11,
+    "friso_thesis/questions": 19,
+    "friso_thesis/shown": 1,
+    "friso_thesis/studies": 179,
+}
+"""Numbers that modules of each room may still give a name of their own, outside its settings. A room that has moved its
+tuning numbers keeps here those of physics, mathematics and formats; no entry may grow."""
+
+SHORTEST_REASON = 20
+"""Characters of a reason that says anything."""
+
+
+@dataclass(frozen=True)
+class RunSettings(Settings):
+    """Settings of a room that is made up."""
+
+    longest_run: float = setting(2.0, "s", "Longer runs show nothing new; shorter ones miss the third swing.")
+
+
+def test_other_values_hold_for_the_block_alone() -> None:
+    assert RunSettings.current().longest_run == 2.0
+    with RunSettings(longest_run=1.0).in_use(), RunSettings(longest_run=3.0).in_use():
+        assert RunSettings.current().longest_run == 3.0
+    assert RunSettings.current().longest_run == 2.0
+
+
+@pytest.mark.parametrize("settings", settings_classes(), ids=lambda settings: settings.__name__)
+def test_every_setting_has_a_reason(settings: type[Settings]) -> None:
+    rows = settings.rows()
+    assert rows
+    assert [row.name for row in rows if len(row.reason) < SHORTEST_REASON] == []
+    assert [row.name for row in rows if "_" not in row.name] == []
+
+
+def test_tuning_numbers_are_settings() -> None:
+    """A room names no more numbers of its own than it did, and fewer lower the list."""
+    counts = Counter(dict.fromkeys(LITERALS, 0))
+    for package in (friso, friso_thesis):
+        root = Path(str(package.__file__)).parent
+        for path in sorted(root.rglob("*.py")):
+            if path.name != "settings.py":
+                parts = path.relative_to(root.parent).parts
+                counts["/".join(parts[:2]) if len(parts) > 2 else parts[0]] += named_numbers(path.read_text("utf-8"))
+    assert {room: count for room, count in counts.items() if count} == LITERALS
+
+
+def named_numbers(source: str) -> int:
+    """How many names of a module stand for numbers, or for tuples and lists of numbers alone."""
+    values: list[ast.expr] = []
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            several = isinstance(targets[0], ast.Tuple) and isinstance(node.value, ast.Tuple)
+            values += node.value.elts if several and isinstance(node.value, ast.Tuple) else [node.value]
+    return sum(map(is_number, values))
+
+
+def is_number(value: ast.expr) -> bool:
+    if isinstance(value, ast.UnaryOp):
+        return is_number(value.operand)
+    if isinstance(value, ast.BinOp):
+        return is_number(value.left) and is_number(value.right)
+    if isinstance(value, ast.Tuple | ast.List):
+        return bool(value.elts) and all(map(is_number, value.elts))
+    return (
+        isinstance(value, ast.Constant) and isinstance(value.value, int | float) and not isinstance(value.value, bool)
+    )
