@@ -59,7 +59,7 @@ PEAKS = ("peaks", "distinct_peaks")
 
 
 @dataclass(frozen=True)
-class Question:
+class MapFinding:
     """What a map is asked first: in which cells the `variable` has one of the `words` (of counts: is more than 0), and
     the subject and verb of the answer."""
 
@@ -74,11 +74,11 @@ class Question:
         return np.isin(values.astype(str), self.words)
 
 
-_HUNTS = Question("verdict", "The stage hunts", ("hunts",))
-_BISTABLE = Question("verdict", "It is bistable (a kick or another move can start hunting)", ("bistable",))
+_HUNTS = MapFinding("verdict", "The stage hunts", ("hunts",))
+_BISTABLE = MapFinding("verdict", "It is bistable (a kick or another move can start hunting)", ("bistable",))
 _QUIET = ("transient", "settles")
-_ATTRACTS = Question("attractor", "A lasting swing attracts the stage", (CYCLE, SWING))
-_SWINGS = Question("outcome", "The run swings at its end", (SWINGS,))
+_ATTRACTS = MapFinding("attractor", "A lasting swing attracts the stage", (CYCLE, SWING))
+_SWINGS = MapFinding("outcome", "The run swings at its end", (SWINGS,))
 
 
 def headline(runs: xr.Dataset, metric: str) -> str:
@@ -93,7 +93,7 @@ def headline(runs: xr.Dataset, metric: str) -> str:
         doubt = f"In {grouped(unknown)} of the cells it is not certain what attracts." if unknown else ""
         return " ".join(filter(None, (_answer(runs, _ATTRACTS), doubt)))
     if metric in PEAKS and metric in runs:
-        return _answer(runs, Question(metric, "Peaks are counted"))
+        return _answer(runs, MapFinding(metric, "Peaks are counted"))
     return " ".join([_answer(runs, _SWINGS), *_creeping(runs)]) if "outcome" in runs else ""
 
 
@@ -107,7 +107,7 @@ def _creeping(runs: xr.Dataset) -> list[str]:
     return [f"It still creeps at its end {where}: {shows}."]
 
 
-def _answer(runs: xr.Dataset, question: Question) -> str:
+def _answer(runs: xr.Dataset, question: MapFinding) -> str:
     """In what share of the map it holds, and where."""
     holds, completed = _flags(runs, question)
     if not completed.any():
@@ -132,7 +132,7 @@ def _answer(runs: xr.Dataset, question: Question) -> str:
     return f"{share}: at {listed(where, 'and')} ({filled})."
 
 
-def _flags(runs: xr.Dataset, question: Question) -> tuple[np.ndarray, np.ndarray]:
+def _flags(runs: xr.Dataset, question: MapFinding) -> tuple[np.ndarray, np.ndarray]:
     """Where it holds, and where runs have a result, both of the shape of the runs: a large store is read in parts."""
     values = runs[question.variable]
     holds, completed = np.zeros(values.shape, bool), np.zeros(values.shape, bool)
