@@ -154,3 +154,12 @@ class Question:
 
 QUESTIONS = Registry[Question]("friso.questions", "QUESTION", GROUP, Question)
 """Every folder of `friso/questions/` declares one, and every package that an installed one names."""
+
+
+def function_of(name: str) -> Callable[..., Any]:
+    """Return the function friso.NAME of a question. Raises KeyError where none has that name, InputError where another
+    package's module has none."""
+    own = name.replace("_", "-")
+    if own in QUESTIONS and QUESTIONS[own].in_python == name:
+        return QUESTIONS[own].function
+    return {question.in_python: question for _, question in QUESTIONS.items()}[name].function
