@@ -14,6 +14,10 @@ import numpy as np
 import pytest
 
 import friso
+from friso.app.questions import QUESTIONS as QUESTIONS_OF_PAGES
+from friso.app.questions import PageRequest, job_of
+from friso.app.uploads import Uploads
+from friso.app.work import Work
 from friso.cli.app import main
 from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
@@ -252,6 +256,23 @@ def test_a_question_of_its_own_is_a_function_of_friso(asked: None, tmp_path: Pat
     assert "hold" in dir(friso)
     assert "set : dict, optional" in (friso.hold.__doc__ or "")
     assert answer.report(tmp_path / "hold.html") == [tmp_path / "hold.html"]
+
+
+def test_a_question_of_its_own_is_a_picture_of_the_app(asked: None) -> None:
+    rig = ROOT / "examples" / "thesis_rig.toml"
+    machine = {"name": "rig.toml", "text": rig.read_text(encoding="utf-8"), "changes": {}}
+    request, work = PageRequest.of({"machine": machine}, Uploads()), Work(lambda frame: None)
+    (described,) = QUESTIONS_OF_PAGES["machine"](request, work)
+    assert {"id": "hold", "label": "Hold"} in described["others"]
+    job, files = job_of("hold"), job_of("hold.zip")
+    assert job is not None
+    assert files is not None
+    (part,) = job(request, work)
+    assert part["sentences"] == ["It holds 2 N."]
+    assert part["command"] == "friso hold rig.toml"
+    (archive,) = files(request, work)
+    assert archive["name"] == "rig_hold.zip"
+    assert job_of("held") is None
 
 
 def test_what_is_registered_is_in_the_help(extended: None, capsys: pytest.CaptureFixture[str]) -> None:
