@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from friso.studies.metric import METRICS
+
 AXIS = 'KEY="FIRST..LAST:POINTS"'
 
 SourceArgument = Annotated[Path, typer.Argument(metavar="STAGE.toml|STORE", help="A stage file, or a study to resume.")]
@@ -33,13 +35,13 @@ SamplesOption = Annotated[
 ]
 Latin = Annotated[bool, typer.Option("--latin", help="Latin hypercube samples.")]
 Logarithmic = Annotated[bool, typer.Option("--log", help="Make all ranges logarithmic; for a single one, append :log.")]
-Metric = Annotated[
+MetricOption = Annotated[
     str | None,
     typer.Option(
         "--metric",
         metavar="NAME",
-        help="Quantity shown in colour. Of the stage: sketch (whether it hunts, by coarse return maps; default), "
-        "verdict, multiplier, amplitude, period. Of each run: outcome (what it does at its end), peaks, ...",
+        help="Quantity shown in colour: sketch (whether the stage hunts, by coarse return maps; default), verdict (by "
+        f"a search of every cell), or any other of {', '.join(METRICS)}.",
     ),
 ]
 Confirm = Annotated[
