@@ -16,7 +16,8 @@ from typer.core import TyperGroup
 
 import friso
 from friso.cli.app import command_line
-from friso.cli.command import COMMANDS, QUESTIONS
+from friso.cli.command import COMMANDS
+from friso.interface.question import TOPICS
 from friso.settings import settings_classes
 
 WIDTH = 100
@@ -110,10 +111,10 @@ def commands_page() -> str:
     group = typer.main.get_command(command_line())
     assert isinstance(group, TyperGroup)
     lines = []
-    for question in QUESTIONS:
-        lines.append(f"## {question}\n")
+    for topic in TOPICS:
+        lines.append(f"## {topic}\n")
         for name in group.commands:
-            if COMMANDS[name].question == question:
+            if COMMANDS[name].topic == topic:
                 lines += [f"### friso {name}\n", "```text", _help(group, name), "```\n"]
     return "\n".join(lines)
 

@@ -4,7 +4,7 @@ import friso.platform.early  # noqa: F401 (notes a signal that comes while the r
 
 # isort: split
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from friso.frequency.describing.response import plant_response
     from friso.frequency.members import Members, member
     from friso.frequency.tuning import Tuning, tuning
+    from friso.interface.starting import example, init, schema
     from friso.questions.bode.question import bode
     from friso.questions.boundary.question import boundary
     from friso.questions.check.question import check
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from friso.questions.export.question import export
     from friso.questions.flexure.question import flexure
     from friso.questions.identify.question import identify
-    from friso.questions.init.starting import example, init, schema
     from friso.questions.logs.question import logs
     from friso.questions.map.question import sweep
     from friso.questions.rig.question import rig
@@ -54,7 +54,7 @@ _PLACES = {
     "friso.questions.logs.question": ("logs",),
     "friso.questions.rig.question": ("rig",),
     "friso.questions.simulate.question": ("simulate",),
-    "friso.questions.init.starting": ("example", "init", "schema"),
+    "friso.interface.starting": ("example", "init", "schema"),
     "friso.questions.map.question": ("sweep",),
     "friso.questions.tune.question": ("tune",),
     "friso.remedies.sensitivities": ("Sensitivities", "sensitivity"),
@@ -129,11 +129,11 @@ def __getattr__(name: str) -> Any:
         from difflib import get_close_matches
 
         from friso.errors import InputError
-        from friso.platform.installed import FUNCTIONS, load_declared
+        from friso.interface.question import QUESTIONS
 
         if name in _installed():
             try:
-                return load_declared(FUNCTIONS, name, _installed()[name], name, Callable)
+                return QUESTIONS[_installed()[name]].function
             except InputError as error:
                 raise AttributeError(str(error)) from error
         nearest = "".join(f"; did you mean {near!r}?" for near in get_close_matches(name, __dir__(), 1))
@@ -146,7 +146,7 @@ def __dir__() -> list[str]:
 
 
 def _installed() -> Mapping[str, str]:
-    """The modules of functions that installed packages name, by name."""
-    from friso.platform.installed import FUNCTIONS, installed_modules
+    """The questions that are not friso's own, by the names of their functions."""
+    from friso.interface.question import QUESTIONS
 
-    return installed_modules(FUNCTIONS, frozenset(_LAZY))
+    return {name.replace("-", "_"): name for name in QUESTIONS.others}

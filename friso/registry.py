@@ -39,16 +39,21 @@ class Registry(Generic[Item]):
         return {module.name.replace("_", self.dash): f"{self.package}.{module.name}" for module in modules}
 
     @property
-    def _installed(self) -> Mapping[str, str]:
+    def installed(self) -> Mapping[str, str]:
         """The modules that installed packages name, by name."""
         return installed_modules(self.group, frozenset(self._own)) if self.group else {}
 
+    @property
+    def others(self) -> list[str]:
+        """The names that friso does not have itself."""
+        return sorted({*self.installed, *self.added})
+
     def __iter__(self) -> Iterator[str]:
         """The names, in alphabetical order."""
-        return iter(sorted({*self._own, *self._installed, *self.added}))
+        return iter(sorted({*self._own, *self.installed, *self.added}))
 
     def __contains__(self, name: object) -> bool:
-        return name in self.added or name in self._own or name in self._installed
+        return name in self.added or name in self._own or name in self.installed
 
     def __getitem__(self, name: str) -> Item:
         """What is declared under a name. Raises KeyError for an unknown one, InputError where another package's module
@@ -57,9 +62,9 @@ class Registry(Generic[Item]):
             return self.added[name][0]
         if name in self._own:
             return getattr(import_module(self._own[name]), self.attribute)
-        if name not in self._installed:
+        if name not in self.installed:
             raise KeyError(name)
-        return load_declared(self.group, name, self._installed[name], self.attribute, self.kind)
+        return load_declared(self.group, name, self.installed[name], self.attribute, self.kind)
 
     def items(self) -> Iterator[tuple[str, Item]]:
         """The names with what is declared; what another package's module does not declare is told, and left out."""
@@ -73,7 +78,7 @@ class Registry(Generic[Item]):
         """What is declared under a name, in one line without a full stop. Raises KeyError for an unknown name."""
         if name in self.added:
             return self.added[name][1]
-        module = self._own.get(name) or self._installed[name]
+        module = self._own.get(name) or self.installed[name]
         try:
             loader: Any = getattr(find_spec(module), "loader", None)
             docstring = ast.get_docstring(ast.parse(loader.get_source(module)))

@@ -25,7 +25,7 @@ from friso.frequency.members import limit_cases, member
 from friso.hunting.criteria import end_of_traces, outcomes, settling_of_traces
 from friso.interface.output_folder import MARKER
 from friso.questions.compare.document import compare_document
-from friso.questions.compare.figures import figures
+from friso.questions.compare.figures import compare_figures
 from friso.questions.compare.page import page
 from friso.questions.compare.words import conclusion, paired_rows, sentences, table_rows
 from friso.shares import share
@@ -480,7 +480,7 @@ def test_standstill_is_compared_on_a_floor_only(made_up: Comparison, wording: Wo
         assert (expected["standstill_compared"], ratio is not None) == (compared, compared)
         assert any("no [floor]" in note for note in expected["notes"]) is not compared
         assert ("no [floor]" in text) is not compared
-        wording(figures(item)[0].caption)
+        wording(compare_figures(item)[0].caption)
 
 
 def test_machines_that_rest_where_they_begin_are_drawn(made_up: Comparison) -> None:
@@ -488,9 +488,9 @@ def test_machines_that_rest_where_they_begin_are_drawn(made_up: Comparison) -> N
     still = [
         replace(result, measures=replace(result.measures, in_position=np.zeros(COUNT))) for result in made_up.results
     ]
-    drawn = figures(replace(made_up, results=tuple(still)))[0]
+    drawn = compare_figures(replace(made_up, results=tuple(still)))[0]
     assert image(drawn, "png")  # warnings are errors here
-    assert [figure.panels[-1].y.log for figure in (drawn, *figures(made_up))] == [False, True]
+    assert [figure.panels[-1].y.log for figure in (drawn, *compare_figures(made_up))] == [False, True]
 
 
 def test_the_cable_is_said_to_be_left_out(built: Stage) -> None:

@@ -36,7 +36,7 @@ MOST = (5, 95)
 """Percentiles between which most machines are."""
 
 
-def figures(comparison: Comparison) -> list[Figure]:
+def compare_figures(comparison: Comparison) -> list[Figure]:
     """Probabilities, settling times and standstill in one figure."""
     within = with_unit(comparison.within, "m")
     caption = (

@@ -169,6 +169,6 @@ def schema(of: str = "stage") -> dict[str, Any]:
     >>> friso.schema()["properties"]["masses"]["properties"]["cart"]["examples"]
     ['1.2 kg']
     """
-    from friso.questions.init.schema import SCHEMAS
+    from friso.interface.schema import SCHEMAS
 
     return SCHEMAS[choice(of, "of", tuple(SCHEMAS), "of=stage")]()
