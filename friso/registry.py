@@ -18,8 +18,8 @@ Item = TypeVar("Item")
 
 
 class Registry(Generic[Item]):
-    """What modules declare under the name `attribute`, by the name of the module with dashes: `break_away.py` declares
-    "break-away".
+    """What modules declare under the name `attribute`, by the name of the module, with dashes unless that is declined:
+    `break_away.py` declares "break-away".
 
     The modules are those of a `package`, and, where there is a `group` of entry points, those that installed packages
     name in it; what the latter declare has to be of a `kind`. The names are read without importing any module, and so
@@ -27,15 +27,16 @@ class Registry(Generic[Item]):
     asked for. `added` takes what is declared elsewhere, as (declared, one line), by name.
     """
 
-    def __init__(self, package: str, attribute: str, group: str = "", kind: type = object) -> None:
+    def __init__(self, package: str, attribute: str, group: str = "", kind: type = object, dashes: bool = True) -> None:
         self.package, self.attribute, self.group, self.kind = package, attribute, group, kind
+        self.dash = "-" if dashes else "_"
         self.added: dict[str, tuple[Item, str]] = {}
 
     @cached_property
     def _own(self) -> dict[str, str]:
         """The modules of the package, by name."""
         modules = iter_modules(import_module(self.package).__path__)
-        return {module.name.replace("_", "-"): f"{self.package}.{module.name}" for module in modules}
+        return {module.name.replace("_", self.dash): f"{self.package}.{module.name}" for module in modules}
 
     @property
     def installed(self) -> Mapping[str, str]:

@@ -34,6 +34,7 @@ from friso.shown.drawing.figure import Axis, Figure, Panel, Series
 from friso.shown.pages import Report
 from friso.stage import Stage
 from friso.stage.foreign import foreign
+from friso.studies.metric import METRICS, MapFinding, Metric, Word
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.studies.rig.outcome import Outcome, RigLog
 
@@ -78,6 +79,25 @@ def push(stage: Stage, seed: int, progress: Progress) -> Outcome:
     return Outcome("push", stage, seed, (RigLog("pushed", "hold", 1e-3, logged, logged, stage, seed),), None)
 
 
+LOADED = Metric(
+    "Load of the actuator",
+    lambda run: np.where(run.measures.largest_force > run.flat["friction.static"], "heavy", "light"),
+    words=(Word("heavy", "orange", "the actuator overcomes static friction"), Word("light", "#eef0ff")),
+    findings=(MapFinding("The actuator works hard", ("heavy",)),),
+)
+"""A metric of words, computed from runs."""
+
+ATTRACTORS = Metric(
+    "Motions that attract",
+    lambda stage: stage.attracted.attracts.astype(float),
+    source="sketch",
+    unit="1",
+    counts=True,
+    findings=(MapFinding("Something attracts"),),
+)
+"""A metric of numbers, computed from a sketch of what attracts a stage."""
+
+
 def read_pairs(path: Path) -> ChannelTable:
     """Position in m and force in N, a millisecond apart, alternating in a file of doubles behind its mark."""
     position, force = np.frombuffer(path.read_bytes()[4:]).reshape(-1, 2).T
@@ -94,6 +114,8 @@ def extended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(KINDS.added, "hold", (KIND, "Forces that the stage bears without moving"))
     monkeypatch.setitem(RIG_EXPERIMENTS.added, "push", (push, "Push without moving"))
     monkeypatch.setitem(FORMATS.added, "pairs", (FORMAT, "Pairs of doubles"))
+    monkeypatch.setitem(METRICS.added, "loaded", (LOADED, "How hard the actuator works"))
+    monkeypatch.setitem(METRICS.added, "attracting", (ATTRACTORS, "How much attracts the stage"))
 
 
 @pytest.fixture
@@ -157,6 +179,26 @@ def test_an_experiment_of_the_rig_of_its_own_is_run_and_shown(
     assert (out / "rig_pushed.png").stat().st_size > 0
     assert run("--help", command="rig") == 0
     assert "push Push without moving" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_metric_of_its_own_is_swept_drawn_and_told(
+    extended: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stage, crossovers = ROOT / "examples" / "thesis_rig.toml", "controller.crossover=4 Hz, 8 Hz"
+    answer = friso.sweep(stage, x=crossovers, metric="attracting")
+    assert answer.data["attracting"].attrs == {"units": "1"}
+    assert np.array_equal(answer.data["attracting"] > 0, friso.sweep(stage, x=crossovers).data["sketch"] == "hunts")
+    assert answer.sentences()[0].startswith("Something attracts in ")
+    assert [figure.title for figure in answer.figures()] == ["Motions that attract"]
+    store = tmp_path / "map.zarr"
+    assert run(stage, "--x", crossovers, "--metric", "loaded", "--out", store, command="map") == 0
+    assert "The actuator works hard in " in " ".join(capsys.readouterr().out.split())
+    page = store.with_suffix(".html").read_text(encoding="utf-8")
+    assert all(text in page for text in ("Load of the actuator", "the actuator overcomes static friction"))
+    assert run(store, "--json", "--out", tmp_path / "again", command="map") == 0
+    assert json.loads(capsys.readouterr().out)["conclusion"].startswith("The actuator works hard")
+    assert run(stage, "--x", crossovers, "--metric", "load", "--out", tmp_path / "no.zarr", command="map") == 2
+    assert "--metric loaded" in capsys.readouterr().err
 
 
 def test_a_page_of_its_own_needs_no_template() -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from friso import example
 from friso.errors import InputError
 from friso.stage import ControllerSection, register_controller
 
@@ -70,6 +71,28 @@ def installed(tmp_path: Path) -> Path:
     package(tmp_path, "other", controllers="own_controller", friction="air_film")
     (tmp_path / "stage.toml").write_text(STAGE)
     return tmp_path
+
+
+METRIC = '''
+"""Largest force over static friction"""
+
+from friso.studies.metric import Metric
+
+METRIC = Metric(
+    "Use of the force", lambda run: run.measures.largest_force / run.flat["friction.static"], unit="1"
+)
+'''
+
+
+def test_a_metric_of_a_package_is_mapped(tmp_path: Path) -> None:
+    (tmp_path / "force_use.py").write_text(METRIC)
+    package(tmp_path, "other", metrics={"force_use": "force_use", "peaks": "force_use"})
+    shutil.copy(example("thesis_rig"), tmp_path / "rig.toml")
+    small = ("rig.toml", "--x", "controller.crossover=4 Hz, 8 Hz", "--out", "a.zarr", "--json")
+    done = friso_command(tmp_path, "map", *small, "--metric", "force_use")
+    assert done.returncode == 0, done.stderr
+    assert "friso.metrics: peaks is left out" in " ".join(done.stderr.split())
+    assert "Use of the force" in (tmp_path / "a.html").read_text(encoding="utf-8")
 
 
 def test_help_names_them(installed: Path) -> None:

@@ -1,6 +1,14 @@
 """Where does it hunt: keys swept over ranges, in memory or in a store that an interrupted study resumes from."""
 
-from friso.interface.question import WHERE, Question
+from friso.interface.question import WHERE, Choices, Question
+
+
+def listed_metrics() -> list[tuple[str, str]]:
+    """List what `--metric` takes, each in one line."""
+    from friso.studies.metric import METRICS
+
+    return [(name, METRICS.one_line(name)) for name in METRICS]
+
 
 QUESTION = Question(
     __name__,
@@ -11,5 +19,6 @@ QUESTION = Question(
     function_name="sweep",
     metavars={"stage": "STAGE.toml|STORE", "rtol": "NUMBER|auto", "verify": "SHARE"},
     defaults={"verify": 0.05},
+    choices=Choices("Metrics (--metric)", listed_metrics),
     runner="friso.cli.runs.map",
 )

@@ -49,7 +49,6 @@ from friso.questions.map.study import (
 )
 from friso.stage import Stage
 from friso.studies.axes import AxisValues
-from friso.studies.cells import SKETCH
 from friso.studies.execute import Crew, local_crew
 from friso.studies.samples import Samples
 from friso.studies.store import Store, check_store, holds_all, in_memory, read_store
@@ -217,9 +216,7 @@ def sweep(
     latin : bool
         Make the samples a Latin hypercube.
     metric : str, optional
-        Quantity shown in colour. Of the stage: sketch (whether it hunts, by coarse return maps; default), verdict,
-        multiplier, amplitude, period, by a search of every cell. Of each run: outcome (what it does at its end),
-        peaks, ...
+        Quantity shown in colour; default: sketch, whether the stage hunts by coarse return maps.
     confirm : bool
         Search every cell, instead of a sketch, which takes up to five times as long.
     rtol : float or "auto", optional
@@ -269,7 +266,7 @@ def sweep(
     if check:
         return _whole(stage)
     exports, share = _checked_exports(export), checked_share(verify)
-    if confirm and metric not in (None, SKETCH, "verdict"):
+    if confirm and metric not in (None, "sketch", "verdict"):
         raise InputError("confirm", f"--confirm and --metric {metric}", "one of the two: it searches for verdicts", "")
     varied = Varied.of_texts(axes or {}, x, y, axis, link, samples, latin, log)
     store = None if out is None else place_of_store(out)
@@ -283,7 +280,7 @@ def sweep(
             store = place_of_store(resumed)
             study, metric = stored_study(store, metric, None if yes else LARGE)
         else:
-            metric = ("verdict" if confirm else SKETCH) if metric in (None, SKETCH) else metric
+            metric = ("verdict" if confirm else "sketch") if metric in (None, "sketch") else metric
             chosen = read_stage(stage, set)
             study = study_for(chosen, varied, metric, refine, None if yes else LARGE, crew)
             study = replace(study, rtol=_chosen_rtol(1e-6 if rtol is None else rtol, study, crew))
