@@ -97,7 +97,7 @@ class Expected:
         rows = [np.concatenate([spot.at, spot.size, spot.special.point.cycle.states[0]]) for spot in last]
         parabola = polyfit(away, rows, len(last) - 1)
         there, ahead = (np.asarray(polyval(step, of)) for of in (parabola, polyder(parabola)))
-        return cls(there[:2], there[2:4], there[None, 4:], _unit(ahead[:2]))
+        return cls(there[:2], there[2:4], there[None, 4:], unit_vector(ahead[:2]))
 
 
 class CurveTracer:
@@ -160,7 +160,7 @@ class CurveTracer:
     def walk(self, spots: list[Spot]) -> tuple[list[Spot], str]:
         """Two neighbouring points with those that follow them, and how they end."""
         start, step = spots[0], FIRST
-        direction = _unit(spots[1].at - spots[0].at)
+        direction = unit_vector(spots[1].at - spots[0].at)
         while len(spots) <= MOST:
             last = spots[-1]
             ahead = last.at + step * direction
@@ -176,7 +176,7 @@ class CurveTracer:
                     return spots, f"it could not be followed farther than {self._named(last.at)}"
                 continue
             spots = [*spots, spot]
-            direction, step = _unit(moved), min(1.4 * step, LONGEST)
+            direction, step = unit_vector(moved), min(1.4 * step, LONGEST)
             if len(spots) > 7 and np.linalg.norm(spot.at - start.at) < step:
                 return spots, CLOSED
         return spots, "it was followed for as many steps as there may be"
@@ -202,7 +202,8 @@ class CurveTracer:
         return ", ".join(f"{key} = {value[0]:.6g} {unit}".rstrip() for (key, value), unit in named)
 
 
-def _unit(vector: np.ndarray) -> np.ndarray:
+def unit_vector(vector: np.ndarray) -> np.ndarray:
+    """Scale a vector to length one."""
     return vector / np.linalg.norm(vector)
 
 

@@ -14,6 +14,7 @@ from friso.hunting.attractors import attractors
 from friso.hunting.boundary.branch import Point, Tracer
 from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
 from friso.hunting.boundary.locate import changes, located
+from friso.hunting.boundary.meetings import Meeting, find_meetings, leg_shares
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, families
@@ -27,7 +28,7 @@ NODES = 13
 PATIENCE = 60
 """Points of a branch between two neighbours at most: one that winds for longer hardly leads to a curve."""
 
-CURVES = "curves between stages that differ"
+CURVES = "curves of the edge of hunting"
 """What is reported to a progress."""
 
 SAME = 0.2
@@ -38,8 +39,8 @@ SAME = 0.2
 class Plane:
     """What was found in the box of two keys: the curves; the hunting cycles on those nodes of a grid, numbered in C
     order with the first key along the first side, that are `allowed`; whether anything attracts the stages on these,
-    whether that is known, and whether their loop is unstable, whatever the friction does; and where a change was seen
-    that no curve could be begun at, each shape (2,)."""
+    whether that is known, and whether their loop is unstable, whatever the friction does; where a change was seen that
+    no curve could be begun at, each shape (2,); and where curves meet."""
 
     space: Space
     curves: tuple[Curve, ...]
@@ -50,6 +51,7 @@ class Plane:
     decided: np.ndarray
     unstable: np.ndarray
     gaps: tuple[np.ndarray, ...]
+    meetings: tuple[Meeting, ...] = ()
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -83,7 +85,8 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES, progress: Progre
         if not known_gap and not any(_crossed(curve, points[a], points[b]) for curve in curves):
             gaps.append(middle)
     unstable = np.any([*unstable_among(stages).values()], axis=0)
-    return Plane(space, tuple(curves), nodes, allowed, hunting, attracts, decided, unstable, tuple(gaps))
+    meetings = find_meetings(space, curves, rtol)
+    return Plane(space, tuple(curves), nodes, allowed, hunting, attracts, decided, unstable, tuple(gaps), meetings)
 
 
 def _sought(
@@ -151,13 +154,10 @@ def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int
 
 def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
     """Whether a curve passes by the way between two neighbours."""
-    points = curve.points
-    legs = points[1:] - points[:-1]
-    path = start + np.linspace(0, 1, 9)[:, None] * (end - start)
-    for at in path:
-        shares = np.clip(((at - points[:-1]) * legs).sum(axis=1) / np.maximum((legs**2).sum(axis=1), 1e-30), 0, 1)
-        away = np.linalg.norm(points[:-1] + shares[:, None] * legs - at, axis=1)
-        if away.min() < SAME * np.linalg.norm(end - start):
+    points, mesh = curve.points, float(np.linalg.norm(end - start))
+    for at in start + np.linspace(0, 1, 9)[:, None] * (end - start):
+        nearest = points[:-1] + leg_shares(points, at)[:, None] * np.diff(points, axis=0)
+        if np.linalg.norm(nearest - at, axis=1).min() < SAME * mesh:
             return True
     return False
 

@@ -12,6 +12,7 @@ from friso.questions.boundary.words import BASIN, CYCLES, MEANINGS, ShownKey, en
 from friso.questions.map.words import QUIET, quantity
 from friso.shown.drawing.figure import (
     BLUE,
+    GREEN,
     GREY,
     INK,
     LIGHT,
@@ -34,6 +35,8 @@ from friso.studies.boundary_lines import (
     UNKNOWN,
     CycleShape,
     Line,
+    curve_ends,
+    curve_meetings,
     lines,
     lost_places,
     node_verdicts,
@@ -56,6 +59,12 @@ NODES = {
 
 LOST = "a change, no curve begun"
 """What is said of places between stages that differ, where no curve could be begun."""
+
+LOST_END = "cycle not followed farther"
+"""What is said of ends of curves inside the range."""
+
+MEETING = "curves meet"
+"""What is said of places where two curves cross, end on each other, or begin or cease to run together."""
 
 REACH = 2.5
 """Multipliers up to which they are shown."""
@@ -140,8 +149,17 @@ def _plane(traced: Plane) -> Figure:
     kinds = dict.fromkeys(line.kinds[0] for line in curves)
     meanings = [f"Beyond a {kind} of a cycle, {MEANINGS[kind]}." for kind in kinds]
     note = " ".join([*meanings, BASIN] if any(line.shape == "asymmetric" for line in curves) else meanings)
-    gaps = lost_places(traced)
-    markers = (Markers(gaps[:, 0], gaps[:, 1], LOST, GREY, "cross"),) if len(gaps) else ()
+    lost_ends = [end.at for end in curve_ends(traced) if end.kind == "lost"]
+    meetings = [place for meeting in curve_meetings(traced) for place in meeting.places]
+    markers = tuple(
+        Markers(*np.array(places).T, label, colour, symbol)
+        for places, label, colour, symbol in (
+            ([*lost_places(traced)], LOST, GREY, "cross"),
+            (lost_ends, LOST_END, GREY, "triangle"),
+            (meetings, MEETING, GREEN, "target"),
+        )
+        if places
+    )
     return Figure("boundary", "Edge of hunting", "", (Panel("", x, y, series, markers, clouds=(nodes,)),), note=note)
 
 
