@@ -349,9 +349,11 @@ def test_where_curves_meet_and_end_is_told(met: Plane, wording: Wording) -> None
     first, second = sentences(met, keys)[1:3]
     assert "at both, the range ends" in first
     assert "joint.stroke = 1.9 mm, controller.kp = 3.16228 N/m, where it meets another curve" in second
-    for told in meeting_sentences(met, keys):
-        assert "joint.stroke = 1.5 mm, controller.kp = 3.16228 N/m" in told or "near joint.stroke = 1.9 mm" in told
-        wording(told)
+    for sentence in meeting_sentences(met, keys):
+        assert (
+            "joint.stroke = 1.5 mm, controller.kp = 3.16228 N/m" in sentence or "near joint.stroke = 1.9 mm" in sentence
+        )
+        wording(sentence)
     assert conclusion(met, keys).endswith("Curves meet at 3 more places.")
 
 

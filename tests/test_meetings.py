@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from variants import VARIANTS
 
 from friso.hunting import CLOSED, END_OF_RANGE, Curve, Cycles, KeyRange, LocatedPoint, Point, Space, Spot
 from friso.hunting.boundary.curve import CurveTracer
@@ -11,7 +12,8 @@ from friso.hunting.boundary.meetings import find_meetings
 
 pytestmark = pytest.mark.inner
 
-SPACE = Space((KeyRange("x", 0.0, 1.0), KeyRange("y", 0.0, 1.0)), dict)
+RANGES = KeyRange("controller.crossover", 8.0, 10.0), KeyRange("masses.cart", 1.0, 2.0)
+SPACE = Space.of(VARIANTS["rigid"], RANGES)
 
 
 def spot(at: Any, amplitude: float, period: float) -> Spot:
@@ -65,6 +67,13 @@ def test_a_crossing_at_which_a_cycle_is_lost_is_where_straight_lines_cross(monke
     assert np.isinf(meeting.error).all()
 
 
+def test_no_crossing_is_refined_where_a_limiter_chatters(monkeypatch: pytest.MonkeyPatch) -> None:
+    bent(monkeypatch)
+    chattering = Space.of(VARIANTS["free"], RANGES)
+    (meeting,) = find_meetings(chattering, [LEVEL, curve(STEEP)], 1e-9)
+    assert np.isinf(meeting.error).all()
+
+
 def test_a_curve_that_was_followed_twice_is_told_as_one() -> None:
     again = curve([(x, 0.501) for x in (0.2, 0.3, 0.4, 0.5)])
     (meeting,) = find_meetings(SPACE, [LEVEL, again], 1e-9)
@@ -76,8 +85,8 @@ def test_a_curve_that_was_followed_twice_is_told_as_one() -> None:
 def test_a_curve_may_end_on_another(amplitude: float, stop: float, meets: bool) -> None:
     """If both have one cycle there, and it is near."""
     lost = curve([(0.52, 0.0), (0.52, 0.2), (0.52, stop)], amplitude, ends=LOST)
-    found = find_meetings(SPACE, [LEVEL, lost], 1e-9)
-    assert [(meeting.curves, meeting.kind) for meeting in found] == [((1, 0), "end")] * meets
+    meetings = find_meetings(SPACE, [LEVEL, lost], 1e-9)
+    assert [(meeting.curves, meeting.kind) for meeting in meetings] == [((1, 0), "end")] * meets
 
 
 def test_a_curve_may_cross_itself(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -191,10 +191,10 @@ def _case(
 ) -> Case:
     flat, ended = stage.flat(), 0
 
-    def begin(part: str) -> None:
+    def begin(part: CheckPart) -> None:
         nonlocal ended
         ended += (step := int(part != CheckPart.ATTRACTION))
-        done.add(step, part)
+        done.add(step, part.progress_word)
 
     with allowance() as spent:
         (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(measuring_options(rtol), room=ROOM))
@@ -213,7 +213,7 @@ def _case(
         if static_friction and static_friction.open_sides:
             judgement = replace(judgement, given_up=(*judgement.given_up, CheckPart.FRICTION))
     breakaway = _breakaway(flat)
-    done.add(PART_COUNT - ended, CheckPart.FRICTION)  # the last, too, where nothing attracts
+    done.add(PART_COUNT - ended, CheckPart.FRICTION.progress_word)  # the last, too, where nothing attracts
     return Case(
         stage=stage,
         judgement=judgement,

@@ -107,6 +107,17 @@ class CheckPart(StrEnum):
     FRICTION = "other static friction"
     FEEDING = "what feeds it"
 
+    @property
+    def progress_word(self) -> str:
+        """What the user reads while this part is computed: words of the glossary."""
+        return _PROGRESS_WORDS.get(self, self.value)
+
+
+_PROGRESS_WORDS = {
+    CheckPart.BANDWIDTHS: "edge of hunting in bandwidth",
+    CheckPart.FRICTION: "margin in static friction",
+}
+
 
 PARTS = CheckPart.ATTRACTION, CheckPart.STARTS, CheckPart.BANDWIDTHS
 """What is computed for a verdict, in this order."""
@@ -157,7 +168,7 @@ def judge(
     stage: Stage,
     ran: Measures,
     rtol: float,
-    begin: Callable[[str], None] = lambda label: None,
+    begin: Callable[[CheckPart], None] = lambda part: None,
     work: float = WORK,
     tell: Callable[[Verdict], None] = lambda verdict: None,
 ) -> Judgement:
@@ -231,7 +242,7 @@ def _with_a_target(
     motions: Motions,
     attraction: Hunting,
     target: Target,
-    begin: Callable[[str], None],
+    begin: Callable[[CheckPart], None],
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:

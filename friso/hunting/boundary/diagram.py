@@ -24,7 +24,7 @@ OTHERS = 6
 """Branches at most of cycles that simulations end in, beside those that the return maps suggest: where periods double
 again and again there is no end of them."""
 
-BRANCHES = "branches of cycles"
+BRANCHES = "following branches of cycles"
 """What is reported to a progress: each cycle that was found lies on a branch."""
 
 CLOSE = 0.1

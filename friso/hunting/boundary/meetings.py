@@ -39,16 +39,16 @@ class Meeting:
 
 def find_meetings(space: Space, curves: Sequence[Curve], rtol: float) -> tuple[Meeting, ...]:
     """Find where curves meet; crossings are refined by cycles that are closed to a relative tolerance."""
-    found: list[Meeting] = []
+    meetings: list[Meeting] = []
     for first, second in combinations(range(len(curves)), 2):
         if stretch := _together(curves, first, second):
-            found.append(stretch)
+            meetings.append(stretch)
             continue
         crossings = [*_crossings(space, curves, (first, second), rtol)]
-        found += crossings or [*_ends_on(curves, first, second), *_ends_on(curves, second, first)][:1]
+        meetings += crossings or [*_ends_on(curves, first, second), *_ends_on(curves, second, first)][:1]
     for number in range(len(curves)):
-        found += _crossings(space, curves, (number, number), rtol)
-    return tuple(found)
+        meetings += _crossings(space, curves, (number, number), rtol)
+    return tuple(meetings)
 
 
 class _Nearest(NamedTuple):
@@ -132,13 +132,14 @@ def _refined(
     rtol: float,
 ) -> Meeting:
     """The crossing near a guess, between two neighbouring points of each curve: straight lines through a point of
-    either curve, in the directions of the curves there, cross at the next guess. Where a cycle is lost on the way, the
-    guess is what is known."""
+    either curve, in the directions of the curves there, cross at the next guess. Where a cycle is lost on the way, or a
+    limiter chatters, so that a single point takes as long as many, the guess is what is known."""
     settings, place = MeetingSettings.current(), guess
+    refinements = 0 if space.stages(guess[None]).chatters else settings.crossing_refinements
     ways = [unit_vector(last.at - first.at) for first, last in pairs]
     spots = [min(pair, key=lambda spot: float(np.linalg.norm(spot.at - guess))) for pair in pairs]
     tracers = [CurveTracer(space, curves[number].kind, curves[number].sign, rtol) for number in numbers]
-    for _ in range(settings.crossing_refinements):
+    for _ in range(refinements):
         near = [
             tracer.on_line(place, way[::-1] * [-1.0, 1.0], spot, settings.crossing_reach)
             for tracer, way, spot in zip(tracers, ways, spots, strict=True)

@@ -28,7 +28,7 @@ NODES = 13
 PATIENCE = 60
 """Points of a branch between two neighbours at most: one that winds for longer hardly leads to a curve."""
 
-CURVES = "curves of the edge of hunting"
+CURVES = "following the edge of hunting"
 """What is reported to a progress."""
 
 SAME = 0.2

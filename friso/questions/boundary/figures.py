@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -151,16 +151,18 @@ def _plane(traced: Plane) -> Figure:
     note = " ".join([*meanings, BASIN] if any(line.shape == "asymmetric" for line in curves) else meanings)
     lost_ends = [end.at for end in curve_ends(traced) if end.kind == "lost"]
     meetings = [place for meeting in curve_meetings(traced) for place in meeting.places]
-    markers = tuple(
-        Markers(*np.array(places).T, label, colour, symbol)
-        for places, label, colour, symbol in (
-            ([*lost_places(traced)], LOST, GREY, "cross"),
-            (lost_ends, LOST_END, GREY, "triangle"),
-            (meetings, MEETING, GREEN, "target"),
-        )
-        if places
+    marks = (
+        *_marks(lost_places(traced), LOST, GREY, "cross"),
+        *_marks(lost_ends, LOST_END, GREY, "triangle"),
+        *_marks(meetings, MEETING, GREEN, "target"),
     )
-    return Figure("boundary", "Edge of hunting", "", (Panel("", x, y, series, markers, clouds=(nodes,)),), note=note)
+    return Figure("boundary", "Edge of hunting", "", (Panel("", x, y, series, marks, clouds=(nodes,)),), note=note)
+
+
+def _marks(places: Sequence[np.ndarray] | np.ndarray, label: str, colour: str, symbol: Symbol) -> tuple[Markers, ...]:
+    """Marks at places in the plane [SI], each of shape (2,), if there are any."""
+    x, y = np.reshape(places, (-1, 2)).T
+    return (Markers(x, y, label, colour, symbol),) if x.size else ()
 
 
 def _axis(swept: KeyRange, margin: float = 0.0) -> Axis:

@@ -194,10 +194,10 @@ def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int 
 
 def _first_meetings(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """The sentences about meetings of curves that stand in the answer."""
-    told = meeting_sentences(traced, keys)
-    more = len(told) - SHOWN_MEETINGS
+    texts = meeting_sentences(traced, keys)
+    more = len(texts) - SHOWN_MEETINGS
     rest = [f"Curves meet at {more} more {'places' if more > 1 else 'place'}."] if more > 0 else []
-    return [*told[:SHOWN_MEETINGS], *rest]
+    return [*texts[:SHOWN_MEETINGS], *rest]
 
 
 def meeting_sentences(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
