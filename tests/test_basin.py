@@ -30,10 +30,11 @@ from friso.hunting import (
     moves_that_hunt,
     pushes_that_hunt,
 )
-from friso.hunting.basin import EDGE, MOVES, ends_in, evenly
+from friso.hunting.basin import ends_in, evenly
 from friso.hunting.cycle.ensemble import done
 from friso.hunting.cycle.rest import pushed
 from friso.hunting.outward import Outward
+from friso.hunting.settings import BasinSettings
 from friso.hunting.verdict import BY_CHANCE, own_motion
 from friso.stage import Stage
 
@@ -42,6 +43,8 @@ GAINS = pytest.mark.xdist_group("gains")
 
 LONG = 60
 """Periods after which a single run has settled, or swings like the cycle."""
+
+MOVES = BasinSettings().drawn_moves
 
 
 def rigid(crossover: float) -> Stage:
@@ -324,7 +327,7 @@ def test_no_margin_within_the_range_of_the_search(crossover: float, attracting: 
 @pytest.mark.inner
 def test_edges_are_sought_finer_than_they_are_checked() -> None:
     """The checks above at 2 % mean something only while edges are found to 1 %."""
-    assert EDGE <= 0.01
+    assert BasinSettings().kick_edge_share <= 0.01
 
 
 @pytest.mark.inner

@@ -354,7 +354,7 @@ def test_where_curves_meet_and_end_is_told(met: Plane, wording: Wording) -> None
             "joint.stroke = 1.5 mm, controller.kp = 3.16228 N/m" in sentence or "near joint.stroke = 1.9 mm" in sentence
         )
         wording(sentence)
-    assert conclusion(met, keys).endswith("Curves meet at 3 more places.")
+    assert conclusion(met, keys).endswith("Curves meet at 2 more places.")
 
 
 def test_the_document_lists_where_curves_meet_and_end(met: Plane) -> None:

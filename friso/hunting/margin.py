@@ -16,15 +16,12 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.outward import AttractionEnd, BandwidthWindow, Beyond, Outward
 from friso.hunting.restabilised import windows_again
+from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import sketched, what_attracts
 from friso.stage import Stage
 
 LOWEST, HIGHEST = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
 """Bandwidths between which is searched, in units of that of the stage."""
-
-SIMULATED, AT_ONCE = 1e8, 8
-"""Work that simulations at bandwidths may take whose return maps are not resolved, and how many of these are done
-together."""
 
 
 @dataclass(frozen=True)
@@ -153,12 +150,15 @@ class _Grid:
     def _survey(self, numbers: np.ndarray) -> None:
         """Sketch the stages at some factors, by number; those whose maps are not resolved are searched by simulations,
         the nearest to the stage itself first, as far as so much work suffices. Raises Exhausted."""
+        settings = EdgeSettings.current()
         sketch = sketched(self._stages(numbers))
         self.attracts[numbers], self.decided[numbers] = sketch.attracts, sketch.decided
         self.returns[numbers], self.resolved[numbers] = sketch.returns, sketch.decided
         left = numbers[~sketch.decided]
         left = left[np.argsort(np.abs(np.log(self.factors[left])), kind="stable")]
-        at_once, work = (AT_ONCE, SIMULATED) if sketch.decided.any() else (len(left), np.inf)
+        at_once, work = (
+            (settings.bandwidths_at_once, settings.simulated_work) if sketch.decided.any() else (len(left), np.inf)
+        )
         with allowance(work) as simulated:
             try:
                 for first in range(0, len(left), at_once):
@@ -253,6 +253,7 @@ class _Grid:
     def proved(self, at: int, ahead: int) -> bool:
         """Whether something attracts at a factor, by number, once orbits were tried to be closed; if not, that is known
         of the next ones behind it as well, at which something seemed to attract."""
+        settings = EdgeSettings.current()
         if at not in self.inspected:
             self._inspect(np.array([at]))
             if not self.attracts[at]:
@@ -260,7 +261,7 @@ class _Grid:
                 end = np.flatnonzero(~self.attracts[behind])
                 some = [k for k in behind[: end[0] if end.size else None].tolist() if k not in self.inspected]
                 if some:
-                    self._inspect(np.array(some[:AT_ONCE]))
+                    self._inspect(np.array(some[: settings.bandwidths_at_once]))
         return bool(self.attracts[at])
 
     def _inspect(self, numbers: np.ndarray) -> None:

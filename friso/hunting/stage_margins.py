@@ -11,15 +11,13 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.parameter_margin import ParameterMargin, Scaled, parameter_margin
+from friso.hunting.settings import EdgeSettings
 from friso.hunting.verdict import Judgement
 from friso.hunting.what_attracts import what_attracts
 from friso.stage import Stage
 
 JOINT_KEYS = "joint.stroke", "joint.stiffness"
 """What of a joint's design hunting depends on."""
-
-JOINT_WORK = 2e8
-"""Work (see `friso.engine.allowance`) that the margins in a joint may take together."""
 
 
 def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | None:
@@ -37,6 +35,7 @@ def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMarg
     """The margins of a stage with a free joint in the joint's stroke and stiffness, by their keys, within so many times
     their values as `SEARCH_LIMITS` tell; none of a stage that cannot hunt, or of which it is not known what attracts
     it."""
+    settings = EdgeSettings.current()
     flat = stage.flat()
     if stage.joint is None or stage.joint.locked or not _is_known(judgement):
         return {}
@@ -45,7 +44,7 @@ def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMarg
         return lambda factors: {**flat, key: flat[key] * factors}
 
     keys = [key for key in JOINT_KEYS if flat.get(key)]
-    with allowance(JOINT_WORK):
+    with allowance(settings.joint_margin_work):
         return {key: _margin(scaled(key), judgement, 1 / SEARCH_LIMITS.most_friction) for key in keys}
 
 

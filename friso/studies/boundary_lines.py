@@ -205,7 +205,7 @@ def node_verdicts(result: Plane) -> list[tuple[float, float, str]]:
 
 
 def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
-    """The same at the corners: both keys low, the second high, the first high, both high."""
+    """The values [SI] of both keys, and the verdict, at the corners: both low, second high, first high, both high."""
     nodes, last = node_verdicts(result), result.nodes - 1
     return [nodes[k] for k in (0, last, result.nodes * last, -1)]
 

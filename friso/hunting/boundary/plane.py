@@ -15,6 +15,7 @@ from friso.hunting.boundary.branch import Point, Tracer
 from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
 from friso.hunting.boundary.locate import changes, located
 from friso.hunting.boundary.meetings import Meeting, find_meetings, leg_shares
+from friso.hunting.boundary.settings import ContinuationSettings
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, families
@@ -22,17 +23,8 @@ from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
 from friso.progress import Progress, Tally, silent
 
-NODES = 13
-"""Stages along either side of the grid from which curves are looked for."""
-
-PATIENCE = 60
-"""Points of a branch between two neighbours at most: one that winds for longer hardly leads to a curve."""
-
 CURVES = "following the edge of hunting"
 """What is reported to a progress."""
-
-SAME = 0.2
-"""Distance of a curve from the way between two stages, as a share of it, at which their change is that of the curve."""
 
 
 @dataclass(frozen=True)
@@ -55,10 +47,11 @@ class Plane:
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def plane(space: Space, rtol: float = RTOL, nodes: int = NODES, progress: Progress = silent) -> Plane:
+def plane(space: Space, rtol: float = RTOL, nodes: int | None = None, progress: Progress = silent) -> Plane:
     """Find all curves in the plane of two keys on which the hunting cycle stops attracting, and those on which an
     asymmetric cycle that bounds its basin appears; orbits are closed to a relative tolerance, and looked for from
     `nodes` x `nodes` stages."""
+    nodes = ContinuationSettings.current().grid_stages if nodes is None else nodes
     points = space.grid(nodes)
     allowed = np.flatnonzero(space.allowed(points))
     stages = space.stages(points[allowed])
@@ -154,10 +147,11 @@ def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int
 
 def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
     """Whether a curve passes by the way between two neighbours."""
+    settings = ContinuationSettings.current()
     points, mesh = curve.points, float(np.linalg.norm(end - start))
     for at in start + np.linspace(0, 1, 9)[:, None] * (end - start):
         nearest = points[:-1] + leg_shares(points, at)[:, None] * np.diff(points, axis=0)
-        if np.linalg.norm(nearest - at, axis=1).min() < SAME * mesh:
+        if np.linalg.norm(nearest - at, axis=1).min() < settings.explained_distance * mesh:
             return True
     return False
 
@@ -165,6 +159,7 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
 def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:
     """The first point on the way from a stage with a cycle to a neighbour at which the cycle stops attracting or folds
     back, if there is one, and whether it reaches that neighbour without."""
+    settings = ContinuationSettings.current()
     mesh = float(np.linalg.norm(end - start))
     across = (end - start) / mesh
     tracer = Tracer(
@@ -176,7 +171,9 @@ def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol
     )
     first = Point.of(space.stages(start[None]), 0.0, cycle)
     steps = count(1)
-    points, reason = tracer.walk(first, 1.0, lambda last, point: bool(changes(last, point)) or next(steps) >= PATIENCE)
+    points, reason = tracer.walk(
+        first, 1.0, lambda last, point: bool(changes(last, point)) or next(steps) >= settings.most_points_between
+    )
     last, point = [first, first, *points][-2:]
     if not (kinds := changes(last, point)):
         return None, tracer.reaches(points, reason)

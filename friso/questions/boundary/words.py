@@ -83,7 +83,7 @@ class ShownKey:
         return self._with_unit(f"{rounded:.6g} ± {float(f'{off:.1g}'):g}")
 
     def as_known(self, value: float, error: float) -> str:
-        """The same, without an error that its digits do not show."""
+        """A value with its error [SI], left out where the digits do not show it."""
         return self.text(value) if error < PLAIN * abs(value) else self.uncertain(value, error)
 
     def extent(self, values: Array, swept: KeyRange) -> str:
@@ -99,12 +99,8 @@ ROUGHLY = 3
 """Digits of where a curve begins and ends, in the answer."""
 
 
-SHOWN_MEETINGS = 2
-"""Meetings of curves at most that the answer tells; the figure and the details have all."""
-
-
 SHOWN_CURVES = 3
-"""Curves at most of which the answer says where they run; the figure and the details have all."""
+"""Curves, and places where they meet, that the answer tells at most; the figure and the details have all."""
 
 
 def sentences(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
@@ -195,9 +191,9 @@ def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int 
 def _first_meetings(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """The sentences about meetings of curves that stand in the answer."""
     texts = meeting_sentences(traced, keys)
-    more = len(texts) - SHOWN_MEETINGS
+    more = len(texts) - SHOWN_CURVES
     rest = [f"Curves meet at {more} more {'places' if more > 1 else 'place'}."] if more > 0 else []
-    return [*texts[:SHOWN_MEETINGS], *rest]
+    return [*texts[:SHOWN_CURVES], *rest]
 
 
 def meeting_sentences(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
@@ -261,7 +257,7 @@ def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors:
 
 
 def _if_unstable(traced: Diagram, change: StabilityChange) -> str:
-    """That a change lies where the loop is unstable anyway; "" where it is not."""
+    """Say that a change lies where the loop is unstable anyway; "" where it is not."""
     beside = np.argmin(np.abs([traced.value(place) - change.low for place in traced.places]))
     return " (where the loop is unstable anyway)" if traced.unstable[beside] else ""
 
