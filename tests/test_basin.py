@@ -33,7 +33,7 @@ from friso.hunting import (
 from friso.hunting.basin import ends_in, evenly
 from friso.hunting.cycle.ensemble import done
 from friso.hunting.cycle.rest import pushed
-from friso.hunting.outward import Outward
+from friso.hunting.outward import EdgeSearch
 from friso.hunting.settings import BasinSettings
 from friso.hunting.verdict import BY_CHANCE, own_motion
 from friso.stage import Stage
@@ -300,7 +300,7 @@ def at(chosen: Stage, factor: float) -> Stage:
 @RIGID
 def test_an_edge_just_before_the_lowest_bandwidth_that_attracts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Within what it is known to: it was searched for among the bandwidths up to it, of which there are none then."""
-    monkeypatch.setattr(Outward, "end", lambda _, at, *others: AttractionEnd(0.9999 * at, 1.01 * at, True))
+    monkeypatch.setattr(EdgeSearch, "end", lambda _, at, *others: AttractionEnd(0.9999 * at, 1.01 * at, True))
     edge = find_margin(rigid(38), attracting=False)
     assert edge is not None
     assert edge.factor == pytest.approx(0.9999 * SEARCH_LIMITS.lowest_bandwidth)

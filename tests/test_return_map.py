@@ -267,7 +267,7 @@ def test_what_one_survey_observed_makes_no_edge_certain_unless_a_thorough_one_do
     observed = tuple(replace(motion, cycles=None) for motion in survey.motions)
     seen = survey if attracts else replace(survey, motions=())
     monkeypatch.setattr("friso.hunting.outward.attractors", lambda *_, **__: seen)
-    where = outward.Outward(locked.flat(), 10.0)
+    where = outward.EdgeSearch(locked.flat(), 10.0)
     assert where._surely_attracts(outward._Place(1.0, observed, 1.1)) == attracts
     assert where._surely_attracts(outward._Place(1.0, survey.motions, 1.1))
 

@@ -187,9 +187,8 @@ def displacements_that_hunt(
 def displacements_that_run_away(stage: Stage) -> Kick:
     """The displacements after which a stage whose force is limited, without anti-windup, runs away from its reference
     for good, in the same way."""
-    settings = BasinSettings.current()
     flat, stages = {**without_motion(stage.flat()), "motion.kind": "release"}, Ensemble.held(stage.flat(), 1)
-    end = settings.runaway_periods * float(typical_period(stages)[0])
+    end = BasinSettings.current().runaway_periods * float(typical_period(stages)[0])
 
     def runs_away(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         options = RunOptions(rtol=RTOL, record_from=np.inf, least_swing=np.inf)

@@ -164,10 +164,9 @@ def _share(stage: Stage) -> float:
 def check_given(stage: Stage, rtol: float = RTOL, progress: Progress = silent) -> Case:
     """Check a stage as it is given, its joint as its file has it; `progress` is called as parts of it end. Raises
     InputError for an unusable `rtol`."""
-    settings = CheckSettings.current()
     checked_rtol(rtol)
     kernels(_needed(stage))
-    return _case(stage, rtol, False, Tally(progress, PART_COUNT), settings.check_work)
+    return _case(stage, rtol, False, Tally(progress, PART_COUNT), CheckSettings.current().check_work)
 
 
 def _needed(stage: Stage) -> set[KernelRequest]:
@@ -184,7 +183,6 @@ def _case(
     tell: Callable[[Verdict], None] = lambda verdict: None,
     margins: bool = False,
 ) -> Case:
-    settings = CheckSettings.current()
     survey_settings = SurveySettings.current()
     flat, ended = stage.flat(), 0
 
@@ -203,7 +201,7 @@ def _case(
     status = Status(int(measures.status[0]))
     fed = None
     if judgement.swing and structure(flat).plays:
-        fed = _fed(stage, max(work - spent.used, settings.feeding_work_share * work))
+        fed = _fed(stage, max(work - spent.used, CheckSettings.current().feeding_work_share * work))
         judgement = judgement if fed else replace(judgement, given_up=(*judgement.given_up, CheckPart.FEEDING))
     static_friction = keeps = None
     if margins:

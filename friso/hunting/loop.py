@@ -100,8 +100,7 @@ def leaves_for_good(stage: Stage) -> bool:
 def unstable_among(stages: Ensemble) -> dict[LoopState, np.ndarray]:
     """The loops of which stages are not stable in each of these states, shape (count,); a swing is damped by the mean
     of the viscous friction in both directions."""
-    settings = CheckSettings.current()
-    limit = settings.least_growth_rate * stages.number("rate")
+    limit = CheckSettings.current().least_growth_rate * stages.number("rate")
     return {state: growth > limit for state, growth in _growths(stages).items()}
 
 

@@ -157,7 +157,6 @@ def judge_runs(
 ) -> np.ndarray:
     """Judge stages of one structure as `judge_many` does, whose own motions were run already, to a relative tolerance,
     and of which it is known what attracts them; `threads` and `cancel` as in `RunOptions`."""
-    settings = CheckSettings.current()
     count, target = len(motions.completed), attracted.target
     stages = Ensemble.held(flat, count, form=shared_structure(flat))
     decided = motions.completed & attracted.certain
@@ -170,7 +169,7 @@ def judge_runs(
         ends, completed, swing = ends_in(some_of(flat, chosen), chosen.size, targets, threads=threads, cancel=cancel)
         completed &= ~swings_seldom(targets, ends, swing)
         if winds_up_at_a_limit(stages):
-            completed &= ~(ends & (swing > settings.runaway_swing_factor * 2 * targets.amplitude))
+            completed &= ~(ends & (swing > CheckSettings.current().runaway_swing_factor * 2 * targets.amplitude))
         in_cycle[chosen], decided[chosen] = ends, completed
         settled = np.isfinite(motions.settling[chosen]) & (swing <= resting(flat, count)[chosen])
         restless = chosen[completed & ~ends & ~settled]

@@ -124,8 +124,7 @@ def followed_motions(
 
 def resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
     """The swings, peak to peak [m], up to which stages of one structure are at rest, shape (count,)."""
-    settings = SurveySettings.current()
-    return 2 * settings.least_swing * Ensemble.held(flat, count, form=shared_structure(flat)).length
+    return 2 * SurveySettings.current().least_swing * Ensemble.held(flat, count, form=shared_structure(flat)).length
 
 
 def some_of(columns: Mapping[str, Any], which: np.ndarray) -> dict[str, Any]:

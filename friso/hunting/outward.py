@@ -1,5 +1,9 @@
-"""Where attraction ends: closed orbits followed through the bandwidth to their own ends, one after the other, until
-nothing attracts just beyond."""
+"""The edge of hunting in bandwidth: the factor at which what attracts a stage ceases to.
+
+A closed orbit is followed through the bandwidth to its end: a flip, a fold, or where it is lost. Just beyond that end
+something else may attract; then its orbit is followed in turn, until nothing attracts. Where no orbit can be followed,
+surveys at bandwidths between the last one with an attractor and the next one without close in on the edge.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +58,7 @@ class BandwidthWindow:
 
     @property
     def narrow(self) -> bool:
-        """Whether no machine holds its bandwidth so exactly that it would stay in there (see `NARROW`)."""
+        """Whether no machine holds its bandwidth so exactly that it would stay in there."""
         settings = EdgeSettings.current()
         return bool(self.low and self.high and self.high.inside < self.low.inside * (1 + settings.narrow_window_share))
 
@@ -66,8 +70,7 @@ class BandwidthWindow:
 
 @dataclass
 class _Place:
-    """What is known on the way to an end: motions that attract at a factor, `at`, and one at which nothing seems to,
-    `outside`."""
+    """How far a search has come: motions that attract `at` a factor, and a factor `outside` where nothing seems to."""
 
     at: float
     motions: tuple[Swinging, ...]
@@ -79,9 +82,11 @@ class Beyond(Exception):
 
 
 @dataclass(frozen=True)
-class Outward:
-    """The search for the end of what attracts a stage, given as flat keys, from a bandwidth towards the `farthest` one
-    (factors). Nothing attracts at the one that is `settled`, if any: a window beyond it is another one."""
+class EdgeSearch:
+    """The search for an edge of hunting of a stage, given as flat keys, towards the `farthest` factor of its bandwidth.
+
+    Nothing attracts at the factor `settled`, if any: what attracts beyond it belongs to another window.
+    """
 
     flat: Mapping[str, Any]
     farthest: float
@@ -98,9 +103,8 @@ class Outward:
             return AttractionEnd(place.at, place.outside, False)
 
     def _followed_to_the_end(self, place: _Place) -> AttractionEnd:
-        """The end of what attracts at a place, which holds what is known on the way."""
-        settings = EdgeSettings.current()
-        for _ in range(settings.most_orbits_followed):
+        """Follow orbits from a place to the edge; the place is kept up to date, so that it tells how far that came."""
+        for _ in range(EdgeSettings.current().most_orbits_followed):
             orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
             if orbit is None:
                 return self._bracketed(place)
@@ -116,8 +120,11 @@ class Outward:
         return self._bracketed(place)
 
     def _proved(self, next_to: float, farther: np.ndarray, distances: np.ndarray) -> tuple[np.ndarray, Attractors]:
-        """The factors at which it is told what attracts, and what: the one next to an end, and those farther off; of
-        stages without a map only those of these at which simulations alone show that something does."""
+        """Look for attractors beyond the end of an orbit: next to it, and at the factors farther off.
+
+        Returns the factors that were searched, and what attracts there. Without a map, factors farther off are only
+        searched if a simulation shows that something attracts.
+        """
         if farther.size and not has_a_map(self._stages(farther)):
             seen = attractors(self._stages(farther), cycles=False)
             decided, farther = bool(seen.decided[~seen.attracts].all()), farther[seen.attracts]
@@ -129,9 +136,8 @@ class Outward:
 
     def _just_beyond(self, end: float) -> tuple[float, np.ndarray]:
         """The factor next to the end of an orbit, at which nothing may attract, and those farther off."""
-        settings = EdgeSettings.current()
         ahead = self._ahead(end)
-        next_to, farther = end * settings.beyond_edge_factor**ahead, end * FARTHER**ahead
+        next_to, farther = end * EdgeSettings.current().beyond_edge_factor ** ahead, end * FARTHER**ahead
         if self.settled is not None and ahead * (self.settled - end) > 0:
             next_to = _nearer(ahead, next_to, self.settled)
         if ahead * (next_to - self.farthest) > 0:
@@ -142,8 +148,11 @@ class Outward:
         return next_to, farther[within]
 
     def _bracketed(self, place: _Place) -> AttractionEnd:
-        """The end of what attracts where no orbit can be followed to it, between the last of some factors at which
-        something does and the next one; again between these, until both are close together."""
+        """Close in on the edge by surveys where no orbit can be followed to it.
+
+        Of several factors, the edge lies between the last at which something attracts and the next one; the search is
+        repeated between these two until they are close together.
+        """
         settings = EdgeSettings.current()
         reach, ahead = settings.reach_log, self._ahead(place.at)
         place.outside = _nearer(ahead, place.outside, self.farthest)
@@ -187,9 +196,8 @@ class Outward:
 
     def _still_ahead(self, at: float, outside: float) -> float:
         """A factor at which nothing attracts; where it was passed, one ahead instead."""
-        settings = EdgeSettings.current()
         ahead = self._ahead(at)
-        return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * settings.reach_log))
+        return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * EdgeSettings.current().reach_log))
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
     def followed(self, at: float, orbit: Swinging) -> tuple[float, float]:

@@ -46,9 +46,11 @@ class MarginEnd:
 
 @dataclass(frozen=True)
 class ParameterMargin:
-    """Where hunting begins, of a stage that nothing attracts, or ends, of one that something `attracts`: the nearest
-    values of a parameter `below` and `above` its own, in units of that (None: none of those tried between it and the
-    end of the `range`). Of a side in `open_sides`, -1 or 1, it is not known."""
+    """How far a parameter of a stage may change before hunting ends, if something `attracts` the stage, or begins.
+
+    `below` and `above` are the nearest factors of the parameter at which it does (None: at no factor tried up to the
+    end of the `range`). On the `open_sides`, -1 or 1, that is not known.
+    """
 
     attracts: bool
     below: MarginEnd | None
@@ -93,8 +95,11 @@ def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: flo
 
 
 class _Side:
-    """Factors of a parameter on one side of the stage's own, from 1 outward: at which of them what attracts has
-    `changed`, of which that is `decided`, which were `searched` thoroughly, and of which of these it is `certain`."""
+    """Factors of a parameter on one side of its own value, from 1 outward, and what is known at each.
+
+    Whether hunting has `changed`, begun or ended; whether that is `decided`; whether the stage there was `searched`
+    thoroughly; and whether that made it `certain`.
+    """
 
     def __init__(self, scaled: Scaled, attracts: bool, farthest: float) -> None:
         """Survey some factors roughly. Raises Exhausted."""
@@ -105,8 +110,7 @@ class _Side:
 
     def end(self) -> MarginEnd | None:
         """Where what attracts changes first; None if it does nowhere. Raises Exhausted, and Undecided."""
-        settings = EdgeSettings.current()
-        for _ in range(settings.most_proofs):
+        for _ in range(EdgeSettings.current().most_proofs):
             first = self._bracketed()
             pair = WITHIN if first is None else self._pair(first)
             self._search(pair[~self.searched[pair]])
@@ -140,8 +144,11 @@ class _Side:
         return np.geomspace(self.factors[first - 1], self.factors[first], settings.bracket_steps + 1)[1:-1]
 
     def _pair(self, first: int) -> np.ndarray:
-        """The numbers of two factors about the first at which it has changed, as far off as `OFF` says: next to where
-        hunting ends motions take long to die out, and a rough survey may be wrong. New ones are surveyed roughly."""
+        """Choose the two factors, by number, that are searched thoroughly about the first one that has changed.
+
+        They lie as far off it as `proved_distances` says: next to where hunting ends motions take long to die out, and
+        a rough survey may be wrong. Factors that are new are surveyed roughly.
+        """
         settings = EdgeSettings.current()
         inward, outward = settings.proved_distances if self.attracts else settings.proved_distances[::-1]
         places, farthest = np.abs(np.log(self.factors)), abs(np.log(self.factors[-1]))

@@ -35,7 +35,6 @@ def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMarg
     """The margins of a stage with a free joint in the joint's stroke and stiffness, by their keys, within so many times
     their values as `SEARCH_LIMITS` tell; none of a stage that cannot hunt, or of which it is not known what attracts
     it."""
-    settings = EdgeSettings.current()
     flat = stage.flat()
     if stage.joint is None or stage.joint.locked or not _is_known(judgement):
         return {}
@@ -44,7 +43,7 @@ def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMarg
         return lambda factors: {**flat, key: flat[key] * factors}
 
     keys = [key for key in JOINT_KEYS if flat.get(key)]
-    with allowance(settings.joint_margin_work):
+    with allowance(EdgeSettings.current().joint_margin_work):
         return {key: _margin(scaled(key), judgement, 1 / SEARCH_LIMITS.most_friction) for key in keys}
 
 

@@ -186,14 +186,12 @@ def _without_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
-    settings = CheckSettings.current()
-    survey_settings = SurveySettings.current()
-    with allowance(settings.rest_work_share * work) as spent:
+    with allowance(CheckSettings.current().rest_work_share * work) as spent:
         rest = followed_motions(
             stage.flat(),
             motions,
             1,
-            replace(measuring_options(rtol), room=survey_settings.run_turning_points),
+            replace(measuring_options(rtol), room=SurveySettings.current().run_turning_points),
             possible=attraction.possible,
         )
     if rest.away[0] and leaves_for_good(stage):
@@ -352,19 +350,17 @@ def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) ->
 
 def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare | None) -> bool:
     """Whether no kick or no move of one kind was seen to start hunting, and runs of that kind were not completed."""
-    settings = BasinSettings.current()
     kicks = [kick for kick in (displacement, push) if kick]
     lost = any(kick.unknown and not kick.windows for kick in kicks)
-    return lost or (moved is not None and not moved.hunting and moved.count < settings.drawn_moves)
+    return lost or (moved is not None and not moved.hunting and moved.count < BasinSettings.current().drawn_moves)
 
 
 def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[CheckPart, ...]]:
     """What a search through the bandwidths shows that may use so much work, and what of it had to be given up."""
-    settings = CheckSettings.current()
     attracting = attraction.target is not None
     with allowance(work) as search:
         sought = search_bandwidths(stage, attracting, attraction.surveyed)
-    with allowance(settings.beyond_edge_work):
+    with allowance(CheckSettings.current().beyond_edge_work):
         sought = followed_on(stage, sought)
     left = CheckPart.LOWER_BANDWIDTHS if sought.to_the_top else CheckPart.BANDWIDTHS
     return sought, (left,) if search.exhausted or sought.undecided else ()

@@ -49,12 +49,11 @@ def close_orbits(
 def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> np.ndarray:
     """Which closed orbits, shape (count,), are simpler ones passed through several times: `fewer` swings lead back to
     where the stage sticks, or, if their number is odd, to its mirror image."""
-    settings = SurveySettings.current()
     if not stages.count:
         return np.zeros(0, bool)
     ends = stages.run(orbits.states, orbits.times * fewer / orbits.swings, rtol).ends[:, stages.sticking]
     sign, sticks = -1.0 if fewer % 2 else 1.0, orbits.states[:, stages.sticking]
-    return np.abs(sign * ends - sticks) < settings.repeated_orbit_share * np.abs(sticks)
+    return np.abs(sign * ends - sticks) < SurveySettings.current().repeated_orbit_share * np.abs(sticks)
 
 
 def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.ndarray:

@@ -114,12 +114,11 @@ def _stands_still(
     stages: Ensemble, ends: np.ndarray, swing: np.ndarray, durations: np.ndarray, loose: np.ndarray
 ) -> np.ndarray:
     """Which runs have moved so little, for so long, that they will not break away again."""
-    orbit_settings = OrbitSettings.current()
     settings = SurveySettings.current()
     distances = np.abs(ends[:, stages.sticking])
     home = (swing < loose / 2) & (distances < loose / 2) & (durations / 2 > settings.rest_waits * wait(stages, loose))
     aside = (swing < 2 * settings.least_swing * stages.length) & (
-        durations / 2 > 2 * orbit_settings.breakaway_waits * wait(stages, distances)
+        durations / 2 > 2 * OrbitSettings.current().breakaway_waits * wait(stages, distances)
     )
     return home | aside
 

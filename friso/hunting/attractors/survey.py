@@ -228,13 +228,12 @@ class Survey:
     def _still_swinging(self, runs: Pending, owners: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
         """The numbers of the runs that swing on without having come to an attractor, once orbits were closed: `early`
         from those alone that repeat themselves well, and unlike any cycle that is known to repel."""
-        settings = SurveySettings.current()
         self.unknown[owners[~ends.completed & ~(ends.away & self.unbounded[owners])]] = True
         swinging = ends.completed & ~ends.rest & ~self._known_to_attract(owners, ends)
         ready = swinging & (ends.repeats.swings > 0)
         if early:
             leave = self._repels(owners, ends) & ~self._stay(owners, ends)
-            ready &= (ends.repeats.deviation < settings.settled_swing_share) & ~leave
+            ready &= (ends.repeats.deviation < SurveySettings.current().settled_swing_share) & ~leave
         if not self.prove:
             ready &= ~self._exact(owners, ends)
         self._close(runs, owners, ends, np.flatnonzero(ready))
@@ -289,8 +288,7 @@ class Survey:
 
     def _close(self, runs: Pending, owners: np.ndarray, ends: Ends, which: np.ndarray) -> None:
         """Close orbits from one of each kind of runs, of those with some numbers."""
-        settings = SurveySettings.current()
-        most, repeats = settings.orbits_per_round if self.thorough else 1, ends.repeats
+        most, repeats = SurveySettings.current().orbits_per_round if self.thorough else 1, ends.repeats
         kinds = which[_kinds(owners[which], ends.take(which), most)[0]]
         pairs = runs.mirrored & (repeats.swings == 2)  # as swings about a symmetric cycle that approach it, too, seem
         tries = (

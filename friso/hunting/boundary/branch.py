@@ -191,9 +191,8 @@ class Tracer:
         return bool(self.sign > 0 and stages.symmetric[0] and leans < 0)
 
     def _stop(self, point: Point) -> str:
-        settings = ContinuationSettings.current()
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
-        if point.cycle.amplitude[0] < settings.vanished_amplitude * stages.length[0]:
+        if point.cycle.amplitude[0] < ContinuationSettings.current().vanished_amplitude * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"
         if abs(point.multiplier) > self.steepest:
             return f"the cycle repels {self.steepest:g}-fold and more per return"

@@ -92,7 +92,6 @@ class CurveTracer:
     ) -> Spot | None:
         """The point of the curve on the line through an origin of the box along a direction, found from one near it, or
         from about what is expected there."""
-        settings = ContinuationSettings.current()
         hundredth = self.space.hundredth(origin, across)
         tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol, hundredth=hundredth)
         point, special = near.special.point, near.special
@@ -102,7 +101,7 @@ class CurveTracer:
         start = np.concatenate([[0.0], size])
         direction, far = np.array([1.0, 0.0, 0.0]), reach
         if self.kind == "fold":
-            direction, far = special.direction * [0.0, 1.0, 1.0], settings.fold_search_depth
+            direction, far = special.direction * [0.0, 1.0, 1.0], ContinuationSettings.current().fold_search_depth
             direction = direction / np.linalg.norm(direction)
         located = corrected(tracer, point, start, direction, self.kind, far, states, slope)
         if located is None or abs(located.point.place) > reach:
@@ -112,12 +111,11 @@ class CurveTracer:
     def _slope(self, near: Spot, across: np.ndarray, expected: Expected) -> float:
         """About how fast the multiplier changes along the line on which a point is expected: across the curve as at the
         point near it, along a line at an angle to it less. NaN if the line through that point grazes the curve."""
-        settings = ContinuationSettings.current()
         if self.kind == "fold":
             return near.special.slope
         normal = expected.direction[::-1] * [-1.0, 1.0]
         crossing = float(normal @ near.across)
-        if abs(crossing) < settings.grazing_sine:
+        if abs(crossing) < ContinuationSettings.current().grazing_sine:
             return np.nan
         return near.special.slope * float(normal @ across) / crossing / float(near.special.direction[0])
 

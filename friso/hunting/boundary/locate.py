@@ -63,9 +63,8 @@ def _complex(point: Point) -> bool:
 
 def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> LocatedPoint | None:
     """The point between two neighbours on a branch at which it happens, with its error; None if it is not reached."""
-    settings = ContinuationSettings.current()
     direction = towards(first, second)
-    points = _enclosed(tracer, first, second, kind, settings.special_point_step)
+    points = _enclosed(tracer, first, second, kind, ContinuationSettings.current().special_point_step)
     if points is None:
         return None
     nearest = min(points, key=lambda place: abs(distance_to(kind, points[place])))
@@ -132,7 +131,6 @@ def _special_point(
 ) -> LocatedPoint:
     """The point with its error; infinite where it cannot be computed at the tighter tolerance, or multipliers scatter
     too much."""
-    tolerances = ToleranceSettings.current()
     if tracer.family(np.zeros(1, np.int64), np.array([point.place])).chatters:
         if kind == "fold":
             return _turning_point(tracer, point, direction, slope)
@@ -141,7 +139,7 @@ def _special_point(
             return LocatedPoint(kind, point, direction, np.inf, slope)
         there = tracer.solve(point, point.vector + (passed.place - point.place) * ALONG, ALONG) or point
         return LocatedPoint(kind, there, direction, passed.reserve, passed.slope * float(direction[0]))
-    tight = Tracer(tracer.family, tracer.sign, tracer.rtol * tolerances.check_rtol_factor).solve(
+    tight = Tracer(tracer.family, tracer.sign, tracer.rtol * ToleranceSettings.current().check_rtol_factor).solve(
         point, point.vector, direction
     )
     if tight is None:
@@ -175,8 +173,7 @@ def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | No
     """Where a branch turns back at a fold, from a curve through the places of orbits about a first guess along a
     direction: where a limiter chatters the multiplier is that over a range of distances, and passes 1 beside the fold.
     Its reserve is that of the curve, or the distance to the first guess, if that is larger. None if it is not known."""
-    settings = ContinuationSettings.current()
-    orbits = _beside(tracer, guess, direction, settings.chattering_fold_reach)
+    orbits = _beside(tracer, guess, direction, ContinuationSettings.current().chattering_fold_reach)
     lengths = np.array([(point.vector - guess.vector) @ direction for point in orbits])
     at = turn(lengths, np.array([point.place for point in orbits]))
     return at and at._replace(reserve=max(at.reserve, abs(at.place - guess.place)))

@@ -112,8 +112,7 @@ class Ensemble:
     @cached_property
     def scales(self) -> np.ndarray:
         """Magnitudes of the states, shape (count, states)."""
-        settings = OrbitSettings.current()
-        size = np.where(self.length > 0, self.length, settings.frictionless_size)
+        size = np.where(self.length > 0, self.length, OrbitSettings.current().frictionless_size)
         values = self.kernel.values({**self.flat, "motion.size": size, "motion.duration": np.inf}, self.count)
         return columns(self.kernel.module.scales(values), self.count)
 

@@ -172,8 +172,7 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
 
 def kept(stages: Ensemble, orbits: Orbits, distances: np.ndarray) -> np.ndarray:
     """Which orbits stick about where they were guessed to, at distances [m], shape (count,)."""
-    settings = OrbitSettings.current()
-    return np.abs(orbits.states[:, stages.sticking] / distances - 1) < settings.kept_distance_share
+    return np.abs(orbits.states[:, stages.sticking] / distances - 1) < OrbitSettings.current().kept_distance_share
 
 
 def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, trial: Orbits, guess: Guess) -> None:

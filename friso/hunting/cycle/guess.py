@@ -70,7 +70,6 @@ def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.nd
     """The distance that is its own end, of those whose numbers are in `goes`; if there is none, the one that is almost:
     near a fold both lie between two points of the map. With `apart` neither where the map passes its symmetric fixed
     point, or comes near that: it almost comes back there whenever a flip is near."""
-    settings = OrbitSettings.current()
     rise, side = end - start, np.zeros(len(start) + 1)
     side[goes] = np.sign(far - start)[goes] if apart else 1.0
     crosses = np.flatnonzero((side[:-2] * side[1:-1] > 0) & (rise[:-1] * rise[1:] <= 0))
@@ -79,7 +78,7 @@ def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.nd
         i = crosses[differ.argmax() if apart else differ.argmin()]
         return float(np.interp(0.0, *_ascending(rise[i : i + 2], start[i : i + 2])))
     change = np.abs(np.log(end[goes] / start[goes]))
-    if not goes.size or change.min() >= settings.almost_return_log:
+    if not goes.size or change.min() >= OrbitSettings.current().almost_return_log:
         return None
     nearest = goes[change.argmin()]
     towards = nearest + int(side[nearest])  # the symmetric fixed point

@@ -59,9 +59,8 @@ def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float)
     """Slope of the straight line through the returns from a small range about the orbits along a direction (count,
     states), shape (count,)."""
     settings = OrbitSettings.current()
-    tolerances = ToleranceSettings.current()
     away = np.linspace(-settings.slope_range_share / 2, settings.slope_range_share / 2, settings.slope_runs)[None, :]
-    heights = returns_of(stages, orbits, direction, away, 2, tolerances.slope_rtol_factor * rtol)
+    heights = returns_of(stages, orbits, direction, away, 2, ToleranceSettings.current().slope_rtol_factor * rtol)
     return np.array([_straight(pairs[np.isfinite(pairs).all(axis=1)]) for pairs in heights])
 
 

@@ -153,7 +153,6 @@ class _Shooting:
         rtol: float,
         places: np.ndarray | None = None,
     ) -> None:
-        settings = OrbitSettings.current()
         tolerances = ToleranceSettings.current()
         self.family, self.sign, self.rtol = family, sign, rtol
         self.states, self.times = states.copy(), times.copy()
@@ -171,13 +170,12 @@ class _Shooting:
         )
         self.limit, self.stalled = (
             tolerances.closed_gap_chattering if self.chatters else tolerances.closed_gap,
-            settings.stalled_steps,
+            OrbitSettings.current().stalled_steps,
         )
 
     def advance(self) -> bool:
         """One step of the orbits still on their way; whether any is on its way still."""
-        settings = OrbitSettings.current()
-        renewed = self.gaps > settings.fresh_jacobian_gap if self.chatters else ~self.serves
+        renewed = self.gaps > OrbitSettings.current().fresh_jacobian_gap if self.chatters else ~self.serves
         for which in (np.flatnonzero(self.active & renewed), np.flatnonzero(self.active & ~renewed)):
             if which.size:
                 self._advance(which, renew=bool(renewed[which[0]]))
@@ -222,8 +220,6 @@ class _Shooting:
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
         """Keep what is closer than before; what is closed, fails or gets no closer rests."""
-        settings = OrbitSettings.current()
-        tolerances = ToleranceSettings.current()
         better = which[gaps < self.gaps[which]]
         self.idle[which] = np.where(gaps < 0.5 * self.gaps[which], 0, self.idle[which] + 1)
         for best, current in ((self.best_states, self.states), (self.best_times, self.times)):
@@ -232,9 +228,9 @@ class _Shooting:
         self.gaps[which] = np.minimum(self.gaps[which], gaps)
         far, near, closed = self.stalled
         patience = np.where(
-            self.gaps[which] > settings.fresh_jacobian_gap,
+            self.gaps[which] > OrbitSettings.current().fresh_jacobian_gap,
             far,
-            np.where(self.gaps[which] > max(tolerances.closed_gap, self.rtol), near, closed),
+            np.where(self.gaps[which] > max(ToleranceSettings.current().closed_gap, self.rtol), near, closed),
         )
         moving = self.idle[which] < patience
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
@@ -263,13 +259,12 @@ class _Following(_Shooting):
     border: Border
 
     def __init__(self, *arguments: Any) -> None:
-        settings = OrbitSettings.current()
         tolerances = ToleranceSettings.current()
         super().__init__(*arguments)
         size = self.states.shape[1] + 2
         self.jacobians = np.full((len(self.times), size, size), np.nan)
         self.best_jacobians = self.jacobians.copy()
-        self.stalled = settings.followed_stalled_steps
+        self.stalled = OrbitSettings.current().followed_stalled_steps
         if self.chatters:
             self.finest = tolerances.followed_gap
         else:
@@ -349,8 +344,7 @@ class _Following(_Shooting):
 
 
 def _iterated(shooting: _S) -> _S:
-    settings = OrbitSettings.current()
-    for _ in range(settings.newton_steps):
+    for _ in range(OrbitSettings.current().newton_steps):
         if not shooting.advance():
             break
     return shooting

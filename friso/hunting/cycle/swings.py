@@ -25,9 +25,8 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
 
     An extremum counts once the way back from it is a leg long, or the run is over.
     """
-    settings = OrbitSettings.current()
     position = starts[:, stages.kernel.position]
-    legs = settings.swing_leg_share * np.abs(position)
+    legs = OrbitSettings.current().swing_leg_share * np.abs(position)
     results = stages.run(starts, durations, rtol, least_swing=0.1 * legs)
     runs, room = results.turn_values.shape
     held = (np.arange(room) < results.turn_counts[:, None]) & done(results)[:, None]

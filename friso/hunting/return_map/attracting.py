@@ -134,7 +134,6 @@ def _proposals(mapped: Mapped) -> list[_Proposal]:
 def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly: bool = False) -> bool:
     """Whether an attractor of a map is a closed cycle of its stage: about as large, and `exactly` that if it takes as
     many landings to return. `length` [m] is the deflection of the loop by the break-away force."""
-    settings = ReturnMapSettings.current()
     distances = np.abs(attractor.distances) * length
     if exactly and not (attractor.periodic and motion.cycles and len(distances) == motion.cycles.swings):
         return False
@@ -144,7 +143,7 @@ def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly:
         size = float(distances.max())
     else:
         size = float(distances[::2].max() + distances[1::2].max()) / 2
-    alike = abs(size / motion.amplitude - 1) < settings.same_orbit_distance_share
+    alike = abs(size / motion.amplitude - 1) < ReturnMapSettings.current().same_orbit_distance_share
     return bool(alike and (not attractor.periodic or motion.swings % len(distances) == 0))
 
 

@@ -24,11 +24,10 @@ def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
     hundredth of it; from the second on, each has to be where the map foretells it from the one before, up to the
     scatter that a map may have.
     """
-    tolerances = ToleranceSettings.current()
     begun = [_starts(survey, int(number)) for number in numbers]
     owners = np.repeat(np.arange(len(numbers)), [len(starts) for starts in begun])
     right = np.ones(len(numbers), bool)
-    for rtol in (RTOL, tolerances.check_rtol_factor * RTOL):
+    for rtol in (RTOL, ToleranceSettings.current().check_rtol_factor * RTOL):
         lands = _land_as_foretold(survey, numbers[owners], np.concatenate(begun), rtol)
         right[owners[~lands]] = False
     return right

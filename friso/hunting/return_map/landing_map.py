@@ -188,9 +188,8 @@ class LandingMap:
 
     def _places(self, distances: np.ndarray) -> np.ndarray:
         """The places of landings at signed distances."""
-        settings = SurveySettings.current()
         at = np.abs(distances) if self.symmetric else distances
-        moves = np.isfinite(at) & (np.abs(at) >= settings.least_swing)
+        moves = np.isfinite(at) & (np.abs(at) >= SurveySettings.current().least_swing)
         return np.where(moves, _place(np.where(moves, at, 1.0)), REST)
 
     def _told_apart(self, paths: np.ndarray) -> Iterator[MapAttractor]:
@@ -264,12 +263,13 @@ def _distance(places: np.ndarray) -> np.ndarray:
 
 
 def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Landings of runs, shape (runs, landings), the start first, without those farther off than `HARDLY_STICKS` from
-    which a run comes back, and how many are left without the start: there it passes its reference without sticking, so
-    that distance alone does not tell what follows."""
-    settings = ReturnMapSettings.current()
+    """Leave out landings beyond `farthest_sticking` from which a run comes back, and count those left after the start.
+
+    From there a stage passes its reference without sticking, so that distance alone does not tell what follows.
+    `distances` have the shape (runs, landings), the start first.
+    """
     rows, order = np.arange(len(distances))[:, None], np.arange(distances.shape[1])
-    near = (np.abs(distances) <= settings.farthest_sticking) & (order <= count[:, None])
+    near = (np.abs(distances) <= ReturnMapSettings.current().farthest_sticking) & (order <= count[:, None])
     last = np.where(near.any(axis=1), distances.shape[1] - 1 - near[:, ::-1].argmax(axis=1), -1)
     kept = (near | (order > last[:, None]) | (order == 0)) & (order <= count[:, None])
     kept_first = np.argsort(~kept, axis=1, kind="stable")

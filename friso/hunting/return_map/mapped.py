@@ -110,14 +110,13 @@ class Mapped:
 
     def _wanted(self, stage: int) -> np.ndarray:
         """Where more runs of a stage begin: those that land between neighbouring points that are too far apart."""
-        settings = ReturnMapSettings.current()
         landing_map, starts = self.maps[stage], []
         which = np.flatnonzero((self.owners == stage) & np.isfinite(self.starts))
         which = which[np.argsort(self.starts[which], kind="stable")]
         length, symmetric = float(self.stages.length[stage]), bool(self.stages.symmetric[stage])
         seen = self.landings.distances[which] / length
         seen = np.abs(seen) if symmetric else seen
-        for place in gaps(landing_map)[: settings.runs_added]:
+        for place in gaps(landing_map)[: ReturnMapSettings.current().runs_added]:
             start = _start_that_lands(self.starts[which], seen, place)
             if start is not None and not np.isclose(start, self.starts[which], rtol=1e-6).any():
                 starts.append(start)
@@ -233,8 +232,7 @@ def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
     """Starts between neighbouring ones, ascending, of which one lands and the other does not, or far from there: beyond
     what is known, landings may go on up to the break. `landings`, the first ones, (runs,)."""
     settings = ReturnMapSettings.current()
-    survey_settings = SurveySettings.current()
-    lands = np.abs(np.nan_to_num(landings)) >= survey_settings.least_swing
+    lands = np.abs(np.nan_to_num(landings)) >= SurveySettings.current().least_swing
     sizes = np.where(lands, np.abs(landings), 1.0)
     breaks = (lands[:-1] != lands[1:]) | (
         lands[:-1] & lands[1:] & (np.abs(np.diff(np.log(sizes))) > settings.break_jump_log)
@@ -249,9 +247,8 @@ def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
 def _start_that_lands(starts: np.ndarray, seen: np.ndarray, place: float) -> float | None:
     """Where a run begins that lands at a place, between two neighbouring ones that land about it; None if none do.
     `starts` (runs,), ascending, and landings, shape (runs, landings), the start first."""
-    settings = ReturnMapSettings.current()
     best, start = np.inf, None
-    for k in range(1, settings.run_landings):
+    for k in range(1, ReturnMapSettings.current().run_landings):
         low, high = seen[:-1, k], seen[1:, k]
         with np.errstate(all="ignore"):
             around = np.flatnonzero(((low - place) * (high - place) <= 0) & (low * high > 0))
