@@ -36,9 +36,10 @@ from friso.hunting import (
     verdict,
     wait,
 )
-from friso.hunting.attractors import Attractors, attractors, starts, survey
+from friso.hunting.attractors import Attractors, attractors, starts
 from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.attractors.rounds import Ends, Pending, lengthened
+from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.attractors.survey import Survey
 from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.cycle.hunting import FARTHER_KICKS, GROWS, MAY_GROW
@@ -46,8 +47,9 @@ from friso.hunting.cycle.rest import bent
 from friso.hunting.margin import NOT_SOUGHT, search_bandwidths
 from friso.hunting.measures import measuring_options
 from friso.hunting.motions import run_motions
-from friso.hunting.outward import BEYOND, BRACKET, Beyond, Outward
-from friso.hunting.verdict import STILL_SWINGS, WORK, own_motion
+from friso.hunting.outward import Beyond, EdgeSearch
+from friso.hunting.settings import CheckSettings, EdgeSettings
+from friso.hunting.verdict import STILL_SWINGS, own_motion
 from friso.hunting.what_attracts import what_attracts
 from friso.stage import Stage
 from friso.studies.boundary_lines import REPELS, UNKNOWN, place_verdicts
@@ -187,10 +189,10 @@ def test_an_orbit_that_attracts_to_the_end_of_the_range_has_no_end_in_it() -> No
     flat = VARIANTS["rigid"].replace({"controller.crossover": "6 Hz"}).flat()
     motions = attractors(Ensemble.held(flat, 1)).motions
     with pytest.raises(Beyond):
-        Outward(flat, 1.2).end(1.0, motions, 1.06)
-    end = Outward(flat, 10.0).end(1.0, motions, 1.06)  # something attracts at 1.06, other than is said
+        EdgeSearch(flat, 1.2).end(1.0, motions, 1.06)
+    end = EdgeSearch(flat, 10.0).end(1.0, motions, 1.06)  # something attracts at 1.06, other than is said
     assert end.inside == pytest.approx(9.77 / 6, rel=1e-3)
-    assert end.outside == pytest.approx(BEYOND * end.inside)
+    assert end.outside == pytest.approx(EdgeSettings().beyond_edge_factor * end.inside)
     assert end.certain
 
 
@@ -312,7 +314,7 @@ LOSING = Stage(
 
 
 def test_an_orbit_that_is_lost_while_it_attracts_well_ends_about_there() -> None:
-    outward = Outward(LOSING.flat(), 10.0)
+    outward = EdgeSearch(LOSING.flat(), 10.0)
     motions = what_attracts(outward._stages(np.array([1.3]))).motions
     end = outward.end(1.3, motions, 2.0)
     assert end.inside <= 1.8997 * 1.002
@@ -327,10 +329,10 @@ def test_an_end_that_no_orbit_can_be_followed_to_is_certain_between_two_bandwidt
     """One orbit is lost at its limiter, of a multiplier near -1; beyond the other irregular swings last a little
     farther. Refuted by none of the starts of `benchmarks.truth --seed 2901`."""
     flat = draw(2901, number, series).flat()
-    outward = Outward(flat, 10.0)
+    outward = EdgeSearch(flat, 10.0)
     end = outward.end(at, what_attracts(outward._stages(np.array([at]))).motions, 1.12 * at)
     assert end.certain
-    assert end.reserve <= BRACKET
+    assert end.reserve <= EdgeSettings().edge_bracket_share
     inside, outside = (
         attractors(outward._stages(np.array([factor])), thorough=True)
         for factor in (0.995 * end.inside, 1.002 * end.outside)
@@ -375,7 +377,7 @@ brute force at 1e-9 (`benchmarks.laws --law rolling --seed 27`, number 91)."""
 
 def test_a_window_just_beyond_an_edge_is_narrower_than_the_steps_of_a_search() -> None:
     """The edge lies beyond it."""
-    outward = Outward(WINDOWED.flat(), 10.0)
+    outward = EdgeSearch(WINDOWED.flat(), 10.0)
     end = outward.end(1.0, what_attracts(held(WINDOWED)).motions, 1.05)
     assert 3 * end.inside > 3.1
     assert 3 * end.outside > 3.35
@@ -383,7 +385,7 @@ def test_a_window_just_beyond_an_edge_is_narrower_than_the_steps_of_a_search() -
 
 def test_no_window_is_looked_for_beyond_the_range_or_a_stage_that_settles() -> None:
     """A stage in the gap below the window was said to be contradicted by an orbit that is followed to it."""
-    end = Outward(WINDOWED.flat(), 10.0, 3.06 / 3).end(1.0, what_attracts(held(WINDOWED)).motions, 1.05)
+    end = EdgeSearch(WINDOWED.flat(), 10.0, 3.06 / 3).end(1.0, what_attracts(held(WINDOWED)).motions, 1.05)
     assert pytest.approx(3 * end.inside, rel=2e-3) == 3.016
 
 
@@ -395,8 +397,8 @@ def test_a_window_that_is_neither_proved_nor_refuted_leaves_an_edge_uncertain(
     nothing = attractors(held(VARIANTS["rigid"].replace({"controller.crossover": "12 Hz"})))
     seen = replace(nothing, decided=np.array([decided]))
     monkeypatch.setattr("friso.hunting.outward.attractors", lambda *_, **__: seen)
-    monkeypatch.setattr(Outward, "_told", lambda *_, **__: nothing)
-    _, survey = Outward(WINDOWED.flat(), 10.0)._proved(1.01, np.array([1.03]), np.array([1e-3]))
+    monkeypatch.setattr(EdgeSearch, "_told", lambda *_, **__: nothing)
+    _, survey = EdgeSearch(WINDOWED.flat(), 10.0)._proved(1.01, np.array([1.03]), np.array([1e-3]))
     assert survey.decided.tolist() == [decided]
 
 
@@ -467,24 +469,23 @@ def test_a_verdict_that_flips_with_the_tolerance_says_so(monkeypatch: pytest.Mon
     assert not attracted.motions
 
 
-def test_runs_that_are_given_up_leave_it_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_that_are_given_up_leave_it_unknown() -> None:
     """Just above its edge many runs of the rigid mass still swing after two rounds, each in its own way. Of a stage of
     which one alone is followed on, and that settles, nothing is known."""
     above = held(VARIANTS["rigid"].replace({"controller.crossover": "9.9 Hz"}))
     assert attractors(above).decided.all()
-    monkeypatch.setattr(survey, "MOST_KINDS", 1)
-    assert attractors(above).decided.all()  # there are steps left for the others
-    monkeypatch.setattr(survey, "DEARER", 1e9)
-    assert not attractors(above).decided.any()
+    with SurveySettings(most_kinds=1).in_use():
+        assert attractors(above).decided.all()  # there are steps left for the others
+    with SurveySettings(most_kinds=1, next_round_cost=1e9).in_use():
+        assert not attractors(above).decided.any()
 
 
 @pytest.mark.parametrize("thorough", [False, True])
-def test_a_survey_out_of_steps_knows_nothing(monkeypatch: pytest.MonkeyPatch, thorough: bool) -> None:
+def test_a_survey_out_of_steps_knows_nothing(thorough: bool) -> None:
     """Just above its edge the rigid mass settles from everywhere, and takes more steps than these to show it."""
     above = held(VARIANTS["rigid"].replace({"controller.crossover": "9.9 Hz"}))
-    monkeypatch.setattr(survey, "STEPS", 20_000)
-    monkeypatch.setattr(survey, "FEWER", 20_000)
-    assert not attractors(above, thorough=thorough).decided.any()
+    with SurveySettings(thorough_step_limit=20_000, quick_step_limit=20_000).in_use():
+        assert not attractors(above, thorough=thorough).decided.any()
 
 
 def with_little_gap(static: str) -> Stage:
@@ -682,7 +683,7 @@ def test_a_stage_that_begins_to_hunt_after_hundreds_of_seconds() -> None:
             },
         }
     )
-    with allowance(WORK / 2) as work:
+    with allowance(CheckSettings().check_work / 2) as work:
         survey = attractors(held(lazy), thorough=True)
     assert not work.exhausted
     assert [motion.amplitude for motion in survey.motions] == pytest.approx([2.90279e-3], rel=1e-4)  # SciPy's as well
@@ -756,7 +757,7 @@ def test_a_motion_that_swings_beside_what_was_observed_for_six_of_its_periods_ma
     """Released from 18.7 mm the stage swings like them, at 1e-6, for up to 5000 s; at 1e-8 to 1e-10 it is at rest from
     2000 s on."""
     stage = asymmetric_stage()
-    target = attractors(held(stage), thorough=True).target.of(0)
+    target = attractors(held(stage), thorough=True).target.take(0)
     assert 2 * target.amplitude == pytest.approx(3.4929e-3, rel=1e-3)
     own = own_motion(stage, target, np.inf)
     assert own.completed
@@ -767,7 +768,7 @@ def test_a_motion_that_swings_beside_what_was_observed_for_six_of_its_periods_ma
 def test_a_motion_that_swings_less_often_than_what_was_observed_is_not_told_at_rest() -> None:
     """The same stage: released from 12.09817 mm it swings as far, but every 1215 s, with pauses of 940 s."""
     seldom = asymmetric_stage().replace({"motion.displacement": "12.09817 mm"})
-    target = attractors(held(seldom), thorough=True).target.of(0)
+    target = attractors(held(seldom), thorough=True).target.take(0)
     ends, completed, swing = ends_in(seldom.flat(), 1, target)
     assert completed[0]
     assert ends[0] or swings_seldom(target, ends, swing)[0]
@@ -880,7 +881,7 @@ def test_of_runs_beside_a_cycle_that_repels_those_that_leave_it_first_are_follow
         time_constant=np.array([50.0]),
     )
     learned, owners, ends = Survey(np.zeros(1, bool), True, 1e-6), np.zeros(17, np.int64), SimpleNamespace()
-    learned.slow_down(np.zeros(1, np.int64), repelling)
+    learned.note_unstable_cycles(np.zeros(1, np.int64), repelling)
     ends.repeats = repeats
     chosen = learned._kinds(owners, cast(Ends, ends), 32, learned._beside(owners, cast(Ends, ends)))
     assert sorted(size[chosen]) == pytest.approx([0.5, 0.97, 0.976, 0.99, 0.992, 1.006, 1.01, 1.02, 3.0, 3.01])

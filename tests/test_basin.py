@@ -30,10 +30,11 @@ from friso.hunting import (
     moves_that_hunt,
     pushes_that_hunt,
 )
-from friso.hunting.basin import EDGE, MOVES, ends_in, evenly
+from friso.hunting.basin import ends_in, evenly
 from friso.hunting.cycle.ensemble import done
 from friso.hunting.cycle.rest import pushed
-from friso.hunting.outward import Outward
+from friso.hunting.outward import EdgeSearch
+from friso.hunting.settings import BasinSettings
 from friso.hunting.verdict import BY_CHANCE, own_motion
 from friso.stage import Stage
 
@@ -42,6 +43,8 @@ GAINS = pytest.mark.xdist_group("gains")
 
 LONG = 60
 """Periods after which a single run has settled, or swings like the cycle."""
+
+MOVES = BasinSettings().drawn_moves
 
 
 def rigid(crossover: float) -> Stage:
@@ -297,7 +300,7 @@ def at(chosen: Stage, factor: float) -> Stage:
 @RIGID
 def test_an_edge_just_before_the_lowest_bandwidth_that_attracts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Within what it is known to: it was searched for among the bandwidths up to it, of which there are none then."""
-    monkeypatch.setattr(Outward, "end", lambda _, at, *others: AttractionEnd(0.9999 * at, 1.01 * at, True))
+    monkeypatch.setattr(EdgeSearch, "end", lambda _, at, *others: AttractionEnd(0.9999 * at, 1.01 * at, True))
     edge = find_margin(rigid(38), attracting=False)
     assert edge is not None
     assert edge.factor == pytest.approx(0.9999 * SEARCH_LIMITS.lowest_bandwidth)
@@ -324,7 +327,7 @@ def test_no_margin_within_the_range_of_the_search(crossover: float, attracting: 
 @pytest.mark.inner
 def test_edges_are_sought_finer_than_they_are_checked() -> None:
     """The checks above at 2 % mean something only while edges are found to 1 %."""
-    assert EDGE <= 0.01
+    assert BasinSettings().kick_edge_share <= 0.01
 
 
 @pytest.mark.inner

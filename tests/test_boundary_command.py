@@ -24,6 +24,7 @@ from friso.hunting import (
     Ensemble,
     KeyRange,
     LocatedPoint,
+    Meeting,
     Plane,
     Point,
     Space,
@@ -32,8 +33,16 @@ from friso.hunting import (
     plane,
 )
 from friso.interface.output_folder import MARKER
-from friso.questions.boundary.figures import LOST, NODES, boundary_figure
-from friso.questions.boundary.words import VERDICTS, ShownKey, _along_one, conclusion, sentences
+from friso.questions.boundary.document import boundary_document
+from friso.questions.boundary.figures import LOST, LOST_END, MEETING, NODES, boundary_figure
+from friso.questions.boundary.words import (
+    VERDICTS,
+    ShownKey,
+    _along_one,
+    conclusion,
+    meeting_sentences,
+    sentences,
+)
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.stage import Stage
 from friso.studies.boundary_lines import corner_verdicts, end_verdicts, lines, plane_edge
@@ -140,7 +149,10 @@ def test_the_curve_of_two_keys_separates_what_attracts(
     )
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
-    assert document.keys() == {"conclusion", "x", "y", "curves", "lost", "corners", "files", "plug_ins"}
+    assert document.keys() == {
+        *("conclusion", "x", "y", "curves", "ends", "meetings", "lost", "corners", "files", "plug_ins")
+    }
+    assert [(end["curve"], end["how"]) for end in document["ends"]][:2] == [(0, "range"), (0, "range")]
     assert document["y"] == {"key": "masses.cart", "unit": "g"}
     assert document["corners"] == {
         **{"low low": "attracting cycle", "low high": "attracting cycle"},
@@ -301,7 +313,7 @@ def crossing() -> Plane:
 
 def test_sentences_of_two_keys(crossing: Plane, snapshots: Snapshots) -> None:
     answer, curve, meaning, *corners, lost = sentences(crossing, (MM, ShownKey("controller.kp", "N/m")))
-    facts = ("3 points", "1.5 to 1.5 mm", "1 to 100 N/m", "1e-06 mm")
+    facts = ("3 points", "1.5 mm", "1 N/m", "100 N/m", "1e-06 mm")
     assert [fact for fact in facts if fact not in curve] == []
     assert [verdict for _, _, verdict in corner_verdicts(crossing)] == [
         *("attracting cycle", "unknown", "invalid", "no attracting cycle"),
@@ -313,6 +325,59 @@ def test_sentences_of_two_keys(crossing: Plane, snapshots: Snapshots) -> None:
     ):
         assert f"joint.stroke = {stroke}, controller.kp = {gain}" in sentence
     snapshots.check("boundary", "two keys", "\n".join([answer, curve, meaning, *corners, lost]))
+
+
+@pytest.fixture
+def met(crossing: Plane) -> Plane:
+    """Beside the flip a fold of another cycle, which is lost inside the range, and both meet in every way."""
+    (flip,) = crossing.curves
+    spots = tuple(Spot(np.array([x, 0.25]), located("fold", 0.0, 1), np.array([0.0, 1.0])) for x in (0.1, 0.5, 0.9))
+    fold = Curve("fold", 1.0, spots, ("end of the range", "it could not be followed farther"))
+    place, error = np.array([[0.5, 0.25]]), np.full(2, 1e-6)
+    meetings = (
+        Meeting((0, 1), "cross", place, error, same_cycle=False),
+        Meeting((0, 1), "cross", place, np.full(2, np.inf), same_cycle=True),
+        Meeting((0, 0), "cross", place, error, same_cycle=False),
+        Meeting((0, 1), "together", np.array([[0.5, 0.25], [0.5, 0.75]]), error, same_cycle=True),
+        Meeting((1, 0), "end", spots[-1].at[None], error, same_cycle=True),
+    )
+    return replace(crossing, curves=(flip, fold), meetings=meetings)
+
+
+def test_where_curves_meet_and_end_is_told(met: Plane, wording: Wording) -> None:
+    keys = (MM, ShownKey("controller.kp", "N/m"))
+    first, second = sentences(met, keys)[1:3]
+    assert "at both, the range ends" in first
+    assert "joint.stroke = 1.9 mm, controller.kp = 3.16228 N/m, where it meets another curve" in second
+    for sentence in meeting_sentences(met, keys):
+        assert (
+            "joint.stroke = 1.5 mm, controller.kp = 3.16228 N/m" in sentence or "near joint.stroke = 1.9 mm" in sentence
+        )
+        wording(sentence)
+    assert conclusion(met, keys).endswith("Curves meet at 2 more places.")
+
+
+def test_the_document_lists_where_curves_meet_and_end(met: Plane) -> None:
+    document = boundary_document(met, (MM, ShownKey("controller.kp", "N/m")))
+    assert [(end["curve"], end["how"]) for end in document["ends"]] == [
+        *((0, "range"), (0, "range"), (1, "range"), (1, "meets")),
+    ]
+    assert document["ends"][3]["at"] == pytest.approx([1.9, 10**0.5])
+    assert [meeting["how"] for meeting in document["meetings"]] == ["cross", "cross", "cross", "together", "end"]
+    first, unrefined = document["meetings"][:2]
+    assert first["curves"] == [0, 1]
+    assert first["places"] == [pytest.approx([1.5, 10**0.5])]
+    assert first["error"] == pytest.approx([1e-6, 10**0.5 * 2e-6 * np.log(10)], rel=1e-3)
+    assert unrefined["error"] == [None, None]
+
+
+def test_the_figure_marks_where_curves_meet_and_are_lost(met: Plane) -> None:
+    keys = (MM, ShownKey("controller.kp", "N/m"))
+    marks = {mark.label: len(mark.x) for mark in boundary_figure(met, keys).panels[0].markers}
+    assert marks == {LOST: 1, MEETING: 6}
+    alone = boundary_figure(replace(met, meetings=()), keys)
+    assert {mark.label for mark in alone.panels[0].markers} == {LOST, LOST_END}
+    assert matplotlib_renderer.image(alone, "png")
 
 
 def test_the_answer_tells_in_three_digits_where_a_curve_runs(crossing: Plane) -> None:

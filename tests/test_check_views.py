@@ -162,6 +162,16 @@ def test_nan_of_a_failed_run_breaks_nothing(start):
     assert "NaN" not in re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
 
 
+def test_nothing_is_shaded_where_swings_to_one_side_differ_and_that_is_said() -> None:
+    uneven = hunts(hunting=fake_hunting(fake_cycle(symmetric=False)))
+    figure = figure_of("return-map", {"given": replace(fake_case(hunting=True), judgement=uneven)})
+    assert figure.panels[0].bands == ()
+    assert "nothing is shaded" in figure.caption
+    even = figure_of("return-map", both_joints())
+    assert even.panels[0].bands
+    assert "nothing is shaded" not in even.caption
+
+
 def test_return_map_with_the_swings_of_this_motion():
     locked, free = figure_of("return-map", both_joints()).panels
     assert locked.x.limits == locked.y.limits == pytest.approx((0.0, 2.2 * 5.2e-4))

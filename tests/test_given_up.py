@@ -30,6 +30,7 @@ from friso.hunting import (
 from friso.hunting.attractors import Attractors
 from friso.hunting.margin import NOT_SOUGHT, SearchedBandwidths
 from friso.hunting.measures import measuring_options
+from friso.hunting.settings import BasinSettings
 from friso.hunting.verdict import (
     BY_CHANCE,
     CHANGED,
@@ -85,7 +86,7 @@ def test_kicks_after_which_swings_are_far_larger_than_what_attracts_make_no_wind
 
 def test_kicks_of_which_none_is_completed_are_unknown() -> None:
     nothing = displaced(beyond(2e-3), beyond(1))
-    assert (nothing.windows, nothing.unknown) == ((), basin.POINTS)
+    assert (nothing.windows, nothing.unknown) == ((), BasinSettings().kick_count)
     assert nothing.searched == pytest.approx((1e-3 / 30, 0.3))
 
 

@@ -7,8 +7,9 @@ import pytest
 from variants import VARIANTS
 
 import friso
-from friso.hunting import Ensemble, loop, unstable
+from friso.hunting import Ensemble, unstable
 from friso.hunting.loop import at_lower_gains
+from friso.hunting.settings import CheckSettings
 from friso.stage import Stage
 
 
@@ -53,10 +54,11 @@ def test_many_loops_are_looked_at_in_parts(monkeypatch: pytest.MonkeyPatch) -> N
     mass = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
     gains = shares * flat["friction.viscous"] * flat["controller.kp"] / mass
     stages, at_once = Ensemble.held({**flat, "controller.ki": gains}, len(gains)), Ensemble.held
-    monkeypatch.setattr(loop, "AT_ONCE", 2)
     monkeypatch.setattr(Ensemble, "held", lambda keys, count, **how: held.append(count) or at_once(keys, count, **how))
-    assert at_lower_gains(stages).tolist() == ["stable" if share < 1 else "unstable" for share in shares]
-    assert max(held) == 2 * len(loop.LOWER)
+    with CheckSettings(loops_at_once=2).in_use():
+        words = at_lower_gains(stages).tolist()
+    assert words == ["stable" if share < 1 else "unstable" for share in shares]
+    assert max(held) == 2 * CheckSettings().lower_gain_shares[-1]
 
 
 @pytest.mark.inner

@@ -1,5 +1,6 @@
 """Margins in static friction, and in a joint's stroke and stiffness."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,7 +19,9 @@ from friso.equations.scaled_friction import (
 from friso.hunting import MarginEnd, ParameterMargin, check, find_attractors, joint_margins
 from friso.hunting import parameter_margin as module
 from friso.hunting.parameter_margin import parameter_margin
+from friso.questions.check.document import joint_margins_document
 from friso.questions.check.margin_words import friction_sentences, margin_sentence, thin_margins
+from friso.questions.check.question import CheckAnswer
 from friso.stage import Stage
 
 
@@ -82,6 +85,27 @@ def test_the_joint_has_margins_where_it_is_free(rig: Stage) -> None:
     margins = joint_margins(cases["free"].stage, cases["free"].judgement)
     assert set(margins) == {"joint.stroke", "joint.stiffness"}
     assert not joint_margins(cases["locked"].stage, cases["locked"].judgement)
+
+
+def test_the_document_holds_the_margins_of_the_joint_where_details_are_wanted(rig: Stage) -> None:
+    """As multiples of the keys of the stage file and as values, in the units of its axis."""
+    begins = ParameterMargin(False, MarginEnd(0.8, 0.75, True), None, (1 / 3, 3.0), (1,))
+    margins = {"joint.stroke": begins, "joint.stiffness": replace(begins, below=None)}
+    document = joint_margins_document(rig, margins)["joint_margins"]
+    stroke, stiffness = rig.flat()["joint.stroke"], rig.flat()["joint.stiffness"]
+    below = document["stroke"].pop("below")
+    assert below == {
+        **{"same_at_factor": 0.8, "other_at_factor": 0.75, "certain": True},
+        **{"same_m": pytest.approx(0.8 * stroke), "other_m": pytest.approx(0.75 * stroke)},
+    }
+    rest = {"hunts": False, "above": None, "searched": [1 / 3, 3.0], "not_determined": ["above"]}
+    assert document == {
+        "stroke": {"yours_m": stroke, **rest},
+        "stiffness": {"yours_n_per_m": stiffness, "below": None, **rest},
+    }
+    answer = CheckAnswer(rig, {"given": SimpleNamespace(stage=rig)}, None, None)
+    vars(answer)["joint_margins"] = margins
+    assert answer.document_of_details().keys() == {"joint_margins"}
 
 
 def made_up_case(margin: ParameterMargin, judgement: Any) -> Any:

@@ -19,12 +19,13 @@ from friso.hunting.attractors import attractors
 from friso.hunting.basin import displacements_that_hunt
 from friso.hunting.cycle.hunting import hunting
 from friso.hunting.margin import NOT_SOUGHT, _Grid, search_bandwidths
-from friso.hunting.return_map import attracting, confirmed
 from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
 from friso.hunting.return_map.confirmed import runs_land_as_foretold
 from friso.hunting.return_map.landing_map import LandingMap, MapAttractor
 from friso.hunting.return_map.landings import RTOL, Landings, find_landings
 from friso.hunting.return_map.mapped import FAR_DISTANCES, NEAR_DISTANCES, gaps
+from friso.hunting.return_map.settings import ReturnMapSettings
+from friso.hunting.settings import EdgeSettings, ToleranceSettings
 from friso.hunting.what_attracts import SKETCH_DISTANCES, Sketch, has_a_map, resolved_map, sketched, what_attracts
 from friso.stage import Stage
 
@@ -266,7 +267,7 @@ def test_what_one_survey_observed_makes_no_edge_certain_unless_a_thorough_one_do
     observed = tuple(replace(motion, cycles=None) for motion in survey.motions)
     seen = survey if attracts else replace(survey, motions=())
     monkeypatch.setattr("friso.hunting.outward.attractors", lambda *_, **__: seen)
-    where = outward.Outward(locked.flat(), 10.0)
+    where = outward.EdgeSearch(locked.flat(), 10.0)
     assert where._surely_attracts(outward._Place(1.0, observed, 1.1)) == attracts
     assert where._surely_attracts(outward._Place(1.0, survey.motions, 1.1))
 
@@ -301,16 +302,17 @@ def test_an_orbit_of_many_swings_of_a_leaning_stage_is_known_again(survey: MapSu
 
 def test_the_page_says_what_certain_means_with_the_numbers_of_the_code() -> None:
     page = (Path(__file__).parent.parent / "docs" / "hunting.md").read_text(encoding="utf-8")
+    edge, maps = EdgeSettings(), ReturnMapSettings()
     section = " ".join(page.split("## What *certain* means")[1].split("\n## ")[0].split())
-    beyond = ", ".join(f"{100 * (factor - 1):.3g}" for factor in (outward.BEYOND, *outward.FARTHER[:-1]))
+    beyond = ", ".join(f"{100 * (factor - 1):.3g}" for factor in (edge.beyond_edge_factor, *outward.FARTHER[:-1]))
     steps = [f"{100 * (10 ** (1 / n) - 1):.0f}" for n in (SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond)]
-    tolerances = f"{RTOL:.0e} and at {confirmed.TIGHTER * RTOL:.0e}".replace("e-0", "e-")
+    tolerances = f"{RTOL:.0e} and at {ToleranceSettings().check_rtol_factor * RTOL:.0e}".replace("e-0", "e-")
     for text in (
-        f"less than {100 * attracting.SCATTER:g} %",
+        f"less than {100 * maps.map_scatter_share:g} %",
         f"from {NEAR_DISTANCES[0]:g} to {FAR_DISTANCES[-1]:g} times",
-        f"at most {100 * outward.BRACKET:g} % away",
+        f"at most {100 * edge.edge_bracket_share:g} % away",
         f"{beyond} and {100 * (outward.FARTHER[-1] - 1):.3g} % beyond",
-        f"land up to {confirmed.FOLLOWED_LANDINGS} times where the map says, at {tolerances}",
+        f"land up to {maps.confirmed_landings} times where the map says, at {tolerances}",
         f"from {SEARCH_LIMITS.lowest_bandwidth:g} to {SEARCH_LIMITS.highest_bandwidth:g} times",
         f"({steps[0]} and {steps[1]} %)",
         f"from {len(SKETCH_DISTANCES) + len(FAR_DISTANCES[1::3])} distances",

@@ -19,7 +19,7 @@ LITERALS = {
     "friso/engine": 49,
     "friso/equations": 27,
     "friso/frequency": 74,
-    "friso/hunting": 262,
+    "friso/hunting": 11,
     "friso/identification": 378,
     "friso/interface": 4,
     "friso/leaf_springs": 26,

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from patched import patched
 
 import friso
 from friso.equations.bandwidth import faster
 from friso.equations.scaled_friction import with_friction
 from friso.errors import InputError
-from friso.hunting import check, sketch_attractors, what_attracts
+from friso.hunting import check, sketch_attractors
 from friso.hunting.criteria import ATTRACTED
+from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.questions.map.figures import map_figure
 from friso.questions.map.findings import own_place
 from friso.questions.map.question import SweepAnswer
@@ -98,7 +98,7 @@ def test_an_attractor_of_few_points_is_not_trusted(locked: Stage) -> None:
     """At 1.357 times its speed, with 2.4 % more friction, a coarse map has an attractor that no orbit confirms."""
     flat = with_friction(faster(locked.flat(), 1.3572), 1.02436)
     assert not sketch_attractors(flat, 1).attracts[0]
-    with patched({what_attracts: {"FEW": 0}}):
+    with ReturnMapSettings(least_arriving_points=0).in_use():
         assert sketch_attractors(flat, 1).attracts[0]
 
 

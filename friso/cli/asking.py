@@ -83,7 +83,7 @@ def show(
     failure, KeyboardInterrupt after an answer that was interrupted."""
     written = [*files]
     if as_json:
-        print_document(answer.document(), written)
+        print_document(answer.to_dict(details), written)
     else:
         for sentence in answer.sentences():
             print_wrapped(sentence)

@@ -125,7 +125,7 @@ def verification(stage: Stage, spec: Spec, softening: float, progress: Progress)
     outcomes: list[MachineOutcomes] = []
     for name, held in (("joint free", False), ("joint locked", True)):
         keys = machines.over(flat) | {"joint.locked": held, "motion.kind": "there_and_back"}
-        outcomes.append(move_machines(keys, machines.count, window, progress, name))
+        outcomes.append(move_machines(keys, machines.count, window, progress, f"moves, {name}"))
     free, locked = outcomes
     return Verification(machines, free, locked, _worst_stage(stage, machines.of(free.worst), free.followed(free.worst)))
 

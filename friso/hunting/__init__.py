@@ -7,6 +7,7 @@ from friso.hunting.attractors import Target
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.basin import Kick, MoveShare, displacements_that_hunt, moves_that_hunt, pushes_that_hunt
 from friso.hunting.boundary import (
+    CLOSED,
     END_OF_RANGE,
     Bifurcation,
     Branch,
@@ -14,6 +15,7 @@ from friso.hunting.boundary import (
     Diagram,
     KeyRange,
     LocatedPoint,
+    Meeting,
     Plane,
     Point,
     Space,
@@ -54,6 +56,7 @@ from friso.hunting.verdict import CheckPart, Judgement
 from friso.hunting.what_attracts import search_alone
 
 __all__ = [
+    "CLOSED",
     "CYCLE_RTOL",
     "DITHERS",
     "END_OF_RANGE",
@@ -82,6 +85,7 @@ __all__ = [
     "LowerGains",
     "Margin",
     "MarginEnd",
+    "Meeting",
     "Motions",
     "MoveShare",
     "Multipliers",

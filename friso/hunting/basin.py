@@ -23,34 +23,10 @@ from friso.hunting.measures import swing_of
 from friso.hunting.motions import run_motions, some_of
 from friso.hunting.return_map.fates import motions_go_on
 from friso.hunting.return_map.landing_map import LandingMap
+from friso.hunting.settings import BasinSettings
 from friso.shares import share_interval
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
-
-LAST = 1.5
-"""Periods at the end of a run by which it is judged."""
-
-CAUGHT = 0.003
-"""Share by which the swing of a run that is looked at early may differ from that which attracts it: then it need not be
-followed for as long as the slowest."""
-
-OBSERVED = 0.5
-"""Share of a run at its end for which a motion stands still that has come to rest where swings were observed."""
-
-RANGE, POINTS = (1 / 30, 300.0), 128
-"""Smallest and largest kick in units of the least motion that attracts, and kicks tried in between."""
-
-EDGE = 0.01
-"""Share to which the edges of the windows are found."""
-
-RUNS_AWAY = 200.0
-"""Typical periods in which a motion runs away that ever does."""
-
-BETWEEN = 7
-"""Kicks between two that enclose an edge: as many runs take hardly longer than one."""
-
-MOVES = 128
-"""Moves drawn."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +78,7 @@ def ends_in(
     observed = np.broadcast_to(target.observed, (count,))
     for runs in (np.flatnonzero(~observed), np.flatnonzero(observed)):
         if runs.size:
-            part = some_of(flat, runs), target.of(runs) if np.ndim(target.amplitude) else target
+            part = some_of(flat, runs), target.take(runs) if np.ndim(target.amplitude) else target
             begin = None if starts is None else starts[runs]
             find = _ends_observed if observed[runs[0]] else _ends_closed
             ends[runs], completed[runs], swing[runs] = find(*part, begin, len(runs), **options)
@@ -113,9 +89,10 @@ def _ends_closed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Runs are looked at early, and those that are not caught by then are followed on, for twice as long each time."""
+    settings = BasinSettings.current()
     size, lasting, early, last = (
         np.broadcast_to(part, (count,))
-        for part in (2 * target.amplitude, target.lasting, target.early, LAST * target.period)
+        for part in (2 * target.amplitude, target.lasting, target.early, settings.judged_periods * target.period)
     )
     ends, completed, swing, since = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count), np.zeros(count)
     left, until, leg = np.arange(count), np.minimum(early, lasting), np.max(last_corner(flat)) + early
@@ -123,7 +100,7 @@ def _ends_closed(
         part = some_of(flat, left), leg[left], last[left], starts
         swing[left], completed[left], starts = _last_swing(*part, RTOL, **options)
         final = until[left] >= lasting[left]
-        close = np.abs(swing[left] / size[left] - 1) <= CAUGHT
+        close = np.abs(swing[left] / size[left] - 1) <= settings.caught_swing_share
         ends[left] = completed[left] & np.where(final, lasts(swing[left], 0.0, size[left] / 4), close)
         on = completed[left] & ~ends[left] & ~final
         left, starts, flat = left[on], starts[on], standing(flat)
@@ -135,12 +112,13 @@ def _ends_closed(
 def _ends_observed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    settings = BasinSettings.current()
     after = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
-    swing, completed, _ = _last_swing(flat, after, LAST * target.period, starts, TIGHT, **options)
+    swing, completed, _ = _last_swing(flat, after, settings.judged_periods * target.period, starts, TIGHT, **options)
     ends = completed & lasts(swing, 0.0, np.broadcast_to(target.amplitude, (count,)) / 2)
     if (others := np.flatnonzero(completed & ~ends)).size:
         begin = None if starts is None else starts[others]
-        part = some_of(flat, others), after[others], OBSERVED * after[others]
+        part = some_of(flat, others), after[others], settings.resting_end_share * after[others]
         swing[others], completed[others], _ = _last_swing(*part, begin, TIGHT, **options)
     return ends, completed, swing
 
@@ -210,7 +188,7 @@ def displacements_that_run_away(stage: Stage) -> Kick:
     """The displacements after which a stage whose force is limited, without anti-windup, runs away from its reference
     for good, in the same way."""
     flat, stages = {**without_motion(stage.flat()), "motion.kind": "release"}, Ensemble.held(stage.flat(), 1)
-    end = RUNS_AWAY * float(typical_period(stages)[0])
+    end = BasinSettings.current().runaway_periods * float(typical_period(stages)[0])
 
     def runs_away(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         options = RunOptions(rtol=RTOL, record_from=np.inf, least_swing=np.inf)
@@ -238,19 +216,20 @@ def pushes_that_hunt(
 def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: float) -> Kick:
     """The windows of kicks that hunt, searched on a grid about `unit`, their edges closer and closer; `hunts` tells
     which kicks do, and whose runs were completed."""
-    tried = np.geomspace(RANGE[0] * unit, RANGE[1] * unit, POINTS)
+    settings = BasinSettings.current()
+    tried = np.geomspace(settings.kick_range[0] * unit, settings.kick_range[1] * unit, settings.kick_count)
     hunting, completed = hunts(tried)
     kicks, hunting, unknown = tried[completed], hunting[completed], int(np.count_nonzero(~completed))
     if not kicks.size:
         return Kick((), (float(tried[0]), float(tried[-1])), unknown)
     edges = np.flatnonzero(hunting[1:] != hunting[:-1])
     low, high = kicks[edges], kicks[edges + 1]
-    while edges.size and np.any(high > (1 + EDGE) * low):
-        between = np.geomspace(low, high, BETWEEN + 2, axis=1)
-        ends, completed = (part.reshape(-1, BETWEEN) for part in hunts(between[:, 1:-1].ravel()))
+    while edges.size and np.any(high > (1 + settings.kick_edge_share) * low):
+        between = np.geomspace(low, high, settings.kicks_between + 2, axis=1)
+        ends, completed = (part.reshape(-1, settings.kicks_between) for part in hunts(between[:, 1:-1].ravel()))
         unknown += int(np.count_nonzero(~completed))
         unlike = completed & (ends != hunting[edges, None])
-        last = np.where(unlike.any(axis=1), unlike.argmax(axis=1), BETWEEN)
+        last = np.where(unlike.any(axis=1), unlike.argmax(axis=1), settings.kicks_between)
         low, high = (between[np.arange(len(edges)), last + step] for step in (0, 1))
     places = np.where(hunting[edges], low, high)  # the side that hunts
     turns = [*([kicks[0]] if hunting[0] else []), *places, *([kicks[-1]] if hunting[-1] else [])]
@@ -264,6 +243,7 @@ def moves_that_hunt(
     """Draw moves about that of the stage's file and find the share of them that ends in its `target`; swings wider than
     `widest`, peak to peak [m], are left out. A return map that is resolved spares long runs. None for motions that have
     no acceleration, or if every run fails."""
+    settings = BasinSettings.current()
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
         return None
@@ -272,13 +252,13 @@ def moves_that_hunt(
     accelerations = (least * acceleration, most * acceleration)
     times = (least * time, min(most * time, flat["motion.return_at"] / (2 + flat.get(CRUISE, 0.0))))
     (low, shortest), (high, longest) = zip(accelerations, times, strict=True)
-    across, along = evenly(MOVES)
+    across, along = evenly(settings.drawn_moves)
     moved = {
         **flat,
         "motion.acceleration": low + across * (high - low),
         "motion.acceleration_time": shortest + along * (longest - shortest),
     }
-    ends, decided = _caught(moved, MOVES, target, widest, landing_map)
+    ends, decided = _caught(moved, settings.drawn_moves, target, widest, landing_map)
     return MoveShare(int(decided.sum()), int(ends[decided].sum()), accelerations, times) if decided.any() else None
 
 

@@ -17,6 +17,7 @@ from friso.engine.side_by_side import side_by_side
 from friso.engine.simulate import RTOL, sampled_outputs, simulate
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import structure
+from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.feeding import Feeding, feeding
@@ -25,8 +26,9 @@ from friso.hunting.loop import LoopState, unstable
 from friso.hunting.many_stages import kernels_to_judge
 from friso.hunting.measures import BANDS, measure_runs, measuring_options
 from friso.hunting.parameter_margin import ParameterMargin
+from friso.hunting.settings import CheckSettings, ToleranceSettings
 from friso.hunting.stage_margins import friction_margin, keeps_friction_margin
-from friso.hunting.verdict import PARTS, ROOM, WORK, CheckPart, Judgement, judge
+from friso.hunting.verdict import PARTS, CheckPart, Judgement, judge
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
@@ -108,20 +110,8 @@ class Case:
 PART_COUNT = len(PARTS) + 1
 """Parts of a case: those of its verdict, and its margin in static friction."""
 
-AT_LIMIT = 1e-9
-"""Share of a limit of the force by which one that stands there may differ from it."""
 
-FREE = 0.58
-"""Share of the work of a check that the case with a free joint may use: it takes the most."""
-
-FED = 0.3
-"""Share of the work of a case that the search for what feeds its cycle may use at least."""
-
-FRICTION, ADVICE = 0.25, 0.1
-"""Shares of the work of a case that its margin in static friction may use beside that, and the question whether advice
-keeps one."""
-
-LONG_RUN_RTOL = 1e-6
+LONG_RUN_RTOL = ToleranceSettings().long_run_rtol
 """Relative tolerance of runs that only tell what becomes of a motion; that of which times are told is finer."""
 
 
@@ -140,6 +130,7 @@ def check(
     called as work is done, and `tell` with the name of a case and its verdict as soon as that is certain, both also
     from worker threads. Raises InputError for an `rtol` that is not usable.
     """
+    settings = CheckSettings.current()
     checked_rtol(rtol)
     variants = stage.variants()
     kernels(needed_kernels(stage))
@@ -150,7 +141,9 @@ def check(
     def judged(variant: Stage) -> Case:
         names = [name for name, other in variants.items() if other == variant]
         share = _share(variant) if len(different) > 1 else 1.0
-        return _case(variant, rtol, traces, done, share * WORK, lambda verdict: tell(names[-1], verdict), margins)
+        return _case(
+            variant, rtol, traces, done, share * settings.check_work, lambda verdict: tell(names[-1], verdict), margins
+        )
 
     cases = side_by_side([partial(judged, variant) for variant in different])
     return {name: cases[different.index(variant)] for name, variant in variants.items()}
@@ -163,8 +156,9 @@ def needed_kernels(stage: Stage) -> set[KernelRequest]:
 
 def _share(stage: Stage) -> float:
     """The share of the work of a check that a case with its joint locked, or free, may use beside the other one."""
+    settings = CheckSettings.current()
     free = stage.joint is not None and not stage.joint.locked
-    return FREE if free else 1 - FREE
+    return settings.free_work_share if free else 1 - settings.free_work_share
 
 
 def check_given(stage: Stage, rtol: float = RTOL, progress: Progress = silent) -> Case:
@@ -172,7 +166,7 @@ def check_given(stage: Stage, rtol: float = RTOL, progress: Progress = silent) -
     InputError for an unusable `rtol`."""
     checked_rtol(rtol)
     kernels(_needed(stage))
-    return _case(stage, rtol, False, Tally(progress, PART_COUNT), WORK)
+    return _case(stage, rtol, False, Tally(progress, PART_COUNT), CheckSettings.current().check_work)
 
 
 def _needed(stage: Stage) -> set[KernelRequest]:
@@ -189,22 +183,25 @@ def _case(
     tell: Callable[[Verdict], None] = lambda verdict: None,
     margins: bool = False,
 ) -> Case:
+    survey_settings = SurveySettings.current()
     flat, ended = stage.flat(), 0
 
-    def begin(part: str) -> None:
+    def begin(part: CheckPart) -> None:
         nonlocal ended
         ended += (step := int(part != CheckPart.ATTRACTION))
-        done.add(step, part)
+        done.add(step, part.progress_word)
 
     with allowance() as spent:
-        (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(measuring_options(rtol), room=ROOM))
+        (runs,) = run_chunks(
+            kernel(structure(flat)), flat, 1, replace(measuring_options(rtol), room=survey_settings.run_turning_points)
+        )
         measures = measure_runs(flat, runs)
         judgement = judge(stage, measures, max(rtol, LONG_RUN_RTOL), begin, work - spent.used, tell)
     room = measures.turns.shape[1]
     status = Status(int(measures.status[0]))
     fed = None
     if judgement.swing and structure(flat).plays:
-        fed = _fed(stage, max(work - spent.used, FED * work))
+        fed = _fed(stage, max(work - spent.used, CheckSettings.current().feeding_work_share * work))
         judgement = judgement if fed else replace(judgement, given_up=(*judgement.given_up, CheckPart.FEEDING))
     static_friction = keeps = None
     if margins:
@@ -213,7 +210,7 @@ def _case(
         if static_friction and static_friction.open_sides:
             judgement = replace(judgement, given_up=(*judgement.given_up, CheckPart.FRICTION))
     breakaway = _breakaway(flat)
-    done.add(PART_COUNT - ended, CheckPart.FRICTION)  # the last, too, where nothing attracts
+    done.add(PART_COUNT - ended, CheckPart.FRICTION.progress_word)  # the last, too, where nothing attracts
     return Case(
         stage=stage,
         judgement=judgement,
@@ -249,7 +246,8 @@ def _fed(stage: Stage, work: float) -> Feeding | None:
 def _friction(stage: Stage, judgement: Judgement, work: float) -> tuple[ParameterMargin | None, bool | None]:
     """The margin of a stage in static friction, and whether the bandwidth that advice leads to keeps one, as far as
     shares of so much work suffice."""
-    with allowance(FRICTION * work):
+    settings = CheckSettings.current()
+    with allowance(settings.friction_margin_work_share * work):
         margin = friction_margin(stage, judgement)
     edge, distance = judgement.margin, SEARCH_LIMITS.edge_distance
     if margin is None or edge is None or judgement.swing is None:
@@ -257,12 +255,13 @@ def _friction(stage: Stage, judgement: Judgement, work: float) -> tuple[Paramete
     to = edge.quiet * distance
     if to > SEARCH_LIMITS.highest_bandwidth:
         return margin, None
-    return margin, keeps_friction_margin(stage, to, ADVICE * work)
+    return margin, keeps_friction_margin(stage, to, settings.advice_work_share * work)
 
 
 def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, breakaway: float) -> float | None:
     """The limit of the force [N] that keeps one stage off its reference for ever: break-away takes more [N], or its run
     ends with the force there. None where it settles or swings, or nothing shows that it stays there."""
+    settings = CheckSettings.current()
     limit, possible = flat.get(FORCE_LIMIT), judgement.hunting.possible
     stands = judgement.followed is not None if possible else judgement.verdict == "settles"
     stays = stands and judgement.settled_after is None
@@ -271,7 +270,7 @@ def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, break
     shape = kernel(structure(flat))
     forces = sampled_outputs(shape, flat, runs.results.ends.T, runs.statistic("ended"))
     force = float(forces[list(shape.outputs).index("force")][0])
-    return limit if abs(force) > limit * (1 - AT_LIMIT) or (possible and limit < breakaway) else None
+    return limit if abs(force) > limit * (1 - settings.limit_force_share) or (possible and limit < breakaway) else None
 
 
 def _breakaway(flat: Mapping[str, Any]) -> float:

@@ -13,15 +13,7 @@ from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.find import Cycles, find_cycles
 from friso.hunting.cycle.multipliers import multipliers
 from friso.hunting.cycle.shooting import Orbits, close
-
-NUDGE = 1e-3
-"""Share by which keys are changed to see how the multiplier changes, which is itself a derivative."""
-
-INSIDE = 1e-3
-"""Share of the bandwidth by which the cycle is looked at inside of the edge of hunting."""
-
-FLIP = 0.8
-"""Size of the multiplier from which on a cycle next to an edge is about to flip."""
+from friso.hunting.settings import EdgeSettings
 
 
 @dataclass(frozen=True)
@@ -113,16 +105,24 @@ def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: flo
     Along the edge the multiplier stays what it is: of that, an exact derivative of the flow, central differences are
     taken.
     """
-    inside = faster(flat, factor * (1 - INSIDE))
+    settings = EdgeSettings.current()
+    inside = faster(flat, factor * (1 - settings.inside_edge_share))
     first = find_cycles(Ensemble.held(inside, 1))
-    if not (first.closed[0] and -1 <= first.multiplier[0] < -FLIP) or Ensemble.held(inside, 1).chatters:
+    if (
+        not (first.closed[0] and -1 <= first.multiplier[0] < -settings.flip_multiplier)
+        or Ensemble.held(inside, 1).chatters
+    ):
         return None
-    changed = [{name: inside[name] * (1 + step)} for name in keys for step in (-NUDGE, NUDGE)]
-    changed += [faster(inside, 1 + step) for step in (-NUDGE, NUDGE)]
+    changed = [
+        {name: inside[name] * (1 + step)}
+        for name in keys
+        for step in (-settings.key_nudge_share, settings.key_nudge_share)
+    ]
+    changed += [faster(inside, 1 + step) for step in (-settings.key_nudge_share, settings.key_nudge_share)]
     multiplier = _multipliers(inside, changed, first, rtol)
     if multiplier is None:
         return None
-    slopes = (multiplier[1::2] - multiplier[::2]) / (2 * NUDGE)
+    slopes = (multiplier[1::2] - multiplier[::2]) / (2 * settings.key_nudge_share)
     return -slopes[:-1] / slopes[-1]
 
 

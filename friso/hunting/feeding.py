@@ -16,12 +16,10 @@ import numpy as np
 from friso.equations.structure import structure
 from friso.hunting.loop import unstable
 from friso.hunting.many_stages import find_attractors
+from friso.hunting.settings import CheckSettings
 from friso.stage import Stage
 from friso.stage.stage import declared_keys
 from friso.stage.transmission import BACKLASH, MOTOR_FRICTION
-
-SHARES = np.array([0.5, 0.1, 0.01, 0.001])
-"""Of what feeds, the last of which stands for nothing."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +60,9 @@ def feeding(stage: Stage) -> Feeding | None:
 def _without_friction(stage: Stage) -> Decline:
     """What becomes of a stage without dry friction as its backlash goes: all motions are as much smaller as that is, so
     that nothing changes until it is gone, and with it all that is not linear."""
+    settings = CheckSettings.current()
     rests = not unstable(stage.replace({BACKLASH: None}))
-    return Decline(lasts=float(SHARES[-1]), gone=0.0 if rests else None, certain=True)
+    return Decline(lasts=float(np.array(settings.feeding_shares)[-1]), gone=0.0 if rests else None, certain=True)
 
 
 def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
@@ -80,12 +79,13 @@ def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _decline(flat: Mapping[str, Any], keys: tuple[str, ...]) -> Decline:
     """What becomes of hunting with some keys at all shares."""
-    scaled = {**flat, **{key: flat[key] * SHARES for key in keys}}
-    attracted = find_attractors(scaled, len(SHARES))
+    settings = CheckSettings.current()
+    scaled = {**flat, **{key: flat[key] * np.array(settings.feeding_shares) for key in keys}}
+    attracted = find_attractors(scaled, len(np.array(settings.feeding_shares)))
     gone = np.flatnonzero(~attracted.attracts)
-    first = int(gone[0]) if gone.size else len(SHARES)
+    first = int(gone[0]) if gone.size else len(np.array(settings.feeding_shares))
     return Decline(
-        lasts=float(SHARES[first - 1]) if first else 1.0,
-        gone=float(SHARES[first]) if gone.size else None,
+        lasts=float(np.array(settings.feeding_shares)[first - 1]) if first else 1.0,
+        gone=float(np.array(settings.feeding_shares)[first]) if gone.size else None,
         certain=bool(attracted.certain[: first + 1].all()),
     )

@@ -9,6 +9,7 @@ import numpy as np
 
 from friso.equations.roles import Role, Steady
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.settings import CheckSettings
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
 from friso.stage.standstill import NO_SETTINGS
@@ -16,22 +17,6 @@ from friso.stage.transmission import BACKLASH, MOTOR_MASS, MOTOR_STATES
 
 LoopState = Literal["sticks", "slides"]
 LowerGains = Literal["stable", "unstable", "unknown"]
-
-STEP = 1e-6
-"""Share of the magnitude of a state by which it is moved to take derivatives."""
-
-GROWTH = 1e-5
-"""Share of the natural frequency of mass and loop below which a growth rate is rounding: that of a stage which sticks
-has poles at 0."""
-
-FAST = 1e3
-"""Speed at which friction is viscous and no more, in units of that of the loop's own motion."""
-
-LOWER = np.geomspace(1e-6, 1.0, 37)
-"""Shares of its gain at which the stability of a loop is looked at."""
-
-AT_ONCE = 256
-"""Stages whose loops are looked at together, at all of these: of a map at once they took 0.1 MB each."""
 
 
 def winds_up_at_a_limit(stages: Ensemble) -> bool:
@@ -70,22 +55,28 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
     the force limit and the viscous friction alone: of a mass m with viscous friction b they shrink where
     b k_p > m k_i, which is Hurwitz's criterion for the same loop at any gain, and grow where it is less.
     """
+    at_once = CheckSettings.current().loops_at_once
     controller, form = controller_of(stages.flat), stages.structure.controller
     settings = form.settings if form else NO_SETTINGS
     if not controller.loop_gain or settings.deadband or settings.dead_zone or settings.gains or settings.push:
         return np.full(stages.count, "unknown", dtype=object)
-    parts = np.split(np.arange(stages.count), range(AT_ONCE, stages.count, AT_ONCE))
+    parts = np.split(np.arange(stages.count), range(at_once, stages.count, at_once))
     return np.concatenate([_at_lower_gains(stages.take(part)) for part in parts])
 
 
 def _at_lower_gains(stages: Ensemble) -> np.ndarray:
-    """The same of not too many stages, whose controller tells which keys its gain is."""
+    """Tell whether loops are stable at lower gains, of few enough stages for the memory, whose gain is a known key."""
+    settings = CheckSettings.current()
+    shares = np.geomspace(*settings.lower_gain_shares)
     controller, form = controller_of(stages.flat), stages.structure
-    flat = stages.take(np.repeat(np.arange(stages.count), len(LOWER))).flat
-    gains = {key: flat[key] * np.tile(LOWER, stages.count) for key in map(controller.key, controller.loop_gain)}
-    slower = Ensemble.held({**flat, **gains}, stages.count * len(LOWER), form=form)
-    growths = _growth(_sliding(slower, _rates(slower), np.min)) / (GROWTH * slower.number("rate"))
-    growing, shrinking = (growths > 1).reshape(-1, len(LOWER)), (growths <= 1).reshape(-1, len(LOWER))
+    flat = stages.take(np.repeat(np.arange(stages.count), len(shares))).flat
+    gains = {key: flat[key] * np.tile(shares, stages.count) for key in map(controller.key, controller.loop_gain)}
+    slower = Ensemble.held({**flat, **gains}, stages.count * len(shares), form=form)
+    growths = _growth(_sliding(slower, _rates(slower), np.min)) / (settings.least_growth_rate * slower.number("rate"))
+    growing, shrinking = (
+        (growths > 1).reshape(-1, len(shares)),
+        (growths <= 1).reshape(-1, len(shares)),
+    )
     words = np.where(shrinking.all(axis=1), "stable", "unknown")
     return np.where(growing.any(axis=1), "unstable", words).astype(object)
 
@@ -109,16 +100,17 @@ def leaves_for_good(stage: Stage) -> bool:
 def unstable_among(stages: Ensemble) -> dict[LoopState, np.ndarray]:
     """The loops of which stages are not stable in each of these states, shape (count,); a swing is damped by the mean
     of the viscous friction in both directions."""
-    limit = GROWTH * stages.number("rate")
+    limit = CheckSettings.current().least_growth_rate * stages.number("rate")
     return {state: growth > limit for state, growth in _growths(stages).items()}
 
 
 @np.errstate(all="ignore")
 def surely_calm(stages: Ensemble) -> np.ndarray:
-    """Of stages that friction cannot make hunt, which surely keep up no other swing, shape (count,): their loops are
+    """Which stages that cannot hunt surely keep up no other swing either, shape (count,): their loops are
     stable, those of a free joint with its limiter touched as well, and beyond a force limit without anti-windup;
     nothing opens them or keeps them moving and, where there is no friction, nothing makes them act otherwise near the
     reference than far from it."""
+    least_rate = CheckSettings.current().least_growth_rate
     form = stages.structure
     drive, controller = form.transmission, form.controller
     settings = controller.settings if controller else NO_SETTINGS
@@ -127,7 +119,7 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
     bent = not rubs and (settings.gains or settings.push or settings.dead_zone or winds)
     if form.plays or settings.dither or bent:
         return np.zeros(stages.count, bool)
-    limit = GROWTH * stages.number("rate")
+    limit = least_rate * stages.number("rate")
     growths = [_growths(stages, touched).values() for touched in {False, form.joint == "free"}]
     stable = np.all([growth <= limit for state in growths for growth in state], axis=0)  # and not unknown
     return stable & ~may_run_away(stages)
@@ -156,28 +148,35 @@ def _motor_state(stages: Ensemble, which: int) -> int:
 
 def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
     """Each state moved a little from rest at the reference, all others at rest, (count, states)."""
+    settings = CheckSettings.current()
     for k, scale in enumerate(stages.scales.T):
         moved = np.zeros(stages.scales.shape)
-        moved[:, k] = STEP * scale
+        moved[:, k] = settings.derivative_step_share * scale
         yield moved
 
 
 def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
     """Derivatives of the rates at rest by the states, in units of the magnitudes of these, (count, states, states);
     with a limiter that is `touched`, far enough beyond the stroke."""
+    settings = CheckSettings.current()
     flank = np.zeros((stages.count, len(stages.kernel.states)))
     if touched:
         flank[:, stages.kernel.cart_position] = 2 * np.asarray(stages.flat["joint.stroke"])
     if stages.structure.plays:  # the loop is open within a backlash
         flank[:, _motor_state(stages, 0)] = stages.flat[BACKLASH]
     moved = ((flank + step, flank - step) for step in _displaced_states(stages))
-    columns = [(stages.rates(ahead) - stages.rates(behind)) / (2 * STEP) for ahead, behind in moved]
+    columns = [
+        (stages.rates(ahead) - stages.rates(behind)) / (2 * settings.derivative_step_share) for ahead, behind in moved
+    ]
     return np.stack(columns, axis=2) / stages.scales[:, :, None]
 
 
 def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., np.ndarray]) -> np.ndarray:
-    """The same without friction but for its viscous share, one made `of_directions`, both; without the states of the
-    friction law."""
+    """The linear system while the stage slides: of friction, only its viscous share is left.
+
+    `of_directions` makes one share of those in the two directions. States of the friction law are left out.
+    """
+    settings = CheckSettings.current()
     kernel, flat = stages.kernel, stages.flat
     bodies = ("cart", "stage") if stages.structure.joint == "rigid" else ("cart",)
     mass = sum(np.asarray(flat.get(f"masses.{body}", 0.0)) for body in bodies)
@@ -191,8 +190,8 @@ def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., n
         unit = stages.scales[:, body]
         for k, step in enumerate(_displaced_states(stages)):
             change = _force(stages, step, output) - _force(stages, -step, output)
-            matrix[:, body, k] += change / (2 * STEP * own * unit)
-        both = [_viscous(stages, way * FAST * unit, output) for way in (1.0, -1.0)]
+            matrix[:, body, k] += change / (2 * settings.derivative_step_share * own * unit)
+        both = [_viscous(stages, way * settings.viscous_speed * unit, output) for way in (1.0, -1.0)]
         matrix[:, body, body] -= of_directions(both, axis=0) / own
     bristles = kernel.having(Role.BRISTLE)
     return np.delete(np.delete(matrix, bristles, 1), bristles, 2)

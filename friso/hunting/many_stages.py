@@ -7,7 +7,7 @@ Stages are given as flat keys to SI numbers, or to arrays of shape (count,) wher
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -33,12 +33,13 @@ from friso.hunting.motions import (
     run_motions,
     some_of,
 )
-from friso.hunting.verdict import RUNNING_AWAY
+from friso.hunting.rows import ArrayRows
+from friso.hunting.settings import CheckSettings
 from friso.hunting.what_attracts import surveyed_roughly
 
 
 @dataclass(frozen=True)
-class StageAttractors:
+class StageAttractors(ArrayRows):
     """What attracts each of many stages that swings for ever, arrays of shape (count,).
 
     Whether anything that `attracts` was found; whether that is `decided`, as every simulation that had to decide was
@@ -72,11 +73,6 @@ class StageAttractors:
             multiplier[k] = np.nan if orbit is None else orbit.multiplier[motion.number]
         swing = closed, amplitude, period, multiplier
         return cls(survey.attracts, survey.decided, certain, *swing, survey.target)
-
-    def take(self, numbers: np.ndarray) -> StageAttractors:
-        """What attracts the stages with these numbers, any of them as often as wanted."""
-        arrays = {entry.name: getattr(self, entry.name)[numbers] for entry in fields(self) if entry.name != "target"}
-        return StageAttractors(**arrays, target=self.target and self.target.of(numbers))
 
 
 def can_hunt(flat: Mapping[str, Any]) -> bool:
@@ -169,11 +165,11 @@ def judge_runs(
     run_options = measuring_options(rtol, threads, cancel)
     chosen = np.flatnonzero(decided & attracts)
     if target is not None and chosen.size:
-        targets = target.of(chosen)
+        targets = target.take(chosen)
         ends, completed, swing = ends_in(some_of(flat, chosen), chosen.size, targets, threads=threads, cancel=cancel)
         completed &= ~swings_seldom(targets, ends, swing)
         if winds_up_at_a_limit(stages):
-            completed &= ~(ends & (swing > RUNNING_AWAY * 2 * targets.amplitude))
+            completed &= ~(ends & (swing > CheckSettings.current().runaway_swing_factor * 2 * targets.amplitude))
         in_cycle[chosen], decided[chosen] = ends, completed
         settled = np.isfinite(motions.settling[chosen]) & (swing <= resting(flat, count)[chosen])
         restless = chosen[completed & ~ends & ~settled]

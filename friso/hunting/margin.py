@@ -14,17 +14,14 @@ from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.limits import SEARCH_LIMITS
-from friso.hunting.outward import AttractionEnd, BandwidthWindow, Beyond, Outward
+from friso.hunting.outward import AttractionEnd, BandwidthWindow, Beyond, EdgeSearch
 from friso.hunting.restabilised import windows_again
+from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import sketched, what_attracts
 from friso.stage import Stage
 
 LOWEST, HIGHEST = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
 """Bandwidths between which is searched, in units of that of the stage."""
-
-SIMULATED, AT_ONCE = 1e8, 8
-"""Work that simulations at bandwidths may take whose return maps are not resolved, and how many of these are done
-together."""
 
 
 @dataclass(frozen=True)
@@ -82,13 +79,12 @@ NOT_SOUGHT = SearchedBandwidths(None, ())
 
 def find_margin(stage: Stage, attracting: bool) -> Margin | None:
     """Find the edge of hunting of a stage, whose own motion plays no part: above its bandwidth the last edge, if
-    something is `attracting` it at that, else the next one below. None where there is none between `LOWEST` and
-    `HIGHEST`."""
+    something is `attracting` it at that, else the next one below. None where there is none in the range searched."""
     return search_bandwidths(stage, attracting).margin
 
 
 def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None = None) -> SearchedBandwidths:
-    """Where something attracts, over bandwidths from `LOWEST` to `HIGHEST`; `survey` is what attracts the stage itself,
+    """Where something attracts, over the bandwidths of `SEARCH_LIMITS`; `survey` is what attracts the stage itself,
     if that was surveyed. Where an allowance is used up, ends are where they are known to be by then, and not certain.
     """
     flat, crossover = stage.flat(), bandwidth(stage.flat())
@@ -153,12 +149,15 @@ class _Grid:
     def _survey(self, numbers: np.ndarray) -> None:
         """Sketch the stages at some factors, by number; those whose maps are not resolved are searched by simulations,
         the nearest to the stage itself first, as far as so much work suffices. Raises Exhausted."""
+        settings = EdgeSettings.current()
         sketch = sketched(self._stages(numbers))
         self.attracts[numbers], self.decided[numbers] = sketch.attracts, sketch.decided
         self.returns[numbers], self.resolved[numbers] = sketch.returns, sketch.decided
         left = numbers[~sketch.decided]
         left = left[np.argsort(np.abs(np.log(self.factors[left])), kind="stable")]
-        at_once, work = (AT_ONCE, SIMULATED) if sketch.decided.any() else (len(left), np.inf)
+        at_once, work = (
+            (settings.bandwidths_at_once, settings.simulated_work) if sketch.decided.any() else (len(left), np.inf)
+        )
         with allowance(work) as simulated:
             try:
                 for first in range(0, len(left), at_once):
@@ -225,7 +224,7 @@ class _Grid:
         """The end of what attracts at a factor (see `end`), which was not followed before. Raises Exhausted."""
         if not self.proved(at, ahead):
             return None
-        outward = Outward(self.flat, HIGHEST if ahead > 0 else LOWEST, self.settled)
+        outward = EdgeSearch(self.flat, HIGHEST if ahead > 0 else LOWEST, self.settled)
         try:
             end = outward.end(float(self.factors[at]), tuple(self.motions[at]), float(self.factors[at + ahead]))
         except Beyond:
@@ -260,7 +259,7 @@ class _Grid:
                 end = np.flatnonzero(~self.attracts[behind])
                 some = [k for k in behind[: end[0] if end.size else None].tolist() if k not in self.inspected]
                 if some:
-                    self._inspect(np.array(some[:AT_ONCE]))
+                    self._inspect(np.array(some[: EdgeSettings.current().bandwidths_at_once]))
         return bool(self.attracts[at])
 
     def _inspect(self, numbers: np.ndarray) -> None:

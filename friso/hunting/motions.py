@@ -14,23 +14,19 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
-from friso.hunting.attractors.rounds import RESOLVED, loose_from
+from friso.hunting.attractors.rounds import loose_from
+from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.criteria import BAND, COUNTED_ABOVE, lasts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import wait
 from friso.hunting.measures import Measures, measure_runs
+from friso.hunting.rows import ArrayRows
+from friso.hunting.settings import CheckSettings
 from friso.hunting.turning import HALF, WINDOW
-
-LONG, SWINGS = 1000.0, 120.0
-"""Time [s] for which a motion that has not settled at its end is followed at least, and how many of the longest waits:
-those at the least distance from which the stage breaks away."""
-
-STEADY = 0.01
-"""Share by which the swing of a motion that neither grows nor decays changes over a quarter of the run."""
 
 
 @dataclass(frozen=True)
-class Motions:
+class Motions(ArrayRows):
     """How the stages' own motions went, arrays of shape (count,): whether they were `completed`, or ran `away` from the
     reference, the thesis's `peaks`, peak to peak of the last quarter, `swing` [m], and the time from the last corner of
     the reference until they stay within 10 um, `settling` [s] (NaN: not within the run)."""
@@ -51,10 +47,6 @@ class Motions:
     def _arrays(self) -> tuple[np.ndarray, ...]:
         return self.completed, self.away, self.peaks, self.swing, self.settling
 
-    def take(self, numbers: np.ndarray) -> Motions:
-        """Those of the stages with these numbers."""
-        return Motions(*(array[numbers] for array in self._arrays))
-
 
 def run_motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) -> Motions:
     """The motions of stages of one structure, run and measured."""
@@ -68,7 +60,7 @@ def run_motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) ->
 
 @dataclass(frozen=True)
 class FollowedMotions:
-    """Of motions of stages without an attracting cycle, arrays of shape (count,): whether they have come to rest at
+    """Motions of stages without an attracting cycle, arrays of shape (count,): whether they have come to rest at
     their end, within 10 um of the reference; which are still `moving`, as they have not, or swing within that; the time
     [s] after which they rest, if they are followed for long (NaN: not then either, or unknown); whether they swing on
     `steady`, neither settling nor decaying; for how long they were `followed` [s] (NaN: no longer than their end, or
@@ -90,9 +82,10 @@ class FollowedMotions:
 
     def follow(self, which: np.ndarray, flat: Mapping[str, Any], count: int, run_options: RunOptions) -> None:
         """Follow the motions with the numbers `which`, those of the stages `flat`, for long. Raises Exhausted."""
+        settings = CheckSettings.current()
         stages = Ensemble.held(flat, count, form=shared_structure(flat))
-        waits = SWINGS * wait(stages, loose_from(stages))
-        lasts_for = np.maximum(np.maximum(LONG, flat["motion.duration"]), waits)
+        waits = settings.least_followed_waits * wait(stages, loose_from(stages))
+        lasts_for = np.maximum(np.maximum(settings.least_followed_time, flat["motion.duration"]), waits)
         long = {**flat, "motion.duration": lasts_for + last_corner(flat)}
         last = run_motions(long, count, replace(run_options, window=WINDOW))
         done = last.completed.copy()
@@ -101,7 +94,7 @@ class FollowedMotions:
             done[swinging] = half.completed
             swing = last.swing[swinging]
             self.steady[which[swinging]] = half.completed & lasts(
-                swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY)
+                swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + settings.steady_motion_share)
             )
         self.followed[which], self.away[which] = np.where(done, lasts_for, np.nan), last.away
         after = np.where(self.rests[which], self.after[which], last.settling)
@@ -131,7 +124,7 @@ def followed_motions(
 
 def resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
     """The swings, peak to peak [m], up to which stages of one structure are at rest, shape (count,)."""
-    return 2 * RESOLVED * Ensemble.held(flat, count, form=shared_structure(flat)).length
+    return 2 * SurveySettings.current().least_swing * Ensemble.held(flat, count, form=shared_structure(flat)).length
 
 
 def some_of(columns: Mapping[str, Any], which: np.ndarray) -> dict[str, Any]:

@@ -1,5 +1,9 @@
-"""Where attraction ends: closed orbits followed through the bandwidth to their own ends, one after the other, until
-nothing attracts just beyond."""
+"""The edge of hunting in bandwidth: the factor at which what attracts a stage ceases to.
+
+A closed orbit is followed through the bandwidth to its end: a flip, a fold, or where it is lost. Just beyond that end
+something else may attract; then its orbit is followed in turn, until nothing attracts. Where no orbit can be followed,
+surveys at bandwidths between the last one with an attractor and the next one without close in on the edge.
+"""
 
 from __future__ import annotations
 
@@ -16,46 +20,16 @@ from friso.hunting.attractors.survey import Swinging
 from friso.hunting.boundary.branch import END_OF_RANGE, REACHED, Point, Tracer
 from friso.hunting.boundary.locate import Bifurcation, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import has_a_map, what_attracts
-
-PACE, FIRST_STEP, SHORTEST_STEP = 3.0, 0.03, 5e-4
-"""How much faster branches are followed than where they are drawn, and their first and shortest steps, changes of the
-logarithm of the bandwidth."""
-
-FLIP_STEP, FOLD_STEP = 1e-4, 1e-3
-"""Steps along a branch that end the search for a flip or a torus, and for a fold, where the bandwidth changes with the
-square of it."""
-
-ROUGH_STEP = 2e-3
-"""The shortest of all steps where a limiter chatters, which makes multipliers rough."""
-
-BEYOND = 1.0095
-"""How far beyond the end of an orbit nothing may attract, as a factor: an edge, rounded to four digits, is known to a
-hundredth."""
 
 FARTHER = np.array([1.03, 1.06])
 """Factors beyond the end of an orbit at which it is looked whether something attracts again: windows that nothing
 followed leads to lie there most often, and are narrower than the steps of a search through all bandwidths."""
 
-NARROW = 1e-3
-"""Share of the bandwidth below which a window is narrow."""
-
-HOPS = 8
-"""Orbits that are followed one after the other at most: beyond the end of one another may attract."""
 
 ALONG = 1 + np.array([-0.08, -0.04, -0.02, -0.01, -0.005, -0.0025, 0.0, 0.0025, 0.005, 0.01, 0.02, 0.04, 0.08])
 """Distances from which a motion is followed from one bandwidth to the next, in units of its own."""
-
-BRACKET = 0.02
-"""Widest share of a bandwidth between one at which something attracts and one at which nothing does, for an edge that
-no orbit was followed to."""
-
-FINER = 5
-"""Bandwidths between the two that enclose the end at which it is looked where no orbit can be followed."""
-
-REACH = 0.06
-"""Change of the logarithm of the bandwidth over which what attracts is looked for beyond where the search took nothing
-to attract; twice as much each time that it goes on."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +58,9 @@ class BandwidthWindow:
 
     @property
     def narrow(self) -> bool:
-        """Whether no machine holds its bandwidth so exactly that it would stay in there (see `NARROW`)."""
-        return bool(self.low and self.high and self.high.inside < self.low.inside * (1 + NARROW))
+        """Whether no machine holds its bandwidth so exactly that it would stay in there."""
+        settings = EdgeSettings.current()
+        return bool(self.low and self.high and self.high.inside < self.low.inside * (1 + settings.narrow_window_share))
 
     def holds(self, factor: float) -> bool:
         """Whether something attracts at a factor."""
@@ -95,8 +70,7 @@ class BandwidthWindow:
 
 @dataclass
 class _Place:
-    """What is known on the way to an end: motions that attract at a factor, `at`, and one at which nothing seems to,
-    `outside`."""
+    """How far a search has come: motions that attract `at` a factor, and a factor `outside` where nothing seems to."""
 
     at: float
     motions: tuple[Swinging, ...]
@@ -108,9 +82,11 @@ class Beyond(Exception):
 
 
 @dataclass(frozen=True)
-class Outward:
-    """The search for the end of what attracts a stage, given as flat keys, from a bandwidth towards the `farthest` one
-    (factors). Nothing attracts at the one that is `settled`, if any: a window beyond it is another one."""
+class EdgeSearch:
+    """The search for an edge of hunting of a stage, given as flat keys, towards the `farthest` factor of its bandwidth.
+
+    Nothing attracts at the factor `settled`, if any: what attracts beyond it belongs to another window.
+    """
 
     flat: Mapping[str, Any]
     farthest: float
@@ -127,8 +103,8 @@ class Outward:
             return AttractionEnd(place.at, place.outside, False)
 
     def _followed_to_the_end(self, place: _Place) -> AttractionEnd:
-        """The end of what attracts at a place, which holds what is known on the way."""
-        for _ in range(HOPS):
+        """Follow orbits from a place to the edge; the place is kept up to date, so that it tells how far that came."""
+        for _ in range(EdgeSettings.current().most_orbits_followed):
             orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
             if orbit is None:
                 return self._bracketed(place)
@@ -144,8 +120,11 @@ class Outward:
         return self._bracketed(place)
 
     def _proved(self, next_to: float, farther: np.ndarray, distances: np.ndarray) -> tuple[np.ndarray, Attractors]:
-        """The factors at which it is told what attracts, and what: the one next to an end, and those farther off; of
-        stages without a map only those of these at which simulations alone show that something does."""
+        """Look for attractors beyond the end of an orbit: next to it, and at the factors farther off.
+
+        Returns the factors that were searched, and what attracts there. Without a map, factors farther off are only
+        searched if a simulation shows that something attracts.
+        """
         if farther.size and not has_a_map(self._stages(farther)):
             seen = attractors(self._stages(farther), cycles=False)
             decided, farther = bool(seen.decided[~seen.attracts].all()), farther[seen.attracts]
@@ -158,7 +137,7 @@ class Outward:
     def _just_beyond(self, end: float) -> tuple[float, np.ndarray]:
         """The factor next to the end of an orbit, at which nothing may attract, and those farther off."""
         ahead = self._ahead(end)
-        next_to, farther = end * BEYOND**ahead, end * FARTHER**ahead
+        next_to, farther = end * EdgeSettings.current().beyond_edge_factor ** ahead, end * FARTHER**ahead
         if self.settled is not None and ahead * (self.settled - end) > 0:
             next_to = _nearer(ahead, next_to, self.settled)
         if ahead * (next_to - self.farthest) > 0:
@@ -169,12 +148,16 @@ class Outward:
         return next_to, farther[within]
 
     def _bracketed(self, place: _Place) -> AttractionEnd:
-        """The end of what attracts where no orbit can be followed to it, between the last of some factors at which
-        something does and the next one; again between these, until both are close together."""
-        reach, ahead = REACH, self._ahead(place.at)
+        """Close in on the edge by surveys where no orbit can be followed to it.
+
+        Of several factors, the edge lies between the last at which something attracts and the next one; the search is
+        repeated between these two until they are close together.
+        """
+        settings = EdgeSettings.current()
+        reach, ahead = settings.reach_log, self._ahead(place.at)
         place.outside = _nearer(ahead, place.outside, self.farthest)
         while True:
-            factors = np.geomspace(place.at, place.outside, FINER + 2)[1:]
+            factors = np.geomspace(place.at, place.outside, settings.bracket_steps + 2)[1:]
             survey = self._told(factors, np.outer([motion.distance for motion in place.motions], ALONG).ravel())
             attracts = np.flatnonzero(survey.attracts)
             if attracts.size:
@@ -188,7 +171,7 @@ class Outward:
                 continue
             place.outside = float(factors[last])
             end = AttractionEnd(place.at, place.outside, bool(survey.decided[last:].all()))
-            if end.reserve <= BRACKET:
+            if end.reserve <= settings.edge_bracket_share:
                 return replace(end, certain=end.certain and self._surely_attracts(place))
 
     def _surely_attracts(self, place: _Place) -> bool:
@@ -214,12 +197,13 @@ class Outward:
     def _still_ahead(self, at: float, outside: float) -> float:
         """A factor at which nothing attracts; where it was passed, one ahead instead."""
         ahead = self._ahead(at)
-        return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * REACH))
+        return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * EdgeSettings.current().reach_log))
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
     def followed(self, at: float, orbit: Swinging) -> tuple[float, float]:
         """The last factor at which a closed orbit attracts, found at `at`, and the distance [m] at which the stage
         sticks there. Raises Beyond where it attracts as far as the search goes."""
+        settings = EdgeSettings.current()
         ahead, cycles = self._ahead(at), orbit.cycles
         assert cycles is not None
 
@@ -228,15 +212,19 @@ class Outward:
 
         length = abs(float(np.log(self.farthest / at)))
         chatters = Ensemble.held(self.flat, 1).chatters
-        shortest, flip = (ROUGH_STEP, ROUGH_STEP) if chatters else (SHORTEST_STEP, FLIP_STEP)
+        shortest, flip = (
+            (settings.chattering_edge_step, settings.chattering_edge_step)
+            if chatters
+            else (settings.shortest_edge_step, settings.flip_search_step)
+        )
         tracer = Tracer(
             family,
             cycles.sign,
             farthest=length,
             swings=cycles.swings,
-            pace=PACE,
+            pace=settings.edge_pace,
             shortest=shortest,
-            first=FIRST_STEP,
+            first=settings.first_edge_step,
         )
         start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
         farthest = start
@@ -251,7 +239,9 @@ class Outward:
         if points and not abs(points[-1].multiplier) < 1 and reason in (REACHED, END_OF_RANGE):
             first, second = ([start, *points])[-2:]
             kind = _kind(first, second)
-            last = last_inside(tracer, first, second, kind, max(flip, FOLD_STEP) if kind == "fold" else flip)
+            last = last_inside(
+                tracer, first, second, kind, max(flip, settings.fold_search_step) if kind == "fold" else flip
+            )
             farthest = max(farthest, last or first, key=lambda point: point.place)
         elif tracer.reaches(points, reason):
             raise Beyond

@@ -11,24 +11,13 @@ import numpy as np
 from friso.engine.allowance import Exhausted
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import surely_surveyed
+from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import surveyed_roughly, what_attracts
 
 SHARES = np.array([0.04, 0.08, 0.13, 0.19, 0.28, 0.42, 0.65, 1.0])
 """Values that are tried first on either side of the stage's own, as shares of the logarithm of the farthest factor:
 closest together where a machine may well be, and as many as are run at once on most processors."""
 
-FINER = 5
-"""Into how many steps a range is divided in which hunting seems to begin or end."""
-
-OFF, SAME = (0.02, 0.06), 1e-6
-"""How far from where hunting seems to end the values lie that are searched thoroughly, where something attracts and
-where nothing does, and by how much two values differ that are the same, all as logarithms of factors."""
-
-CLOSE = 0.03
-"""Widest share between two neighbouring values where what attracts changes."""
-
-PROOFS = 6
-"""How often both ends are searched thoroughly at most, once for every end at which a rough survey was wrong."""
 
 WITHIN = np.array([2, 4])
 """Numbers of the values, from the stage's own outward, that are searched thoroughly where a rough survey finds no
@@ -57,9 +46,11 @@ class MarginEnd:
 
 @dataclass(frozen=True)
 class ParameterMargin:
-    """Where hunting begins, of a stage that nothing attracts, or ends, of one that something `attracts`: the nearest
-    values of a parameter `below` and `above` its own, in units of that (None: none of those tried between it and the
-    end of the `range`). Of a side in `open_sides`, -1 or 1, it is not known."""
+    """How far a parameter of a stage may change before hunting ends, if something `attracts` the stage, or begins.
+
+    `below` and `above` are the nearest factors of the parameter at which it does (None: at no factor tried up to the
+    end of the `range`). On the `open_sides`, -1 or 1, that is not known.
+    """
 
     attracts: bool
     below: MarginEnd | None
@@ -86,22 +77,29 @@ def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: flo
     thoroughly. So ranges narrower than these steps may be missed. Where an allowance is used up, or that does not
     decide, a side is open.
     """
+    settings = EdgeSettings.current()
     ends: dict[int, MarginEnd | None] = {-1: None, 1: None}
     open_sides = []
     for side, farthest in ((-1, lowest), (1, highest)):
-        if side * (farthest - 1) <= CLOSE:
+        if side * (farthest - 1) <= settings.widest_factor_step:
             continue
         try:
             ends[side] = _Side(scaled, attracts, farthest).end()
         except (Exhausted, Undecided):
             open_sides.append(side)
-    searched = lowest if lowest < 1 - CLOSE else 1.0, highest if highest > 1 + CLOSE else 1.0
+    searched = (
+        lowest if lowest < 1 - settings.widest_factor_step else 1.0,
+        highest if highest > 1 + settings.widest_factor_step else 1.0,
+    )
     return ParameterMargin(attracts, ends[-1], ends[1], searched, tuple(open_sides))
 
 
 class _Side:
-    """Factors of a parameter on one side of the stage's own, from 1 outward: at which of them what attracts has
-    `changed`, of which that is `decided`, which were `searched` thoroughly, and of which of these it is `certain`."""
+    """Factors of a parameter on one side of its own value, from 1 outward, and what is known at each.
+
+    Whether hunting has `changed`, begun or ended; whether that is `decided`; whether the stage there was `searched`
+    thoroughly; and whether that made it `certain`.
+    """
 
     def __init__(self, scaled: Scaled, attracts: bool, farthest: float) -> None:
         """Survey some factors roughly. Raises Exhausted."""
@@ -112,7 +110,7 @@ class _Side:
 
     def end(self) -> MarginEnd | None:
         """Where what attracts changes first; None if it does nowhere. Raises Exhausted, and Undecided."""
-        for _ in range(PROOFS):
+        for _ in range(EdgeSettings.current().most_proofs):
             first = self._bracketed()
             pair = WITHIN if first is None else self._pair(first)
             self._search(pair[~self.searched[pair]])
@@ -132,24 +130,30 @@ class _Side:
     def _bracketed(self) -> int | None:
         """The number of the first factor at which it has changed, once others close to it were tried; None if it has
         nowhere."""
+        settings = EdgeSettings.current()
         while (changed := np.flatnonzero(self.changed)).size:
             first = int(changed[0])
-            if abs(self.factors[first] / self.factors[first - 1] - 1) <= CLOSE:
+            if abs(self.factors[first] / self.factors[first - 1] - 1) <= settings.widest_factor_step:
                 return first
             self._try(self._finer(first))
         return None
 
     def _finer(self, first: int) -> np.ndarray:
         """Factors between the first at which it has changed and the one before it."""
-        return np.geomspace(self.factors[first - 1], self.factors[first], FINER + 1)[1:-1]
+        settings = EdgeSettings.current()
+        return np.geomspace(self.factors[first - 1], self.factors[first], settings.bracket_steps + 1)[1:-1]
 
     def _pair(self, first: int) -> np.ndarray:
-        """The numbers of two factors about the first at which it has changed, as far off as `OFF` says: next to where
-        hunting ends motions take long to die out, and a rough survey may be wrong. New ones are surveyed roughly."""
-        inward, outward = OFF if self.attracts else OFF[::-1]
+        """Choose the two factors, by number, that are searched thoroughly about the first one that has changed.
+
+        They lie as far off it as `proved_distances` says: next to where hunting ends motions take long to die out, and
+        a rough survey may be wrong. Factors that are new are surveyed roughly.
+        """
+        settings = EdgeSettings.current()
+        inward, outward = settings.proved_distances if self.attracts else settings.proved_distances[::-1]
         places, farthest = np.abs(np.log(self.factors)), abs(np.log(self.factors[-1]))
         wanted = np.clip([places[first - 1] - inward, places[first] + outward], 0.0, farthest)
-        new = [place for place in wanted if np.abs(places - place).min() > SAME]
+        new = [place for place in wanted if np.abs(places - place).min() > settings.same_factor_log]
         if new:
             self._try(np.exp(np.sign(np.log(self.factors[-1])) * np.array(new)))
         places = np.abs(np.log(self.factors))

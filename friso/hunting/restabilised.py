@@ -24,15 +24,9 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles, families
 from friso.hunting.cycle.shooting import Family
 from friso.hunting.outward import AttractionEnd, BandwidthWindow
+from friso.hunting.settings import EdgeSettings, ToleranceSettings
 
-PACE, SHORTEST, STEEPEST = 8.0, 1e-5, 1000.0
-"""How much faster branches are followed than where they are drawn, their shortest step, and the multiplier up to which
-they are."""
-
-LEAST_ERROR = 1e-5
-"""Share of a bandwidth up to which an end of a window is known at best."""
-
-RTOL = 1e-7
+RTOL = ToleranceSettings().survey_rtol
 """Relative tolerance of the runs."""
 
 Stretch = tuple[tuple[float, float], tuple[float, float] | None]
@@ -45,6 +39,7 @@ def windows_again(
     """Windows `besides` some others in which a cycle attracts that repels at a factor of the bandwidth, `at`, where
     nothing attracts, on its way to the farthest factor; none where a limiter chatters, which makes multipliers rough,
     and no more once an allowance is used up."""
+    settings = EdgeSettings.current()
     ahead, form = 1.0 if farthest > at else -1.0, shared_structure(flat)
 
     def factor(place: float | np.ndarray) -> Any:
@@ -55,7 +50,7 @@ def windows_again(
 
     def end(place: float, error: float, outward: float) -> AttractionEnd:
         inside = float(factor(place))
-        return AttractionEnd(inside, inside * (1 + max(LEAST_ERROR, error)) ** (ahead * outward), False)
+        return AttractionEnd(inside, inside * (1 + max(settings.least_window_error, error)) ** (ahead * outward), False)
 
     windows: list[BandwidthWindow] = []
     with allowance(), suppress(Exhausted):
@@ -81,7 +76,17 @@ def _ranges(family: Family, farthest: float) -> Iterator[Stretch]:
 def restabilised(family: Family, cycle: Cycles, farthest: float) -> Iterator[Stretch]:
     """Where a single cycle that repels at place 0 of a family of stages attracts, as far as the farthest place, or to
     where its branch first turns back or is lost."""
-    tracer = Tracer(family, cycle.sign, RTOL, farthest, cycle.swings, pace=PACE, shortest=SHORTEST, steepest=STEEPEST)
+    settings = EdgeSettings.current()
+    tracer = Tracer(
+        family,
+        cycle.sign,
+        RTOL,
+        farthest,
+        cycle.swings,
+        pace=settings.window_pace,
+        shortest=settings.shortest_window_step,
+        steepest=settings.steepest_window_multiplier,
+    )
     start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycle)
     points, reason = tracer.walk(start, 1.0, lambda last, point: point.place < last.place)
     branch = Branch(cycle.sign, (start, *points), (reason, reason))

@@ -13,9 +13,7 @@ from friso.engine.cache import CodeRequest, code_digest
 from friso.engine.kinds import ArrayKind
 from friso.engine.machine_code import Loops, load_object
 from friso.hunting import turning
-
-COMPILED_FROM = 100
-"""Turning points, of all runs together, from which on the compiled loops are loaded; they take as long as so many."""
+from friso.hunting.settings import CheckSettings
 
 _FLAT, _SQUARE = ArrayKind("float64", 1), ArrayKind("float64", 2)
 _COUNTS, _MARKS = ArrayKind("int64", 1), ArrayKind("bool", 2)
@@ -25,7 +23,7 @@ KINDS = (_SQUARE, _SQUARE, _COUNTS, _FLAT, _FLAT, _COUNTS, _MARKS, _MARKS, _FLAT
 
 @dataclass(frozen=True)
 class Turns:
-    """Of runs: which turning points are counted `peaks` and which `distinct` ones, shape (runs, room) (see
+    """What turning points tell of runs: which are counted `peaks` and which `distinct` ones, shape (runs, room) (see
     `friso.hunting.criteria.peak_count`); the `period` of the swing [s] (NaN: none), when it `turned` for the last time
     [s] (-inf: never), and peak to peak of the last half of the run, `earlier` [m], shape (runs,) (see
     `friso.hunting.criteria.run_outcome`)."""
@@ -46,12 +44,13 @@ def scan_turning_points(
     `swing` [m], shape (runs,), is the peak-to-peak deviation of the last quarter, of which legs of a half or more make
     the period: ringing on top of it does not count. `ended` [s], shape (runs,), is the end of each run.
     """
+    settings = CheckSettings.current()
     runs = len(counts)
     arrays = tuple(map(np.ascontiguousarray, (times, values, counts, swing, ended)))
     kinds = np.zeros(times.shape[1], np.int64)
     peaks, distinct = (np.zeros(times.shape, np.bool_) for _ in range(2))
     period, turned, earlier = (np.empty(runs) for _ in range(3))
-    scan_runs: Callable[..., None] = turning.run if counts.sum() < COMPILED_FROM else _compiled()
+    scan_runs: Callable[..., None] = turning.run if counts.sum() < settings.compiled_from_points else _compiled()
     scan_runs(*arrays, kinds, peaks, distinct, period, turned, earlier)
     return Turns(peaks, distinct, period, turned, earlier)
 

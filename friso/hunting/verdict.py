@@ -13,8 +13,8 @@ from friso.equations.bandwidth import faster
 from friso.equations.motion import last_corner
 from friso.hunting.attractors import Target
 from friso.hunting.attractors.rounds import RTOL
+from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.basin import (
-    MOVES,
     Kick,
     MoveShare,
     displacements_that_hunt,
@@ -39,31 +39,19 @@ from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths, followe
 from friso.hunting.measures import Measures, measuring_options
 from friso.hunting.motions import Motions, followed_motions, keeps_moving, resting, run_motions
 from friso.hunting.outward import AttractionEnd, BandwidthWindow
+from friso.hunting.settings import BasinSettings, CheckSettings
 from friso.hunting.what_attracts import resolved_map
 from friso.stage import Stage
 
 MOVING = "the reference never stands still"
 """Why a stage whose reference is a ramp does not hunt: it may stick and slip, but not about a place."""
 
-WORK = 8e8
-"""Work of a check (see `friso.engine.allowance`): about 10 s on one core."""
-
-SURVEY, REST, KICKS = 0.4, 0.3, 0.3
-"""Shares of the work of a verdict that the search for what attracts the stage may use at most, and of what that leaves
-those for following a motion that has not come to rest, and for kicks and moves; the search for the edge of hunting may
-use all that is left then."""
-
-AGAIN = 1.5e8
-"""Work beside that of a check in which cycles are followed beyond the edge of hunting."""
-
-FARTHER = 12.0
-"""How many times as long a motion is followed that still swings by less than what attracts."""
 
 LEFT_OVER = "not every motion that kept swinging was followed to its end: this one may end in another swing"
 """Why it is not certain that a motion comes to rest which does not end in what attracts."""
 
 SWINGS_ON = "this motion was still swinging when it was given up, by less than half of what was found to attract"
-"""The same where it has been seen not to have done so."""
+"""Why it is not certain that a motion comes to rest which was seen to swing on."""
 
 STILL_SWINGS = "this motion still swings a little at the end of the longest run, but nothing was found that attracts"
 
@@ -75,20 +63,15 @@ UNFOLLOWED = (
 CHANGED = 1 + np.array([0.0, -1e-5, -1e-6, -1e-7, 1e-7, 1e-6, 1e-5])
 """Masses, as multiples of the stage's own, with which its motion is run: no machine is known as closely."""
 
-RUNNING_AWAY = 2.0
-"""How many times as far as what attracts, peak to peak, a motion swings at its end that does not end there."""
 
 RUNS_AWAY = "this motion swings much farther at its end than what was found to attract, and may run away"
-"""Why it is not certain that such a motion hunts as is said."""
+"""Why it is not certain that a motion hunts which swings much farther than what attracts."""
 
 BY_CHANCE = "a change of its mass by a hundred-thousandth, or rounding, decides whether this motion ends in hunting"
 """Why it is not certain how a motion ends that ends otherwise with some of these masses."""
 
 UNCHECKED = "runs with hardly different masses, which show whether chance decides how this motion ends, were given up"
-"""The same where it is not known whether it does."""
-
-ROOM = 1 << 14
-"""Room for turning points of a motion that is followed for long: one that needs more is run again."""
+"""Reason given when the runs with changed masses were not completed."""
 
 
 class CheckPart(StrEnum):
@@ -106,6 +89,17 @@ class CheckPart(StrEnum):
     LOWER_BANDWIDTHS = "lower bandwidths"
     FRICTION = "other static friction"
     FEEDING = "what feeds it"
+
+    @property
+    def progress_word(self) -> str:
+        """What the user reads while this part is computed: words of the glossary."""
+        return _PROGRESS_WORDS.get(self, self.value)
+
+
+_PROGRESS_WORDS = {
+    CheckPart.BANDWIDTHS: "edge of hunting in bandwidth",
+    CheckPart.FRICTION: "margin in static friction",
+}
 
 
 PARTS = CheckPart.ATTRACTION, CheckPart.STARTS, CheckPart.BANDWIDTHS
@@ -157,8 +151,8 @@ def judge(
     stage: Stage,
     ran: Measures,
     rtol: float,
-    begin: Callable[[str], None] = lambda label: None,
-    work: float = WORK,
+    begin: Callable[[CheckPart], None] = lambda part: None,
+    work: float | None = None,
     tell: Callable[[Verdict], None] = lambda verdict: None,
 ) -> Judgement:
     """The verdict on a stage whose motion was run and measured at a relative tolerance.
@@ -167,11 +161,15 @@ def judge(
     was computed for it: kicks and other bandwidths follow, and a cycle that is followed here from another bandwidth may
     still contradict it. What cannot be settled by so much `work` (see `friso.engine.allowance`) is not certain.
     """
+    settings = CheckSettings.current()
+    work = settings.check_work if work is None else work
     motions = Motions.of(ran)
     begin(CheckPart.ATTRACTION)
     with allowance() as spent:
         moves_on = keeps_moving(stage.flat()) and not cannot_hunt(stage)
-        attraction = Hunting((), MOVING, True, None) if moves_on else hunting(stage, work=SURVEY * work)
+        attraction = (
+            Hunting((), MOVING, True, None) if moves_on else hunting(stage, work=settings.survey_work_share * work)
+        )
     if not motions.completed[0]:
         return Judgement("failed", attraction, runs_away=bool(motions.away[0]) and leaves_for_good(stage))
     if attraction.target:
@@ -188,9 +186,13 @@ def _without_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
-    with allowance(REST * work) as spent:
+    with allowance(CheckSettings.current().rest_work_share * work) as spent:
         rest = followed_motions(
-            stage.flat(), motions, 1, replace(measuring_options(rtol), room=ROOM), possible=attraction.possible
+            stage.flat(),
+            motions,
+            1,
+            replace(measuring_options(rtol), room=SurveySettings.current().run_turning_points),
+            possible=attraction.possible,
         )
     if rest.away[0] and leaves_for_good(stage):
         return Judgement("failed", attraction, runs_away=True)
@@ -231,24 +233,25 @@ def _with_a_target(
     motions: Motions,
     attraction: Hunting,
     target: Target,
-    begin: Callable[[str], None],
+    begin: Callable[[CheckPart], None],
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
+    settings = CheckSettings.current()
     with allowance() as spent:
-        own = own_motion(stage, target, REST * work)
+        own = own_motion(stage, target, settings.rest_work_share * work)
         if not own.completed:
             return Judgement("failed", attraction, runs_away=_runs_away(stage, target) and leaves_for_good(stage))
         within = float(motions.settling[0])
         doubt = "" if own.ends else _restless(stage, attraction, own.swing, within)
         doubt = own.doubt or doubt
-        if own.ends and own.swing > RUNNING_AWAY * _widest(attraction):
+        if own.ends and own.swing > settings.runaway_swing_factor * _widest(attraction):
             doubt = RUNS_AWAY
         word = verdicts(np.ones(1, bool), np.ones(1, bool), np.array([own.ends]), np.zeros(1, bool))[0]
         if attraction.certain and not doubt:
             tell(word)
         begin(CheckPart.STARTS)
-        starts, started = _starts(stage, attraction, target, KICKS * work)
+        starts, started = _starts(stage, attraction, target, settings.kick_work_share * work)
     begin(CheckPart.BANDWIDTHS)
     sought, given_up = _sought(stage, attraction, work - spent.used)
     sought = _as_sure(stage, sought, attraction)
@@ -279,6 +282,7 @@ class OwnMotion:
 def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     """Where the stage's own motion ends (see `ends_in`). One that still swings then, by less than what attracts, or
     less often, is followed for longer, if that takes no more than so much work: it may be dying out."""
+    settings = CheckSettings.current()
     flat = stage.flat()
     changed = {key: value * CHANGED for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
     ends, completed, swing = ends_in({**flat, **changed}, len(CHANGED), target)
@@ -286,7 +290,9 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     own = OwnMotion(ends[0], completed[0], float(swing[0]), doubt)
     if own.ends or own.doubt or not own.completed or own.swing <= resting(flat)[0]:
         return own
-    longer = replace(target, early=FARTHER * target.lasting, lasting=FARTHER * target.lasting)
+    longer = replace(
+        target, early=settings.small_swing_factor * target.lasting, lasting=settings.small_swing_factor * target.lasting
+    )
     try:
         with allowance(work):
             last = OwnMotion(*(column[0] for column in ends_in(flat, 1, longer)))
@@ -312,10 +318,11 @@ def _starts(
     stage: Stage, attraction: Hunting, target: Target, work: float
 ) -> tuple[tuple[Kick | None, Kick | None, MoveShare | None], tuple[CheckPart, ...]]:
     """Which kicks and moves start hunting, as far as so much work shows, and what of that had to be given up."""
+    settings = CheckSettings.current()
     starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
     if attraction.passing:  # what swings less at its end may be passing as well
         return starts, ()
-    widest = np.inf if attraction.lower_gains is None else RUNNING_AWAY * _widest(attraction)
+    widest = np.inf if attraction.lower_gains is None else settings.runaway_swing_factor * _widest(attraction)
     try:
         with allowance(work):
             surveyed = attraction.surveyed
@@ -345,7 +352,7 @@ def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare
     """Whether no kick or no move of one kind was seen to start hunting, and runs of that kind were not completed."""
     kicks = [kick for kick in (displacement, push) if kick]
     lost = any(kick.unknown and not kick.windows for kick in kicks)
-    return lost or (moved is not None and not moved.hunting and moved.count < MOVES)
+    return lost or (moved is not None and not moved.hunting and moved.count < BasinSettings.current().drawn_moves)
 
 
 def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[CheckPart, ...]]:
@@ -353,14 +360,14 @@ def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBan
     attracting = attraction.target is not None
     with allowance(work) as search:
         sought = search_bandwidths(stage, attracting, attraction.surveyed)
-    with allowance(AGAIN):
+    with allowance(CheckSettings.current().beyond_edge_work):
         sought = followed_on(stage, sought)
     left = CheckPart.LOWER_BANDWIDTHS if sought.to_the_top else CheckPart.BANDWIDTHS
     return sought, (left,) if search.exhausted or sought.undecided else ()
 
 
 def _as_sure(stage: Stage, sought: SearchedBandwidths, attraction: Hunting) -> SearchedBandwidths:
-    """The same, no edge more certain than the verdict, nor certain where the stage may run away beyond it."""
+    """Make the ends found by a search no more certain than the verdict, and uncertain where the stage may run away."""
 
     def sure(end: AttractionEnd) -> bool:
         if not (end.certain and attraction.certain):

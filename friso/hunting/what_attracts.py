@@ -20,18 +20,17 @@ from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_map
 from friso.hunting.return_map.confirmed import runs_land_as_foretold
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.mapped import Mapped, map_stages
+from friso.hunting.return_map.settings import ReturnMapSettings
+from friso.hunting.rows import ArrayRows
+from friso.hunting.settings import ToleranceSettings
 from friso.stage.standstill import dead_band
 
 SKETCH_DISTANCES = np.concatenate([[0.003], np.geomspace(0.02, 3.0, 14)])
 """Distances at which stages are stuck at first for a sketch, in units of the deflection of the loop by the break-away
 force."""
 
-HARDLY, FEW = 0.95, 4
-"""Where an attractor of a sketch is not trusted: a larger share of a deviation than `HARDLY` remains when it repeats
-itself, or fewer of the map's points than `FEW` come to it. Of the sketched attractors of the thesis's rig, over
-bandwidth and static friction, 51 of 149 with a larger share did not attract, and 2 of all others."""
 
-SKETCH_RTOL = 1e-5
+SKETCH_RTOL = ToleranceSettings().sketch_rtol
 """Relative tolerance of the runs of a sketch."""
 
 
@@ -68,7 +67,7 @@ def what_attracts(
 
 
 @dataclass(frozen=True)
-class _Cycles:
+class _Cycles(ArrayRows):
     """The cycles of stages that Newton's method closes from their maps at rest, and distances [m], shape (count, n), in
     motions that those hold which repel, NaN where there is none."""
 
@@ -82,8 +81,7 @@ class _Cycles:
         return cls(cycles, np.hstack([held_beside(stages, family) for family in cycles]))
 
     def beside(self, survey: MapSurvey, numbers: np.ndarray) -> _Cycles:
-        """These cycles of the stages with some numbers, with the motions that the orbits hold which were closed from
-        attractors of their maps, but repel."""
+        """Add the motions held by unstable orbits that a survey of maps closed, of the stages with some numbers."""
         more = [np.full((len(numbers), 1), np.nan)]
         for motion in survey.repelling:
             if motion.cycles is not None and (rows := np.flatnonzero(numbers == motion.stage)).size:
@@ -95,12 +93,8 @@ class _Cycles:
 
     @property
     def attract_or_hold(self) -> np.ndarray:
-        """Of which stages a cycle attracts, or holds motions, shape (count,)."""
+        """Which stages have a cycle that attracts, or that holds motions, shape (count,)."""
         return np.any([family.attracting for family in self.families], axis=0) | np.isfinite(self.held).any(axis=1)
-
-    def take(self, numbers: np.ndarray) -> _Cycles:
-        """The cycles of the stages with these numbers."""
-        return _Cycles(tuple(family.take(numbers) for family in self.families), self.held[numbers])
 
 
 def _searched(stages: Ensemble, rtol: float, distances: np.ndarray | None, cycles: _Cycles) -> Attractors:
@@ -182,9 +176,12 @@ def _hardly_attracts(landing_map: LandingMap) -> bool:
     """Whether no attractor of a map is as simple, attracts as strongly, and from as many of its points, that a coarse
     map is to be trusted: where the next landing is about as far off as the last one, straight pieces between points
     come to cycles of several landings that the stage does not have."""
+    settings = ReturnMapSettings.current()
     swings = 1 if landing_map.symmetric else 2
     return not any(
-        len(one.distances) == swings and one.basin.size >= FEW and landing_map.slope(one) <= HARDLY
+        len(one.distances) == swings
+        and one.basin.size >= settings.least_arriving_points
+        and landing_map.slope(one) <= settings.hardly_attracting_share
         for one in landing_map.attractors
     )
 

@@ -54,7 +54,17 @@ class AnswerTable:
     behind: bool = False
 
 
-_SHOWN = {"sentences", "blocks", "tables", "details", "next_steps", "figures", "document", "files"}
+_SHOWN = {
+    "sentences",
+    "blocks",
+    "tables",
+    "details",
+    "next_steps",
+    "figures",
+    "document",
+    "document_of_details",
+    "files",
+}
 """Methods of an answer that show it."""
 
 
@@ -180,15 +190,24 @@ class Answer:
 
         return dataset_of(self.to_dict())
 
-    def to_dict(self) -> dict[str, Any]:
+    def document_of_details(self) -> dict[str, Any]:
+        """What `--details` adds to the JSON document: numbers that take further work."""
+        return {}
+
+    def to_dict(self, details: bool = False) -> dict[str, Any]:
         """The document that `--json` prints, without the files that a command writes.
+
+        Parameters
+        ----------
+        details : bool
+            Whether to add what `--details` adds to it, which may take work.
 
         Returns
         -------
         dict
             Plain numbers, texts, lists and dictionaries; SI units, named at the end of the keys (`_m`, `_s`, `_hz`).
         """
-        return self.document()
+        return self.document() | (self.document_of_details() if details else {})
 
     def plot(self, axes: Axes | Sequence[Axes] | None = None, figure: int = 0) -> list[Axes]:
         """Draw one of the figures.

@@ -192,7 +192,7 @@ def tune(
             session.tries(remedy)
         session.tries_less()
         if listed and not any(outcome.certainty == "works" for outcome in session.outcomes):
-            report("what to relax")
+            report("which part of the goal to relax")
             relaxed = relaxations(session.outcomes, goal, machines.take(np.arange(budget.machines)))
         sensitivities = edge_sensitivities(ideal, case.judgement.margin)
     except KeyboardInterrupt:
@@ -360,15 +360,15 @@ class _Session:
         long as it does not say."""
         remedy, goal = search.remedy, search.goal
         tuned = remedy.tuned(shares)
-        self.report(f"{remedy.name}: unseen machines")
+        self.report(f"{remedy.name}: verified on machines not tuned for")
         measured = performance_of(tuned, self.unseen, goal, self.drive)
         doubted, case = missed_parts(measured, goal), None
         if not doubted:
-            self.report(f"{remedy.name}: cycles")
+            self.report(f"{remedy.name}: verified by its hunting cycles")
             case = verified(tuned)
             doubted = unsettled_parts(case, measured, goal)
         if not doubted:
-            self.report(f"{remedy.name}: further machines", CYCLES)
+            self.report(f"{remedy.name}: verified on more machines", CYCLES)
             for part in np.split(np.arange(self.further.count), [self.further.count // 3]):
                 if measured.decides(goal) is None:
                     measured = measured.with_further(tuned, self.further.take(part), goal, self.drive)

@@ -191,7 +191,7 @@ class Search:
     def tries(self, points: np.ndarray) -> Iterator[np.ndarray]:
         """Try points (points, variables), a few at a time: those of them that break nothing."""
         for few in np.array_split(points, -(-len(points) // WIDE)):
-            self.report(f"{self.remedy.name}: settings")
+            self.report(f"{self.remedy.name}: trying settings")
             with self._allowed(self._work):
                 self.tried.append(self.measured(few))
             if self.cut:
@@ -231,7 +231,7 @@ class Search:
             return
 
         def cost(shares: np.ndarray, most: np.ndarray | float = np.inf) -> np.ndarray:
-            self.report(f"{self.remedy.name}: settings")
+            self.report(f"{self.remedy.name}: trying settings")
             points = np.clip(shares.T, 0, 1)
             small = None if wanted is None else wanted(points)
             self.tried.append(self.measured(points, most, small))
@@ -344,7 +344,7 @@ class Search:
 
     def clear(self, shares: np.ndarray) -> np.ndarray:
         """With which points (points, variables) nothing attracts the machines, shape (points,)."""
-        self.report(f"{self.remedy.name}: what attracts")
+        self.report(f"{self.remedy.name}: what attracts the machines")
         machines = self.machines.take(np.arange(min(self.budget.surveyed, self.machines.count)))
         clear = attraction(self.remedy, shares, machines, self.goal).clear.mean(axis=1) >= self.goal.share
         self.attracted += int(np.count_nonzero(~clear))
@@ -353,7 +353,7 @@ class Search:
     def share(self, shares: np.ndarray) -> np.ndarray:
         """How large a share of the fresh machines meet the goal by their moves and margins with points (points,
         variables), shape (points,); of those with which too many lack the margin, the share that has it."""
-        self.report(f"{self.remedy.name}: fresh machines")
+        self.report(f"{self.remedy.name}: on other machines")
         goal = self.goal
         meets = modulus_margins(self.remedy, shares, self.fresh, self.drive) >= goal.margin
         robust = np.flatnonzero(meets.mean(axis=1) >= goal.share)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from friso.hunting import Branch, Curve, Cycles, Diagram, LocatedPoint, Plane, Space
+from friso.hunting import CLOSED, END_OF_RANGE, Branch, Curve, Cycles, Diagram, LocatedPoint, Meeting, Plane, Space
 
 CycleShape = Literal["symmetric", "asymmetric", "whole"]
 """A cycle that is its own mirror image; one that is not, of a stage that is; one of a stage that is not."""
@@ -205,7 +205,7 @@ def node_verdicts(result: Plane) -> list[tuple[float, float, str]]:
 
 
 def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
-    """The same at the corners: both keys low, the second high, the first high, both high."""
+    """The values [SI] of both keys, and the verdict, at the corners: both low, second high, first high, both high."""
     nodes, last = node_verdicts(result), result.nodes - 1
     return [nodes[k] for k in (0, last, result.nodes * last, -1)]
 
@@ -257,6 +257,41 @@ def _crossings(result: Plane, along: int, value: float) -> list[float]:
             share = other[k] / (other[k] - other[k + 1]) if other[k] != other[k + 1] else 0.0
             crossings.append(float(at[k] + share * (at[k + 1] - at[k])))
     return crossings
+
+
+EndKind = Literal["range", "closed", "meets", "lost"]
+"""How a curve ends: at the end of the range, as a ring, on another curve, or where its cycle was lost."""
+
+
+class CurveEnd(NamedTuple):
+    """One of the two ends of the curve with number `line`: where it is [SI], shape (2,), and how it ends."""
+
+    line: int
+    at: np.ndarray
+    kind: EndKind
+
+
+def curve_ends(result: Plane) -> list[CurveEnd]:
+    """List both ends of every curve of a plane, in the order of the curves."""
+    on_another = [(meeting.curves[0], meeting.places[0]) for meeting in result.meetings if meeting.kind == "end"]
+    ends = []
+    for number, curve in enumerate(result.curves):
+        for spot, how in zip((curve.spots[0], curve.spots[-1]), curve.ends, strict=True):
+            on = any(number == other and np.array_equal(spot.at, place) for other, place in on_another)
+            kinds: dict[str, EndKind] = {END_OF_RANGE: "range", CLOSED: "closed"}
+            kind = kinds.get(how, "meets" if on else "lost")
+            ends.append(CurveEnd(number, _values(result.space, spot.at[None])[0], kind))
+    return ends
+
+
+def curve_meetings(result: Plane) -> list[Meeting]:
+    """List where curves of a plane meet, their places and errors as values of the keys [SI]."""
+    meetings = []
+    for meeting in result.meetings:
+        places = _values(result.space, meeting.places)
+        error = np.abs(_values(result.space, meeting.places[:1] + meeting.error) - places[:1])[0]
+        meetings.append(replace(meeting, places=places, error=error))
+    return meetings
 
 
 def lost_places(result: Plane) -> np.ndarray:

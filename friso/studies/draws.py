@@ -117,5 +117,5 @@ def _fates(stage: Stage, sample: Sample, rtol: float, tally: Tally) -> Fates:
         flat, count = laid_over(stage, keys), chunk.stop - first
         words[chunk] = judge_many(flat, count, rtol)
         lost[chunk] = loops_unstable(flat, count)
-        tally.add(chunk.stop - first, "draws")
+        tally.add(chunk.stop - first, "machines drawn")
     return Fates(words, lost)

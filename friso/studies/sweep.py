@@ -25,7 +25,7 @@ from friso.studies.verify import checked_share, verify_cells
 if TYPE_CHECKING:
     import xarray as xr
 
-CELLS = "cells"
+CELLS = "cells of the map"
 """What a sweep reports to its progress."""
 
 

@@ -2,44 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from friso.engine.allowance import Exhausted
 from friso.hunting.attractors.rounds import TIGHT, typical_period
+from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.attractors.starts import Starts
 from friso.hunting.attractors.survey import Survey, Swinging
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, families
 from friso.hunting.loop import surely_run_away
-
-PERIODS, CONSTANTS = (60.0, 600.0), 8.0
-"""Periods after which a motion has come to what attracts it, at least and at most, and time constants of deviations
-from that: near a flip transients last."""
-
-EARLY = 0.25
-"""Share of that time after which a motion that swings by as much as what attracts has come to it, if deviations from
-that shrink so fast that they are small by then: two time constants, or 15 periods."""
-
-PATIENT = 3.0
-"""Longest period that these are counted in, in units of a typical one."""
+from friso.hunting.rows import ArrayRows
 
 BESIDE = np.array([0.9, 0.97, 0.99, 1.0, 1.01, 1.03, 1.1])
 """Distances from which a motion that was observed is tried again, in units of its own."""
 
-WAITED, UNCLOSED = 6.0, 24.0
-"""Periods, however long, that are waited for at least, of what attracts as a closed orbit and of what was observed: of
-that it is not known how slowly motions leave what is beside it."""
-
 
 @dataclass(frozen=True)
-class Target:
-    """What all motions of stages end in that do not come to rest, arrays of shape (count,) or numbers: they swing by
-    the `amplitude` [m], half of peak to peak, at least; the `period` is not longer than this [s]; and they do so once
-    the time `lasting` has passed [s]. One that swings by that amplitude after the time `early` [s] will do so. Where
-    some of them were `observed`, and not closed, there may be others beside them that swing as far, less often."""
+class Target(ArrayRows):
+    """What motions of stages end in unless they come to rest: arrays of shape (count,), or numbers of one stage.
+
+    They swing by the `amplitude` [m], half of peak to peak, at least, with the `period` [s] at most, once the time
+    `lasting` [s] has passed. A motion that swings by that amplitude after the time `early` [s] will do so. Where
+    attractors were only `observed`, not closed, others beside them may swing as far, less often.
+    """
 
     amplitude: Any
     period: Any
@@ -47,21 +36,17 @@ class Target:
     early: Any
     observed: Any = False
 
-    def of(self, numbers: Any) -> Target:
-        """That of the stages with these numbers, or of one."""
-        return Target(*(getattr(self, field.name)[numbers] for field in fields(self)))
-
 
 @dataclass(frozen=True)
 class Attractors:
-    """Of stages: the motions that attract, of each stage those that were looked for (see `attractors`); whether that is
-    `decided`, shape (count,) (not where a simulation that had to decide failed); a `typical` period of
-    hunting [s], shape (count,); and of a thorough survey the cycles that the return map suggests, attracting or not:
-    `families`, the symmetric ones first (of stages that are not symmetric, those of a whole period); and of which
-    stages simulations at different tolerances tell different things, `flips`, shape (count,): the tighter hold.
-    `complete`, shape (count,): every motion was followed to what attracts it, so that a thorough survey has missed none
-    of these. `runs_away`, shape (count,): the motions that begin farthest run away, for want of anti-windup, and so
-    does what begins beyond them."""
+    """Result of surveying several stages; arrays are of shape (count,).
+
+    The `motions` that attract: as many of each stage as were looked for (see `attractors`). A stage is `decided` unless
+    a simulation that had to decide failed. `typical` is a typical period of hunting [s]. `families` are the cycles
+    that the return map suggests to a thorough survey, attracting or not, the symmetric ones first. Where simulations
+    at two tolerances disagree, the stage `flips`, and the tighter one holds. A survey is `complete` if every motion
+    was followed to what attracts it. A stage `runs_away` if motions from far off do, for want of anti-windup.
+    """
 
     motions: tuple[Swinging, ...]
     decided: np.ndarray
@@ -81,22 +66,27 @@ class Attractors:
     @property
     def target(self) -> Target:
         """What the stages' motions end in, arrays of shape (count,): NaN where nothing attracts."""
+        settings = SurveySettings.current()
         amplitude, period, lasting, early = (np.full(len(self.decided), np.nan) for _ in range(4))
         observed = np.zeros(len(self.decided), bool)
         for motion in self.motions:
             observed[motion.stage] |= motion.observed
-            k, unit = motion.stage, min(motion.period, PATIENT * self.typical[motion.stage])
+            k, unit = motion.stage, min(motion.period, settings.longest_counted_period * self.typical[motion.stage])
             amplitude[k] = np.fmin(amplitude[k], motion.amplitude)
             period[k] = np.fmax(period[k], motion.period)
-            constants = CONSTANTS * motion.time_constant / unit
-            waited = (UNCLOSED if motion.observed else WAITED) * motion.period
-            until = max(np.clip(np.nan_to_num(constants), *PERIODS) * unit, waited)
+            constants = settings.arrival_time_constants * motion.time_constant / unit
+            waited = (
+                settings.observed_swing_periods if motion.observed else settings.closed_orbit_periods
+            ) * motion.period
+            until = max(np.clip(np.nan_to_num(constants), *settings.arrival_periods) * unit, waited)
             lasting[k] = np.fmax(lasting[k], until)
-            early[k] = np.fmax(early[k], EARLY * until if constants < PERIODS[1] else until)
+            early[k] = np.fmax(
+                early[k], settings.early_arrival_share * until if constants < settings.arrival_periods[1] else until
+            )
         return Target(amplitude, period, lasting, early, observed)
 
     def take(self, numbers: np.ndarray) -> Attractors:
-        """Those of the stages with these numbers."""
+        """The survey of the stages with these numbers, each once."""
         motions_of: dict[int, list[Swinging]] = {}
         for motion in self.motions:
             motions_of.setdefault(motion.stage, []).append(motion)
@@ -157,7 +147,7 @@ def attractors(
 def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested: tuple[Cycles, ...]) -> None:
     """Confirm the suggested cycles that attract the stages with some numbers, and begin beside those that repel."""
     for cycles in suggested:
-        survey.slow_down(numbers, cycles)
+        survey.note_unstable_cycles(numbers, cycles)
         starts.beside(cycles)
         if (attracting := np.flatnonzero(cycles.attracting)).size:
             survey.confirm(starts.on_cycles(cycles, attracting), numbers[attracting], cycles.take(attracting))
@@ -186,8 +176,7 @@ def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
 
 
 def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors:
-    """The same, after simulations at a tighter tolerance of the stages of which no orbit that attracts was closed: what
-    these tell holds, and whether it contradicts the others."""
+    """Try stages without a closed orbit again at a tighter tolerance, which holds where both disagree."""
     proved = {motion.stage for motion in first.motions if motion.cycles is not None}
     which = np.array([k for k in range(stages.count) if k not in proved], dtype=np.int64)
     if not which.size:
@@ -204,7 +193,7 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
         if motion.seen is not None:
             starts.seen(motion.stage, motion.seen)
     for cycles in first.families:
-        survey.slow_down(np.arange(stages.count), cycles)
+        survey.note_unstable_cycles(np.arange(stages.count), cycles)
     for runs, owners in starts.waves(at_once=True):
         survey.follow(runs, owners)
     if stages.remember:

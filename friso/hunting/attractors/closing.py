@@ -5,21 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from friso.hunting.attractors.rounds import Pending
+from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles, described
 from friso.hunting.cycle.shooting import Orbits, close
-
-SAMPLES = 400
-"""Samples of the time in which a run repeats itself."""
-
-STILL = 1e-3
-"""Share of peak to peak by which a stage that stands still moves from one sample to the next at most."""
-
-REPEATED = 1e-3
-"""Share of distance and time by which an orbit may differ from the simpler one that it passes through several times."""
-
-NEAR = 0.2
-"""Share of peak to peak by which that of an orbit may differ from the run that it was closed from."""
 
 
 def close_orbits(
@@ -28,6 +17,7 @@ def close_orbits(
     """The cycles beside runs that repeat themselves after numbers of swings and times [s], with sizes from peak to peak
     [m], each of shape (runs,): in groups of as many swings, the numbers of the runs and their cycles, which are not
     `closed` where no orbit like the run could be closed."""
+    settings = SurveySettings.current()
     states = _where_they_stick(runs, times)
     parts = []
 
@@ -38,7 +28,7 @@ def close_orbits(
         if sign < 0:
             starts = starts * np.sign(starts[:, stages.sticking])[:, None]
         cycles = described(stages, close(stages, starts, times, sign, rtol, n), rtol)
-        cycles.closed[~(np.abs(2 * cycles.amplitude / sizes[group] - 1) < NEAR)] = False
+        cycles.closed[~(np.abs(2 * cycles.amplitude / sizes[group] - 1) < settings.closed_swing_share)] = False
         parts.append((group, cycles))
         return cycles
 
@@ -63,24 +53,28 @@ def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> 
         return np.zeros(0, bool)
     ends = stages.run(orbits.states, orbits.times * fewer / orbits.swings, rtol).ends[:, stages.sticking]
     sign, sticks = -1.0 if fewer % 2 else 1.0, orbits.states[:, stages.sticking]
-    return np.abs(sign * ends - sticks) < REPEATED * np.abs(sticks)
+    return np.abs(sign * ends - sticks) < SurveySettings.current().repeated_orbit_share * np.abs(sticks)
 
 
 def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.ndarray:
     """Which orbits, (count,), are others passed through so many times, by where they stick and how long they take."""
+    settings = SurveySettings.current()
     distances = np.abs(once.states[:, sticking]) / np.abs(orbits.states[:, sticking])
-    return (np.abs(distances - 1) < REPEATED) & (np.abs(passes * once.times / orbits.times - 1) < REPEATED)
+    return (np.abs(distances - 1) < settings.repeated_orbit_share) & (
+        np.abs(passes * once.times / orbits.times - 1) < settings.repeated_orbit_share
+    )
 
 
 def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
     """States (runs, states) that runs pass within the next times [s], (runs,), where the integrator is such that the
     actuator balances constant forces on a stage at rest: of several that before which the stage has
     stood still for longest."""
+    settings = SurveySettings.current()
     stages, size = pending.stages, len(pending.stages.kernel.states)
     numbers, ahead = np.arange(stages.count), np.zeros(stages.count)
     octave = np.round(np.log2(times))  # runs of about the same length are sampled together
     for group in (numbers[octave == n] for n in np.unique(octave)):
-        runs, step = pending.take(group), float(times[group].min()) / SAMPLES
+        runs, step = pending.take(group), float(times[group].min()) / settings.samples_per_repetition
         paths = runs.stages.run(runs.states, 2 * times[group], pending.rtol, interval=step).samples
         for k, path in zip(group, paths, strict=True):
             residuals = stages.unbalanced(path, k)
@@ -91,9 +85,12 @@ def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
 def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
     """The sample, and what share of the step to the next, at which the integrator is no longer off that balance,
     where the stage has stood still in its place [m] for longest before; both of shape (samples,)."""
+    settings = SurveySettings.current()
     if not np.isfinite(place).any():  # the run failed
         return 0.0
-    standing = np.abs(np.diff(place)) < STILL * np.nanmax(place) - STILL * np.nanmin(place)
+    standing = np.abs(np.diff(place)) < settings.still_move_share * np.nanmax(
+        place
+    ) - settings.still_move_share * np.nanmin(place)
     moves = np.where(~standing, np.arange(len(standing)), -1)
     stood = np.arange(len(standing)) - np.maximum.accumulate(moves)
     crossed = np.flatnonzero((residuals[:-1] * residuals[1:] <= 0) & np.isfinite(residuals[1:]))

@@ -8,7 +8,8 @@ from itertools import product
 import numpy as np
 
 from friso.equations.roles import Steady
-from friso.hunting.attractors.rounds import PERIODS, RTOL, Pending, loose_from, typical_period
+from friso.hunting.attractors.rounds import RTOL, Pending, loose_from, typical_period
+from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles
 from friso.hunting.cycle.rest import bent, pushed, stuck
@@ -19,21 +20,12 @@ THOROUGH_DISTANCES = np.geomspace(0.001, 0.009, 12), np.geomspace(0.01, 3.0, 96)
 nearest most creep home, farther off they do not stick."""
 
 DISTANCES = np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 48), np.geomspace(5.0, 300.0, 6)
-"""The same for many stages at once."""
+"""Distances for many stages at once: half as many."""
 
 LIMITED = np.geomspace(500.0, 30000.0, 8)
 """Distances beyond these, in the same units, for stages with a force limit: cycles that it drives are as large as the
 limit moves the masses in the time in which the integrator unwinds."""
 
-WOUND_UP, FARTHEST = (np.geomspace(0.1, 100.0, 24), (0.0, 1.0, 10.0)), 1e5
-"""Distances at which stages without anti-windup are let go as well, in units of the deflection of the loop by the limit
-of its force, and how far their integrators are wound up then, as a move at that limit winds them: so many times what
-relaxes a stage stuck there, to the other side. The farthest distance in units of the deflection by the break-away
-force: a tenth of that at which a run is stopped that runs away."""
-
-OUTER = -10.0, -1.0, 1.0, 10.0
-"""How far integrals of outer loops have wound up at first, where there are several: times for which they have
-integrated the distance, in units of the time in which the loop moves."""
 
 PUSHES = np.geomspace(0.03, 300.0, 12)
 """Velocities of stages at their reference, in units of what deflects the loop by as much."""
@@ -41,16 +33,6 @@ PUSHES = np.geomspace(0.03, 300.0, 12)
 REMEMBERED = np.geomspace(0.01, 30.0, 128), np.geomspace(0.01, 10.0, 32)
 """Distances, in the same units, from which stages with several bristles begin with these bent in many ways: of a
 thorough survey, and of others."""
-
-TRAVELS, BACK = (1e-3, 10.0), 1e-3
-"""Travels drawn by which bristles are bent first, in the same units, and the least share of that by which they are bent
-back then, and forth again."""
-
-EVERY = 64, 16, 4, 1
-"""One start in so many is tried first, then one in so many of the others, and so on."""
-
-ASIDE = (-0.03, -0.003, 0.003, 0.03)
-"""Shares of the distance by which motions begin beside a cycle."""
 
 
 class Starts:
@@ -64,12 +46,13 @@ class Starts:
         self.states: list[np.ndarray] = []
 
     def take(self, numbers: np.ndarray) -> Starts:
-        """Those of the stages with these numbers, none of them begun."""
+        """Starts of the stages with these numbers, none of them begun."""
         return Starts(self.stages.take(numbers), self.rtol, self.loose[numbers])
 
     def spread(self, thorough: np.ndarray | bool) -> None:
         """Stuck at distances on both sides (on one of symmetric stages); those stages that are `thorough`, (count,) or
         all, at twice as many, and pushed as well."""
+        settings = SurveySettings.current()
         controller = self.stages.structure.controller
         limited = controller is not None and controller.anti_windup is not None
         for side, more in product((1.0, -1.0), (False, True)):
@@ -81,7 +64,7 @@ class Starts:
                 stages = self.stages.take(owners)
                 distances = side * np.tile(units, which.size) * stages.length
                 self._add(owners, stuck(stages, distances))
-                for wound in OUTER if stages.outer_integrals else ():
+                for wound in settings.outer_integral_windups if stages.outer_integrals else ():
                     self._add(owners, stuck(stages, distances, wound / stages.number("rate")))
                 if controller is not None and controller.anti_windup == "none":
                     self._wound_up(which, side)
@@ -93,10 +76,12 @@ class Starts:
 
     def _wound_up(self, which: np.ndarray, side: float) -> None:
         """Let go at distances on one side, their integrators wound up."""
-        distances, times = WOUND_UP
+        settings = SurveySettings.current()
+        span, times = settings.wound_up_starts
+        distances = np.geomspace(*span)
         stages = self.stages.take(np.repeat(which, len(distances)))
         limit = stages.flat[FORCE_LIMIT] / stages.number("stiffness")
-        begin = side * np.minimum(np.tile(distances, which.size) * limit, FARTHEST * stages.length)
+        begin = side * np.minimum(np.tile(distances, which.size) * limit, settings.farthest_start * stages.length)
         for wound in times:
             states = stages.displaced(begin)
             states[:, stages.integral] -= wound * stages.relaxed * begin
@@ -106,12 +91,13 @@ class Starts:
         """With several bristles, bent in ways in which motions leave them: let go at a distance, the controller being
         switched on before or only then, and pushed; and stuck, drawn there from the reference, after a long way out or
         back, and after travels to and fro that are drawn at random."""
+        settings = SurveySettings.current()
         units = REMEMBERED[0 if thorough else 1]
         rng = np.random.default_rng(0)
-        shares = np.exp(rng.uniform(np.log(BACK), 0.0, (2, len(units))))
-        way = np.exp(rng.uniform(np.log(TRAVELS[0]), np.log(TRAVELS[1]), len(units))) * rng.choice(
-            [-1.0, 1.0], len(units)
-        )
+        shares = np.exp(rng.uniform(np.log(settings.least_bend_back_share), 0.0, (2, len(units))))
+        way = np.exp(
+            rng.uniform(np.log(settings.bending_travels[0]), np.log(settings.bending_travels[1]), len(units))
+        ) * rng.choice([-1.0, 1.0], len(units))
         for side in (1.0, -1.0):
             which = np.flatnonzero((side > 0) | ~self.stages.symmetric)
             owners = np.repeat(which, len(units))
@@ -127,8 +113,12 @@ class Starts:
 
     def beside(self, cycles: Cycles) -> None:
         """Beside cycles that repel."""
+        settings = SurveySettings.current()
         which = np.flatnonzero(cycles.closed & ~cycles.attracting & np.isfinite(cycles.direction).all(axis=1))
-        owners, away = np.repeat(which, len(ASIDE)), np.tile(ASIDE, which.size)
+        owners, away = (
+            np.repeat(which, len(settings.beside_cycle_shares)),
+            np.tile(settings.beside_cycle_shares, which.size),
+        )
         size = np.abs(cycles.states[owners, self.stages.sticking])
         self._add(owners, cycles.states[owners] + (away * size)[:, None] * cycles.direction[owners])
 
@@ -141,7 +131,8 @@ class Starts:
     def seen(self, owner: int, state: np.ndarray) -> None:
         """Farther from and nearer to rest than a state (kept,) in which a run of the stage with a number ended; on from
         there itself, a run might stay on a cycle that hardly repels."""
-        states = np.outer(1 + np.array(ASIDE), state[: self.stages.kernel.initial_size])
+        settings = SurveySettings.current()
+        states = np.outer(1 + np.array(settings.beside_cycle_shares), state[: self.stages.kernel.initial_size])
         self._add(np.full(len(states), owner), states)
 
     def _add(self, owners: np.ndarray, states: np.ndarray) -> None:
@@ -151,6 +142,7 @@ class Starts:
     def waves(self, at_once: bool) -> Iterator[tuple[Pending, np.ndarray]]:
         """The runs before their first round, and the numbers of their stages: all `at_once`, or a few first, from which
         most stages that hunt do."""
+        settings = SurveySettings.current()
         if not self.owners:
             return
         owners, states = np.concatenate(self.owners), np.concatenate(self.states)
@@ -158,7 +150,7 @@ class Starts:
         rank = np.empty(len(owners), np.int64)
         rank[order] = np.arange(len(owners)) - np.searchsorted(owners[order], owners[order])
         left = np.ones(len(owners), bool)
-        for step in EVERY[-1:] if at_once else EVERY:
+        for step in settings.start_strides[-1:] if at_once else settings.start_strides:
             if (which := np.flatnonzero(left & (rank % step == step // 2))).size:
                 yield self._begun(owners[which], states[which]), owners[which]
             left[which] = False
@@ -168,6 +160,9 @@ class Starts:
         return self._begun(which, cycles.states[which])
 
     def _begun(self, owners: np.ndarray, states: np.ndarray) -> Pending:
+        settings = SurveySettings.current()
         stages, mirrored = self.stages.take(owners), self.stages.symmetric[owners]
         begins = stages.kernel.with_modes(states, np.zeros(3), stages.values)
-        return Pending(stages, begins, PERIODS * self.period[owners], self.loose[owners], mirrored, self.rtol)
+        return Pending(
+            stages, begins, settings.first_round_periods * self.period[owners], self.loose[owners], mirrored, self.rtol
+        )

@@ -8,70 +8,9 @@ import numpy as np
 
 from friso.hunting.attractors.closing import close_orbits
 from friso.hunting.attractors.rounds import Ends, Pending, lengthened, one_round
+from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.cycle.find import Cycles
-
-ROUNDS = 5
-"""Rounds at most: the last takes two thousand typical periods."""
-
-STEPS, FEWER = 16_000_000, 6_000_000
-"""Steps that all runs of a stage take together at most until they are given up, in a survey that decides, and in
-others."""
-
-UNPROVED = 400_000
-"""Steps that a run takes in a round at most where nothing has to be proved: of many stages at once a single one keeps
-all others waiting."""
-
-ALIKE = 0.05
-"""Share by which the time and the peak to peak of two motions differ at most that are the same."""
-
-CLOSE = 0.01
-"""The same share of the peak to peak of runs that do not repeat themselves."""
-
-SAME = 1e-3
-"""The same of two orbits that are the same."""
-
-MOST_KINDS, DEARER = 32, 30.0
-"""Kinds of runs of a stage that are followed after the second round; and how many times as many steps as the last round
-the next ones may take: of a stage that nothing attracts so far all kinds are followed for which the steps left
-suffice."""
-
-ABREAST, OUTER = 4, 0.25
-"""Runs that are followed of all that repeat themselves like a cycle that repels, on either side of it, and the share of
-the distance of the farthest one over which they are spread: those leave it first. So many together take no longer than
-one."""
-
-TIMES = 2
-"""How many times the time of a cycle that repels a motion takes at most that repeats itself beside it."""
-
-ENOUGH = 3
-"""Rounds after which no more motions that attract are looked for where one is known."""
-
-SETTLED, PATIENCE = 0.005, 3
-"""Share of peak to peak up to which swings repeat themselves that an orbit is closed from at once, and the round from
-which on one is tried to be closed from all others."""
-
-REGULAR, UNCHANGED = 2, 2e-3
-"""The round from which on a motion is taken for attracted, although no orbit could be closed, if it repeats itself, and
-the share by which its mean swing may change over that round, of two hundred typical periods and more."""
-
-EXACT = 1e-7
-"""Share of peak to peak up to which a motion repeats itself that is taken for attracted at once: so near a cycle that
-repels no run comes by chance."""
-
-CONVERGED, APPROACHES = 1e-4, 0.7
-"""The same where nothing has to be proved, and the share of what it was some swings before below which it does for
-motions that are about to repeat themselves (`SETTLED`)."""
-
-MOST_ORBITS = 3
-"""Orbits that are tried to be closed for a stage after one round of a thorough survey, of others one."""
-
-LEAVES, LONGEST = 15.0, 20.0
-"""Time constants of a cycle that repels after which a run has left it, and the longest that it is followed for that, in
-units of the last round."""
-
-STEADY = 0.8
-"""Share of its mean swing that a motion which swings on keeps at least over the last round, three times as long as all
-before: a decay that is slower than this looks like a cycle."""
+from friso.hunting.rows import ArrayRows
 
 
 @dataclass(frozen=True)
@@ -96,9 +35,13 @@ class Swinging:
 
     def like(self, other: Swinging) -> bool:
         """Whether two motions of a stage are the same, or mirror images."""
+        settings = SurveySettings.current()
         if self.stage != other.stage:
             return False
-        same = abs(self.amplitude / other.amplitude - 1) < SAME and abs(self.period / other.period - 1) < SAME
+        same = (
+            abs(self.amplitude / other.amplitude - 1) < settings.same_orbit_share
+            and abs(self.period / other.period - 1) < settings.same_orbit_share
+        )
         return same and (self.cycles is None) == (other.cycles is None)
 
     @property
@@ -120,7 +63,7 @@ _Kind = tuple[int, float, float]
 
 
 @dataclass(frozen=True)
-class _Beside:
+class _Beside(ArrayRows):
     """The numbers of the closed cycles that repel like which runs repeat themselves, `cycles` (runs,), -1: none; and by
     which share they swing farther than these, `offsets` (runs,), 0 without one."""
 
@@ -131,24 +74,22 @@ class _Beside:
     def nothing(cls, count: int) -> _Beside:
         return cls(np.full(count, -1), np.zeros(count))
 
-    def take(self, numbers: np.ndarray) -> _Beside:
-        """Those of the runs with these numbers."""
-        return _Beside(self.cycles[numbers], self.offsets[numbers])
-
     @property
     def leave_first(self) -> np.ndarray:
         """The runs that are followed for all on the same side of the same cycle, (runs,)."""
+        settings = SurveySettings.current()
         chosen, far, sides = np.zeros(len(self.cycles), bool), np.abs(self.offsets), np.sign(self.offsets)
         for cycle, side in {*zip(self.cycles.tolist(), sides.tolist(), strict=True)} - {(-1, 0.0)}:
             group = np.flatnonzero((self.cycles == cycle) & (sides == side))
             group = group[np.argsort(-far[group], kind="stable")]
-            group = group[far[group] >= OUTER * far[group[0]]]
-            chosen[group[np.linspace(0, len(group) - 1, ABREAST).round().astype(int)]] = True
+            group = group[far[group] >= settings.outer_share * far[group[0]]]
+            chosen[group[np.linspace(0, len(group) - 1, settings.runs_per_side).round().astype(int)]] = True
         return chosen
 
 
 def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
     """Which runs, of the stages with the numbers `owners`, repeat themselves like one of some kinds of motion."""
+    settings = SurveySettings.current()
     motions_of: dict[int, list[tuple[float, float]]] = {}
     for stage, size, time in kinds:
         motions_of.setdefault(stage, []).append((size, time))
@@ -156,8 +97,8 @@ def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
     for stage, motions in motions_of.items():
         which = np.flatnonzero(owners == stage)
         for size, time in motions:
-            same = np.abs(ends.repeats.size[which] / size - 1) < ALIKE
-            like[which] |= same & (np.abs(ends.repeats.time[which] / time - 1) < ALIKE)
+            same = np.abs(ends.repeats.size[which] / size - 1) < settings.same_motion_share
+            like[which] |= same & (np.abs(ends.repeats.time[which] / time - 1) < settings.same_motion_share)
     return like
 
 
@@ -208,8 +149,11 @@ class Survey:
         return len(self.unbounded)
 
     def __post_init__(self) -> None:
+        settings = SurveySettings.current()
         self.unknown, self.slowest = np.zeros(self.count, bool), np.zeros(self.count)
-        self.left = np.full(self.count, float(STEPS if self.decides else FEWER))
+        self.left = np.full(
+            self.count, float(settings.thorough_step_limit if self.decides else settings.quick_step_limit)
+        )
         self.rested, self.away = np.zeros(self.count), np.zeros(self.count)
 
     @property
@@ -231,19 +175,23 @@ class Survey:
                 self.attracting.append(motion)
                 self._attracting_kinds.append((motion.stage, 2 * motion.amplitude, motion.time))
 
-    def slow_down(self, numbers: np.ndarray, cycles: Cycles) -> None:
-        """Take notice of the cycles that repel, of the stages with some numbers: runs take long to leave these."""
+    def note_unstable_cycles(self, numbers: np.ndarray, cycles: Cycles) -> None:
+        """Note unstable cycles of the stages with some numbers: runs take long to leave them."""
+        settings = SurveySettings.current()
         repel = np.flatnonzero(cycles.closed & ~cycles.attracting)
         for k in repel:
             size, time = 2 * float(cycles.amplitude[k]), float(cycles.orbits.times[k])
-            self._closed += [(int(numbers[k]), size, times * time) for times in range(1, TIMES + 1)]
+            self._closed += [
+                (int(numbers[k]), size, times * time) for times in range(1, settings.most_period_multiple + 1)
+            ]
         np.maximum.at(self.slowest, numbers[repel], cycles.time_constant[repel])
 
     def follow(self, runs: Pending, owners: np.ndarray) -> None:
         """Follow runs, each of the stage with the number `owners`, (runs,), to what attracts them."""
+        settings = SurveySettings.current()
         before, begun = np.full(len(owners), np.nan), np.abs(runs.states[:, runs.stages.sticking])
-        for number in range(ROUNDS):
-            enough = ENOUGH if self.thorough else 0
+        for number in range(settings.most_rounds):
+            enough = settings.enough_rounds if self.thorough else 0
             dropped = (self.attracted[owners] & (number >= enough)) | (self.left[owners] <= 0)
             self.unknown[owners[dropped]] = True
             keep = np.flatnonzero(~dropped)
@@ -251,10 +199,10 @@ class Survey:
                 return
             owners, before, begun = owners[keep], before[keep], begun[keep]
             most = self.left[owners].max()
-            runs, ends = one_round(runs.take(keep), most if self.prove else min(most, UNPROVED))
+            runs, ends = one_round(runs.take(keep), most if self.prove else min(most, settings.unproved_round_steps))
             for farthest, which in ((self.rested, ends.rest), (self.away, ends.away)):
                 np.maximum.at(farthest, owners[which], begun[which])
-            swinging = self._still_swinging(runs, owners, ends, early=number < PATIENCE)
+            swinging = self._still_swinging(runs, owners, ends, early=number < settings.close_from_round)
             swinging = self._within_budget(swinging, owners, ends)
             if not swinging.size:
                 return
@@ -265,10 +213,10 @@ class Survey:
             most = self._affordable(owners, ends)[moving]
             kinds = moving[self._kinds(owners[moving], ends.take(moving), most, beside.take(moving))]
             swinging = np.union1d(kinds, still)
-            if number == ROUNDS - 1:
+            if number == settings.most_rounds - 1:
                 return self._last(runs.take(swinging), owners[swinging], ends.take(swinging), before[swinging])
             regular = self._exact(owners[swinging], ends.take(swinging))
-            if number >= REGULAR:
+            if number >= settings.regular_from_round:
                 regular |= self._regular(owners[swinging], ends.take(swinging), before[swinging])
             self._observe(owners[swinging[regular]], ends.take(swinging[regular]), before[swinging[regular]])
             swinging = swinging[~regular]
@@ -285,14 +233,14 @@ class Survey:
         ready = swinging & (ends.repeats.swings > 0)
         if early:
             leave = self._repels(owners, ends) & ~self._stay(owners, ends)
-            ready &= (ends.repeats.deviation < SETTLED) & ~leave
+            ready &= (ends.repeats.deviation < SurveySettings.current().settled_swing_share) & ~leave
         if not self.prove:
             ready &= ~self._exact(owners, ends)
         self._close(runs, owners, ends, np.flatnonzero(ready))
         return np.flatnonzero(swinging & ~self._known_to_attract(owners, ends))
 
     def _within_budget(self, swinging: np.ndarray, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Those of the runs with the numbers `swinging` whose stages have steps left after a round."""
+        """Keep the runs, of those with the numbers `swinging`, whose stages have steps left after a round."""
         np.subtract.at(self.left, owners, ends.steps)
         spent = self.left[owners[swinging]] <= 0
         self.unknown[owners[swinging[spent]]] = True
@@ -300,27 +248,31 @@ class Survey:
 
     def _affordable(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """How many kinds of runs of its stage may be followed on, for each run."""
+        settings = SurveySettings.current()
         runs = np.bincount(owners, minlength=self.count)
         steps = np.bincount(owners, ends.steps, minlength=self.count) / np.maximum(runs, 1)
-        most = np.where(self.attracted, 0, self.left / (DEARER * np.maximum(steps, 1)))
-        return np.maximum(most, MOST_KINDS)[owners]
+        most = np.where(self.attracted, 0, self.left / (settings.next_round_cost * np.maximum(steps, 1)))
+        return np.maximum(most, settings.most_kinds)[owners]
 
     def _kinds(
         self, owners: np.ndarray, ends: Ends, most: np.ndarray | int, beside: _Beside | None = None
     ) -> np.ndarray:
-        """The numbers of runs that are followed on for all of their kind; of stages with more kinds than may be it is
-        unknown what the others come to."""
+        """The numbers of runs that are followed on for all of their kind.
+
+        Marks a stage unknown if it has more kinds of run than may be followed.
+        """
         chosen, surplus = _kinds(owners, ends, most, beside)
         self.unknown[owners[surplus]] = True
         return chosen
 
     def _beside(self, owners: np.ndarray, ends: Ends) -> _Beside:
         """Beside which closed cycles that repel runs repeat themselves like them: the nearest ones."""
+        settings = SurveySettings.current()
         cycles, offsets = np.full(len(owners), -1), np.full(len(owners), np.inf)
         for number, kind in enumerate(self._closed):
             offset = np.where(_like([kind], owners, ends), ends.repeats.size / kind[1] - 1, np.inf)
             nearer = np.abs(offset) < np.abs(offsets)
-            cycles[nearer], offsets[nearer] = number // TIMES, offset[nearer]
+            cycles[nearer], offsets[nearer] = number // settings.most_period_multiple, offset[nearer]
         return _Beside(cycles, np.where(cycles < 0, 0.0, offsets))
 
     def _repels(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
@@ -336,7 +288,7 @@ class Survey:
 
     def _close(self, runs: Pending, owners: np.ndarray, ends: Ends, which: np.ndarray) -> None:
         """Close orbits from one of each kind of runs, of those with some numbers."""
-        most, repeats = MOST_ORBITS if self.thorough else 1, ends.repeats
+        most, repeats = SurveySettings.current().orbits_per_round if self.thorough else 1, ends.repeats
         kinds = which[_kinds(owners[which], ends.take(which), most)[0]]
         pairs = runs.mirrored & (repeats.swings == 2)  # as swings about a symmetric cycle that approach it, too, seem
         tries = (
@@ -357,7 +309,7 @@ class Survey:
         for group, cycles in close_orbits(runs.take(swinging), swings, times, repeats.size[swinging], self.rtol):
             numbers = swinging[group]
             self.add(of_cycles(owners[numbers], cycles, runs.stages.sticking))
-            self.slow_down(owners[numbers], cycles)
+            self.note_unstable_cycles(owners[numbers], cycles)
             for kinds_of, which in ((self._attracting_kinds, cycles.attracting), (self._unclosed, ~cycles.attracting)):
                 columns = (column[numbers[which]].tolist() for column in (owners, repeats.size, repeats.time))
                 kinds_of += zip(*columns, strict=True)  # the runs are not as exact as their orbits
@@ -365,12 +317,13 @@ class Survey:
     def _last(self, runs: Pending, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
         """Take runs that swing to the end for attracted, if they have not decayed; those that may be about to leave a
         cycle that repels are followed for as long as that takes."""
-        kinds = self._kinds(owners, ends, MOST_ORBITS)
-        leave = LEAVES * self.slowest[owners]
+        settings = SurveySettings.current()
+        kinds = self._kinds(owners, ends, settings.orbits_per_round)
+        leave = settings.leaving_time_constants * self.slowest[owners]
         slow = kinds[leave[kinds] > runs.durations[kinds]]
         if slow.size:
             kinds = np.setdiff1d(kinds, slow)
-            longest = LONGEST * runs.durations[slow]
+            longest = settings.longest_leaving_rounds * runs.durations[slow]
             longer = replace(runs.take(slow), durations=np.minimum(leave[slow], longest))
             self.unknown[owners[slow[leave[slow] > longest]]] = True
             after, last = one_round(longer)
@@ -380,37 +333,48 @@ class Survey:
 
     def confirm(self, runs: Pending, owners: np.ndarray, cycles: Cycles) -> None:
         """Add those cycles, of the stages `owners` (runs,), that a run which begins on them stays on."""
+        settings = SurveySettings.current()
         _, ends = one_round(runs)
-        size = np.abs(ends.repeats.size / (2 * cycles.amplitude) - 1) < ALIKE
-        stays = size & (np.abs(ends.repeats.time / cycles.orbits.times - 1) < ALIKE)
+        size = np.abs(ends.repeats.size / (2 * cycles.amplitude) - 1) < settings.same_motion_share
+        stays = size & (np.abs(ends.repeats.time / cycles.orbits.times - 1) < settings.same_motion_share)
         which = np.flatnonzero(stays)
         self.add(of_cycles(owners[which], cycles.take(which), runs.stages.sticking))
 
     def _regular(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> np.ndarray:
         """Which runs repeat themselves so well, and have changed so little in the last round, that they will not leave
         where they are: unless that is beside a cycle that repels."""
-        same = np.abs(ends.repeats.mean / before - 1) < UNCHANGED
-        return same & (ends.repeats.deviation < SETTLED) & ~self._repels(owners, ends)
+        settings = SurveySettings.current()
+        same = np.abs(ends.repeats.mean / before - 1) < settings.unchanged_swing_share
+        return same & (ends.repeats.deviation < settings.settled_swing_share) & ~self._repels(owners, ends)
 
     def _exact(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Which runs repeat themselves as exactly as they do on what attracts alone, or approach that where nothing
         has to be proved, and unlike any closed cycle that repels, or beside one to stay."""
+        settings = SurveySettings.current()
         repeats, unlike = ends.repeats, (ends.repeats.swings > 0) & ~_like(self._closed, owners, ends)
         if self.prove:
-            return (unlike & (repeats.deviation < EXACT)) | self._stay(owners, ends)
-        approaches = (repeats.deviation < SETTLED) & (repeats.deviation < APPROACHES * repeats.earlier)
-        return unlike & ((repeats.deviation < CONVERGED) | approaches)
+            return (unlike & (repeats.deviation < settings.exact_repetition_share)) | self._stay(owners, ends)
+        approaches = (repeats.deviation < settings.settled_swing_share) & (
+            repeats.deviation < settings.approach_share * repeats.earlier
+        )
+        return unlike & ((repeats.deviation < settings.converged_swing_share) | approaches)
 
     def _stay(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Which runs repeat themselves beside a closed cycle that repels more exactly than they would on their way from
         it: they are on another one."""
+        settings = SurveySettings.current()
         offsets = np.abs(self._beside(owners, ends).offsets)
-        return (ends.repeats.swings > 0) & (ends.repeats.deviation < EXACT * offsets)
+        return (ends.repeats.swings > 0) & (ends.repeats.deviation < settings.exact_repetition_share * offsets)
 
     def _observe(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
+        settings = SurveySettings.current()
         repeats = ends.repeats
-        begun = (before == 0) & ~(repeats.deviation < CONVERGED)  # it has swung for a few times by now
-        steady = (repeats.mean > 0) & ~begun & ~(repeats.mean < STEADY * before)  # or in the first round alone
+        begun = (before == 0) & ~(
+            repeats.deviation < settings.converged_swing_share
+        )  # it has swung for a few times by now
+        steady = (
+            (repeats.mean > 0) & ~begun & ~(repeats.mean < settings.steady_swing_share * before)
+        )  # or in the first round alone
         self.unknown[owners[~steady]] = True
         for k in np.flatnonzero(steady):
             if self._known_to_attract(owners[k : k + 1], ends.take(np.array([k])))[0]:
@@ -436,16 +400,20 @@ def _kinds(
     """The numbers of runs that stand for all, no two of a stage that are alike and not more than `most` of each, a
     number or one for each run, and of those that are like none of these. Runs that do not repeat themselves are on
     their way, and soon apart. A few of those `beside` a cycle that repels stand for all on the same side of it."""
+    settings = SurveySettings.current()
     limits, beside = np.broadcast_to(most, (len(owners),)), beside or _Beside.nothing(len(owners))
     chosen: dict[int, list[int]] = {}
     surplus: list[int] = []
     repeats = ends.repeats.swings > 0
     sizes, times = ends.repeats.size, np.nan_to_num(ends.repeats.time)
-    near = np.where(repeats, ALIKE, CLOSE)
+    near = np.where(repeats, settings.same_motion_share, settings.same_irregular_share)
     cycles, leaves_first = beside.cycles, beside.leave_first
 
     def same_kind(k: int, j: int) -> bool:
-        same = abs(sizes[k] - sizes[j]) <= near[k] * sizes[j] and abs(times[k] - times[j]) <= ALIKE * times[j]
+        same = (
+            abs(sizes[k] - sizes[j]) <= near[k] * sizes[j]
+            and abs(times[k] - times[j]) <= settings.same_motion_share * times[j]
+        )
         return bool(same and repeats[k] == repeats[j] and cycles[j] < 0)
 
     for k in np.argsort(ends.repeats.swings, kind="stable").tolist():

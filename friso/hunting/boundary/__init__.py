@@ -1,13 +1,15 @@
 """The boundary of hunting: cycles followed through one key or two, and where they stop attracting."""
 
 from friso.hunting.boundary.branch import END_OF_RANGE, Branch, Point
-from friso.hunting.boundary.curve import Curve, Spot
+from friso.hunting.boundary.curve import CLOSED, Curve, Spot
 from friso.hunting.boundary.diagram import Diagram, diagram
 from friso.hunting.boundary.locate import Bifurcation, LocatedPoint
+from friso.hunting.boundary.meetings import Meeting
 from friso.hunting.boundary.plane import Plane, plane
 from friso.hunting.boundary.space import KeyRange, Space
 
 __all__ = [
+    "CLOSED",
     "END_OF_RANGE",
     "Bifurcation",
     "Branch",
@@ -15,6 +17,7 @@ __all__ = [
     "Diagram",
     "KeyRange",
     "LocatedPoint",
+    "Meeting",
     "Plane",
     "Point",
     "Space",

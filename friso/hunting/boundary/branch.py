@@ -12,38 +12,20 @@ from itertools import pairwise
 
 import numpy as np
 
+from friso.hunting.boundary.settings import ContinuationSettings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, described
 from friso.hunting.cycle.shooting import Border, Family, close_along
-
-FIRST, LONGEST, SHORTEST = 0.002, 0.1, 1e-6
-"""First, longest and shortest step along a branch, in the space of the key over its range and the logarithms of
-distance and time."""
-
-MOST = 300
-"""Steps in one direction at most."""
-
-SHRUNK = 1e-3
-"""Amplitude, in units of the deflection of the loop by the break-away force, below which a branch has ended in the rest
-at the reference."""
-
-STEEPEST = 30.0
-"""Multiplier beyond which a cycle is not followed farther: nothing comes near it."""
-
-SMOOTH, STEEP = 0.25, 3.0
-"""Largest change of the multiplier from one step to the next, where it is not steep."""
 
 END_OF_RANGE = "end of the range"
 """How a branch ends that has been followed to the end."""
 
 REACHED = "it reached the end of the requested range"
-"""How one ends that was followed until something happened."""
+"""How a branch ends that was followed until something happened."""
 
 NO_FARTHER = "it could not be followed farther"
-"""How one begins to say it ends whose next cycle was not found."""
+"""How the reason begins where the next cycle of a branch was not found."""
 
-TURN = 0.3
-"""Largest change of direction [rad] from one step to the next."""
 
 HUNDREDTH = float(np.log(1.01))
 """Length of a line over which what is varied changes by a hundredth, where places are logarithms of it."""
@@ -99,14 +81,21 @@ class Tracer:
         farthest: float = 1.0,
         swings: int | None = None,
         pace: float = 1.0,
-        shortest: float = SHORTEST,
+        shortest: float | None = None,
         hundredth: Callable[[float], float] = lambda _: HUNDREDTH,
-        steepest: float = STEEPEST,
+        steepest: float | None = None,
         first: float | None = None,
     ) -> None:
+        settings = ContinuationSettings.current()
         self.family, self.sign, self.rtol, self.farthest, self.swings = family, sign, rtol, farthest, swings
-        self.first, self.longest, self.smooth = first or pace * FIRST, pace * LONGEST, pace * SMOOTH
-        self.shortest, self.hundredth, self.steepest = shortest, hundredth, steepest
+        self.first, self.longest, self.smooth = (
+            first or pace * settings.first_branch_step,
+            pace * settings.longest_branch_step,
+            pace * settings.multiplier_change_per_step,
+        )
+        self.hundredth = hundredth
+        self.shortest = settings.shortest_branch_step if shortest is None else shortest
+        self.steepest = settings.steepest_multiplier if steepest is None else steepest
 
     def solve(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
@@ -122,7 +111,7 @@ class Tracer:
     def _solved(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
     ) -> Point | None:
-        """The same, with the Jacobian of the cycle near it alone, if there is one."""
+        """Solve for the cycle as `solve` does, but with the Jacobian of the nearby cycle alone, if it has one."""
         border = Border(normal[None, :], np.array([normal @ target]))
         begin, times, place = near.cycle.states, near.cycle.orbits.times, np.array([near.place])
         if states is not None or near.jacobians is None:
@@ -145,8 +134,9 @@ class Tracer:
         """The points that follow the start on one side, and how they end; `ahead` is 1 or -1. The first point of which,
         with the one before it, `until` holds is the last, and asymmetric cycles are then followed on where they meet
         the symmetric one."""
+        settings = ContinuationSettings.current()
         points, direction, step = [start], np.array([ahead, 0.0, 0.0]), self.first
-        while len(points) <= MOST:
+        while len(points) <= settings.most_branch_steps:
             last = points[-1]
             target, states = continued(points[-3:], step, direction)
             point = self.solve(last, target, direction, states)
@@ -156,13 +146,16 @@ class Tracer:
             ahead = float(moved @ direction) / length if near else 0.0
             if near and (ahead > 0 or len(points) == 1):
                 direction = moved / length
-            if point is None or not near or (ahead < np.cos(TURN) and len(points) > 1):
+            if point is None or not near or (ahead < np.cos(settings.branch_turn_per_step) and len(points) > 1):
                 step /= 3  # and along the direction that the branch turned out to have
                 points[-1] = replace(last, jacobians=None)  # which may have led astray
                 if step < self.shortest:
                     return points[1:], f"{NO_FARTHER} (multiplier {last.multiplier:.3g})"
                 continue
-            coarse = abs(point.multiplier - last.multiplier) > self.smooth and abs(last.multiplier) < STEEP
+            coarse = (
+                abs(point.multiplier - last.multiplier) > self.smooth
+                and abs(last.multiplier) < settings.steep_multiplier
+            )
             if coarse and step > self.first:
                 step /= 2
                 continue
@@ -199,7 +192,7 @@ class Tracer:
 
     def _stop(self, point: Point) -> str:
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
-        if point.cycle.amplitude[0] < SHRUNK * stages.length[0]:
+        if point.cycle.amplitude[0] < ContinuationSettings.current().vanished_amplitude * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"
         if abs(point.multiplier) > self.steepest:
             return f"the cycle repels {self.steepest:g}-fold and more per return"

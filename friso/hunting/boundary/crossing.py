@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-SPREAD, ENOUGH = 9, 6
-"""Values through which the cubic is laid, and how many of these have to be known."""
+from friso.hunting.boundary.settings import ContinuationSettings
 
 
 class Crossing(NamedTuple):
@@ -23,7 +22,7 @@ def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
     off by twice what their scatter moves the cubic or their trend, or by the distance to where the cubic passes zero as
     well; None if that is more than half of the range of places, beyond which nothing is known, or if it does not pass
     zero, or there are too few values."""
-    if len(places) < ENOUGH:
+    if len(places) < ContinuationSettings.current().least_cubic_values:
         return None
     trend, curve = (np.polynomial.Polynomial.fit(places, values, degree) for degree in (1, 3))
     slopes, roots = curve.deriv(), curve.roots()
@@ -53,7 +52,7 @@ def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
     """Where the cubic through places, (n,), over lengths turns, nearest to length 0. The place may be off by twice what
     they scatter about it; None if it does not turn among them, from either end by more than that, or there are too
     few."""
-    if len(places) < ENOUGH:
+    if len(places) < ContinuationSettings.current().least_cubic_values:
         return None
     curve = np.polynomial.Polynomial.fit(lengths, places, 3)
     turns = curve.deriv().roots()
@@ -67,5 +66,5 @@ def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
 
 
 def _scatter(curve: np.polynomial.Polynomial, at: np.ndarray, values: np.ndarray) -> float:
-    """Of values, (n,), about a cubic through them."""
+    """Standard deviation of values, (n,), about a cubic through them."""
     return float(np.sqrt(np.sum((values - curve(at)) ** 2) / (len(at) - 4)))

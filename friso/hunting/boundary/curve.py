@@ -16,29 +16,9 @@ from numpy.polynomial.polynomial import polyder, polyfit, polyval
 from friso.engine.side_by_side import side_by_side
 from friso.hunting.boundary.branch import END_OF_RANGE, Tracer
 from friso.hunting.boundary.locate import Bifurcation, LocatedPoint, corrected
+from friso.hunting.boundary.settings import ContinuationSettings
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL
-
-FIRST, LONGEST, SHORTEST = 0.01, 0.05, 1e-3
-"""First, longest and shortest step along a curve, in units of the ranges of both keys."""
-
-BESIDE = 1e-3
-"""Distance of the second point of a curve from the first, in the same units."""
-
-MOST = 400
-"""Steps in one direction at most."""
-
-TURN = 0.4
-"""Largest change of direction [rad] from one step to the next."""
-
-ASIDE = 0.7
-"""How far aside of its prediction, in steps, a point may lie."""
-
-GRAZING = 0.2
-"""Sine of the angle between a curve and a line below which this tells nothing of how the multiplier changes across."""
-
-DEEP = 0.5
-"""How far a fold may lie from its prediction in the logarithms of distance and time."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +77,7 @@ class Expected:
         rows = [np.concatenate([spot.at, spot.size, spot.special.point.cycle.states[0]]) for spot in last]
         parabola = polyfit(away, rows, len(last) - 1)
         there, ahead = (np.asarray(polyval(step, of)) for of in (parabola, polyder(parabola)))
-        return cls(there[:2], there[2:4], there[None, 4:], _unit(ahead[:2]))
+        return cls(there[:2], there[2:4], there[None, 4:], unit_vector(ahead[:2]))
 
 
 class CurveTracer:
@@ -121,7 +101,7 @@ class CurveTracer:
         start = np.concatenate([[0.0], size])
         direction, far = np.array([1.0, 0.0, 0.0]), reach
         if self.kind == "fold":
-            direction, far = special.direction * [0.0, 1.0, 1.0], DEEP
+            direction, far = special.direction * [0.0, 1.0, 1.0], ContinuationSettings.current().fold_search_depth
             direction = direction / np.linalg.norm(direction)
         located = corrected(tracer, point, start, direction, self.kind, far, states, slope)
         if located is None or abs(located.point.place) > reach:
@@ -135,18 +115,19 @@ class CurveTracer:
             return near.special.slope
         normal = expected.direction[::-1] * [-1.0, 1.0]
         crossing = float(normal @ near.across)
-        if abs(crossing) < GRAZING:
+        if abs(crossing) < ContinuationSettings.current().grazing_sine:
             return np.nan
         return near.special.slope * float(normal @ across) / crossing / float(near.special.direction[0])
 
     def curve(self, first: Spot) -> Curve | None:
         """The whole curve through a point; None if no second point is found next to it."""
+        settings = ContinuationSettings.current()
         aside = first.across[::-1] * [1.0, -1.0]
-        for side in (BESIDE, -BESIDE):
+        for side in (settings.second_point_distance, -settings.second_point_distance):
             neighbour = first.at + side * aside
             if np.any((neighbour < 0) | (neighbour > 1)):
                 continue
-            second = self.on_line(neighbour, first.across, first, 20 * BESIDE)
+            second = self.on_line(neighbour, first.across, first, 20 * settings.second_point_distance)
             if second is not None:
                 break
         else:
@@ -159,24 +140,25 @@ class CurveTracer:
 
     def walk(self, spots: list[Spot]) -> tuple[list[Spot], str]:
         """Two neighbouring points with those that follow them, and how they end."""
-        start, step = spots[0], FIRST
-        direction = _unit(spots[1].at - spots[0].at)
-        while len(spots) <= MOST:
+        settings = ContinuationSettings.current()
+        start, step = spots[0], settings.first_curve_step
+        direction = unit_vector(spots[1].at - spots[0].at)
+        while len(spots) <= settings.most_curve_steps:
             last = spots[-1]
             ahead = last.at + step * direction
             if np.any((ahead < 0) | (ahead > 1)):
                 return [*spots, *self._at_the_side(spots, direction, step)], END_OF_RANGE
             across, expected = direction[::-1] * [-1.0, 1.0], Expected.beyond(spots, step)
             ahead = ahead + (expected.at - ahead) @ across * across
-            spot = self.on_line(ahead, across, last, ASIDE * step, expected)
+            spot = self.on_line(ahead, across, last, settings.aside_of_prediction * step, expected)
             moved = np.zeros(2) if spot is None else spot.at - last.at
-            if spot is None or moved @ direction < np.cos(TURN) * np.linalg.norm(moved):
+            if spot is None or moved @ direction < np.cos(settings.curve_turn_per_step) * np.linalg.norm(moved):
                 step /= 2
-                if step < SHORTEST:
+                if step < settings.shortest_curve_step:
                     return spots, f"it could not be followed farther than {self._named(last.at)}"
                 continue
             spots = [*spots, spot]
-            direction, step = _unit(moved), min(1.4 * step, LONGEST)
+            direction, step = unit_vector(moved), min(1.4 * step, settings.longest_curve_step)
             if len(spots) > 7 and np.linalg.norm(spot.at - start.at) < step:
                 return spots, CLOSED
         return spots, "it was followed for as many steps as there may be"
@@ -202,7 +184,8 @@ class CurveTracer:
         return ", ".join(f"{key} = {value[0]:.6g} {unit}".rstrip() for (key, value), unit in named)
 
 
-def _unit(vector: np.ndarray) -> np.ndarray:
+def unit_vector(vector: np.ndarray) -> np.ndarray:
+    """Scale a vector to length one."""
     return vector / np.linalg.norm(vector)
 
 

@@ -10,25 +10,16 @@ import numpy as np
 
 from friso.hunting.attractors import attractors
 from friso.hunting.boundary.branch import Branch, Point, Tracer
-from friso.hunting.boundary.locate import SAME_CYCLE, LocatedPoint, special_points
+from friso.hunting.boundary.locate import LocatedPoint, special_points
+from friso.hunting.boundary.settings import ContinuationSettings
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL, Cycles, families
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
 from friso.progress import Progress, Tally, silent
 
-SEEDS = 33
-"""Stages over the range at which cycles are looked for."""
-
-OTHERS = 6
-"""Branches at most of cycles that simulations end in, beside those that the return maps suggest: where periods double
-again and again there is no end of them."""
-
-BRANCHES = "branches of cycles"
+BRANCHES = "following branches of cycles"
 """What is reported to a progress: each cycle that was found lies on a branch."""
-
-CLOSE = 0.1
-"""Hundredths of the key up to which two branches meet one special point, where their cycles are the same there."""
 
 
 @dataclass(frozen=True)
@@ -65,11 +56,12 @@ def _in_doubt(special: Sequence[Sequence[LocatedPoint]], places: np.ndarray) -> 
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS, progress: Progress = silent) -> Diagram:
+def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress: Progress = silent) -> Diagram:
     """Follow over the range of one key every cycle that is found at `seeds` stages evenly over it: those that the
     return map suggests, the symmetric one and asymmetric ones, and those that simulations end in, of any number of
     swings. Orbits are closed to a relative tolerance."""
-    places = np.linspace(0, 1, seeds)
+    settings = ContinuationSettings.current()
+    places = np.linspace(0, 1, settings.range_stages if seeds is None else seeds)
     places = places[space.allowed(places[:, None])]
     stages = space.stages(places[:, None])
     sought, surveyed = families(stages, rtol), attractors(stages, rtol=rtol)
@@ -94,7 +86,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS, progress: Prog
         follow(k, cycles.take(np.array([k])))
     for motion in surveyed.motions:
         tally.add(1, BRANCHES)
-        if motion.cycles is not None and skipped < OTHERS:
+        if motion.cycles is not None and skipped < settings.other_branches:
             skipped += follow(motion.stage, motion.cycles.take(np.array([motion.number])))
     once = each_once(special, hundredth)
     attracting = sought[0].attracting & ~_in_doubt(once, places)
@@ -110,10 +102,11 @@ def each_once(
     """The special points of branches, of those within the errors of each other the first alone, and so of those of
     several branches that are CLOSE, in terms of the `hundredth` of the key at a place: where a limiter chatters cycles
     are followed over short ways, which overlap, and multipliers scatter. What these differ by is part of its error."""
+    settings = ContinuationSettings.current()
     once: list[tuple[int, LocatedPoint]] = []
     for number, own in enumerate(special):
         for spot in own:
-            close = CLOSE * hundredth(spot.point.place)
+            close = settings.same_point_hundredths * hundredth(spot.point.place)
             twins = (k for k, (on, other) in enumerate(once) if _same(other, spot, close if on != number else 0.0))
             twin = next(twins, None)
             if twin is None:
@@ -128,14 +121,16 @@ def each_once(
 def _same(first: LocatedPoint, second: LocatedPoint, close: float) -> bool:
     """Whether two special points are one: of the same kind, with the same cycle there, not farther apart than `close`
     or what is known of their errors."""
+    settings = ContinuationSettings.current()
     close = max([close, *(spot.error for spot in (first, second) if np.isfinite(spot.error))])
     apart = np.abs(first.point.vector - second.point.vector)
     kinds = [(spot.kind, spot.point.cycle.sign, spot.point.cycle.swings) for spot in (first, second)]
-    return bool(kinds[0] == kinds[1] and apart[0] < close and apart[1:].max() < SAME_CYCLE)
+    return bool(kinds[0] == kinds[1] and apart[0] < close and apart[1:].max() < settings.same_cycle_log)
 
 
 def _passes(branch: Branch, point: Point) -> bool:
     """Whether a branch passes through a cycle, or through its mirror image."""
+    settings = ContinuationSettings.current()
     if (branch.sign, branch.points[0].cycle.swings) != (point.cycle.sign, point.cycle.swings):
         return False
     path = np.array([passed.vector for passed in branch.points])
@@ -144,6 +139,9 @@ def _passes(branch: Branch, point: Point) -> bool:
         if low <= point.place <= high:
             share = (point.place - first[0]) / (second[0] - first[0]) if high > low else 0.0
             between = first + share * (second - first)
-            if np.abs(between - point.vector)[1:].max() < SAME_CYCLE or abs(between[2] - point.time) < SAME_CYCLE / 4:
+            if (
+                np.abs(between - point.vector)[1:].max() < settings.same_cycle_log
+                or abs(between[2] - point.time) < settings.same_cycle_log / 4
+            ):
                 return True
     return False

@@ -9,32 +9,15 @@ from typing import Literal
 import numpy as np
 
 from friso.hunting.boundary.branch import Branch, Point, Tracer
-from friso.hunting.boundary.crossing import SPREAD, Crossing, FoldBack, crossing, turn
+from friso.hunting.boundary.crossing import Crossing, FoldBack, crossing, turn
+from friso.hunting.boundary.settings import ContinuationSettings
+from friso.hunting.settings import ToleranceSettings
 
 Bifurcation = Literal["flip", "fold", "torus"]
 
-PRECISE, TRIES = 1e-7, 30
-"""Step along the branch that ends a search, and steps at most."""
-
-ASIDE = 1e-3
-"""Step from a first guess from which the slope is taken."""
-
-MET = 1e-5
-"""How far the multiplier may be off at a first guess that is right, going by what it is expected to change along the
-way."""
 
 ALONG = np.array([1.0, 0.0, 0.0])
 """Direction along the key alone, in the space of place, log distance and log time."""
-
-TURNING = 0.03
-"""How far on either side of a fold orbits are looked at where a limiter chatters, in the space of place, log distance
-and log time: the multiplier, over a range of a hundredth of the distance, may be 1 as far as that from it."""
-
-SAME_CYCLE = 0.02
-"""Difference in the logarithms of distance and time up to which two cycles of one stage are the same."""
-
-TIGHTER = 0.01
-"""Share of the tolerance at which a point is computed again for its error."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +35,9 @@ class LocatedPoint:
     def in_doubt(self, point: Point) -> bool:
         """Whether a point of the same branch lies within the error of this one, if that is known: whether the cycle
         attracts there is not."""
+        settings = ContinuationSettings.current()
         apart = np.abs(self.point.vector - point.vector)
-        return bool(np.isfinite(self.error) and apart[0] < self.error and apart[1:].max() < SAME_CYCLE)
+        return bool(np.isfinite(self.error) and apart[0] < self.error and apart[1:].max() < settings.same_cycle_log)
 
 
 def distance_to(kind: Bifurcation, point: Point) -> float:
@@ -80,7 +64,7 @@ def _complex(point: Point) -> bool:
 def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> LocatedPoint | None:
     """The point between two neighbours on a branch at which it happens, with its error; None if it is not reached."""
     direction = towards(first, second)
-    points = _enclosed(tracer, first, second, kind, PRECISE)
+    points = _enclosed(tracer, first, second, kind, ContinuationSettings.current().special_point_step)
     if points is None:
         return None
     nearest = min(points, key=lambda place: abs(distance_to(kind, points[place])))
@@ -88,8 +72,10 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> L
 
 
 def last_inside(tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float) -> Point | None:
-    """Of the points between two neighbours on a branch that still attract, the one nearest to where it happens, to so
-    much along the branch; None if one of them cannot be reached."""
+    """The last point between two neighbours on a branch at which the cycle still attracts.
+
+    It lies within `precise` of the special point, along the branch. None if a cycle on the way cannot be closed.
+    """
     points = _enclosed(tracer, first, second, kind, precise)
     if points is None:
         return None
@@ -107,6 +93,7 @@ def _enclosed(
 ) -> dict[float, Point] | None:
     """The points between two neighbours that the search for where it happens has met, by their places along the branch;
     None if one of them cannot be reached."""
+    settings = ContinuationSettings.current()
     from scipy.optimize import brentq  # 0.4 s to import
 
     direction, length = towards(first, second), float(np.linalg.norm(second.vector - first.vector))
@@ -122,7 +109,7 @@ def _enclosed(
         return distance_to(kind, points[place_along])
 
     try:
-        root = float(brentq(distance, 0.0, length, xtol=precise, maxiter=TRIES))  # type: ignore[arg-type]
+        root = float(brentq(distance, 0.0, length, xtol=precise, maxiter=settings.special_point_tries))  # type: ignore[arg-type]
         distance(root)
     except (Unreached, RuntimeError):
         return None
@@ -152,7 +139,9 @@ def _special_point(
             return LocatedPoint(kind, point, direction, np.inf, slope)
         there = tracer.solve(point, point.vector + (passed.place - point.place) * ALONG, ALONG) or point
         return LocatedPoint(kind, there, direction, passed.reserve, passed.slope * float(direction[0]))
-    tight = Tracer(tracer.family, tracer.sign, tracer.rtol * TIGHTER).solve(point, point.vector, direction)
+    tight = Tracer(tracer.family, tracer.sign, tracer.rtol * ToleranceSettings.current().check_rtol_factor).solve(
+        point, point.vector, direction
+    )
     if tight is None:
         return LocatedPoint(kind, point, direction, np.inf, slope)
     moved = (abs(distance_to(kind, tight) - distance_to(kind, point)) + abs(distance_to(kind, point))) / abs(slope)
@@ -184,7 +173,7 @@ def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | No
     """Where a branch turns back at a fold, from a curve through the places of orbits about a first guess along a
     direction: where a limiter chatters the multiplier is that over a range of distances, and passes 1 beside the fold.
     Its reserve is that of the curve, or the distance to the first guess, if that is larger. None if it is not known."""
-    orbits = _beside(tracer, guess, direction, TURNING)
+    orbits = _beside(tracer, guess, direction, ContinuationSettings.current().chattering_fold_reach)
     lengths = np.array([(point.vector - guess.vector) @ direction for point in orbits])
     at = turn(lengths, np.array([point.place for point in orbits]))
     return at and at._replace(reserve=max(at.reserve, abs(at.place - guess.place)))
@@ -192,10 +181,11 @@ def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | No
 
 def _beside(tracer: Tracer, guess: Point, direction: np.ndarray, reach: float) -> list[Point]:
     """Orbits on either side of a point of a branch along a direction, not farther than `reach`."""
+    settings = ContinuationSettings.current()
     orbits: list[Point] = []
     for way in (-1.0, 1.0):
         near: Point | None = guess
-        for away in way * np.linspace(0, reach, SPREAD // 2 + 1)[1:]:
+        for away in way * np.linspace(0, reach, settings.cubic_values // 2 + 1)[1:]:
             near = near and tracer.solve(near, guess.vector + away * direction, direction)
             orbits += [near] if near else []
     return orbits
@@ -214,18 +204,19 @@ def corrected(
     """The point at which it happens, by the secant method along a direction from an origin (place, log distance, log
     time), not farther from it than `reach`, from a cycle near it; None if there is none. The search begins with
     about its `states` (1, states), and with the `slope` of the multiplier, if that is known."""
+    settings = ContinuationSettings.current()
     places, points = [0.0], [tracer.solve(near, origin, direction, states)]
-    for _ in range(TRIES):
+    for _ in range(settings.special_point_tries):
         if (latest := points[-1]) is None:
             return None
         if len(points) > 1:
             slope = (distance_to(kind, latest) - distance_to(kind, points[-2])) / (places[-1] - places[-2])  # type: ignore[arg-type]
         off, first = distance_to(kind, latest), len(points) == 1
         step = -off / slope if slope else np.inf
-        if abs(step) < PRECISE and (not first or abs(off) < MET):
+        if abs(step) < settings.special_point_step and (not first or abs(off) < settings.met_multiplier_error):
             return _special_point(tracer, kind, latest, direction, slope)
-        if first and not PRECISE <= abs(step) <= reach:
-            step = ASIDE
+        if first and not settings.special_point_step <= abs(step) <= reach:
+            step = settings.slope_step
         elif not abs(places[-1] + step) <= reach:
             return None
         places.append(places[-1] + step)

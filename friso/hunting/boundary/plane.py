@@ -14,6 +14,8 @@ from friso.hunting.attractors import attractors
 from friso.hunting.boundary.branch import Point, Tracer
 from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
 from friso.hunting.boundary.locate import changes, located
+from friso.hunting.boundary.meetings import Meeting, find_meetings, leg_shares
+from friso.hunting.boundary.settings import ContinuationSettings
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, families
@@ -21,25 +23,16 @@ from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
 from friso.progress import Progress, Tally, silent
 
-NODES = 13
-"""Stages along either side of the grid from which curves are looked for."""
-
-PATIENCE = 60
-"""Points of a branch between two neighbours at most: one that winds for longer hardly leads to a curve."""
-
-CURVES = "curves between stages that differ"
+CURVES = "following the edge of hunting"
 """What is reported to a progress."""
-
-SAME = 0.2
-"""Distance of a curve from the way between two stages, as a share of it, at which their change is that of the curve."""
 
 
 @dataclass(frozen=True)
 class Plane:
     """What was found in the box of two keys: the curves; the hunting cycles on those nodes of a grid, numbered in C
     order with the first key along the first side, that are `allowed`; whether anything attracts the stages on these,
-    whether that is known, and whether their loop is unstable, whatever the friction does; and where a change was seen
-    that no curve could be begun at, each shape (2,)."""
+    whether that is known, and whether their loop is unstable, whatever the friction does; where a change was seen that
+    no curve could be begun at, each shape (2,); and where curves meet."""
 
     space: Space
     curves: tuple[Curve, ...]
@@ -50,13 +43,15 @@ class Plane:
     decided: np.ndarray
     unstable: np.ndarray
     gaps: tuple[np.ndarray, ...]
+    meetings: tuple[Meeting, ...] = ()
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def plane(space: Space, rtol: float = RTOL, nodes: int = NODES, progress: Progress = silent) -> Plane:
+def plane(space: Space, rtol: float = RTOL, nodes: int | None = None, progress: Progress = silent) -> Plane:
     """Find all curves in the plane of two keys on which the hunting cycle stops attracting, and those on which an
     asymmetric cycle that bounds its basin appears; orbits are closed to a relative tolerance, and looked for from
     `nodes` x `nodes` stages."""
+    nodes = ContinuationSettings.current().grid_stages if nodes is None else nodes
     points = space.grid(nodes)
     allowed = np.flatnonzero(space.allowed(points))
     stages = space.stages(points[allowed])
@@ -83,7 +78,8 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES, progress: Progre
         if not known_gap and not any(_crossed(curve, points[a], points[b]) for curve in curves):
             gaps.append(middle)
     unstable = np.any([*unstable_among(stages).values()], axis=0)
-    return Plane(space, tuple(curves), nodes, allowed, hunting, attracts, decided, unstable, tuple(gaps))
+    meetings = find_meetings(space, curves, rtol)
+    return Plane(space, tuple(curves), nodes, allowed, hunting, attracts, decided, unstable, tuple(gaps), meetings)
 
 
 def _sought(
@@ -151,13 +147,11 @@ def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int
 
 def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
     """Whether a curve passes by the way between two neighbours."""
-    points = curve.points
-    legs = points[1:] - points[:-1]
-    path = start + np.linspace(0, 1, 9)[:, None] * (end - start)
-    for at in path:
-        shares = np.clip(((at - points[:-1]) * legs).sum(axis=1) / np.maximum((legs**2).sum(axis=1), 1e-30), 0, 1)
-        away = np.linalg.norm(points[:-1] + shares[:, None] * legs - at, axis=1)
-        if away.min() < SAME * np.linalg.norm(end - start):
+    settings = ContinuationSettings.current()
+    points, mesh = curve.points, float(np.linalg.norm(end - start))
+    for at in start + np.linspace(0, 1, 9)[:, None] * (end - start):
+        nearest = points[:-1] + leg_shares(points, at)[:, None] * np.diff(points, axis=0)
+        if np.linalg.norm(nearest - at, axis=1).min() < settings.explained_distance * mesh:
             return True
     return False
 
@@ -165,6 +159,7 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
 def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:
     """The first point on the way from a stage with a cycle to a neighbour at which the cycle stops attracting or folds
     back, if there is one, and whether it reaches that neighbour without."""
+    settings = ContinuationSettings.current()
     mesh = float(np.linalg.norm(end - start))
     across = (end - start) / mesh
     tracer = Tracer(
@@ -176,7 +171,9 @@ def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol
     )
     first = Point.of(space.stages(start[None]), 0.0, cycle)
     steps = count(1)
-    points, reason = tracer.walk(first, 1.0, lambda last, point: bool(changes(last, point)) or next(steps) >= PATIENCE)
+    points, reason = tracer.walk(
+        first, 1.0, lambda last, point: bool(changes(last, point)) or next(steps) >= settings.most_points_between
+    )
     last, point = [first, first, *points][-2:]
     if not (kinds := changes(last, point)):
         return None, tracer.reaches(points, reason)

@@ -25,7 +25,7 @@ VERDICTS: tuple[Verdict, ...] = ("hunts", "bistable", "transient", "settles", "f
 """The words, the worst first."""
 
 ATTRACTED: tuple[Verdict, ...] = ("hunts", "bistable")
-"""Those of stages with a cycle that attracts."""
+"""Verdicts on stages with a cycle that attracts."""
 
 VERDICT_CRITERION = "verdict on the stage, by its attracting cycles and where its own motion ends"
 

@@ -15,10 +15,8 @@ from friso.engine.kernel import Kernel, columns, kernel
 from friso.equations.motion import without_motion
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, shared_structure
+from friso.hunting.cycle.settings import OrbitSettings
 from friso.stage.transmission import BACKLASH
-
-WITHOUT_FRICTION = 1e-6
-"""Size of the motion [m] from which magnitudes follow where no friction deflects the loop: such a stage is linear."""
 
 PER_STAGE = ("symmetric", "length", "scales", "relaxed", "per_newton", "balancing")
 """Properties of the stages one by one, which are kept with them."""
@@ -114,7 +112,7 @@ class Ensemble:
     @cached_property
     def scales(self) -> np.ndarray:
         """Magnitudes of the states, shape (count, states)."""
-        size = np.where(self.length > 0, self.length, WITHOUT_FRICTION)
+        size = np.where(self.length > 0, self.length, OrbitSettings.current().frictionless_size)
         values = self.kernel.values({**self.flat, "motion.size": size, "motion.duration": np.inf}, self.count)
         return columns(self.kernel.module.scales(values), self.count)
 

@@ -8,35 +8,21 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.guess import UNWINDING, Guess, symmetric_guess, whole_guess
+from friso.hunting.cycle.guess import Guess, symmetric_guess, whole_guess
 from friso.hunting.cycle.multipliers import multipliers
 from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.cycle.return_map import ReturnMap, return_map
+from friso.hunting.cycle.settings import OrbitSettings
 from friso.hunting.cycle.shooting import Orbits, close, swings_of_simplest
 from friso.hunting.cycle.swings import swings
+from friso.hunting.rows import ArrayRows
+from friso.hunting.settings import ToleranceSettings
 
-RTOL = 1e-9
+RTOL = ToleranceSettings().cycle_rtol
 """Default relative tolerance for following cycles."""
 
-COARSE_RTOL = 1e-6
+COARSE_RTOL = ToleranceSettings().guess_rtol
 """Relative tolerance that does for guesses."""
-
-TRIES = ((1.0, 1.0), (0.985, 1.05), (0.985, 1.0), (0.97, 1.05), (1.015, 1.0))
-"""Shares of the guessed distance and time from which orbits are tried to be closed, one after the other."""
-
-MOST_ASYMMETRY = 0.05
-"""Share by which the two distances of an asymmetric cycle of a symmetric stage differ at least to be guessed."""
-
-LEANING = 1e-3
-"""Share of the amplitude by which the middle of an asymmetric cycle is off the reference at least."""
-
-KEPT = 0.5
-"""Share of the guessed distance by which that of a closed orbit may differ: farther off it is another one, such as the
-rest at the reference, which every stage has."""
-
-REPEATED, STEADY = 40, 0.02
-"""Returns that are simulated where no orbit near a guess could be closed, and the share of the distance by which the
-last of them may differ if there is a cycle that attracts."""
 
 
 NO_RETURN = "from every distance the stage swings back less far than it started"
@@ -54,7 +40,7 @@ def time_constant(returned: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Cycles:
+class Cycles(ArrayRows):
     """One cycle per stage, or none.
 
     `closed` (count,), whether there is one; `reasons` (count,), why there is none; `sign`, -1 for cycles that are their
@@ -91,7 +77,7 @@ class Cycles:
 
     @property
     def uncertain(self) -> np.ndarray:
-        """Of which stages no cycle was found although there may be one, shape (count,)."""
+        """Which stages may have a cycle that was not found, shape (count,)."""
         return np.isin(self.reasons.astype(str), UNCERTAIN)
 
     @property
@@ -104,10 +90,6 @@ class Cycles:
     def arrays(self) -> dict[str, np.ndarray]:
         """What is known of every stage, by name."""
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("sign", "swings")}
-
-    def take(self, numbers: np.ndarray) -> Cycles:
-        """The cycles with these numbers."""
-        return Cycles(self.sign, self.swings, **{name: array[numbers] for name, array in self.arrays.items()})
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -149,8 +131,9 @@ def families(stages: Ensemble, rtol: float = RTOL) -> tuple[Cycles, ...]:
 def asymmetric_cycles(stages: Ensemble, positive: ReturnMap, rtol: float = RTOL) -> Cycles:
     """One of the pair of cycles, mirror images of each other, that a symmetric stage may have beside its symmetric
     cycle; from its return map."""
-    cycles = _closed(stages, whole_guess(stages, positive, positive, MOST_ASYMMETRY), 1.0, rtol)
-    same = np.abs(cycles.middle) < LEANING * cycles.amplitude
+    settings = OrbitSettings.current()
+    cycles = _closed(stages, whole_guess(stages, positive, positive, settings.least_asymmetry_share), 1.0, rtol)
+    same = np.abs(cycles.middle) < settings.least_lean_share * cycles.amplitude
     cycles.closed[same], cycles.reasons[same] = False, NO_PAIR
     return cycles
 
@@ -174,7 +157,7 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
         np.zeros(count, bool),
         swings_of_simplest(sign),
     )
-    for distance, time in TRIES:
+    for distance, time in OrbitSettings.current().guess_variants:
         missing = guess.numbers[~orbits.closed[guess.numbers]]
         if not missing.size:
             break
@@ -189,7 +172,7 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
 
 def kept(stages: Ensemble, orbits: Orbits, distances: np.ndarray) -> np.ndarray:
     """Which orbits stick about where they were guessed to, at distances [m], shape (count,)."""
-    return np.abs(orbits.states[:, stages.sticking] / distances - 1) < KEPT
+    return np.abs(orbits.states[:, stages.sticking] / distances - 1) < OrbitSettings.current().kept_distance_share
 
 
 def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, trial: Orbits, guess: Guess) -> None:
@@ -201,21 +184,26 @@ def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, trial: Orbits, 
 
 def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float) -> None:
     """Close orbits from where a long simulation ends, as far as it repeats itself."""
+    settings = OrbitSettings.current()
     missing = guess.numbers[~orbits.closed[guess.numbers]]
     if not missing.size:
         return
     subset, sign = stages.take(missing), orbits.sign
     starts = stuck(subset, guess.distances[missing])
-    extrema = swings(subset, starts, REPEATED * guess.times[missing], 4 * REPEATED, COARSE_RTOL)
+    extrema = swings(
+        subset, starts, settings.guess_returns * guess.times[missing], 4 * settings.guess_returns, COARSE_RTOL
+    )
     rows, step = np.arange(subset.count), 1 if sign < 0 else 2
     last = np.maximum(np.isfinite(extrema.values).sum(axis=1) - 2, step)
     last -= (sign > 0) & (extrema.values[rows, last] < 0)  # on the side that it is followed from
     heights = np.abs(np.stack([extrema.values[rows, last], extrema.values[rows, last - step]]))
     times = extrema.times[rows, last] - extrema.times[rows, last - step]
-    fine = np.flatnonzero((last > REPEATED // 2) & (np.abs(heights[0] / heights[1] - 1) < STEADY))
+    fine = np.flatnonzero(
+        (last > settings.guess_returns // 2) & (np.abs(heights[0] / heights[1] - 1) < settings.steady_return_share)
+    )
     if not fine.size:
         return
-    ends_at = extrema.times[rows, last] + UNWINDING * wait(subset, heights[0])
+    ends_at = extrema.times[rows, last] + settings.unwinding_wait_share * wait(subset, heights[0])
     ends = subset.take(fine).run(starts[fine], ends_at[fine], COARSE_RTOL).ends
     if sign < 0:
         ends *= np.sign(ends[:, stages.sticking])[:, None]

@@ -9,16 +9,7 @@ import numpy as np
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import wait
 from friso.hunting.cycle.return_map import ReturnMap, trace_returns
-
-REFINED = 8
-"""Distances between the two of the map that enclose a fixed point, to enclose it closer."""
-
-UNWINDING = 0.4
-"""Time from landing until the actuator only balances constant forces, in units of the wait for the break-away."""
-
-
-ALMOST = 0.03
-"""Difference in the logarithm of distance up to which a stage almost comes back to where it was."""
+from friso.hunting.cycle.settings import OrbitSettings
 
 
 @dataclass(frozen=True)
@@ -37,15 +28,18 @@ class Guess:
 
 def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess:
     """The largest distance from which a stage lands as far on the other side, the map falling through the diagonal."""
+    settings = OrbitSettings.current()
     low, high = _falling(positive.distances, positive.returns - positive.distances)
     numbers = np.flatnonzero(np.isfinite(low))
     distances, times = np.full(stages.count, np.nan), np.full(stages.count, np.nan)
     if numbers.size:
         subset = stages.take(numbers)
-        between = np.linspace(low[numbers], high[numbers], REFINED, axis=1)
+        between = np.linspace(low[numbers], high[numbers], settings.refined_distances, axis=1)
         finer = trace_returns(subset, between, rtol, 1.0)
         distances[numbers] = root = _crossing(finer.distances, finer.returns - finer.distances)
-        times[numbers] = _interpolated(root, finer.distances, finer.times) + UNWINDING * wait(subset, root)
+        times[numbers] = _interpolated(root, finer.distances, finer.times) + settings.unwinding_wait_share * wait(
+            subset, root
+        )
     return Guess(distances, times)
 
 
@@ -55,6 +49,7 @@ def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apar
 
     `positive` and `negative` are the maps of the stages that stick on the positive and on the negative side.
     """
+    settings = OrbitSettings.current()
     guess = Guess(np.full(stages.count, np.nan), np.full(stages.count, np.nan))
     for k in range(stages.count):
         start, far = positive.distances[k], positive.returns[k]
@@ -67,7 +62,7 @@ def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apar
                 middle, negative.distances[k], negative.times[k]
             )
             waits = wait(stages.take(np.array([k, k])), np.array([at, middle]))
-            guess.distances[k], guess.times[k] = at, flights + UNWINDING * waits.sum()
+            guess.distances[k], guess.times[k] = at, flights + settings.unwinding_wait_share * waits.sum()
     return guess
 
 
@@ -83,7 +78,7 @@ def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.nd
         i = crosses[differ.argmax() if apart else differ.argmin()]
         return float(np.interp(0.0, *_ascending(rise[i : i + 2], start[i : i + 2])))
     change = np.abs(np.log(end[goes] / start[goes]))
-    if not goes.size or change.min() >= ALMOST:
+    if not goes.size or change.min() >= OrbitSettings.current().almost_return_log:
         return None
     nearest = goes[change.argmin()]
     towards = nearest + int(side[nearest])  # the symmetric fixed point

@@ -21,6 +21,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
+from friso.hunting.cycle.settings import OrbitSettings
 from friso.hunting.loop import LowerGains, far_beyond_a_limit, surely_calm
 from friso.stage import Stage
 from friso.stage.standstill import dead_band
@@ -28,57 +29,34 @@ from friso.stage.standstill import dead_band
 if TYPE_CHECKING:
     import xarray as xr
 
-AWAY, FOLLOWED, LINEAR = 2e-3, 8, 0.02
-"""Where a simulation beside a cycle begins, as share of the distance at which the stage sticks; how many returns it is
-followed for; and up to which share a deviation counts as small."""
 
 UNDECIDED = "simulations that had to decide failed, or had not settled when they were stopped"
 """Why it is not certain whether anything attracts a stage."""
 
 GIVEN_UP = "the search for what attracts the stage would have taken more work than a check may"
-"""The same where an allowance was used up."""
+"""Why it is not certain what attracts a stage where an allowance was used up."""
 
-SMALL_GAP, ROUNDING = 0.002, 1e-9
-"""Share of the break-away force by which friction falls with speed: the smallest for which cycles are of a size that is
-looked for; and where it does not fall at all."""
-
-UNFED = 0.05
-"""Fall of friction up to a speed, as that share, over the amplitude of swings that fast, as a share of the deflection
-by the break-away force: where it is below this at all speeds, no cycle is fed. The least with which one was found was
-forty times as much."""
-
-FASTEST, SPEEDS = 1e7, 300
-"""The fastest speed at which friction is evaluated, in units of the largest of small swings, and how many of these."""
-
-SMALL_SWING, FED = 0.001, (2.0, 6.0)
-"""The smallest amplitude that is looked for with certainty, as a share of the deflection by the break-away force; and
-how much larger than the amplitude of a cycle the fall of friction over its speeds is, as a share of the static one, at
-least and at most."""
-
-WIDE_BAND = 2.0
-"""Dead zone of the controller, in units of the deflection by the break-away force, from which on most starts of a
-survey lie within it, where no integrator winds up."""
 
 FLIPS = "whether the stage hunts depends on the tolerance of the simulation, a hundredth of which decided"
-"""The same where simulations contradict each other."""
+"""Why it is not certain what attracts a stage where simulations contradict each other."""
 
 REACHED = "a cycle that attracts at another bandwidth could be followed to this one, but was not found here"
-"""The same where the search through the bandwidths contradicts the survey of the stage itself."""
+"""Reason given when the search through the bandwidths contradicts the survey of the stage itself."""
 
 DITHERS = "dither keeps the stage moving, so no cycle is searched for: only runs show whether it hunts"
 """Why cycles of a stage are not searched that may hunt all the same."""
 
 BY_ITSELF = "its loop is unstable, or not linear even without friction"
-"""The same of a stage that friction cannot make hunt."""
+"""Why it is not certain that a stage settles which friction cannot make hunt."""
 
 GROWS = "with this force limit and no anti-windup swings may grow without bound: a size is where a run was stopped"
-"""The same where what was observed may be such a swing, as the loop is unstable at lower gains."""
+"""Reason given when an observed swing may grow without bound, as the loop is unstable at lower gains."""
 
 MAY_GROW = "without anti-windup it is not known whether large swings grow: a size is where a run was stopped"
-"""The same where it is not known whether it is."""
+"""Reason given when stability at lower gains is unknown, so that an observed swing may grow."""
 
 MAY_DIE_OUT = "without anti-windup large swings die out the slower the larger they are: what was observed may be one"
-"""The same where the loop is stable at lower gains."""
+"""Reason given when the loop is stable at lower gains, so that a large observed swing may die out."""
 
 PASSING: Mapping[LowerGains, str] = {"stable": MAY_DIE_OUT, "unstable": GROWS, "unknown": MAY_GROW}
 
@@ -86,34 +64,28 @@ FARTHER_KICKS = "with a force limit and no anti-windup, kicks larger than those 
 """Why something may attract a stage that a survey does not reach."""
 
 MOSTLY_WITHIN = "most starts tried lie within error_deadband, few beyond it: some of those beyond may keep swinging"
-"""The same with a wide dead zone."""
+"""Reason given when a wide dead zone holds most starts of a survey."""
 
 OUTER_INTEGRALS = (
     "with integrals in several loops, a stage stuck with the outer one wound up otherwise may keep swinging"
 )
-"""The same where starts differ in the inner one alone."""
+"""Reason given when starts vary the integral of the inner loop alone."""
 
 SMALL_CYCLES = (
     "friction falls so little over the speeds of small swings that cycles may be smaller than the search covers"
 )
-"""The same of small swings."""
+"""Reason given when cycles may be smaller than the survey covers, as friction falls so little."""
 
 NARROW_PLAY = "the backlash is so narrow that cycles of its size may be smaller than the search covers"
-"""The same of swings within a backlash."""
+"""Reason given when cycles within a narrow backlash may be smaller than the survey covers."""
 
 STIFF_BRISTLES = "bristles give way by so little that runs do not resolve how friction falls as they break away"
-"""The same of stages whose bristles hardly bend."""
+"""Reason given when bristles bend by less than runs resolve."""
 
 RESOLVED_BRISTLES = 10 * TIGHT
 """Deflection of bristles, in units of that of the loop, below which runs do not resolve it, even at the tightest
 tolerance of a survey: with 9e-10 nothing attracts in friso's runs where the exact map of a stage has a cycle, with 1e-8
 and more the cycle is there (`benchmarks.oracles`, always)."""
-
-AT_ONCE = 64
-"""Stages whose friction is looked at together, at hundreds of speeds each."""
-
-SAMPLES = 2000
-"""Sampling intervals in a period of the trace."""
 
 
 @dataclass(frozen=True)
@@ -257,15 +229,18 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
         observed=tuple(
             Swing(m.amplitude, m.period, bool(m.time == m.time), m.swings) for m in survey.motions if not m.cycles
         ),
-        target=survey.target.of(0) if survey.motions else None,
+        target=survey.target.take(0) if survey.motions else None,
         surveyed=survey,
         lower_gains=None if far is None else far[0],
     )
 
 
 def surely_surveyed(stages: Ensemble, survey: Attractors | None) -> np.ndarray:
-    """Of which stages it is certain what attracts them, shape (count,): a survey decided that, and nothing may lie
-    beyond it; of those that were not surveyed because they cannot hunt (None), which keep up no other swing."""
+    """Which stages it is certain of what attracts them, shape (count,).
+
+    A survey decided that, and nothing may lie beyond it. Stages that cannot hunt are not surveyed (None): they are
+    certain if they keep up no other swing.
+    """
     if survey is None:
         return surely_calm(stages) if why_not(stages.structure) else np.ones(stages.count, bool)
     return np.asarray(survey.decided & (beyond_the_survey(stages, survey) == ""))
@@ -289,34 +264,47 @@ def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
 def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
     """Why something may attract stages that a survey does not reach, words of shape (count,): motions from `farther`
     off, (count,), for instance, which may swing on for all that is known."""
+    settings = OrbitSettings.current()
     if stages.outer_integrals:
         why = np.full(stages.count, OUTER_INTEGRALS, dtype=object)
     else:
         why = np.where(small_cycles_possible(stages), SMALL_CYCLES, "").astype(object)
-        why[(stages.backlash > 0) & (stages.backlash < SMALL_SWING * stages.length)] = NARROW_PLAY
+        why[(stages.backlash > 0) & (stages.backlash < settings.least_certain_swing * stages.length)] = NARROW_PLAY
     if bristles := stages.kernel.having(Role.BRISTLE):
         why[stages.scales[:, bristles].min(axis=1) < RESOLVED_BRISTLES * stages.length] = STIFF_BRISTLES
-    why[(dead_band(stages.flat) >= WIDE_BAND * stages.length) & (stages.length > 0)] = MOSTLY_WITHIN
+    why[(dead_band(stages.flat) >= settings.wide_dead_zone * stages.length) & (stages.length > 0)] = MOSTLY_WITHIN
     why[farther] = FARTHER_KICKS
     return why
 
 
 def small_cycles_possible(stages: Ensemble) -> np.ndarray:
-    """Of which stages cycles may be smaller than is looked for, shape (count,): those that the fall of friction feeds
-    are a certain share of it (`FED`), and they attract where it falls off with less than their size."""
+    """Which stages may have cycles smaller than is looked for, shape (count,).
+
+    A cycle that the fall of friction feeds is a certain share of that fall (`feeding_ratio_range`), and it attracts
+    where friction falls more slowly than cycles grow.
+    """
+    settings = OrbitSettings.current()
     possible, rub = np.zeros(stages.count, bool), np.flatnonzero(stages.number("breakaway") > 0)
-    for first in range(0, len(rub), AT_ONCE):
-        part = rub[first : first + AT_ONCE]
+    for first in range(0, len(rub), settings.friction_stages_at_once):
+        part = rub[first : first + settings.friction_stages_at_once]
         possible[part] = _small_cycles_possible(stages.take(part))
     return possible
 
 
 def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
-    """The same of stages with friction."""
+    """Which stages with friction may have cycles smaller than is looked for, shape (count,)."""
+    settings = OrbitSettings.current()
     breakaway = stages.number("breakaway")[:, None]
-    sizes = np.geomspace(1e-3 * SMALL_SWING, SMALL_SWING, 60)
+    sizes = np.geomspace(1e-3 * settings.least_certain_swing, settings.least_certain_swing, 60)
     small = np.outer(stages.length * stages.number("rate"), sizes)
-    speeds = np.hstack([small, np.geomspace(small[:, -1], FASTEST * small[:, -1], SPEEDS, axis=1)])
+    speeds = np.hstack(
+        [
+            small,
+            np.geomspace(
+                small[:, -1], settings.fastest_friction_speed * small[:, -1], settings.friction_speeds, axis=1
+            ),
+        ]
+    )
     numbers = np.repeat(np.arange(stages.count), 2 * speeds.shape[1])
     friction = stages.take(numbers).steady_friction(np.hstack([speeds, -speeds]).ravel())
     if friction is None:
@@ -328,9 +316,11 @@ def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
     falls = (np.maximum.accumulate(np.maximum(force, at_rest), axis=2) - force) / breakaway[:, None]
     deepest, fed = falls.max(axis=2), falls[:, :, : sizes.size] / sizes
     last, most = fed[:, :, -1], fed.max(axis=2)
-    feeds = (falls / (speeds / (stages.length * stages.number("rate"))[:, None])[:, None]).max(axis=2) > UNFED
-    little = (deepest > ROUNDING) & (deepest < SMALL_GAP) & feeds
-    fades = (last < FED[1]) & (most > np.maximum(FED[0], 1.2 * last))
+    feeds = (falls / (speeds / (stages.length * stages.number("rate"))[:, None])[:, None]).max(
+        axis=2
+    ) > settings.least_feeding_ratio
+    little = (deepest > settings.no_friction_fall) & (deepest < settings.least_friction_fall) & feeds
+    fades = (last < settings.feeding_ratio_range[1]) & (most > np.maximum(settings.feeding_ratio_range[0], 1.2 * last))
     return np.any(little | fades, axis=1)
 
 
@@ -353,19 +343,25 @@ def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
 
 def _growth(stages: Ensemble, cycles: Cycles) -> float:
     """Growth of a small deviation from one return to the next, in a simulation near the cycle."""
-    away = np.array([[0.0, AWAY, -AWAY]])
-    heights = returns_of(stages, cycles.orbits, cycles.direction, away, FOLLOWED, COARSE_RTOL / 100)[0]
+    settings = OrbitSettings.current()
+    away = np.array([[0.0, settings.beside_cycle_share, -settings.beside_cycle_share]])
+    heights = returns_of(
+        stages, cycles.orbits, cycles.direction, away, settings.beside_cycle_returns, COARSE_RTOL / 100
+    )[0]
     deviations = (heights[1:] - heights[0]) / cycles.amplitude[0]
     before, after = deviations[:, :-1].ravel(), deviations[:, 1:].ravel()
-    small = (np.abs(before) < LINEAR) & (np.abs(after) < LINEAR)  # and no NaN
+    small = (np.abs(before) < settings.linear_deviation_share) & (
+        np.abs(after) < settings.linear_deviation_share
+    )  # and no NaN
     if np.count_nonzero(small) < 2:
         return np.nan
     return float(before[small] @ after[small] / (before[small] @ before[small]))
 
 
 def _signals(stages: Ensemble, cycles: Cycles) -> dict[str, Any]:
+    settings = OrbitSettings.current()
     period = float(cycles.period[0])
-    results = stages.run(cycles.states, cycles.period, COARSE_RTOL / 100, interval=period / SAMPLES)
-    time = np.arange(results.samples.shape[1]) * (period / SAMPLES)
+    results = stages.run(cycles.states, cycles.period, COARSE_RTOL / 100, interval=period / settings.trace_samples)
+    time = np.arange(results.samples.shape[1]) * (period / settings.trace_samples)
     flat = {**stages.flat, "motion.displacement": float(stages.length[0]), "motion.duration": period}
     return {**output_variables(stages.kernel, flat, results.samples[0].T, time), **time_axis(time)}

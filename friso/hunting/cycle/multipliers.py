@@ -8,23 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.settings import OrbitSettings
 from friso.hunting.cycle.shooting import Orbits, shoot
 from friso.hunting.cycle.swings import swings
-
-RANGE, POINTS, ENOUGH = 0.01, 41, 30
-"""Range of the macroscopic slope, as a share of the distance at which the stage sticks, runs across it, and how many
-of them have to come back."""
-
-ROUGHER = 100.0
-"""Tolerance of these runs in units of that of the orbits: their range is wide."""
-
-NEAR = 0.25
-"""How far off the others, as a share of the range, a return may lie that counts."""
+from friso.hunting.settings import ToleranceSettings
 
 
 @dataclass(frozen=True)
 class Multipliers:
-    """Of each orbit: its Floquet multipliers but the one that every cycle has along itself, the largest first
+    """Floquet multipliers of orbits, but for the one that every cycle has along itself, the largest first
     (count, states - 1), the direction that belongs to the first, with a position of 1 (count, states), and the
     macroscopic slope of the return map along it (count,), NaN where no limiter chatters: it decides nothing there; and
     the extremes of the position on the way that they were taken on, `high` and `low` [m] (count,)."""
@@ -66,21 +58,23 @@ def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np
 def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
     """Slope of the straight line through the returns from a small range about the orbits along a direction (count,
     states), shape (count,)."""
-    away = np.linspace(-RANGE / 2, RANGE / 2, POINTS)[None, :]
-    heights = returns_of(stages, orbits, direction, away, 2, ROUGHER * rtol)
+    settings = OrbitSettings.current()
+    away = np.linspace(-settings.slope_range_share / 2, settings.slope_range_share / 2, settings.slope_runs)[None, :]
+    heights = returns_of(stages, orbits, direction, away, 2, ToleranceSettings.current().slope_rtol_factor * rtol)
     return np.array([_straight(pairs[np.isfinite(pairs).all(axis=1)]) for pairs in heights])
 
 
 def _straight(pairs: np.ndarray) -> float:
     """Slope of a straight line through pairs (points, 2) without outliers, as where the stage
     does not break away; NaN with too few."""
-    if len(pairs) < ENOUGH:
+    settings = OrbitSettings.current()
+    if len(pairs) < settings.least_slope_runs:
         return np.nan
     first, second = (pairs - np.median(pairs, axis=0)).T
     earlier, later = np.triu_indices(len(first), 1)
     slope = np.nanmedian((second[later] - second[earlier]) / (first[later] - first[earlier]))  # that of Theil and Sen
-    near = np.abs(second - slope * first) < NEAR * np.ptp(first)
-    if np.count_nonzero(near) < ENOUGH:
+    near = np.abs(second - slope * first) < settings.near_return_share * np.ptp(first)
+    if np.count_nonzero(near) < settings.least_slope_runs:
         return np.nan
     return float(np.polyfit(first[near], second[near], 1)[0])
 

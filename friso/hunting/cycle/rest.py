@@ -6,11 +6,8 @@ import numpy as np
 
 from friso.equations.roles import Role, Steady
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.settings import OrbitSettings
 from friso.stage.standstill import integral_leak
-
-LEAKED = 10.0
-"""Time constants of a leak after which the integrator of a stage that sticks changes no more: it is off its end by
-5e-5 then, and by 4e-18 after four such waits (`WOUND`)."""
 
 
 def stuck(stages: Ensemble, displacement: np.ndarray, wound: np.ndarray | float = 0.0) -> np.ndarray:
@@ -28,8 +25,9 @@ def stuck(stages: Ensemble, displacement: np.ndarray, wound: np.ndarray | float 
 
 
 def bent(stages: Ensemble, displacement: np.ndarray, *travels: np.ndarray) -> np.ndarray:
-    """The same stages, but the bristles, relaxed at first, bent by slow `travels` [m] of the masses, each of shape
-    (count,), one after the other, to where they stick: no farther than by the break-away force.
+    """Stuck states as `stuck` gives them, with the bristles bent by slow travels of the masses.
+
+    The `travels` [m], each of shape (count,), follow one another, and bend bristles no farther than break-away does.
 
     Of several bristles some stick on while others slip. What breaks away has not forgotten these then, and the distance
     alone does not tell what follows.
@@ -51,7 +49,8 @@ def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
 def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     """Time [s] that the integrator takes to wind up to the break-away force while a stage sticks, shape (count,); where
     it pauses instead, a time in which the loop moves. No longer than an integrator with a leak winds at all."""
+    settings = OrbitSettings.current()
     rate = np.abs(stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton)
     with np.errstate(divide="ignore"):
         winding = np.where(rate > 0, stages.number("breakaway") / rate, 2 * np.pi / stages.number("rate"))
-        return np.minimum(winding, LEAKED / np.asarray(2 * np.pi * integral_leak(stages.flat)))
+        return np.minimum(winding, settings.leak_time_constants / np.asarray(2 * np.pi * integral_leak(stages.flat)))

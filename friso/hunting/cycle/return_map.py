@@ -8,20 +8,8 @@ import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import stuck, wait
+from friso.hunting.cycle.settings import OrbitSettings
 from friso.hunting.cycle.swings import swings
-
-POINTS = 32
-"""Distances from which the map is taken, at first."""
-
-RANGE = (0.02, 2.0)
-"""Smallest and largest of them, in units of the distance that the break-away force deflects the loop by."""
-
-PATIENCE = 2.0
-"""How long a stage may take to break away, in units of the time in which the integrator winds up to the break-away
-force; one that takes longer creeps home, as it does from distances like the deflection of its bristles."""
-
-FLIGHT = 60.0
-"""How long the way across may take, in units of 1/(natural frequency of mass and loop)."""
 
 
 @dataclass(frozen=True)
@@ -37,12 +25,13 @@ class ReturnMap:
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def return_map(stages: Ensemble, rtol: float, side: float = 1.0) -> ReturnMap:
     """The map of stages that stick on one side, 1 or -1, of their reference; finer where it might return as far."""
-    coarse = np.geomspace(*RANGE, POINTS)[None, :] * stages.length[:, None]
+    settings = OrbitSettings.current()
+    coarse = np.geomspace(*settings.map_range, settings.map_points)[None, :] * stages.length[:, None]
     first = trace_returns(stages, coarse, rtol, side)
     gain = np.argmax(first.returns / first.distances, axis=1)
     rows = np.arange(stages.count)
-    low, high = (first.distances[rows, np.clip(gain + step, 0, POINTS - 1)] for step in (-1, 1))
-    finer = np.geomspace(low, high, POINTS // 2 + 2, axis=1)[:, 1:-1]
+    low, high = (first.distances[rows, np.clip(gain + step, 0, settings.map_points - 1)] for step in (-1, 1))
+    finer = np.geomspace(low, high, settings.map_points // 2 + 2, axis=1)[:, 1:-1]
     second = trace_returns(stages, finer, rtol, side)
     parts = (np.hstack(pair) for pair in zip(_columns(first), _columns(second), strict=True))
     distances, returns, times = parts
@@ -56,10 +45,13 @@ def _columns(return_map: ReturnMap) -> tuple[np.ndarray, ...]:
 
 def trace_returns(stages: Ensemble, distances: np.ndarray, rtol: float, side: float) -> ReturnMap:
     """Let every stage go from each of the distances [m], shape (count, points), ascending."""
+    settings = OrbitSettings.current()
     shape = distances.shape
     several = stages.take(np.repeat(np.arange(stages.count), shape[1]))
     starts = stuck(several, side * distances.ravel())
-    durations = PATIENCE * wait(several, distances.ravel()) + FLIGHT / several.number("rate")
+    durations = settings.breakaway_waits * wait(several, distances.ravel()) + settings.flight_time / several.number(
+        "rate"
+    )
     first = swings(several, starts, durations, 1, rtol)
     returns, times = (np.nan_to_num(part).reshape(shape) for part in (-side * first.values, first.times))
     return ReturnMap(distances, returns, times)

@@ -10,39 +10,9 @@ import numpy as np
 
 from friso.engine.arrays import STATISTICS
 from friso.hunting.cycle.ensemble import Ensemble, done
-
-STEPS = 40
-"""Steps at most."""
-
-RENEWED = 1e-5
-"""Gap, as a share of the states' magnitudes, above which every step has a Jacobian of its own."""
-
-SERVES = 0.1
-"""Share to which a step with an older Jacobian has to bring the gap for that Jacobian to serve for another."""
-
-STALLED = (3, 8, 1)
-"""Steps after which an orbit whose gap has not halved gets no closer: while it is above `RENEWED`, below that, and once
-the orbit is closed, or as close as the tolerance of its runs: what is left then is rounding, and halves by chance."""
-
-STRIDE = 0.3
-"""Largest change in one step of the distance at which the stage sticks, and of the time, as a share of it."""
-
-CLOSED, CLOSED_CHATTERING = 1e-8, 1e-4
-"""Gap up to which an orbit counts as closed, and that for a limiter that may chatter."""
-
-FINEST, FINEST_CHATTERING = 1e-11, 1e-8
-"""Gap that is as good as none, and that for a limiter that may chatter, where gaps below it are rounding's."""
-
-WITHIN = 0.1
-"""Share of the tolerance of its runs to which a gap is as good as none, if an orbit with it is closed (`CLOSED`)."""
-
-FOLLOWED, STALLED_FOLLOWED = 1e-6, (3, 3, 1)
-"""Gap on the way along a branch up to which an orbit counts as closed that gets no closer, as where the stage is stiff
-and its runs are not as exact, and after how many steps it does not; where a limiter may chatter, multipliers are
-rougher than orbits with such a gap, which is as good as none."""
-
-NUDGE = 1e-5
-"""Change of a place over which the derivative by it is taken."""
+from friso.hunting.cycle.settings import OrbitSettings
+from friso.hunting.rows import ArrayRows
+from friso.hunting.settings import ToleranceSettings
 
 
 @dataclass(frozen=True)
@@ -59,7 +29,7 @@ class Shot:
 
 
 @dataclass(frozen=True)
-class Orbits:
+class Orbits(ArrayRows):
     """Closed orbits: a state of each (count, states), the time after which it comes back, or comes to its mirror
     image where sign is -1 [s] (count,), the gap that is left, as a share of the states' magnitudes (count,), whether
     Newton's method has come that far that they may be called closed (count,), and the number of `swings` in that time:
@@ -71,11 +41,6 @@ class Orbits:
     gaps: np.ndarray
     closed: np.ndarray
     swings: int
-
-    def take(self, numbers: np.ndarray) -> Orbits:
-        """The orbits with these numbers."""
-        arrays = (self.states[numbers], self.times[numbers], self.sign, self.gaps[numbers], self.closed[numbers])
-        return Orbits(*arrays, self.swings)
 
 
 def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Shot:
@@ -188,6 +153,7 @@ class _Shooting:
         rtol: float,
         places: np.ndarray | None = None,
     ) -> None:
+        tolerances = ToleranceSettings.current()
         self.family, self.sign, self.rtol = family, sign, rtol
         self.states, self.times = states.copy(), times.copy()
         count = len(times)
@@ -197,12 +163,19 @@ class _Shooting:
         self.inverses: list[np.ndarray] = [np.empty(0)] * count
         self.active, self.serves = np.ones(count, bool), np.zeros(count, bool)
         self.chatters = family(np.arange(count), self.places).chatters
-        self.finest = FINEST_CHATTERING if self.chatters else max(FINEST, min(WITHIN * rtol, CLOSED))
-        self.limit, self.stalled = CLOSED_CHATTERING if self.chatters else CLOSED, STALLED
+        self.finest = (
+            tolerances.finest_gap_chattering
+            if self.chatters
+            else max(tolerances.finest_gap, min(tolerances.gap_rtol_factor * rtol, tolerances.closed_gap))
+        )
+        self.limit, self.stalled = (
+            tolerances.closed_gap_chattering if self.chatters else tolerances.closed_gap,
+            OrbitSettings.current().stalled_steps,
+        )
 
     def advance(self) -> bool:
         """One step of the orbits still on their way; whether any is on its way still."""
-        renewed = self.gaps > RENEWED if self.chatters else ~self.serves
+        renewed = self.gaps > OrbitSettings.current().fresh_jacobian_gap if self.chatters else ~self.serves
         for which in (np.flatnonzero(self.active & renewed), np.flatnonzero(self.active & ~renewed)):
             if which.size:
                 self._advance(which, renew=bool(renewed[which[0]]))
@@ -210,6 +183,7 @@ class _Shooting:
 
     def _advance(self, which: np.ndarray, renew: bool) -> None:
         """One step of some orbits, with a Jacobian of their own or with the last one."""
+        settings = OrbitSettings.current()
         stages, states, times = self.family(which, self.places[which]), self.states[which], self.times[which]
         if renew:
             shot = shoot(stages, states, times, self.sign, self.rtol)
@@ -221,7 +195,7 @@ class _Shooting:
             ends, fine = self.sign * results.ends, done(results)
         misses = ends - states
         gaps = np.where(fine, np.max(np.abs(misses) / stages.scales, axis=1), np.inf)
-        self.serves[which] = renew | (gaps < np.maximum(SERVES * self.gaps[which], self.finest))
+        self.serves[which] = renew | (gaps < np.maximum(settings.old_jacobian_share * self.gaps[which], self.finest))
         kept = self.serves[which] | self.chatters  # the others are shot once more from where they are
         self._keep_best(which[kept], gaps[kept])
         residual = self._residual(which, stages)
@@ -254,16 +228,19 @@ class _Shooting:
         self.gaps[which] = np.minimum(self.gaps[which], gaps)
         far, near, closed = self.stalled
         patience = np.where(
-            self.gaps[which] > RENEWED, far, np.where(self.gaps[which] > max(CLOSED, self.rtol), near, closed)
+            self.gaps[which] > OrbitSettings.current().fresh_jacobian_gap,
+            far,
+            np.where(self.gaps[which] > max(ToleranceSettings.current().closed_gap, self.rtol), near, closed),
         )
         moving = self.idle[which] < patience
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
 
     def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
         """Take a step of one orbit, shortened to the stride; what it was. `scales` are those of its states."""
+        settings = OrbitSettings.current()
         step, size = self.inverses[k] @ -residual, self.states.shape[1]
-        far = abs(step[sticking]) / (STRIDE * abs(self.states[k, sticking]))
-        late = abs(step[size]) / (STRIDE * self.times[k])
+        far = abs(step[sticking]) / (settings.newton_stride * abs(self.states[k, sticking]))
+        late = abs(step[size]) / (settings.newton_stride * self.times[k])
         step = step / max(far, late, 1.0)
         self.states[k] += step[:size]
         self.times[k] += step[size]
@@ -282,15 +259,16 @@ class _Following(_Shooting):
     border: Border
 
     def __init__(self, *arguments: Any) -> None:
+        tolerances = ToleranceSettings.current()
         super().__init__(*arguments)
         size = self.states.shape[1] + 2
         self.jacobians = np.full((len(self.times), size, size), np.nan)
         self.best_jacobians = self.jacobians.copy()
-        self.stalled = STALLED_FOLLOWED
+        self.stalled = OrbitSettings.current().followed_stalled_steps
         if self.chatters:
-            self.finest = FOLLOWED
+            self.finest = tolerances.followed_gap
         else:
-            self.limit = FOLLOWED
+            self.limit = tolerances.followed_gap
         # of each orbit its last step, and what that was to bring to zero
         self.latest: list[tuple[np.ndarray, np.ndarray] | None] = [None] * len(self.times)
 
@@ -335,13 +313,14 @@ class _Following(_Shooting):
         self.jacobians[which, -1, -1] = along
 
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
+        settings = OrbitSettings.current()
         self.jacobians[which, :-1, :-1] = super()._jacobians(which, stages, shot)
         gaps = np.max(np.abs(shot.ends - self.states[which]) / stages.scales, axis=1)
-        serves = self.chatters & np.isfinite(self.gaps[which]) & (gaps < SERVES * self.gaps[which])
+        serves = self.chatters & np.isfinite(self.gaps[which]) & (gaps < settings.old_jacobian_share * self.gaps[which])
         stale = which[~serves]
         if stale.size:
             behind, ahead = self._beside(stale)
-            self.jacobians[stale, :-1, -1] = (ahead - behind) / (2 * NUDGE)
+            self.jacobians[stale, :-1, -1] = (ahead - behind) / (2 * settings.place_nudge)
         self._set_border(which, stages)
         for k in which:
             self.latest[k] = None
@@ -350,8 +329,9 @@ class _Following(_Shooting):
     def _beside(self, which: np.ndarray) -> np.ndarray:
         """Where the orbits end, and how far their phase is off, with the stages a little farther back and ahead along
         their lines, shape (2, orbits, states + 1)."""
+        settings = OrbitSettings.current()
         both = np.concatenate([which, which])
-        nudge = np.repeat([-NUDGE, NUDGE], len(which))
+        nudge = np.repeat([-settings.place_nudge, settings.place_nudge], len(which))
         stages = self.family(both, self.places[both] + nudge)
         ends = self.sign * stages.run(self.states[both], self.times[both], self.rtol).ends
         return np.hstack([ends, super()._residual(both, stages)]).reshape(2, len(which), -1)
@@ -364,7 +344,7 @@ class _Following(_Shooting):
 
 
 def _iterated(shooting: _S) -> _S:
-    for _ in range(STEPS):
+    for _ in range(OrbitSettings.current().newton_steps):
         if not shooting.advance():
             break
     return shooting

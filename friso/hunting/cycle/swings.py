@@ -8,9 +8,7 @@ import numpy as np
 
 from friso.engine.arrays import Results
 from friso.hunting.cycle.ensemble import Ensemble, done
-
-LEG = 0.5
-"""Legs of a swing are at least this share of the distance at which it started; smaller ones are ringing."""
+from friso.hunting.cycle.settings import OrbitSettings
 
 
 @dataclass(frozen=True)
@@ -28,7 +26,7 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
     An extremum counts once the way back from it is a leg long, or the run is over.
     """
     position = starts[:, stages.kernel.position]
-    legs = LEG * np.abs(position)
+    legs = OrbitSettings.current().swing_leg_share * np.abs(position)
     results = stages.run(starts, durations, rtol, least_swing=0.1 * legs)
     runs, room = results.turn_values.shape
     held = (np.arange(room) < results.turn_counts[:, None]) & done(results)[:, None]

@@ -7,30 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.hunting.attractors.closing import close_orbits
-from friso.hunting.attractors.recurrence import MOST as MOST_SWINGS
 from friso.hunting.attractors.rounds import RTOL as RUN_RTOL
 from friso.hunting.attractors.rounds import Pending
+from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL
 from friso.hunting.return_map.landing_map import MapAttractor
 from friso.hunting.return_map.mapped import Mapped, map_stages, remembered
-
-TRIES = 4
-"""How often attractors of the maps are followed, whose landings join the maps."""
-
-FOLLOWED = 3
-"""Cycles for which an attractor of a map is followed at least."""
-
-ABOUT, CLOSELY = 0.05, 0.01
-"""Shares by which landings differ at most from those of a cycle before that is tried to be closed: of the simplest, and
-of others."""
-
-ALIKE = 0.05
-"""Share by which the mean distance of landings of an attractor of a map differs at most from that of its orbit."""
-
-SCATTER = 0.05
-"""Share by which landings may differ from what their neighbours foretell: by more, this is not a map."""
+from friso.hunting.return_map.settings import ReturnMapSettings
 
 UNCLOSED = "an attractor of the map was not closed as an orbit that attracts"
 LOST = "runs were not completed"
@@ -52,6 +37,7 @@ class MapSurvey:
     @property
     def doubts(self) -> np.ndarray:
         """Why it is not known what attracts stages, words of shape (count,), "" where it is."""
+        settings = ReturnMapSettings.current()
         why = np.full(self.mapped.stages.count, "", dtype=object)
         for stage, landing_map in enumerate(self.mapped.maps):
             scatter, _ = landing_map.scatter
@@ -59,13 +45,13 @@ class MapSurvey:
                 why[stage] = UNCLOSED
             elif landing_map.lost:
                 why[stage] = LOST
-            elif scatter > SCATTER:
+            elif scatter > settings.map_scatter_share:
                 why[stage] = f"{SCATTERS} ({remembered(self.mapped, stage)})"
         return why
 
     @property
     def resolved(self) -> np.ndarray:
-        """Of which stages it is known what attracts them, shape (count,)."""
+        """Which stages have a map that tells what attracts them, shape (count,)."""
         return np.equal(self.doubts, "")
 
     @property
@@ -87,15 +73,20 @@ class _Proposal:
 
 def survey_maps(stages: Ensemble, rtol: float = RTOL) -> MapSurvey:
     """What attracts stages, found by their return maps; orbits are closed to a relative tolerance."""
+    settings = ReturnMapSettings.current()
+    survey_settings = SurveySettings.current()
     mapped = map_stages(stages)
     motions: list[Swinging] = []
     repelling: list[Swinging] = []
-    for _ in range(TRIES):
+    for _ in range(settings.attractor_tries):
         proposals = _left(mapped, motions, repelling)
         if not proposals:
             break
         runs = np.array([proposal.run for proposal in proposals])
-        most = max(MOST_SWINGS, FOLLOWED * max(_swings(p.attractor) for p in proposals))
+        most = max(
+            survey_settings.most_repeating_swings,
+            settings.followed_repetitions * max(_swings(p.attractor) for p in proposals),
+        )
         before = len(mapped.owners)
         mapped = mapped.gone_on(runs, most)
         _close(mapped, np.arange(before, len(mapped.owners)), rtol, motions, repelling)
@@ -152,7 +143,7 @@ def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly:
         size = float(distances.max())
     else:
         size = float(distances[::2].max() + distances[1::2].max()) / 2
-    alike = abs(size / motion.amplitude - 1) < ALIKE
+    alike = abs(size / motion.amplitude - 1) < ReturnMapSettings.current().same_orbit_distance_share
     return bool(alike and (not attractor.periodic or motion.swings % len(distances) == 0))
 
 
@@ -184,11 +175,12 @@ def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging
 def _repeats(path: np.ndarray, symmetric: bool, least: int) -> int:
     """The least number of swings, from the `least`, after which the last landings of a run, (landings,), about repeat
     themselves; 0 if they do not."""
+    settings = ReturnMapSettings.current()
     sizes = np.abs(path) if symmetric else path
     for swings in range(1 if symmetric else 2, len(path) // 2 + 1, 1 if symmetric else 2):
         last = min(max(swings, 2), len(path) - swings)
         again = sizes[-last:] / sizes[-last - swings : len(path) - swings]
-        share = ABOUT if swings <= 2 - symmetric else CLOSELY
+        share = settings.simple_closing_share if swings <= 2 - symmetric else settings.closing_share
         if swings >= least and np.all(np.abs(again - 1) < share):
             return swings
     return 0

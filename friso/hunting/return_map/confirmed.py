@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.hunting.attractors.rounds import RESOLVED
+from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.cycle.rest import stuck
-from friso.hunting.return_map.attracting import SCATTER, MapSurvey
+from friso.hunting.return_map.attracting import MapSurvey
 from friso.hunting.return_map.landings import RTOL, find_landings
 from friso.hunting.return_map.mapped import NEAR_DISTANCES
+from friso.hunting.return_map.settings import ReturnMapSettings
+from friso.hunting.settings import ToleranceSettings
 
 PLACES = np.array([1 / 6, 1 / 2, 5 / 6])
 """Which of the starts from which a stage rests, or goes on, in order of distance, are followed."""
 
-FOLLOWED_LANDINGS = 12
-"""Landings for which each run is followed."""
-
-TIGHTER = 0.01
-"""Relative tolerance at which all is repeated, in units of that of the map."""
-
 
 def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
-    """Of which stages runs land where the map says, shape of the `numbers`.
+    """Which stages, by number, have runs that land where the map says, shape of the `numbers`.
 
     Runs begin stuck at three distances from which the stage rests, at three from which it goes on, and in the widest
     gap between the starts of the map. Each is followed for some landings, at the tolerance of the map and at a
@@ -31,7 +27,7 @@ def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
     begun = [_starts(survey, int(number)) for number in numbers]
     owners = np.repeat(np.arange(len(numbers)), [len(starts) for starts in begun])
     right = np.ones(len(numbers), bool)
-    for rtol in (RTOL, TIGHTER * RTOL):
+    for rtol in (RTOL, ToleranceSettings.current().check_rtol_factor * RTOL):
         lands = _land_as_foretold(survey, numbers[owners], np.concatenate(begun), rtol)
         right[owners[~lands]] = False
     return right
@@ -57,8 +53,10 @@ def _starts(survey: MapSurvey, stage: int) -> np.ndarray:
 @np.errstate(all="ignore")  # landings that are not there are NaN
 def _land_as_foretold(survey: MapSurvey, owners: np.ndarray, starts: np.ndarray, rtol: float) -> np.ndarray:
     """Which runs of stages, stuck at first at `starts`, land where the maps say, shape (runs,)."""
+    settings = ReturnMapSettings.current()
+    survey_settings = SurveySettings.current()
     stages = survey.mapped.stages.take(owners)
-    landed = find_landings(stages, stuck(stages, starts * stages.length), FOLLOWED_LANDINGS, rtol)
+    landed = find_landings(stages, stuck(stages, starts * stages.length), settings.confirmed_landings, rtol)
     distances = landed.distances / stages.length[:, None]
     lands = ~landed.lost
     for k, owner in enumerate(owners.tolist()):
@@ -67,6 +65,8 @@ def _land_as_foretold(survey: MapSurvey, owners: np.ndarray, starts: np.ndarray,
         if landed.rest[k] and last:
             before, after = distances[k, 1 : last + 1], np.append(after, 0.0)
         foretold = np.abs(survey.mapped.maps[owner].foretold(before))
-        apart = np.abs(foretold - after) / np.maximum(foretold, RESOLVED)
-        lands[k] &= bool(np.all((apart < SCATTER) | (np.maximum(foretold, after) < RESOLVED)))
+        apart = np.abs(foretold - after) / np.maximum(foretold, survey_settings.least_swing)
+        lands[k] &= bool(
+            np.all((apart < settings.map_scatter_share) | (np.maximum(foretold, after) < survey_settings.least_swing))
+        )
     return lands

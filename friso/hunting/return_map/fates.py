@@ -14,12 +14,7 @@ from friso.equations.structure import shared_structure
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.landings import RTOL, find_landings
-
-FIRST_LANDINGS, MORE_LANDINGS, ROUNDS = 3, 3, 8
-"""Landings of a run before the map is asked, more of one of which it is not sure, and how often."""
-
-UNSURE = 0.02
-"""Share by which a landing may be off: by more, the stage has not forgotten yet how its motion began."""
+from friso.hunting.return_map.settings import ReturnMapSettings
 
 
 def motions_go_on(
@@ -47,22 +42,32 @@ def motions_go_on(
 @np.errstate(all="ignore")  # a stage that never lands is still at its reference
 def _go_on(stages: Ensemble, starts: np.ndarray, landing_map: LandingMap) -> tuple[np.ndarray, np.ndarray]:
     """Which runs from states go on for ever, by where they land, and of which that is known, both (runs,)."""
+    settings = ReturnMapSettings.current()
     count = len(starts)
     ends, decided, left = np.zeros(count, bool), np.zeros(count, bool), np.arange(count)
-    states, most = starts, FIRST_LANDINGS
-    for _ in range(ROUNDS):
+    states, most = starts, settings.first_landings
+    for _ in range(settings.fate_rounds):
         landed = find_landings(stages.take(left), states, most)
         rows = np.arange(left.size)
         before, last = (
             landed.distances[rows, at] / stages.length[left] for at in (np.maximum(landed.count - 1, 0), landed.count)
         )
-        fates = np.array([landing_map.goes_on(last * share) for share in (1 - UNSURE, 1.0, 1 + UNSURE)])
+        fates = np.array(
+            [
+                landing_map.goes_on(last * share)
+                for share in (1 - settings.unsure_landing_share, 1.0, 1 + settings.unsure_landing_share)
+            ]
+        )
         foretold = np.abs(landing_map.foretold(before) / last) - 1
-        sure = (fates == fates[1]).all(axis=0) & (np.abs(foretold) < UNSURE) & (landed.count == most)
+        sure = (
+            (fates == fates[1]).all(axis=0)
+            & (np.abs(foretold) < settings.unsure_landing_share)
+            & (landed.count == most)
+        )
         sure = landed.rest | (sure & ~landed.lost)
         ends[left[sure]], decided[left[sure]] = fates[1][sure] & ~landed.rest[sure], True
         on = ~sure & ~landed.lost
-        left, states, most = left[on], landed.ends[on], MORE_LANDINGS
+        left, states, most = left[on], landed.ends[on], settings.more_landings
         if not left.size:
             break
     return ends, decided

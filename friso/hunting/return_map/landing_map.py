@@ -10,36 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from friso.hunting.attractors.recurrence import MOST as MOST_SWINGS
-from friso.hunting.attractors.rounds import RESOLVED
+from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.return_map.landings import Landings
-
-JUMP, STEEPEST = 0.5, 3.0
-"""Where the map breaks off: two neighbouring returns differ in their logarithms by more than this and so many times the
-difference of the logarithms of their distances."""
-
-ITERATIONS, TIMES = 200, 4
-"""Landings after which the map may have come to what attracts it, and how often their number is doubled while it still
-leaves a cycle."""
-
-CHECKED, EXACT = 10, 1e-9
-"""Landings after which it is looked whether all have come to rest or to a cycle of 1, 2, 5 or 10 landings, by the share
-up to which they are what they were before."""
-
-ROUNDING = 1e-6
-"""Share up to which landings have come to a cycle."""
-
-SAME = 2e-3
-"""Share by which landings differ at most that are the same after a cycle."""
-
-ALIKE = 0.02
-"""Share by which the landings of one attractor of the map differ at most from those of another start."""
-
-HARDLY_STICKS = 3.0
-"""Distance, in units of the deflection of the loop by the break-away force, beyond which a stage hardly sticks."""
-
-SCATTER_RANGE = 0.05
-"""Range of the logarithm of distance over which points beside each other tell the scatter."""
+from friso.hunting.return_map.settings import ReturnMapSettings
 
 OTHER_SIDE = 1e3
 """What places on the negative side are shifted by."""
@@ -80,6 +53,7 @@ class LandingMap:
     def of(cls, landings: Landings, length: float, symmetric: bool) -> LandingMap:
         """The map from the landings of runs of one stage, but where they started: what follows that depends on how the
         run began. `length` [m] is the deflection of the loop by the break-away force."""
+        settings = SurveySettings.current()
         distances = landings.distances / length
         ended = np.where(landings.rest, 0.0, np.where(landings.away, np.inf, np.nan))
         distances, count = _without_excursions(np.abs(distances) if symmetric else distances, landings.count)
@@ -88,8 +62,8 @@ class LandingMap:
             here = distances[:, k]
             ahead = distances[:, min(k + 1, distances.shape[1] - 1)]
             following = np.where(k < count, ahead, ended)
-            following = np.where(np.abs(following) < RESOLVED, 0.0, following)
-            which = np.flatnonzero((np.abs(here) >= RESOLVED) & ~np.isnan(following) & (k <= count))
+            following = np.where(np.abs(following) < settings.least_swing, 0.0, following)
+            which = np.flatnonzero((np.abs(here) >= settings.least_swing) & ~np.isnan(following) & (k <= count))
             columns.append((here[which], following[which], which, k + 1 == count[which]))
         before, after, run, final = (np.concatenate(part) for part in zip(*columns, strict=True))
         order = np.argsort(before, kind="stable")
@@ -121,6 +95,7 @@ class LandingMap:
         Between two points the logarithm of distance goes straight, or, where the map breaks off, with the gain of the
         nearer point.
         """
+        settings = ReturnMapSettings.current()
         begins, values, slopes = [-np.inf], [REST], [0.0]
 
         def piece(begin: float, value: float, slope: float) -> None:
@@ -144,14 +119,14 @@ class LandingMap:
                 one, two = after[k], after[k + 1]
                 if np.isfinite(one) and np.isfinite(two) and one * two > 0:
                     rise = np.log(two / one)
-                    if abs(rise) < JUMP + STEEPEST * (high - low):
+                    if abs(rise) < settings.break_jump_log + settings.break_steepness * (high - low):
                         slope = rise / (high - low)
                         piece(low, float(_place(np.array(one))) - slope * low, slope)
                         continue
                 beside(low, low, one)
                 beside((low + high) / 2, high, two)
             if len(points) and first < len(begins) and begins[first] == places[0]:  # the same line a little nearer
-                begins[first] -= SCATTER_RANGE
+                begins[first] -= settings.scatter_range_log
             if len(points):
                 beside(places[-1], places[-1], after[-1] if abs(after[-1]) < abs(self.before[points[-1]]) else 0.0)
             piece(OTHER_SIDE / 2 if side > 0 else np.inf, REST, 0.0)
@@ -160,10 +135,11 @@ class LandingMap:
     def next(self, places: np.ndarray) -> np.ndarray:
         """The places of the next landings after those at places (see `_place`), shape (count,), straight between the
         points of the map."""
+        settings = SurveySettings.current()
         begins, values, slopes = self._lines
         pieces = np.searchsorted(begins, places, side="right") - 1
         after = values[pieces] + slopes[pieces] * places
-        nearest = np.where(after > OTHER_SIDE / 2, after - OTHER_SIDE, after) < np.log(RESOLVED)
+        nearest = np.where(after > OTHER_SIDE / 2, after - OTHER_SIDE, after) < np.log(settings.least_swing)
         return np.where(nearest, REST, after)
 
     @cached_property
@@ -176,23 +152,28 @@ class LandingMap:
     def _followed(self, at: np.ndarray) -> np.ndarray:
         """The last of the landings that follow places, shape (points, landings), once the map has come to what attracts
         it."""
-        iterations, before, paths = ITERATIONS, np.full(len(at), np.inf), at[:, None]
-        for _ in range(TIMES):
+        settings = ReturnMapSettings.current()
+        survey_settings = SurveySettings.current()
+        iterations, before, paths = settings.map_iterations, np.full(len(at), np.inf), at[:, None]
+        for _ in range(settings.iteration_doublings):
             earlier = np.full(len(at), np.inf)
             for number in range(iterations):
-                if number % CHECKED == 0:
-                    if np.all((np.abs(at - earlier) < EXACT) | (at <= REST)):
+                if number % settings.checked_landings == 0:
+                    if np.all((np.abs(at - earlier) < settings.exact_repetition_share) | (at <= REST)):
                         break
                     earlier = at
                 at = self.next(at)
             if not np.any(at > REST):
                 return np.tile(at[:, None], 2)
             orbits = [at]
-            for _ in range(2 * MOST_SWINGS):
+            for _ in range(2 * survey_settings.most_repeating_swings):
                 orbits.append(self.next(orbits[-1]))
             paths = np.array(orbits).T
             strays = _strays(paths)
-            if not np.any((strays > ROUNDING) & (strays > before) | ((strays > SAME) & ~np.isfinite(before))):
+            if not np.any(
+                (strays > settings.arrived_share) & (strays > before)
+                | ((strays > settings.same_landing_share) & ~np.isfinite(before))
+            ):
                 break
             at, iterations, before = orbits[-1], 2 * iterations, strays
         return paths
@@ -208,17 +189,18 @@ class LandingMap:
     def _places(self, distances: np.ndarray) -> np.ndarray:
         """The places of landings at signed distances."""
         at = np.abs(distances) if self.symmetric else distances
-        moves = np.isfinite(at) & (np.abs(at) >= RESOLVED)
+        moves = np.isfinite(at) & (np.abs(at) >= SurveySettings.current().least_swing)
         return np.where(moves, _place(np.where(moves, at, 1.0)), REST)
 
     def _told_apart(self, paths: np.ndarray) -> Iterator[MapAttractor]:
         """The attractors that paths of places, shape (points, landings), are on, each once."""
+        settings = ReturnMapSettings.current()
         left = np.all(paths > REST, axis=1)
         while left.any():
             number = int(np.flatnonzero(left)[0])
             first = paths[number]
             swings = _repeats_after(first, self.symmetric)
-            near = np.abs(paths[:, :, None] - first[None, None, : max(swings, 1)]) < ALIKE
+            near = np.abs(paths[:, :, None] - first[None, None, : max(swings, 1)]) < settings.same_attractor_share
             same = left & (near.any(axis=1).all(axis=1) if swings else _mixed(paths, first))
             same[number] = True
             yield MapAttractor(_distance(first[: swings or len(first)]), np.flatnonzero(same), swings > 0)
@@ -247,6 +229,7 @@ class LandingMap:
         """By how much, at worst, a landing differs from what its neighbours predict, as a share of it, and at which
         distance; infinite where a stage rests between two landings that go on alike, or the other way round; 0 where no
         three points are close together. Only points that land at more than half of their distance count."""
+        settings = ReturnMapSettings.current()
         worst, place = 0.0, np.nan
         for side in self.sides:
             points = self.points(side)
@@ -258,9 +241,9 @@ class LandingMap:
                 v = np.log(np.abs(after))
                 share = (u[1:-1] - u[:-2]) / np.maximum(u[2:] - u[:-2], 1e-12)
                 off = np.abs(v[1:-1] - (1 - share) * v[:-2] - share * v[2:])
-                alike = (goes[:-2] == goes[2:]) & ~(np.abs(v[2:] - v[:-2]) > JUMP)
+                alike = (goes[:-2] == goes[2:]) & ~(np.abs(v[2:] - v[:-2]) > settings.break_jump_log)
             off = np.where(goes[1:-1] & goes[:-2] & goes[2:], off, np.where(goes[:-2] != goes[1:-1], np.inf, 0.0))
-            off = np.where(alike & (u[2:] - u[:-2] < SCATTER_RANGE), off, 0.0)
+            off = np.where(alike & (u[2:] - u[:-2] < settings.scatter_range_log), off, 0.0)
             off[np.fmax(v[1:-1] - u[1:-1], v[2:] - u[2:]) < np.log(0.5)] = 0.0
             if off.max() > worst:
                 k = int(off.argmax())
@@ -280,11 +263,13 @@ def _distance(places: np.ndarray) -> np.ndarray:
 
 
 def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Landings of runs, shape (runs, landings), the start first, without those farther off than `HARDLY_STICKS` from
-    which a run comes back, and how many are left without the start: there it passes its reference without sticking, so
-    that distance alone does not tell what follows."""
+    """Leave out landings beyond `farthest_sticking` from which a run comes back, and count those left after the start.
+
+    From there a stage passes its reference without sticking, so that distance alone does not tell what follows.
+    `distances` have the shape (runs, landings), the start first.
+    """
     rows, order = np.arange(len(distances))[:, None], np.arange(distances.shape[1])
-    near = (np.abs(distances) <= HARDLY_STICKS) & (order <= count[:, None])
+    near = (np.abs(distances) <= ReturnMapSettings.current().farthest_sticking) & (order <= count[:, None])
     last = np.where(near.any(axis=1), distances.shape[1] - 1 - near[:, ::-1].argmax(axis=1), -1)
     kept = (near | (order > last[:, None]) | (order == 0)) & (order <= count[:, None])
     kept_first = np.argsort(~kept, axis=1, kind="stable")
@@ -295,17 +280,25 @@ def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.nd
 def _strays(paths: np.ndarray) -> np.ndarray:
     """By how much the places of paths, shape (points, landings), differ at least from those of a cycle before, shape
     (points,)."""
-    return np.min([np.abs(paths[:, n:] - paths[:, :-n]).max(axis=1) for n in range(1, MOST_SWINGS + 1)], axis=0)
+    settings = SurveySettings.current()
+    return np.min(
+        [np.abs(paths[:, n:] - paths[:, :-n]).max(axis=1) for n in range(1, settings.most_repeating_swings + 1)], axis=0
+    )
 
 
 def _repeats_after(path: np.ndarray, symmetric: bool) -> int:
     """The number of swings after which the places of landings repeat themselves, 0 if they do not."""
-    for swings in range(1 if symmetric else 2, MOST_SWINGS + 1, 1 if symmetric else 2):
-        if np.all(np.abs(path[swings:] - path[:-swings]) < SAME):
+    settings = ReturnMapSettings.current()
+    survey_settings = SurveySettings.current()
+    for swings in range(1 if symmetric else 2, survey_settings.most_repeating_swings + 1, 1 if symmetric else 2):
+        if np.all(np.abs(path[swings:] - path[:-swings]) < settings.same_landing_share):
             return swings
     return 0
 
 
 def _mixed(paths: np.ndarray, first: np.ndarray) -> np.ndarray:
     """Which paths wander over the range of one, shape (points,)."""
-    return (paths.min(axis=1) > first.min() - 10 * ALIKE) & (paths.max(axis=1) < first.max() + 10 * ALIKE)
+    settings = ReturnMapSettings.current()
+    return (paths.min(axis=1) > first.min() - 10 * settings.same_attractor_share) & (
+        paths.max(axis=1) < first.max() + 10 * settings.same_attractor_share
+    )

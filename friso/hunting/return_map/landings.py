@@ -7,36 +7,20 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from friso.equations.roles import Role
-from friso.hunting.attractors.rounds import RESOLVED, TYPICAL
+from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.rest import wait
+from friso.hunting.cycle.settings import OrbitSettings
+from friso.hunting.return_map.settings import ReturnMapSettings
+from friso.hunting.rows import ArrayRows
+from friso.hunting.settings import ToleranceSettings
 
-RTOL = 1e-6
+RTOL = ToleranceSettings().landing_rtol
 """Relative tolerance of the runs."""
-
-LEG = 0.05
-"""Share of its distance by which a stage moves back and forth at most that rings where it has landed."""
-
-STANDS = 1e-3
-"""Speed, in units of its distance times the natural frequency of mass and loop, up to which a stage has landed."""
-
-RESTS = 0.01
-"""Share of its distance by which a stage moves at most, while it could have broken away, that rests or creeps home."""
-
-BUDGET = 20_000
-"""Steps that a run takes in a round at most: a swing takes a thousand, but where a limiter or a controller chatters."""
-
-PATIENCE, FLIGHT = 2.0, 30.0
-"""How long a round is: in waits for the integrator to wind up to the break-away force where the stage sticks, and in
-units of 1/(natural frequency of mass and loop) for the way across."""
-
-ROUNDS = 10
-"""Rounds of runs more than the landings wanted: a stage that stops short of its reference, creeps, or is driven at the
-limit of its force needs several for a swing."""
 
 
 @dataclass(frozen=True)
-class Landings:
+class Landings(ArrayRows):
     """Runs and their landings: signed distances from the reference [m] and times [s], shape (runs, landings), NaN after
     the last, the start first; how many there are without the start, `count` (runs,); the states in which the runs
     ended, shape (runs, states); which of them `rest` and which ran `away` or failed, `lost`, shape (runs,)."""
@@ -49,12 +33,8 @@ class Landings:
     away: np.ndarray
     lost: np.ndarray
 
-    def take(self, numbers: np.ndarray) -> Landings:
-        """The runs with these numbers."""
-        return Landings(*(getattr(self, entry.name)[numbers] for entry in fields(self)))
-
     def joined(self, more: Landings) -> Landings:
-        """These runs and more."""
+        """Put these runs and more into one table."""
         room = max(self.distances.shape[1], more.distances.shape[1])
         pairs = ((getattr(part._with(room), entry.name) for part in (self, more)) for entry in fields(self))
         return Landings(*(np.concatenate([*pair]) for pair in pairs))
@@ -74,6 +54,9 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
     A round of runs is as long as each stage may take to wind up where it sticks, or where it may stick if it moves, and
     to cross its reference.
     """
+    orbit_settings = OrbitSettings.current()
+    settings = ReturnMapSettings.current()
+    survey_settings = SurveySettings.current()
     count, position, sticking = len(starts), stages.kernel.position, stages.sticking
     speeds = stages.kernel.having(Role.VELOCITY)
     states = stages.kernel.with_modes(starts, np.zeros(3), stages.values)
@@ -81,15 +64,15 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
     rest, away, lost = (np.zeros(count, bool) for _ in range(3))
     passed, left, landed = np.zeros(count), np.arange(count), np.zeros(count, np.int64)
     where, when = values, times
-    for _ in range(most + ROUNDS):
+    for _ in range(most + settings.extra_rounds):
         some, begun = stages.take(left), states[left]
         sticks = np.abs(begun[:, sticking])
-        small = RESOLVED * some.length
-        moves = np.abs(begun[:, speeds]).max(axis=1) > STANDS * some.number("rate") * some.length
-        from_where = np.maximum(sticks, np.where(moves, TYPICAL * some.length, small))
-        durations = PATIENCE * wait(some, from_where) + FLIGHT / some.number("rate")
-        legs = np.maximum(LEG * sticks, small)
-        results = some.run(begun, durations, rtol, with_modes=True, least_swing=legs, budget=BUDGET)
+        small = survey_settings.least_swing * some.length
+        moves = np.abs(begun[:, speeds]).max(axis=1) > settings.standing_speed * some.number("rate") * some.length
+        from_where = np.maximum(sticks, np.where(moves, survey_settings.typical_distance * some.length, small))
+        durations = orbit_settings.breakaway_waits * wait(some, from_where) + settings.flight_time / some.number("rate")
+        legs = np.maximum(settings.ringing_share * sticks, small)
+        results = some.run(begun, durations, rtol, with_modes=True, least_swing=legs, budget=settings.round_step_limit)
         fine, room = done(results), results.turn_values.shape[1]
         held = (np.arange(room) < results.turn_counts[:, None]) & fine[:, None]
         more, at = np.full((2, count, room + 1), np.nan)
@@ -100,11 +83,13 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
         away[left], lost[left] = ~fine & (np.abs(results.ends[:, position]) > 1e5 * some.length), ~fine
         before = landed[left]
         speed = np.abs(results.ends[:, speeds]).max(axis=1)
-        stands = speed < STANDS * some.number("rate") * np.maximum(np.abs(results.ends[:, position]), small)
+        stands = speed < settings.standing_speed * some.number("rate") * np.maximum(
+            np.abs(results.ends[:, position]), small
+        )
         where, when, landed = _landings(values, times, most)
         ends = np.abs(results.ends[:, sticking])
         rest[left] = fine & stands & (landed[left] == before) & (before < most)
-        rest[left] &= np.abs(ends - sticks) < np.maximum(RESTS * sticks, small)
+        rest[left] &= np.abs(ends - sticks) < np.maximum(settings.resting_move_share * sticks, small)
         last = np.abs(where[left, landed[left]])
         rest[left] |= fine & stands & (ends < small) & (last < small)
         unfinished = ~stands & (landed[left] == most) & (before < most)

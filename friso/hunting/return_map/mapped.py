@@ -7,11 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from friso.hunting.attractors.rounds import RESOLVED
+from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import stuck
-from friso.hunting.return_map.landing_map import JUMP, LandingMap
+from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.landings import RTOL, Landings, find_landings
+from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.stage.controllers import FORCE_LIMIT
 
 NEAR_DISTANCES = np.concatenate([np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 24)])
@@ -25,28 +26,10 @@ LIMITED_DISTANCES = np.geomspace(600.0, 30000.0, 6)
 """Still farther distances, in units of the deflection of the loop by the break-away force, from which stages with a
 force limit begin."""
 
-LANDINGS = 3
-"""Landings of a run: what follows the first of them does not depend any more on how the run began."""
 
-COARSE, FINE = 0.15, 0.01
-"""Widest gaps between neighbouring points, as logarithms of distance: anywhere, and where the map comes near its
-diagonal."""
-
-DIAGONAL = 0.1
-"""Logarithm of the gain up to which the map is near its diagonal."""
-
-OUTERMOST = 0.3
-"""Logarithm of the loss below which nothing more is looked for beyond the outermost points of a map."""
-
-BREAK, WITHIN = 0.02, np.array([0.2, 0.4, 0.6, 0.8])
+WITHIN = np.array([0.2, 0.4, 0.6, 0.8])
 """How closely a break between the landings of two starts is narrowed down, as a logarithm of their distances, and the
 shares of the way between them at which more runs begin."""
-
-MOST = 12
-"""Runs that are added for a stage at once, at most."""
-
-ROUNDS = 2
-"""How often runs are added."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +71,7 @@ class Mapped:
         return Mapped(self.stages.take(numbers), owners, *runs, self.rtol)
 
     def joined(self, owners: np.ndarray, starts: np.ndarray, landings: Landings) -> Mapped:
-        """These stages with more runs of them."""
+        """Add runs of these stages."""
         together = self.landings.joined(landings)
         joined = Mapped(
             self.stages,
@@ -104,12 +87,13 @@ class Mapped:
             vars(joined)["maps"] = tuple(maps)
         return joined
 
-    def begun(self, owners: np.ndarray, starts: np.ndarray, most: int = LANDINGS) -> Mapped:
-        """These stages with more runs, of those with the numbers `owners`, stuck at first at `starts`, both (runs,)."""
+    def begun(self, owners: np.ndarray, starts: np.ndarray, most: int | None = None) -> Mapped:
+        """Add runs of the stages `owners` that are stuck at `starts` at first, both of shape (runs,)."""
+        most = ReturnMapSettings.current().run_landings if most is None else most
         return self.joined(owners, starts, _stuck_at(self.stages, owners, starts, most, self.rtol))
 
     def gone_on(self, runs: np.ndarray, most: int) -> Mapped:
-        """These stages with more runs, which go on from the last landings of those with some numbers."""
+        """Add runs that go on from the last landings of the runs with some numbers."""
         owners, states = self.owners[runs], self.landings.ends[runs]
         more = find_landings(self.stages.take(owners), states, most, self.rtol)
         continued = self.continued.copy()
@@ -119,7 +103,7 @@ class Mapped:
         return before.joined(owners, np.full(len(runs), np.nan), more)
 
     def finer(self) -> Mapped:
-        """These stages with more runs, where a map is not resolved yet."""
+        """Add runs where a map is not resolved yet."""
         wanted = [self._wanted(k) for k in range(self.stages.count)]
         owners = np.repeat(np.arange(self.stages.count), [len(starts) for starts in wanted])
         return self.begun(owners, np.concatenate(wanted)) if owners.size else self
@@ -132,7 +116,7 @@ class Mapped:
         length, symmetric = float(self.stages.length[stage]), bool(self.stages.symmetric[stage])
         seen = self.landings.distances[which] / length
         seen = np.abs(seen) if symmetric else seen
-        for place in gaps(landing_map)[:MOST]:
+        for place in gaps(landing_map)[: ReturnMapSettings.current().runs_added]:
             start = _start_that_lands(self.starts[which], seen, place)
             if start is not None and not np.isclose(start, self.starts[which], rtol=1e-6).any():
                 starts.append(start)
@@ -141,19 +125,24 @@ class Mapped:
 
 
 def map_stages(
-    stages: Ensemble, near: np.ndarray = NEAR_DISTANCES, rounds: int = ROUNDS, rtol: float = RTOL, sparse: bool = False
+    stages: Ensemble,
+    near: np.ndarray = NEAR_DISTANCES,
+    rounds: int | None = None,
+    rtol: float = RTOL,
+    sparse: bool = False,
 ) -> Mapped:
     """The return maps of stages, from runs that begin stuck at distances `near` their reference and farther off, those
     in every third place alone where a `sparse` map will do."""
+    settings = ReturnMapSettings.current()
     limited = [LIMITED_DISTANCES] if FORCE_LIMIT in stages.flat else []
     far = np.concatenate([FAR_DISTANCES, *limited])
     units = np.concatenate([near, far[1::3]] if sparse else [near, far])
     sides = [(np.arange(stages.count), 1.0), (np.flatnonzero(~stages.symmetric), -1.0)]
     owners = np.concatenate([np.repeat(which, len(units)) for which, _ in sides])
     starts = np.concatenate([np.tile(side * units, len(which)) for which, side in sides])
-    landings = _stuck_at(stages, owners, starts, LANDINGS, rtol)
+    landings = _stuck_at(stages, owners, starts, settings.run_landings, rtol)
     mapped = Mapped(stages, owners, starts, np.zeros(len(owners), bool), landings, rtol)
-    for _ in range(rounds):
+    for _ in range(settings.refining_rounds if rounds is None else rounds):
         mapped = mapped.finer()
     return mapped
 
@@ -161,11 +150,14 @@ def map_stages(
 def remembered(mapped: Mapped, stage: int) -> str:
     """The state in which two runs of a stage differ most that land equally far off, but return differently: what it has
     not forgotten there, by name; "" where no landings show that."""
+    settings = ReturnMapSettings.current()
     landing_map = mapped.maps[stage]
     _, place = landing_map.scatter
     with np.errstate(all="ignore"):
         apart = np.log(landing_map.before / place)  # NaN on the other side, and where nothing scatters
-    near = np.flatnonzero((np.abs(apart) < COARSE) & landing_map.final & np.isfinite(landing_map.after))
+    near = np.flatnonzero(
+        (np.abs(apart) < settings.coarse_gap_log) & landing_map.final & np.isfinite(landing_map.after)
+    )
     if near.size < 2:
         return ""
     after = np.abs(landing_map.after[near])
@@ -185,6 +177,7 @@ def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: in
 
 def gaps(landing_map: LandingMap) -> np.ndarray:
     """Signed distances in the middle of gaps between points that are wider than they may be, the worst first."""
+    settings = ReturnMapSettings.current()
     places, excess = [], []
     for side in landing_map.sides:
         points = landing_map.points(side)
@@ -196,10 +189,14 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
             u, gain = np.log(before), np.log(across / before)
             apart = np.diff(u)
             lower, upper = np.minimum(gain[:-1], gain[1:]), np.maximum(gain[:-1], gain[1:])
-            crosses = (lower < DIAGONAL) & (upper > -DIAGONAL)
+            crosses = (lower < settings.diagonal_gain_log) & (upper > -settings.diagonal_gain_log)
             away = np.isinf(across[:-1]) & np.isinf(across[1:])
-            breaks = ~(np.abs(np.diff(np.log(across))) < JUMP) & (upper > -1.0) & ~away
-        limit = np.where(crosses & ~breaks, FINE, np.where(breaks, 2 * FINE, COARSE))
+            breaks = ~(np.abs(np.diff(np.log(across))) < settings.break_jump_log) & (upper > -1.0) & ~away
+        limit = np.where(
+            crosses & ~breaks,
+            settings.fine_gap_log,
+            np.where(breaks, 2 * settings.fine_gap_log, settings.coarse_gap_log),
+        )
         limit = np.where((upper < -1.0) | away, np.inf, limit)
         wide = np.flatnonzero(apart > limit)
         places += (side * np.exp((u[wide] + u[wide + 1]) / 2)).tolist()
@@ -209,11 +206,12 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
 
 def unclosed(landing_map: LandingMap) -> list[int]:
     """The runs of the outermost points of a map that go on about as far: beyond them it is not known what follows."""
+    settings = ReturnMapSettings.current()
     runs = []
     for side in landing_map.sides:
         points = landing_map.points(side)
         for end in points[-1:], points[landing_map.after[points] != 0][:1]:
-            if end.size and np.log(max(landing_map.gain[end[0]], 1e-300)) > -OUTERMOST:
+            if end.size and np.log(max(landing_map.gain[end[0]], 1e-300)) > -settings.outermost_loss_log:
                 runs.append(int(landing_map.run[end[0]]))
     return runs
 
@@ -233,11 +231,14 @@ def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[fl
 def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
     """Starts between neighbouring ones, ascending, of which one lands and the other does not, or far from there: beyond
     what is known, landings may go on up to the break. `landings`, the first ones, (runs,)."""
-    lands = np.abs(np.nan_to_num(landings)) >= RESOLVED
+    settings = ReturnMapSettings.current()
+    lands = np.abs(np.nan_to_num(landings)) >= SurveySettings.current().least_swing
     sizes = np.where(lands, np.abs(landings), 1.0)
-    breaks = (lands[:-1] != lands[1:]) | (lands[:-1] & lands[1:] & (np.abs(np.diff(np.log(sizes))) > JUMP))
+    breaks = (lands[:-1] != lands[1:]) | (
+        lands[:-1] & lands[1:] & (np.abs(np.diff(np.log(sizes))) > settings.break_jump_log)
+    )
     near = np.maximum(np.abs(starts[:-1]), np.abs(starts[1:])) <= NEAR_DISTANCES[-1]
-    apart = np.abs(np.diff(np.log(np.abs(starts)))) > BREAK
+    apart = np.abs(np.diff(np.log(np.abs(starts)))) > settings.break_width_log
     ends = np.flatnonzero(breaks & near & apart & (starts[:-1] * starts[1:] > 0))
     between = [starts[k] * (starts[k + 1] / starts[k]) ** WITHIN for k in ends]
     return np.concatenate(between).tolist() if between else []
@@ -247,7 +248,7 @@ def _start_that_lands(starts: np.ndarray, seen: np.ndarray, place: float) -> flo
     """Where a run begins that lands at a place, between two neighbouring ones that land about it; None if none do.
     `starts` (runs,), ascending, and landings, shape (runs, landings), the start first."""
     best, start = np.inf, None
-    for k in range(1, LANDINGS):
+    for k in range(1, ReturnMapSettings.current().run_landings):
         low, high = seen[:-1, k], seen[1:, k]
         with np.errstate(all="ignore"):
             around = np.flatnonzero(((low - place) * (high - place) <= 0) & (low * high > 0))

@@ -6,10 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from friso.hunting import Diagram, Plane
+from friso.hunting import Diagram, Meeting, Plane
 from friso.questions.boundary.words import ShownKey, conclusion
 from friso.shown.documents import plain_json
-from friso.studies.boundary_lines import Line, corner_verdicts, end_verdicts, lines, lost_places
+from friso.studies.boundary_lines import (
+    Line,
+    corner_verdicts,
+    curve_ends,
+    curve_meetings,
+    end_verdicts,
+    lines,
+    lost_places,
+)
 
 
 def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
@@ -61,8 +69,22 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
         "x": {"key": x.key, "unit": x.unit},
         "y": {"key": y.key, "unit": y.unit},
         "curves": [_curve(line, keys) for line in lines(traced)],
+        "ends": [
+            {"curve": end.line, "at": _numbers(end.at[None], keys)[0], "how": end.kind} for end in curve_ends(traced)
+        ],
+        "meetings": [_meeting(meeting, keys) for meeting in curve_meetings(traced)],
         "lost": _numbers(lost_places(traced), keys),
         "corners": dict(zip(("low low", "low high", "high low", "high high"), verdicts, strict=True)),
+    }
+
+
+def _meeting(meeting: Meeting, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
+    return {
+        "curves": list(meeting.curves),
+        "how": meeting.kind,
+        "places": _numbers(meeting.places, keys),
+        "error": _numbers(meeting.error[None], keys)[0],
+        "same_cycle": meeting.same_cycle,
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from friso.questions.boundary.words import BASIN, CYCLES, MEANINGS, ShownKey, en
 from friso.questions.map.words import QUIET, quantity
 from friso.shown.drawing.figure import (
     BLUE,
+    GREEN,
     GREY,
     INK,
     LIGHT,
@@ -34,6 +35,8 @@ from friso.studies.boundary_lines import (
     UNKNOWN,
     CycleShape,
     Line,
+    curve_ends,
+    curve_meetings,
     lines,
     lost_places,
     node_verdicts,
@@ -56,6 +59,12 @@ NODES = {
 
 LOST = "a change, no curve begun"
 """What is said of places between stages that differ, where no curve could be begun."""
+
+LOST_END = "cycle not followed farther"
+"""What is said of ends of curves inside the range."""
+
+MEETING = "curves meet"
+"""What is said of places where two curves cross, end on each other, or begin or cease to run together."""
 
 REACH = 2.5
 """Multipliers up to which they are shown."""
@@ -140,9 +149,20 @@ def _plane(traced: Plane) -> Figure:
     kinds = dict.fromkeys(line.kinds[0] for line in curves)
     meanings = [f"Beyond a {kind} of a cycle, {MEANINGS[kind]}." for kind in kinds]
     note = " ".join([*meanings, BASIN] if any(line.shape == "asymmetric" for line in curves) else meanings)
-    gaps = lost_places(traced)
-    markers = (Markers(gaps[:, 0], gaps[:, 1], LOST, GREY, "cross"),) if len(gaps) else ()
-    return Figure("boundary", "Edge of hunting", "", (Panel("", x, y, series, markers, clouds=(nodes,)),), note=note)
+    lost_ends = [end.at for end in curve_ends(traced) if end.kind == "lost"]
+    meetings = [place for meeting in curve_meetings(traced) for place in meeting.places]
+    marks = (
+        *_marks(lost_places(traced), LOST, GREY, "cross"),
+        *_marks(lost_ends, LOST_END, GREY, "triangle"),
+        *_marks(meetings, MEETING, GREEN, "target"),
+    )
+    return Figure("boundary", "Edge of hunting", "", (Panel("", x, y, series, marks, clouds=(nodes,)),), note=note)
+
+
+def _marks(places: Sequence[np.ndarray] | np.ndarray, label: str, colour: str, symbol: Symbol) -> tuple[Markers, ...]:
+    """Marks at places in the plane [SI], each of shape (2,), if there are any."""
+    x, y = np.reshape(places, (-1, 2)).T
+    return (Markers(x, y, label, colour, symbol),) if x.size else ()
 
 
 def _axis(swept: KeyRange, margin: float = 0.0) -> Axis:

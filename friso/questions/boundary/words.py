@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from friso.hunting import END_OF_RANGE, Diagram, KeyRange, Plane, Space
+from friso.hunting import END_OF_RANGE, Diagram, KeyRange, Meeting, Plane, Space
 from friso.shown.drawing.figure import Array
 from friso.shown.drawing.prefixes import listed, plus_minus, pretty, with_unit
 from friso.studies.boundary_lines import (
@@ -22,6 +22,8 @@ from friso.studies.boundary_lines import (
     PlaneEdge,
     StabilityChange,
     corner_verdicts,
+    curve_ends,
+    curve_meetings,
     end_verdicts,
     followed_changes,
     lines,
@@ -81,7 +83,7 @@ class ShownKey:
         return self._with_unit(f"{rounded:.6g} ± {float(f'{off:.1g}'):g}")
 
     def as_known(self, value: float, error: float) -> str:
-        """The same, without an error that its digits do not show."""
+        """A value with its error [SI], left out where the digits do not show it."""
         return self.text(value) if error < PLAIN * abs(value) else self.uncertain(value, error)
 
     def extent(self, values: Array, swept: KeyRange) -> str:
@@ -98,7 +100,7 @@ ROUGHLY = 3
 
 
 SHOWN_CURVES = 3
-"""Curves at most of which the answer says where they run; the figure and the details have all."""
+"""Curves, and places where they meet, that the answer tells at most; the figure and the details have all."""
 
 
 def sentences(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
@@ -130,12 +132,13 @@ def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
     if isinstance(traced, Diagram):
         return f"{_edges(traced, keys[0])} {end_sentence(traced, keys[0])}"
     if edge := plane_edge(traced):
-        return _along_one(edge, keys)
+        return " ".join([_along_one(edge, keys), *_first_meetings(traced, keys)])
     verdicts = [verdict for _, _, verdict in corner_verdicts(traced)]
     if curves := lines(traced):
-        longest = sorted(curves, key=lambda line: -len(line.at))[:SHOWN_CURVES]
+        longest = sorted(range(len(curves)), key=lambda number: -len(curves[number].at))[:SHOWN_CURVES]
         more = [f"There are {len(curves) - len(longest)} more curves."] if len(curves) > len(longest) else []
-        return " ".join([_hunting_corners(traced, keys), *(_course(line, keys) for line in longest), *more])
+        courses = [f"{_course(traced, number, keys, ROUGHLY)}." for number in longest]
+        return " ".join([_hunting_corners(traced, keys), *courses, *more, *_first_meetings(traced, keys)])
     if traced.gaps or UNKNOWN in verdicts:
         return f"{_hunting_corners(traced, keys)} No curve could be followed."
     return f"{_hunting_corners(traced, keys)} {_no_boundary(traced.space, keys)}"
@@ -172,10 +175,53 @@ def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
     return f"Of the corners of the plane, hunting is possible at {'; '.join(hunting)}{others}."
 
 
-def _course(line: Line, keys: tuple[ShownKey, ...]) -> str:
-    """From where to where a boundary runs, and why it ends there."""
-    first, last = (_place(place, keys, ROUGHLY) for place in line.at[[0, -1]].tolist())
-    return f"A {line.kinds[0]} of {CYCLES[line.shape]} runs from {first} to {last}{_ends(line)}."
+def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int = 6) -> str:
+    """From where to where the curve with a number runs, and how it ends there."""
+    line, ends = lines(traced)[number], [end for end in curve_ends(traced) if end.line == number]
+    name = f"A {line.kinds[0]} of {CYCLES[line.shape]} runs"
+    start, stop = (_place(end.at.tolist(), keys, digits) for end in ends)
+    first, last = (end.kind for end in ends)
+    if first == "closed":
+        return f"{name} in a ring through {start}"
+    if first == last:
+        return f"{name} from {start} to {stop}; at both, {ENDS[first]}"
+    return f"{name} from {start}, where {ENDS[first]}, to {stop}, where {ENDS[last]}"
+
+
+def _first_meetings(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+    """The sentences about meetings of curves that stand in the answer."""
+    texts = meeting_sentences(traced, keys)
+    more = len(texts) - SHOWN_CURVES
+    rest = [f"Curves meet at {more} more {'places' if more > 1 else 'place'}."] if more > 0 else []
+    return [*texts[:SHOWN_CURVES], *rest]
+
+
+def meeting_sentences(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+    """Tell for each meeting of two curves which these are, where they meet, and whether one cycle does both."""
+    return [_meeting(meeting, lines(traced), keys) for meeting in curve_meetings(traced)]
+
+
+def _meeting(meeting: Meeting, curves: Sequence[Line], keys: tuple[ShownKey, ...]) -> str:
+    names = [f"{curves[number].kinds[0]} of {CYCLES[curves[number].shape]}" for number in meeting.curves]
+    pair = f"A {names[0]} and a {names[1]}" if names[0] != names[1] else f"Two curves of a {names[0]}"
+    places, one = [_place(place, keys) for place in meeting.places.tolist()], "both are changes of one cycle"
+    if meeting.curves[0] == meeting.curves[1]:
+        return f"A curve of a {names[0]} crosses itself at {places[0]}: there two cycles of one stage change."
+    if meeting.kind == "together":
+        whole = "are one curve, followed from two places," if names[0] == names[1] else "run together"
+        return f"{pair} {whole} from {places[0]} to {places[1]}; {one}."
+    if meeting.kind == "end":
+        return f"{pair} meet near {places[0]}, where the first is not followed farther; {one}."
+    about = "at" if np.isfinite(meeting.error).all() else "at about"
+    return f"{pair} cross {about} {places[0]}; {one if meeting.same_cycle else 'these are two cycles of one stage'}."
+
+
+ENDS = {
+    "range": "the range ends",
+    "meets": "it meets another curve",
+    "lost": "its cycle could not be followed farther",
+}
+"""How a curve of the plane ends."""
 
 
 def _edges(traced: Diagram, key: ShownKey) -> str:
@@ -211,7 +257,7 @@ def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors:
 
 
 def _if_unstable(traced: Diagram, change: StabilityChange) -> str:
-    """That a change lies where the loop is unstable anyway; "" where it is not."""
+    """Say that a change lies where the loop is unstable anyway; "" where it is not."""
     beside = np.argmin(np.abs([traced.value(place) - change.low for place in traced.places]))
     return " (where the loop is unstable anyway)" if traced.unstable[beside] else ""
 
@@ -265,7 +311,8 @@ def end_sentence(traced: Diagram, key: ShownKey) -> str:
 
 def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     curves = lines(traced)
-    text = [_curve(line, keys, traced.space) for line in curves]
+    text = [f"{_course(traced, number, keys)} ({_accuracy(line, keys)})." for number, line in enumerate(curves)]
+    text += meeting_sentences(traced, keys)
     text += [
         f"{kind.capitalize()}: beyond, {MEANINGS[kind]}." for kind in dict.fromkeys(line.kinds[0] for line in curves)
     ]
@@ -273,17 +320,14 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     return [*text, *_corners(traced, keys), *_untraced(traced, keys)]
 
 
-def _curve(line: Line, keys: tuple[ShownKey, ...], space: Space) -> str:
-    """How many points a curve has, where it runs, how it ends, and its largest errors."""
-    sides = zip(keys, line.at.T, space.ranges, strict=True)
-    extents = ", ".join(f"{key.key} {key.extent(values, swept)}" for key, values, swept in sides)
+def _accuracy(line: Line, keys: tuple[ShownKey, ...]) -> str:
+    """How many points a curve has, and their largest errors."""
     finite = line.error[np.isfinite(line.error).all(axis=1)]
     errors = ", ".join(key.text(error, 1) for key, error in zip(keys, finite.max(axis=0, initial=0.0), strict=True))
-    head = f"{line.kinds[0].capitalize()} of {CYCLES[line.shape]}: {len(line.at)} points, {extents}"
     unknown = len(line.error) - len(finite)
     errors_at = [f"largest error: {errors}"] if len(finite) else []
     errors_at += [f"error unknown at {unknown} of the points"] if unknown else []
-    return f"{head}{_ends(line)}; {', '.join(errors_at)}."
+    return f"{len(line.at)} points, {', '.join(errors_at)}"
 
 
 def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:

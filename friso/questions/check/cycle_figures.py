@@ -12,7 +12,7 @@ from friso.shown.cases import ShownCase
 from friso.shown.drawing.figure import GREY, INK, Array, Axis, Band, Dash, Figure, Markers, Panel, Series
 
 if TYPE_CHECKING:
-    from friso.hunting import Cycle
+    from friso.hunting import Cycle, Hunting
 
 _VIEW = 2.2  # reach of a return map's axes, in units of the largest cycle, or swing followed by one as large
 _STARTS, _FOLLOWED = 401, 300  # distances that are followed by a return map, and for how many swings
@@ -38,6 +38,10 @@ def return_map_figure(cases: list[ShownCase]) -> Figure:
         )
     hunting = [(item.label, item.case.judgement.hunting) for item in cases]
     caption += "".join(f" {label}: no cycle, as {search.reason}." for label, search in hunting if search.reason)
+    uneven = [label for label, search in hunting if search.attracting and not _mirrored(search)]
+    caption += "".join(
+        f" {label}: nothing is shaded, as swings to one side differ from those to the other." for label in uneven
+    )
     return Figure("return-map", "Does the next swing reach as far?", caption, panels, 2, subject(cases))
 
 
@@ -56,9 +60,13 @@ def _return_map(item: ShownCase) -> list[Panel]:
     if swings.size > 2:
         series.append(Series(swings[1:-1], swings[2:], "this motion", INK, width=0.8))
     x, y = Axis("This swing", "m", (0.0, reach)), Axis("Next swing", "m", (0.0, reach))
-    mirrored = bool(hunting.cycles) and all(cycle.symmetric for cycle in hunting.cycles)
-    basins = _basins(distances, returns, reach) if hunting.attracting and mirrored else ()
+    basins = _basins(distances, returns, reach) if hunting.attracting and _mirrored(hunting) else ()
     return [Panel(item.label, x, y, tuple(series), _fixed_points(hunting.cycles), bands=basins)]
+
+
+def _mirrored(hunting: Hunting) -> bool:
+    """Whether swings to one side are mirror images of those to the other: then one curve tells where they end."""
+    return bool(hunting.cycles) and all(cycle.symmetric for cycle in hunting.cycles)
 
 
 def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from friso.questions.check.laws import laws_document
 from friso.questions.check.words import answer
-from friso.shown.documents import plain_json
+from friso.shown.documents import plain_json, unit_suffix
 from friso.stage.tables import passive_where
 
 if TYPE_CHECKING:
     from friso.hunting import AttractionEnd, Case, Cycle, Feeding, Judgement, Margin, MarginEnd, ParameterMargin, Swing
     from friso.remedies.suggestion import Suggestion
     from friso.shares import Share
+    from friso.stage import Stage
     from friso.studies.draws import Draws
     from friso.studies.laws.verdicts import VerdictsByLaw
 
@@ -169,6 +170,17 @@ def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
         "searched": margin.range,
         "not_determined": [{-1: "below", 1: "above"}[side] for side in margin.open_sides],
     }
+
+
+def joint_margins_document(stage: Stage, margins: Mapping[str, ParameterMargin]) -> dict[str, Any]:
+    """The margins of a stage in keys of its joint: as multiples of its own values, and as values of these keys."""
+    document, flat, fields = {}, stage.flat(), stage.numeric_keys()
+    for key, margin in margins.items():
+        entry, unit = _parameter_margin(margin), unit_suffix(fields[key].unit)
+        for end in filter(None, (entry["below"], entry["above"])):
+            end |= {f"{name}{unit}": end[f"{name}_at_factor"] * flat[key] for name in ("same", "other")}
+        document[key.removeprefix("joint.")] = {f"yours{unit}": flat[key], **entry}
+    return plain_json({"joint_margins": document})
 
 
 def draws_document(draws: Draws, case: str) -> dict[str, Any]:

@@ -114,6 +114,13 @@ class CheckAnswer(Answer):
         activity = activity_sentences(passive_where(self.stage.flat()))
         return [*between_surveyed(self.result), *joint_sentences(self.joint_margins), *activity]
 
+    def document_of_details(self) -> dict[str, Any]:
+        """How far a joint may be from its design."""
+        from friso.questions.check.document import joint_margins_document
+
+        case = self.result.get("free", self.result["given"])
+        return joint_margins_document(case.stage, self.joint_margins)
+
     @cached_property
     def joint_margins(self) -> Mapping[str, ParameterMargin]:
         """The margins of the case with a free joint in the joint's stroke and stiffness, by key."""

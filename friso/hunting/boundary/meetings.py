@@ -1,0 +1,178 @@
+"""Where curves of the edge of hunting meet in the plane of two keys: they cross, run together, or end on one another.
+
+Curves are straight between their points, at most a twentieth of the ranges apart; a crossing is then refined with
+cycles. That two curves meet in the plane says nothing of their cycles: one stage may have both cycles at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from friso.hunting.boundary.branch import END_OF_RANGE
+from friso.hunting.boundary.curve import CLOSED, Curve, CurveTracer, Spot, unit_vector
+from friso.hunting.boundary.settings import MeetingSettings
+from friso.hunting.boundary.space import Space
+
+MeetingKind = Literal["cross", "together", "end"]
+"""Two curves cross at a point; they run together over a stretch; the first one ends on the second."""
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """How two curves of a plane meet, by their numbers (twice the same number: a curve that crosses itself).
+
+    `places` in the box of the keys, shape (1, 2), or (2, 2) for both ends of a stretch, may be off by `error` along
+    each key (infinite: not refined). Either both are changes of the `same_cycle` there, or of two cycles of one stage.
+    """
+
+    curves: tuple[int, int]
+    kind: MeetingKind
+    places: np.ndarray
+    error: np.ndarray
+    same_cycle: bool
+
+
+def find_meetings(space: Space, curves: Sequence[Curve], rtol: float) -> tuple[Meeting, ...]:
+    """Find where curves meet; crossings are refined by cycles that are closed to a relative tolerance."""
+    meetings: list[Meeting] = []
+    for first, second in combinations(range(len(curves)), 2):
+        if stretch := _together(curves, first, second):
+            meetings.append(stretch)
+            continue
+        crossings = [*_crossings(space, curves, (first, second), rtol)]
+        meetings += crossings or [*_ends_on(curves, first, second), *_ends_on(curves, second, first)][:1]
+    for number in range(len(curves)):
+        meetings += _crossings(space, curves, (number, number), rtol)
+    return tuple(meetings)
+
+
+class _Nearest(NamedTuple):
+    """The point of a curve nearest to a place, by how far it is away, and logarithms of its cycle's amplitude and
+    period, shape (2,)."""
+
+    away: float
+    cycle: np.ndarray
+
+
+def _nearest(curve: Curve, at: np.ndarray) -> _Nearest:
+    """Project a place, shape (2,), on the straight lines between the points of a curve."""
+    path, sizes = curve.points, np.array([_size(spot) for spot in curve.spots])
+    shares = leg_shares(path, at)
+    away = np.linalg.norm(path[:-1] + shares[:, None] * np.diff(path, axis=0) - at, axis=1)
+    leg = int(away.argmin())
+    return _Nearest(float(away[leg]), sizes[leg] + shares[leg] * (sizes[leg + 1] - sizes[leg]))
+
+
+def leg_shares(path: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Compute where on each leg of a path, (n, 2), the point nearest to a place, (2,), lies: shares from 0 to 1."""
+    legs = np.diff(path, axis=0)
+    return np.clip(((at - path[:-1]) * legs).sum(axis=1) / np.maximum((legs**2).sum(axis=1), 1e-30), 0, 1)
+
+
+def _size(spot: Spot) -> np.ndarray:
+    """Logarithms of the amplitude [m] and period [s] of the cycle at a point of a curve, shape (2,)."""
+    cycle = spot.special.point.cycle
+    return np.log([cycle.amplitude[0], cycle.period[0]])
+
+
+def _alike(one: np.ndarray, other: np.ndarray) -> bool:
+    """Tell from logarithms of amplitude and period whether two cycles are one, or one of them, of twice the period,
+    grows out of the other."""
+    size, period = np.abs(one - other)
+    return bool(max(size, min(period, abs(period - np.log(2)))) < MeetingSettings.current().same_cycle_log)
+
+
+def _together(curves: Sequence[Curve], first: int, second: int) -> Meeting | None:
+    """The stretch over which two curves are changes of one cycle and run on top of one another, if they do: as where a
+    curve was followed twice because it was lost in between."""
+    settings = MeetingSettings.current()
+    on: list[np.ndarray] = []
+    for spot in curves[second].spots:
+        near = _nearest(curves[first], spot.at)
+        on += [spot.at] if near.away < settings.together_distance and _alike(near.cycle, _size(spot)) else []
+    if len(on) < settings.together_points:
+        return None
+    return Meeting((first, second), "together", np.array([on[0], on[-1]]), np.full(2, settings.together_distance), True)
+
+
+def _crossings(space: Space, curves: Sequence[Curve], numbers: tuple[int, int], rtol: float) -> Iterator[Meeting]:
+    """Where two curves cross, or one crosses itself."""
+    first, second = (curves[number] for number in numbers)
+    legs, others = np.diff(first.points, axis=0), np.diff(second.points, axis=0)
+    apart = second.points[None, :-1] - first.points[:-1, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        across = _cross(legs[:, None], others[None])
+        shares = _cross(apart, others[None]) / across, _cross(apart, legs[:, None]) / across
+    crossed = np.all([(share >= 0) & (share < 1) for share in shares], axis=0)
+    if numbers[0] == numbers[1]:  # neighbouring legs have a point in common, the first and last one of a ring as well
+        crossed = np.triu(crossed, 2)
+        crossed[0, -1] &= first.ends[0] != CLOSED
+    for k, m in zip(*(index.tolist() for index in np.nonzero(crossed)), strict=True):
+        place = first.points[k] + shares[0][k, m] * legs[k]
+        pairs = first.spots[k : k + 2], second.spots[m : m + 2]
+        yield _refined(space, curves, numbers, place, pairs, rtol)
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross products of vectors in the plane, along the last axis."""
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _refined(
+    space: Space,
+    curves: Sequence[Curve],
+    numbers: tuple[int, int],
+    guess: np.ndarray,
+    pairs: Sequence[Sequence[Spot]],
+    rtol: float,
+) -> Meeting:
+    """The crossing near a guess, between two neighbouring points of each curve: straight lines through a point of
+    either curve, in the directions of the curves there, cross at the next guess. Where a cycle is lost on the way, or a
+    limiter chatters, so that a single point takes as long as many, the guess is what is known."""
+    settings, place = MeetingSettings.current(), guess
+    refinements = 0 if space.stages(guess[None]).chatters else settings.crossing_refinements
+    ways = [unit_vector(last.at - first.at) for first, last in pairs]
+    spots = [min(pair, key=lambda spot: float(np.linalg.norm(spot.at - guess))) for pair in pairs]
+    tracers = [CurveTracer(space, curves[number].kind, curves[number].sign, rtol) for number in numbers]
+    for _ in range(refinements):
+        near = [
+            tracer.on_line(place, way[::-1] * [-1.0, 1.0], spot, settings.crossing_reach)
+            for tracer, way, spot in zip(tracers, ways, spots, strict=True)
+        ]
+        one, other = near
+        if one is None or other is None:
+            break
+        chords = [new.at - old.at for new, old in zip((one, other), spots, strict=True)]
+        ways = [_turned(way, chord) for way, chord in zip(ways, chords, strict=True)]
+        spots, before = [one, other], place
+        place = one.at + _cross(other.at - one.at, ways[1]) / _cross(*ways) * ways[0]
+        if not np.abs(place - guess).max() < settings.crossing_reach:
+            break
+        moved = np.abs(place - before)
+        if moved.max() < settings.crossing_precision:
+            error = moved + one.error + other.error
+            return Meeting(numbers, "cross", place[None], error, _alike(_size(one), _size(other)))
+    sizes = [_nearest(curves[number], guess).cycle for number in numbers]
+    return Meeting(numbers, "cross", guess[None], np.full(2, np.inf), _alike(*sizes))
+
+
+def _turned(way: np.ndarray, chord: np.ndarray) -> np.ndarray:
+    """The direction of a curve after a step to another point of it, `chord`: as before, if that is hardly along it."""
+    along, length = abs(float(chord @ way)), float(np.linalg.norm(chord))
+    settings = MeetingSettings.current()
+    return unit_vector(chord) if along > max(settings.crossing_precision, settings.chord_along * length) else way
+
+
+def _ends_on(curves: Sequence[Curve], number: int, other: int) -> Iterator[Meeting]:
+    """The ends of a curve inside the range that lie on another curve, with the same cycle there."""
+    curve = curves[number]
+    for how, spot in zip(curve.ends, (curve.spots[0], curve.spots[-1]), strict=True):
+        if how not in (END_OF_RANGE, CLOSED):
+            near = _nearest(curves[other], spot.at)
+            if near.away < MeetingSettings.current().end_distance and _alike(near.cycle, _size(spot)):
+                yield Meeting((number, other), "end", spot.at[None], np.full(2, near.away), True)

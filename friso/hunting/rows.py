@@ -1,0 +1,28 @@
+"""What is known of many stages, or runs, row by row: arrays of which some rows can be taken together."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any, Self
+
+import numpy as np
+
+
+class ArrayRows:
+    """Base of dataclasses whose arrays, and parts with rows of their own, have one row for every stage or run.
+
+    Numbers, words and what else is the same for all rows stay as they are.
+    """
+
+    def take(self, numbers: Any) -> Self:
+        """Take the rows with these numbers, any of them as often as wanted."""
+        parts = {part.name: _rows_of(getattr(self, part.name), numbers) for part in fields(self)}  # type: ignore[arg-type]
+        return replace(self, **parts)  # type: ignore[type-var]
+
+
+def _rows_of(part: Any, numbers: Any) -> Any:
+    if isinstance(part, np.ndarray):
+        return part[numbers]
+    if isinstance(part, tuple):
+        return tuple(_rows_of(one, numbers) for one in part)
+    return part.take(numbers) if hasattr(part, "take") and not isinstance(part, np.generic) else part
