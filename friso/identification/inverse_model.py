@@ -84,6 +84,10 @@ class InverseModel:
         """What least squares made of the column called so, whether the log shows it or not."""
         return self.solution[name]
 
+    def estimate(self, name: str) -> Estimate:
+        """Return the estimate of one of the quantities that every inverse model has."""
+        return next(estimate for estimate in self.estimates if estimate.name == name)
+
 
 @dataclass(frozen=True)
 class FilteredMotion:
@@ -190,6 +194,12 @@ def inverse_model(
     return InverseModel(
         estimates, numbers, columns[:, :own], covariance, time, force - explained, fitted - explained, band
     )
+
+
+def least_squares(columns: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Fit a force [N], shape (rows,), by columns; return the solution, shape (columns,), and what it leaves [N]."""
+    solution = np.linalg.lstsq(columns, force, rcond=None)[0]
+    return solution, force - columns @ solution
 
 
 def _other_sign(log: Log) -> str:

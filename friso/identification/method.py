@@ -11,6 +11,7 @@ import numpy as np
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError
 from friso.identification.combine import combined, correlations
+from friso.identification.doubt import words_of
 from friso.identification.estimate import Estimate
 from friso.identification.kind import NOTHING_CHOSEN, AnalysisSettings, Prior, Source, left_out
 from friso.identification.kinds import KINDS, in_order
@@ -19,7 +20,7 @@ from friso.identification.logs.log import Log
 from friso.identification.stage_file import identified_stage, origins
 from friso.identification.stage_keys import Fitting, fitting
 from friso.progress import Progress, share_of, silent
-from friso.stage import Stage, plausible
+from friso.stage import Stage
 from friso.stage.correlations import Correlations
 
 
@@ -99,7 +100,7 @@ def identify(
     warnings += [*_notes(experiments, base), *_set_up([log for log, _ in logs], stage)]
     fits = fitting(stage, estimates)
     fitted = identified_stage(stage, fits.estimates, [log.name for log, _ in logs])
-    doubts += _unusual(fitted, estimates)
+    doubts += words_of("stage", (fitted, estimates))
     return Identification(
         fitted,
         _correlations(experiments, estimates, fits, fitted),
@@ -121,18 +122,7 @@ def with_laws(
     times = [log for log in logs if isinstance(log, Log)]
     stage = identification.stage or base
     laws = compare_laws(times, stage, Prior(base, True, estimates), progress)
-    return replace(identification, laws=laws, doubts=(*identification.doubts, *_of_another_law(laws, stage)))
-
-
-def _of_another_law(laws: LawComparison, stage: Stage) -> tuple[str, ...]:
-    """That the record supports other laws than that of the stage, if it does."""
-    model, supported = stage.flat()["friction.model"], [law.law for law in laws.supported]
-    if not supported or model in supported or model not in (law.law for law in laws.predictions):
-        return ()
-    return (
-        f"The record does not support {model}, the law of the stage: what is told of bristles is what {model} comes "
-        "nearest with",
-    )
+    return replace(identification, laws=laws, doubts=(*identification.doubts, *words_of("laws", (laws, stage))))
 
 
 def nothing_learnt(estimates: Sequence[Estimate], failed: bool) -> bool:
@@ -197,13 +187,6 @@ def _unpredictable(log: Log) -> InputError:
     needs = [predictor.needs for name in reversed(in_order()) if (predictor := KINDS[name].predictor)]
     expected = ", or ".join(needs)
     return InputError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
-
-
-def _unusual(stage: Stage, estimates: Sequence[Estimate]) -> tuple[str, ...]:
-    """A sentence on each identified value that no positioning stage has."""
-    keys = [estimate.name for estimate in estimates if estimate.determined]
-    sentences = [sentence for sentence in plausible.implausible_values(stage) if sentence.partition(" ")[0] in keys]
-    return tuple(f"{sentence}: a wrong unit or --scale of a channel?" for sentence in sentences)
 
 
 def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:

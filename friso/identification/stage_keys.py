@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
-from friso.identification.output_error.parameters import HIGHEST_RATIO
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.stage_file import estimate_text, identified_stage
 from friso.intervals import uncertain_value
 from friso.quantities import Number, Quantity
@@ -83,7 +83,7 @@ def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) ->
     flat = stage.flat()
     coulomb = next((candidate for candidate in estimates if candidate.name == COULOMB and candidate.determined), None)
     value, high = (coulomb.value, coulomb.high) if coulomb else (flat[COULOMB], flat[COULOMB])
-    top = HIGHEST_RATIO * value
+    top = OutputErrorSettings.current().highest_friction_ratio * value
     # a bound that is Coulomb friction itself adds nothing: static friction then moves along with that
     return replace(estimate, high=top) if max(flat[STATIC], high) < estimate.low < top else estimate
 

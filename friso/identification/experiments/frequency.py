@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from friso.identification.combine import Correlated, determined
+from friso.identification.doubt import words_of
 from friso.identification.estimate import Estimate
 from friso.identification.kind import (
     AnalysisSettings,
@@ -99,19 +100,6 @@ def _correlated(result: Bench, estimates: Sequence[Estimate]) -> Correlated:
     return independent(result, estimates)
 
 
-def _doubts(bench: Bench) -> list[str]:
-    """That the motion goes against the force, as it does with a wrong sign of either."""
-    model = bench.two_masses
-    against = model.signs[0] < 0 if model is not None else any(line.sign < 0 for line in bench.lines[:1])
-    if not against:
-        return []
-    force, motion = bench.driven.channels.input, bench.driven.channels.output
-    return [
-        f"The {motion} goes against the {force}, which no mass does: one of them has the wrong sign; the values are "
-        "those with the sign reversed"
-    ]
-
-
 def _predict(result: Bench, log: Log, prior: Prior, settings: AnalysisSettings) -> tuple[float, ...]:
     """The relative errors of the outputs over the band, the driven mass's first."""
     return predicted(result, log, settings.period)
@@ -125,6 +113,6 @@ KIND = ExperimentKind[Bench](
     together=True,
     responses=True,
     claims=_claims,
-    doubts=_doubts,
+    doubts=lambda bench: words_of("response", bench),
     predictor=Predictor("one of the bench beside frequency responses", _predict),
 )

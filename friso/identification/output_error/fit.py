@@ -13,37 +13,10 @@ from friso.engine.driven import Inputs
 from friso.identification.output_error.parameters import FitParameter, keys_of
 from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.refine import bounds_of, refine_fit
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.spread import correlation_length, groups_of, spread_of
 from friso.intervals import COVERAGE
 from friso.progress import Progress, Tally, share_of, silent
-
-STARTS, TRIED, KEPT = 1024, 20, 6
-"""Starts that are simulated, how many of them are refined at first, and how many to the end."""
-
-NARROW, LINEAR = 0.3, 0.02
-"""Share by which the starts of core parameters are off the inverse model's values, each way; of those whose logarithm
-is not fitted, and which may be 0, the share of their range."""
-
-SCREENED, STRETCHES = 1e7, 8
-"""Samples that the starts are simulated over, all together: long records are cut for them, into so many stretches."""
-
-FIRST, ROUGH, FINE = 3, 5, 30
-"""Iterations at most of the refinement of the starts tried, further ones of those kept, and of the best of these."""
-
-LITTLE = 1e-6
-"""Share by which the sum of squares of the best fit falls at last."""
-
-NEARBY, FAR = 127, 3.0
-"""Starts near an earlier fit, and how many times as far as its covariance they are drawn: the loop of a stage that
-hunts has optima of its own, and the fit it starts from is of another problem."""
-
-EXPLAINED = 2.0
-"""A fit that leaves no more than so many times the noise of the record explains it."""
-
-ALIKE = 1e-3
-"""Share of the largest singular value below which fitted numbers cannot be distinguished."""
-
-SEED = 7
 
 
 @dataclass(frozen=True)
@@ -66,8 +39,10 @@ class OutputErrorFit:
         """What the fit leaves [N], RMS, where it counts."""
         return float(np.sqrt(np.sum(self.residual**2) / max(float(self.problem.counted.sum()), 1.0)))
 
-    def explains(self, noise: float, times: float = EXPLAINED) -> bool:
-        """Whether it leaves less than so many times the `noise` [N] of the log's force."""
+    def explains(self, noise: float, closely: bool = False) -> bool:
+        """Whether it leaves about the `noise` [N] of the log's force, or `closely` no more than that."""
+        settings = OutputErrorSettings.current()
+        times = settings.noise_ratio_of_a_closed_fit if closely else settings.noise_ratio_of_an_explained_record
         return self.left < times * noise * self.problem.passes
 
     @property
@@ -122,12 +97,18 @@ def _fit(
 ) -> OutputErrorFit:
     """Fit from the best starts. What one of them is worth shows after a few iterations, on pieces of a long record: of
     a stage that sticks and slips the best of the starts as they are lead to other optima."""
+    settings = OutputErrorSettings.current()
     mask = np.zeros(tried.shape[1], bool)
     mask[list(free)] = True
     rough = [problem] if problem.closed else [problem.part(piece) for piece in pieces]
-    for number, (parts, most, iterations) in enumerate(((rough, TRIED, FIRST), ([problem], KEPT, ROUGH))):
-        part = share_of(progress, number, 3)
-        refined = refine_fit(parts, tried[:most], np.tile(mask, (len(tried[:most]), 1)), iterations, progress=part)
+    rounds = (
+        (rough, settings.starts_refined_first, settings.iterations_of_first_starts),
+        ([problem], settings.starts_refined_further, settings.iterations_of_further_starts),
+    )
+    enough = settings.cost_share_of_refinement
+    for number, (parts, most, iterations) in enumerate(rounds):
+        tried, part = tried[:most], share_of(progress, number, 3)
+        refined = refine_fit(parts, tried, np.tile(mask, (len(tried), 1)), iterations, enough, part)
         tried = refined.inner[np.argsort(refined.cost)]
     return polished(problem, tuple(free), tried[0], share_of(progress, 2, 3))
 
@@ -136,15 +117,19 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
     """Many starts over the ranges of the free parameters, shape (starts, parameters), behind the `first`: they
     find parameters that not every motion shows. Core parameters start about the inverse model's values: a first fit
     of them alone to motion that sticks and slips can be anywhere."""
+    settings = OutputErrorSettings.current()
     low, high = bounds_of(problem)
     core = np.array([parameter.core for parameter in problem.parameters])
     logarithmic = np.array([parameter.logarithmic for parameter in problem.parameters])
-    centre, half = first_values(problem.parameters), np.where(logarithmic, NARROW, LINEAR * (high - low))
+    centre, half = (
+        first_values(problem.parameters),
+        np.where(logarithmic, settings.logarithm_of_core_starts, settings.range_share_of_core_starts * (high - low)),
+    )
     low, high = (
         np.where(core, np.maximum(centre - half, low), low),
         np.where(core, np.minimum(centre + half, high), high),
     )
-    shares = qmc.Sobol(len(first), rng=SEED).random(STARTS)
+    shares = qmc.Sobol(len(first), rng=settings.seed_of_starts).random(settings.starts_of_a_fit)
     starts = np.where(np.isin(np.arange(len(first)), free), low + shares * (high - low), first)
     return np.vstack([first, starts])
 
@@ -152,15 +137,18 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
 def nearby(fit: OutputErrorFit) -> np.ndarray:
     """Starts that another problem's fit allows, shape (starts, parameters), itself the first: drawn from its covariance
     `FAR` times as wide."""
+    settings = OutputErrorSettings.current()
     low, high = (end[list(fit.free)] for end in bounds_of(fit.problem))
     deviation = np.sqrt(np.diag(fit.covariance))
     usable = np.isfinite(deviation) & (deviation > 0)
     correlation = np.eye(len(fit.free))
     part = fit.covariance[np.ix_(usable, usable)]
     correlation[np.ix_(usable, usable)] = part / np.outer(deviation[usable], deviation[usable])
-    spread = np.minimum(FAR * np.where(usable, deviation, np.inf), (high - low) / 4)
-    rows = np.random.default_rng(SEED).multivariate_normal(np.zeros(len(spread)), correlation, NEARBY, method="eigh")
-    starts = np.tile(fit.inner, (NEARBY + 1, 1))
+    spread = np.minimum(settings.deviations_of_near_starts * np.where(usable, deviation, np.inf), (high - low) / 4)
+    rows = np.random.default_rng(settings.seed_of_starts).multivariate_normal(
+        np.zeros(len(spread)), correlation, settings.starts_near_a_fit, method="eigh"
+    )
+    starts = np.tile(fit.inner, (settings.starts_near_a_fit + 1, 1))
     starts[1:, list(fit.free)] += rows * spread
     starts[:, list(fit.free)] = np.clip(starts[:, list(fit.free)], low, high)
     return starts
@@ -170,7 +158,8 @@ def _ranked(
     problems: Sequence[Problem], pieces: Sequence[slice], starts: np.ndarray, progress: Progress
 ) -> list[np.ndarray]:
     """Of each problem the best starts, shape (tried, parameters), the first one always among them."""
-    if len(starts) <= TRIED:
+    settings = OutputErrorSettings.current()
+    if len(starts) <= settings.starts_refined_first:
         return [starts] * len(problems)
     sums = np.zeros((len(problems), len(starts) - 1))
     tally = Tally(progress, len(pieces) * (len(starts) - 1))
@@ -179,24 +168,30 @@ def _ranked(
         for numbers, record in part.simulated(starts[1:]):
             sums[:, numbers] += counted**2 @ ((part.target - record.force) ** 2).T
             tally.add(len(numbers), "")
-    best = np.argsort(np.where(np.isfinite(sums), sums, np.inf), axis=1)[:, : TRIED - 1]
+    best = np.argsort(np.where(np.isfinite(sums), sums, np.inf), axis=1)[:, : settings.starts_refined_first - 1]
     return [np.vstack([starts[0], starts[1:][chosen]]) for chosen in best]
 
 
 def _parts(problem: Problem, starts: int) -> list[slice]:
     """What of a record the starts are simulated over: all of a short one; of a long one its beginning in closed loop,
     whose state is not known later on, and else stretches from all over it: slow motion may come last."""
-    count, most = len(problem.target), int(SCREENED / starts)
+    settings = OutputErrorSettings.current()
+    count, most = len(problem.target), int(settings.samples_of_all_starts / starts)
     if count <= most or problem.closed:
         return [slice(0, min(count, most))]
-    firsts = np.linspace(0, count - most // STRETCHES, STRETCHES).astype(int)
-    return [slice(int(first), int(first) + most // STRETCHES) for first in firsts]
+    firsts = np.linspace(
+        0, count - most // settings.stretches_of_a_screening, settings.stretches_of_a_screening
+    ).astype(int)
+    return [slice(int(first), int(first) + most // settings.stretches_of_a_screening) for first in firsts]
 
 
 def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
     """The end of the fit, and how well it is known."""
+    settings = OutputErrorSettings.current()
     mask = np.isin(np.arange(len(inner)), free)
-    best = refine_fit([problem], inner[None], mask[None], FINE, LITTLE, progress).inner[0]
+    best = refine_fit(
+        [problem], inner[None], mask[None], settings.iterations_of_a_fit, settings.cost_share_of_a_fit, progress
+    ).inner[0]
     rest, slopes = problem.linearised(best, mask)
     counted = problem.counted > 0
     velocity, acceleration = problem.inputs.segments[0, :-1, 2:4].T
@@ -221,9 +216,10 @@ def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.nd
 
 def _moved_by(inputs: Inputs, problem: Problem, best: np.ndarray, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """By how much the fitted numbers move, shape (free,), with other inputs, which a log allows just as well."""
+    settings = OutputErrorSettings.current()
     change = replace(problem, inputs=inputs).residuals(best[None])[0] - rest
     if not np.isfinite(change).all():
         return np.zeros(slopes.shape[1])
     size = np.linalg.norm(slopes, axis=0)
     size = np.where(size > 0, size, 1.0)
-    return -np.linalg.lstsq(slopes / size, change, rcond=ALIKE)[0] / size
+    return -np.linalg.lstsq(slopes / size, change, rcond=settings.smallest_singular_value)[0] / size

@@ -8,13 +8,7 @@ from dataclasses import replace
 from scipy.stats import chi2
 
 from friso.identification.output_error.fit import OutputErrorFit, polished
-
-SURE = 0.999
-"""Probability with which the worse of both has to be wrong."""
-
-NOISE_ALONE = 1.2
-"""What a fit may leave, in units of the noise, for the difference of both to be judged by that noise: errors of the
-model decide as well."""
+from friso.identification.output_error.settings import OutputErrorSettings
 
 
 def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
@@ -38,6 +32,7 @@ def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
     Half a sample apart, they move the damping of the bristles by half a sample times their stiffness. The other one no
     longer counts where the better explains the record, to the `noise` [N] of its force, and the other clearly less.
     """
+    settings = OutputErrorSettings.current()
     problem = fit.problem
     other = next((inputs for inputs in problem.unsettled if inputs.held != problem.inputs.held), None)
     if other is None:
@@ -46,8 +41,8 @@ def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
     turned = tuple(replace(inputs, held=other.held) for inputs in sharper)
     swapped = polished(replace(problem, inputs=other, unsettled=(problem.inputs, *turned)), fit.free, fit.inner)
     better, worse = sorted((fit, swapped), key=lambda one: one.cost)
-    if better.left > NOISE_ALONE * noise * problem.passes or worse.cost < better.cost * (
-        1 + chi2.ppf(SURE, 1) / better.independent
+    if better.left > settings.noise_ratio_of_a_closed_fit * noise * problem.passes or worse.cost < better.cost * (
+        1 + chi2.ppf(settings.probability_of_an_effect, 1) / better.independent
     ):
         return better
     return polished(replace(better.problem, unsettled=turned if better is swapped else sharper), fit.free, better.inner)

@@ -8,32 +8,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.stats import chi2
 
-from friso.identification.output_error.coverage import NEAR, Coverage
+from friso.identification.output_error.coverage import Coverage
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
 from friso.identification.output_error.holding import with_force_settled, with_smoothness_settled
-from friso.identification.output_error.parameters import EXPONENT, MASS, RATIO, SHARE, bends
+from friso.identification.output_error.parameters import BRISTLES, CURVE, EXPONENT, MASS, RATIO, SHARE, STRIBECK, bends
 from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.profile import WORSE, Profile, profile
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.readings.common import low_pass
 from friso.progress import Progress, between, silent
-
-STRIBECK = (RATIO, "friction.stribeck_velocity")
-CURVE = (*STRIBECK, EXPONENT)
-BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
-
-CLOSELY = 1.2
-"""A closed loop that leaves no more than so many times the noise of the record is where it belongs. One that leaves
-more may have found another optimum than the right one, in which its parameters seem to be known as sharply: it is
-fitted once more, from what the stage that follows the log says."""
-
-STEP_OUT = 1.5
-"""A closed loop that leaves so many times the residual of the stage that follows the log has got out of step."""
-
-SURE = 0.99
-"""Probability that parameters which no motion shows one by one improve the fit all the same."""
-
-AGAIN = 3
-"""Times at most that a profile leads to a better fit."""
 
 PLAIN, LOOP, ALONG, AGAIN_LOOP = 0.1, 0.4, 0.85, 0.95
 """Shares of the work up to the ends of its parts: mass and sliding friction, all parameters in closed loop, all along
@@ -42,12 +25,6 @@ the log, and the closed loop from there; the last is how well they are known the
 FITTED, SETTLED, PROFILED = 0.5, 0.65, 0.95
 """The same of the fit along the log: that of all parameters, what the log does not say between its samples, and how
 well each is known; the last is the fit of those that are shown."""
-
-SWINGS = 0.25
-"""Natural frequency of the mass on its bristles, times the sample time, up to which a log follows how these bend."""
-
-SHARP = 3.0
-"""Factor between the ends of a profile interval within which a parameter counts as shown."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +63,7 @@ def fit_identifiable(
         numbers = tuple(range(len(names)))
         part = between(progress, PLAIN, LOOP, "moves: all parameters in closed loop")
         full = fit(loop, numbers, np.vstack([nearby(plain), everywhere(loop, numbers, plain.inner)]), part)
-        if full.explains(noise, CLOSELY):
+        if full.explains(noise, closely=True):
             return believed(full, core, covered, between(progress, LOOP, 1), explained=True)
         explaining = [full] if full.explains(noise) else []
     part = between(progress, *((PLAIN, 1) if loop is None else (LOOP, ALONG)))
@@ -100,7 +77,7 @@ def fit_identifiable(
     best = min((fit(loop, along.fit.free, starts, part), *explaining), key=lambda one: one.cost)
     if not (_in_step(best, along.fit, bandwidth) and bounds_as_much(best, along.fit)):
         return along
-    if best.explains(noise, CLOSELY):
+    if best.explains(noise, closely=True):
         return believed(best, core, covered, between(progress, AGAIN_LOOP, 1), explained=True)
     return replace(along, fit=best)
 
@@ -139,7 +116,7 @@ def believed(
     names = [parameter.name for parameter in full.problem.parameters]
     asked = [i for i in full.free if names[i] not in core]
     profiles: dict[str, Profile] = {}
-    again = AGAIN
+    again = OutputErrorSettings.current().better_fits_by_profiles
     while len(profiles) < len(asked):
         i = asked[len(profiles)]
         progress(len(profiles), len(asked), f"moves: how well {names[i]} is known")
@@ -156,8 +133,11 @@ def believed(
 
 def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
     """Whether a fit with more parameters is better by more than chance would make it, with a probability of 99 %."""
+    settings = OutputErrorSettings.current()
     more = len(full.free) - len(plain.free)
-    return bool(plain.cost > full.cost * (1 + chi2.ppf(SURE, more) / full.independent))
+    return bool(
+        plain.cost > full.cost * (1 + chi2.ppf(settings.probability_of_more_parameters, more) / full.independent)
+    )
 
 
 def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -> bool:
@@ -165,7 +145,7 @@ def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -
     counts, both within the motion's bandwidth [Hz], since the latter knows no noise above it."""
     step, counted = looped.problem.inputs.sample_time, direct.problem.counted > 0
     powers = [np.sum(low_pass(fit.residual, step, bandwidth)[counted] ** 2) for fit in (looped, direct)]
-    return bool(powers[0] <= STEP_OUT**2 * powers[1])
+    return bool(powers[0] <= OutputErrorSettings.current().residual_ratio_out_of_step ** 2 * powers[1])
 
 
 def bounds_as_much(looped: OutputErrorFit, direct: OutputErrorFit) -> bool:
@@ -200,9 +180,10 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
 
 def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
     """Whether a profile closes on both sides, and near by."""
+    settings = OutputErrorSettings.current()
     parameter = next(one for one in full.problem.parameters if one.name == seen.name)
     closed = not (seen.open_low or seen.open_high)
-    return closed and (not parameter.logarithmic or seen.high < SHARP * seen.low)
+    return closed and (not parameter.logarithmic or seen.high < settings.factor_of_a_sharp_profile * seen.low)
 
 
 def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
@@ -212,7 +193,7 @@ def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
     if name in BRISTLES:
         stiffness = full.value("friction.bristle_stiffness")
         swings = np.sqrt(stiffness / full.value(MASS)) / (2 * np.pi)
-        fast_enough = swings * full.problem.inputs.sample_time < SWINGS
+        fast_enough = swings * full.problem.inputs.sample_time < OutputErrorSettings.current().sampled_bristle_frequency
         return bool(fast_enough and covered.shows_length(full.value("friction.coulomb") / stiffness))
     return True
 
@@ -223,7 +204,7 @@ def why_not_shown(name: str, covered: Coverage) -> str:
         low, high = covered.gap
         if not np.isfinite(high):
             return "no steady motion at all, in which the Stribeck effect would show"
-        if high > NEAR**2 * low:
+        if high > OutputErrorSettings.current().speed_factor_of_coverage ** 2 * low:
             return (
                 f"no steady motion between {low * 1e3:.2g} and {high * 1e3:.3g} mm/s, where the Stribeck effect would "
                 "show"

@@ -10,28 +10,17 @@ import numpy as np
 
 from friso.axis import LINEAR, axis_of
 from friso.errors import InputError
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.stage.tables import friction_law, friction_laws
 
 MASS, SHARE, RATIO = "mass", "cart share", "static friction ratio"
 """The mass that moves; the cart's share of it, which a rigid stage has as given; static over Coulomb friction."""
 
-HIGHEST_RATIO = 4.0
-"""Largest ratio of these that is believed of a bearing; the thesis's rig has 3."""
-
-SHORTEST, LONGEST = 5e-8, 3e-4
-"""Lengths [m] by which bristles are believed to bend at least and at most before they slip."""
-
 EXPONENT = "friction.stribeck_exponent"
-
-EXPONENTS, SLIGHTLY_LESS = (0.5, 2.5), 0.995
-"""Exponents that are believed of a Stribeck curve: 0.5 to 1 (Bo, Pavelescu), 1 (Tustin), 2 (Armstrong-Helouvry, Dupont,
-Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7); and the share of the given one at which its fit begins."""
-
-RADII = 5e-3, 0.5
-"""Radii [m] between which bearings that turn are believed to be: their bristles bend by an angle [rad]."""
-
-STRIBECK_UP_TO = 0.02
-"""Speed [m/s] up to which the Stribeck effect of a bearing may act."""
+STRIBECK = (RATIO, "friction.stribeck_velocity")
+CURVE = (*STRIBECK, EXPONENT)
+BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
+"""Parameters of the Stribeck curve, and those of the bristles."""
 
 
 @dataclass(frozen=True)
@@ -60,16 +49,22 @@ class FitParameter:
 
 def bends(flat: Mapping[str, Any]) -> tuple[float, float]:
     """Lengths [m], or angles [rad] on a rotary axis, by which bristles bend at least and at most before they slip."""
+    settings = OutputErrorSettings.current()
     if axis_of(flat) == LINEAR:
-        return SHORTEST, LONGEST
-    smallest, largest = RADII
-    return SHORTEST / largest, LONGEST / smallest
+        return settings.shortest_bristle_bend, settings.longest_bristle_bend
+    smallest, largest = settings.bearing_radii
+    return settings.shortest_bristle_bend / largest, settings.longest_bristle_bend / smallest
 
 
 def stribeck_up_to(flat: Mapping[str, Any]) -> float:
     """The highest Stribeck velocity [m/s] that is believed of a bearing; on a rotary axis [rad/s], at the radius in the
     middle of those that bearings have."""
-    return STRIBECK_UP_TO if axis_of(flat) == LINEAR else STRIBECK_UP_TO / float(np.sqrt(np.prod(RADII)))
+    settings = OutputErrorSettings.current()
+    return (
+        settings.highest_stribeck_velocity
+        if axis_of(flat) == LINEAR
+        else settings.highest_stribeck_velocity / float(np.sqrt(np.prod(settings.bearing_radii)))
+    )
 
 
 def is_free(flat: Mapping[str, Any]) -> bool:
@@ -113,6 +108,7 @@ def fit_parameters(
 def _friction(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
 ) -> list[FitParameter]:
+    settings = OutputErrorSettings.current()
     coulomb, viscous = levels["coulomb"], levels["viscous"]
     parameters = [
         FitParameter("friction.coulomb", "N", coulomb, coulomb / 20, coulomb * 5),
@@ -122,7 +118,7 @@ def _friction(
         if both_ways:
             parameters.append(FitParameter("friction.viscous_asymmetry", "", 1e-6, -0.9, 0.9, logarithmic=False))
         parameters += [
-            FitParameter(RATIO, "", 1.0, 1.0, HIGHEST_RATIO, logarithmic=False, core=False),
+            FitParameter(RATIO, "", 1.0, 1.0, settings.highest_friction_ratio, logarithmic=False, core=False),
             _slow("friction.stribeck_velocity", "m/s", flat, speed / 3e3, max(speed, stribeck_up_to(flat))),
             _exponent(flat["friction.stribeck_exponent"]),
         ]
@@ -139,7 +135,8 @@ def _friction(
 def _exponent(stated: float) -> FitParameter:
     """The exponent of the Stribeck curve, from a little below what the stage has: 1 and 2 have equations of their own,
     in which it does not occur."""
-    start, (least, most) = SLIGHTLY_LESS * stated, EXPONENTS
+    settings = OutputErrorSettings.current()
+    start, (least, most) = settings.exponent_share_of_a_start * stated, settings.stribeck_exponents
     return FitParameter(EXPONENT, "", start, min(least, start), max(most, start), logarithmic=False, core=False)
 
 

@@ -20,45 +20,14 @@ from friso.errors import InputError
 from friso.identification.inverse_model import SMOOTH, motion
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import MASS, FitParameter, stages
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.readings.common import noise_of, robust
 from friso.stage.controllers import CONTROLLER
 
-STEP = 1e-4
-"""Steps of the fitted numbers for derivatives: shares of the value for logarithmic ones."""
-
-RTOL = 1e-5
-"""Relative tolerance of the simulations."""
-
 CONTINUOUS = "the controller is simulated in continuous time"
-
-SLOW = 10.0
-"""Bandwidth [Hz] at most of the controller that holds a stage to a log's position."""
-
-REMEMBERED, BEGINNING = 0.1, 0.05
-"""Time [s] for which a closed loop is taken to show where, how fast and with what bristles it was started, and share of
-a record that this takes at most: our choice."""
-
-FIRST = 10
-"""Samples from which the velocity at the beginning is taken."""
-
-REST, STILL = 0.1, 20.0
-"""A stage rests where it goes less than so many standard deviations of the position's noise in this time [s]."""
-
-SHARPER = (1, 2, 4, 8)
-"""Times the cut-off frequency of the inverse model's filter at which the position is smoothed that a stage is held to:
-at first, and as long as it explains more."""
-
-SETTLED = 3.0
-"""Time constants of the controller that holds a stage to a log, after which it has forgotten where that stood."""
 
 PASSES = 5 / 8
 """Noise bandwidth [Hz] of a critically damped second-order loop, in units of its natural frequency [rad/s]."""
-
-AT_ONCE = 16384
-"""Samples of all runs together for which outputs are computed at once: what they are made of stays in the caches."""
-
-SAME = 1e-3
-"""Share by which the sample time of the log and that of the drive may differ to count as one."""
 
 
 @dataclass(frozen=True)
@@ -129,9 +98,10 @@ class Problem:
 
     def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
         """Numbers of the runs and their records, a chunk at a time, for fitted numbers of shape (runs, parameters)."""
+        settings = OutputErrorSettings.current()
         flat = stages(self.flat, self.parameters, inner)
         starts = self._starts(flat, len(inner))
-        for runs in run_driven(self.kernel, flat, len(inner), self.inputs, starts, RTOL):
+        for runs in run_driven(self.kernel, flat, len(inner), self.inputs, starts, settings.run_tolerance):
             yield runs.numbers, self._record(flat, runs)
 
     def record(self, inner: np.ndarray) -> Simulated:
@@ -180,8 +150,9 @@ class Problem:
 
     def _step(self, inner: np.ndarray, i: int) -> float:
         """The step of a number, away from the nearer end of its range."""
+        settings = OutputErrorSettings.current()
         parameter = self.parameters[i]
-        size = STEP * (1.0 if parameter.logarithmic else 0.01 * (parameter.high - parameter.low))
+        size = settings.derivative_step * (1.0 if parameter.logarithmic else 0.01 * (parameter.high - parameter.low))
         return size if inner[i] < (parameter.inner(parameter.low) + parameter.inner(parameter.high)) / 2 else -size
 
     def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
@@ -216,7 +187,7 @@ class Problem:
         reference = self.inputs.segments[0, :count, 1:].T[:, None, :]
         states = np.moveaxis(runs.states, 2, 0)
         force = np.empty(runs.states.shape[:2])
-        size = max(1, AT_ONCE // len(runs.numbers))
+        size = max(1, OutputErrorSettings.current().samples_of_outputs // len(runs.numbers))
         for first in range(0, count, size):
             part = slice(first, first + size)
             modes = self.kernel.modes(states[..., part], 0.0, reference[..., part], values)
@@ -258,7 +229,7 @@ def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
     if "drive.sample_time" not in flat:
         return ""
     step = flat["drive.sample_time"]
-    if abs(step / sample_time - 1) >= SAME:
+    if abs(step / sample_time - 1) >= OutputErrorSettings.current().sample_time_tolerance:
         return f"{CONTINUOUS}: the drive samples every {1e3 * step:g} ms, the log every {1e3 * sample_time:g} ms"
     return ""
 
@@ -270,15 +241,19 @@ def tracking(
     that of the motion. A faster one, or the noise itself, would shake the bristles of a stage at rest. A log tells
     neither whether its force is held from sample to sample or follows straight lines, nor how smooth its motion was.
     Raises InputError for a log that never moves for long enough to count."""
-    omega = 2 * np.pi * min(bandwidth, SLOW)
+    settings = OutputErrorSettings.current()
+    omega = 2 * np.pi * min(bandwidth, settings.bandwidth_of_holding)
+    settling, step = settings.time_constants_of_settling / omega, log.sample_time
     smooth, *sharper = (
-        motion(log["position"][part], log.sample_time, SMOOTH * times * bandwidth).position for times in SHARPER
+        motion(log["position"][part], log.sample_time, SMOOTH * times * bandwidth).position
+        for times in settings.smoothing_steps
     )
-    held = abs(flat.get("drive.sample_time", np.inf) / log.sample_time - 1) < SAME  # from each sample to the next
-    inputs = Inputs(smooth, log["force"][part], log.sample_time, held)
-    counted = _moving(log["position"][part], smooth, log.sample_time, SETTLED / omega)
+    # held from each sample to the next
+    held = abs(flat.get("drive.sample_time", np.inf) / step - 1) < settings.sample_time_tolerance
+    inputs = Inputs(smooth, log["force"][part], step, held)
+    counted = _moving(log["position"][part], smooth, step, settling)
     if not counted.any():
-        actual = f"{log.sample_time * len(counted):.3g} s, in which it never moves for {SETTLED / omega:.2g} s on end"
+        actual = f"{log.sample_time * len(counted):.3g} s, in which it never moves for {settling:.2g} s on end"
         expected = "moves that last longer: is the time, or the position, in another unit?"
         raise InputError("position", actual, expected, '--unit TIME="ms"', log.name)
     mass = next(parameter.start for parameter in parameters if parameter.name == MASS)
@@ -304,9 +279,10 @@ def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settli
     A stage that sticks does so within micrometres of the log, and the controller that holds it to the log then shows
     that distance instead of a force: rests do not count, nor does the time `settling` [s] after each of them and after
     the beginning."""
-    window = max(3, round(REST / sample_time))
+    settings = OutputErrorSettings.current()
+    window = max(3, round(settings.time_of_a_rest / sample_time))
     span = maximum_filter1d(position, window) - minimum_filter1d(position, window)
-    resting = span <= STILL * blur_of(position, smooth)
+    resting = span <= settings.deviations_of_a_rest * blur_of(position, smooth)
     resting[0] = True
     late = round(settling / sample_time)
     recent = maximum_filter1d(resting.astype(np.int8), 2 * late + 1, origin=late)
@@ -322,12 +298,14 @@ def blur_of(position: np.ndarray, smooth: np.ndarray) -> float:
 def _after_start(count: int, sample_time: float) -> np.ndarray:
     """0 while a closed loop still shows how it was started, which a log tells but roughly, and 1 from there on, shape
     (count,)."""
-    first = round(min(REMEMBERED / sample_time, BEGINNING * count))
+    settings = OutputErrorSettings.current()
+    first = round(min(settings.time_of_a_start / sample_time, settings.record_share_of_a_start * count))
     return np.where(np.arange(count) < first, 0.0, 1.0)
 
 
 def _start(log: Log, part: slice) -> tuple[float, float]:
     """Position [m] and velocity [m/s] at the beginning, from a parabola through the first samples."""
-    time = np.arange(FIRST) * log.sample_time
-    slope = np.polyfit(time, log["position"][part][:FIRST], 2)[1]
+    settings = OutputErrorSettings.current()
+    time = np.arange(settings.samples_of_first_velocity) * log.sample_time
+    slope = np.polyfit(time, log["position"][part][: settings.samples_of_first_velocity], 2)[1]
     return float(log["position"][part.start]), float(slope)

@@ -9,19 +9,7 @@ from scipy.stats import chi2
 
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.refine import Refined, bounds_of, costs, refine_fit
-
-POINTS = 7
-"""Values of the parameter over its range (or about the fit), besides its own, at which the others are fitted anew."""
-
-WIDE = 4.0
-"""Standard deviations about the fit that the values reach, for a parameter whose spread is known."""
-
-WIDER = 5.0
-"""Times as far each time that the interval does not end within."""
-
-ROUNDS, SETTLED = 5, 0.1
-"""Iterations of each of these fits at most, and the share of what ends an interval by which one may still fall: along a
-ridge, such as that of a Stribeck curve that is passed quickly, a fit that is ended early makes intervals too narrow."""
+from friso.identification.output_error.settings import OutputErrorSettings
 
 WORSE = float(chi2.ppf(0.95, 1))
 """By how much -2 ln(likelihood) grows at the ends of a 95 % interval."""
@@ -49,33 +37,41 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
     `best` is the mean square [N^2] of the fit that others are compared with. The values reach as far as the interval,
     or over the whole range.
     """
+    settings = OutputErrorSettings.current()
     low, high = (float(end[number]) for end in bounds_of(fit.problem))
     centre = fit.inner[number]
     spread = fit.covariance[fit.free.index(number), fit.free.index(number)] if number in fit.free else np.inf
     limit = best * (1 + WORSE / fit.independent)
     parameter = fit.problem.parameters[number]
-    half = WIDE * np.sqrt(spread) if spread > 0 else np.inf
+    half = settings.deviations_of_a_profile * np.sqrt(spread) if spread > 0 else np.inf
     while True:
         near, far = max(low, centre - half), min(high, centre + half)
-        values = np.unique([*np.linspace(near, far, POINTS), centre])
+        values = np.unique([*np.linspace(near, far, settings.points_of_a_profile), centre])
         fits = _fits(fit, number, others, values)
         cost = fits.cost
         left, right, open_left, open_right = _ends(values, cost, limit)
         if not ((open_left and near > low) or (open_right and far < high)):
             break
-        half *= WIDER
+        half *= settings.widening_of_a_profile
     ends = float(parameter.outer(left)), float(parameter.outer(right))
     return Profile(parameter.name, parameter.outer(values), cost, limit, *ends, open_left, open_right), fits
 
 
 def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray) -> Refined:
     """The fits at values of a parameter, shape (values,), the others free."""
+    settings = OutputErrorSettings.current()
     starts = np.repeat(fit.inner[None], len(values), axis=0)
     starts[:, number] = values
     free = np.zeros(starts.shape, bool)
     free[:, list(others)] = True
     return (
-        refine_fit([fit.problem], starts, free, ROUNDS, SETTLED * WORSE / fit.independent)
+        refine_fit(
+            [fit.problem],
+            starts,
+            free,
+            settings.iterations_of_a_profile,
+            settings.cost_share_of_a_profile * WORSE / fit.independent,
+        )
         if others
         else Refined(starts, costs([fit.problem], starts))
     )

@@ -8,19 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.identification.output_error.problem import Problem
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.progress import Progress, silent
-
-FIRST, MOST = 1e-2, 1e3
-"""Damping of the first step, as a share of the curvature, and that at which a fit that gets no better is left."""
 
 LADDER = np.array([0.1, 1.0, 10.0, 100.0])
 """Dampings that are tried at once, in units of the last one that was best."""
-
-ENOUGH = 1e-4
-"""Share by which the sum of squares of a fit falls at last, unless that has to be told more precisely."""
-
-BOUND = 1e-9
-"""Share of a range by which a number is kept inside it."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +45,7 @@ def refine_fit(
     starts: np.ndarray,
     free: np.ndarray,
     iterations: int,
-    enough: float = ENOUGH,
+    enough: float,
     progress: Progress = silent,
 ) -> Refined:
     """Fit all `pieces` of a problem from several starts, shape (starts, parameters); of each only the numbers that are
@@ -61,19 +53,20 @@ def refine_fit(
 
     Of every start several dampings are tried side by side, which costs less than the derivatives do; these are computed
     anew only where one of them was better. A number at an end of its range from which it is driven out stays there."""
+    settings = OutputErrorSettings.current()
     low, high = bounds_of(pieces[0])
-    margin = BOUND * (high - low)
+    margin = settings.range_share_inside * (high - low)
     low, high = low + margin, high - margin
     inner = np.clip(starts, low, high)
     cost = costs(pieces, inner)
-    damping = np.full(len(inner), FIRST)
+    damping = np.full(len(inner), settings.first_damping)
     busy = np.isfinite(cost)
     squares, gradients = np.zeros((*inner.shape, inner.shape[1])), np.zeros(inner.shape)
     moved = busy.copy()
     for iteration in range(iterations):
         progress(iteration, iterations, "")
         squares[moved], gradients[moved] = _curvature(pieces, inner[moved], free[moved])
-        busy &= np.isfinite(gradients).all(axis=1) & (damping < MOST)
+        busy &= np.isfinite(gradients).all(axis=1) & (damping < settings.highest_damping)
         rows = np.flatnonzero(busy)
         if not rows.size:
             break

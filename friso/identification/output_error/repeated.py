@@ -13,17 +13,10 @@ from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.problem import Problem, blur_of, tracking
 from friso.identification.output_error.refine import refine_fit
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.spread import CONFIDENCE
 from friso.intervals import COVERAGE
 from friso.progress import Progress
-
-TIMES = 4
-"""Simulated logs that the fit is repeated on: Student's t of so many is 1.4 times that of a known spread."""
-
-ITERATIONS = 8
-"""Of each of these fits, which begin at their truth: one that has not settled by then is far off."""
-
-SEED = 11
 
 
 def as_far_off_as_repeated(
@@ -38,13 +31,20 @@ def as_far_off_as_repeated(
     more than those to the simulated logs do is off by as much more than they are: noise that has led it away, as that
     of a force in coarse digits does, moves the machine it made less than it moved the true one.
     """
+    settings = OutputErrorSettings.current()
     free = np.isin(np.arange(len(once.inner)), once.free)
     again = [
-        refine_fit([problem], once.inner[None], free[None], ITERATIONS)
+        refine_fit(
+            [problem],
+            once.inner[None],
+            free[None],
+            settings.iterations_of_a_repetition,
+            settings.cost_share_of_refinement,
+        )
         for problem in _simulated_logs(once, log, part, bandwidth, noise, progress)
     ]
     off = np.sqrt(np.mean([(fit.inner[0] - once.inner)[free] ** 2 for fit in again], axis=0))
-    off = off * float(student.ppf(CONFIDENCE, TIMES)) / COVERAGE
+    off = off * float(student.ppf(CONFIDENCE, settings.repetitions_of_a_fit)) / COVERAGE
     usual = float(np.mean([fit.cost[0] for fit in again]))
     off *= np.sqrt(max(1.0, once.cost / usual)) if 0 < usual < np.inf else 1.0
     deviation = np.sqrt(np.diag(once.covariance))
@@ -73,12 +73,13 @@ def _simulated_logs(
 ) -> Iterator[Problem]:
     """Problems like that of a fit, of logs that the stage it made leaves when it does as it did there: the force is
     that of the log and of the controller that held it, the position is its own, and either has the log's noise."""
+    settings = OutputErrorSettings.current()
     problem = once.problem
-    record, rng = problem.record(once.inner), np.random.default_rng(SEED)
+    record, rng = problem.record(once.inner), np.random.default_rng(settings.seed_of_repetitions)
     measured = log["position"][part]
     blur = blur_of(measured, problem.inputs.reference)
-    for number in range(TIMES):
-        progress(number, TIMES, "moves: the same fit of simulated logs")
+    for number in range(settings.repetitions_of_a_fit):
+        progress(number, settings.repetitions_of_a_fit, "moves: the same fit of simulated logs")
         signals = {role: values.copy() for role, values in log.signals.items()}
         signals["position"][part] = record.position + blur * rng.standard_normal(len(measured))
         force = problem.inputs.force + record.force

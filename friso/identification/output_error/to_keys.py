@@ -9,25 +9,19 @@ import numpy as np
 from friso.identification.estimate import Estimate
 from friso.identification.output_error.coverage import Coverage
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.identifiable import STRIBECK, IdentifiableFit, why_not_shown
-from friso.identification.output_error.parameters import MASS, RATIO, SHARE, keys_of
+from friso.identification.output_error.identifiable import IdentifiableFit, why_not_shown
+from friso.identification.output_error.parameters import MASS, RATIO, SHARE, STRIBECK, keys_of
 from friso.identification.output_error.profile import Profile
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.readings.common import LINEARITY
 from friso.intervals import COVERAGE
 
 METHOD = "output error"
 
-FOLLOWED = 0.05
-"""Share by which static friction may be off where the stage follows the log instead of its reference: it comes out too
-high, by 3 to 6 % in those of 21 machines of known truth that a narrower interval missed (docs/identify.md)."""
-
-MOST = 0.7
-"""Half of a 95 % interval, of the logarithm, from which on a record does not bound a quantity: beyond a factor of two,
-intervals of a linearised fit do not hold (Stribeck velocity under a noise of a fifth of the force)."""
-
 
 def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """The keys of the stage file with their intervals, and the correlation of those shown."""
+    settings = OutputErrorSettings.current()
     fit = identified.fit
     parameters = fit.problem.parameters
     spread = np.zeros((len(parameters), len(parameters)))
@@ -37,7 +31,10 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
     keys, slopes = _slopes(fit)
     covariance = slopes @ spread @ slopes.T
     values = _keys_at(fit, fit.inner)
-    shares = [FOLLOWED if key == "friction.static" and not fit.problem.closed else LINEARITY for key in keys]
+    shares = [
+        settings.static_error_of_following if key == "friction.static" and not fit.problem.closed else LINEARITY
+        for key in keys
+    ]
     linear = np.array(shares) * np.abs([values[key] for key in keys]) / COVERAGE
     of_logarithm = {parameter.name for parameter in parameters if parameter.logarithmic}
     logarithmic = np.isin([_OWNERS.get(key, key) for key in keys], [*of_logarithm])
@@ -76,6 +73,7 @@ _OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}
 
 def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
     """Why parameters, or keys that hang on them, are not shown."""
+    settings = OutputErrorSettings.current()
     fit = identified.fit
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     unknown = {
@@ -85,7 +83,7 @@ def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
     } | dict(identified.refuted)
     for number, deviation in zip(fit.free, np.sqrt(np.diag(fit.covariance)), strict=True):
         parameter = fit.problem.parameters[number]
-        most = MOST if parameter.logarithmic else (parameter.high - parameter.low) / 2
+        most = settings.widest_logarithm if parameter.logarithmic else (parameter.high - parameter.low) / 2
         if not COVERAGE * deviation < most:
             unknown.setdefault(parameter.name, "the log does not bound it")
     for name, other in (STRIBECK, STRIBECK[::-1]):

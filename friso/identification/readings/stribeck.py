@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as fisher
 
-from friso.identification.output_error.parameters import EXPONENTS
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.readings.common import t_value
 
 SURE = 0.01
@@ -76,9 +76,13 @@ class Forces:
 def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> FittedStribeck | None:
     """The curve through the forces; None where a straight line, which leaves `plain` (squares over variances), does as
     well. With an `exponent` that is not refuted by the forces it is that one; forces too few to tell leave all."""
+    settings = OutputErrorSettings.current()
     speeds = forces.speeds
     velocities = np.geomspace(speeds.min() / SLOWER, speeds.max() * FASTER, VELOCITIES)
-    shapes, left = np.linspace(EXPONENTS[0], EXPONENTS[1], SHAPES), len(speeds) - 5 - forces.both
+    shapes, left = (
+        np.linspace(settings.stribeck_exponents[0], settings.stribeck_exponents[1], SHAPES),
+        len(speeds) - 5 - forces.both,
+    )
     apart = left < 1
     left += apart
     if left < 1:
@@ -152,6 +156,7 @@ class _Grid:
     def curve(self, left: int, refuted: bool, outer: tuple[float, float]) -> FittedStribeck:
         """The best curve with its ranges, of `left` degrees of freedom; those that reach an `outer` Stribeck velocity
         or exponent are not closed."""
+        settings = OutputErrorSettings.current()
         forces, open_shape = self.forces, len(self.shapes) > 1
         best = np.unravel_index(int(np.argmin(self.cost)), self.cost.shape)
         scatter, t = max(float(self.cost[best]) / left, 1.0), t_value(left)
@@ -159,7 +164,7 @@ class _Grid:
         inside = room >= 0
         fast, shaped = np.asarray(inside.any(axis=1)), np.asarray(inside.any(axis=0))
         ends = [bool(self.velocities[fast][end] == outer[end]) for end in (0, -1)]
-        cut = any(float(self.shapes[shaped][end]) == EXPONENTS[end] for end in (0, -1))
+        cut = any(float(self.shapes[shaped][end]) == settings.stribeck_exponents[end] for end in (0, -1))
 
         def linear(place: int, scale: float, level: float, closed: bool) -> Possible:
             centre = self.solutions[..., place][inside] * scale

@@ -11,8 +11,8 @@ from friso.axis import axis_shown, unit_shown
 from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog
-from friso.identification.output_error.drawn import DRAWS
 from friso.identification.output_error.profile import Profile
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.quantities import percent
 from friso.questions.identify.estimates import ends_document
 from friso.questions.identify.kind_view import Facts, KindView, PredictionView
@@ -147,12 +147,14 @@ def _headline(moves: IdentifiedMoves) -> str:
 
 
 def _prediction_sentence(simulated: SimulatedLog) -> str:
+    settings = OutputErrorSettings.current()
     errors, apart = simulated.errors, simulated.apart
     farthest = f"differs from it by {percent(apart)} of the position" if np.isfinite(apart) else "runs away"
     return (
         f"relative errors of position {percent(errors.position, 3)}, velocity {percent(errors.velocity, 3)}, "
-        f"acceleration {percent(errors.acceleration, 3)}, force {percent(errors.force, 3)}; of {DRAWS} machines "
-        f"drawn from the intervals, and from the ranges of what is not identified, the farthest {farthest}."
+        f"acceleration {percent(errors.acceleration, 3)}, force {percent(errors.force, 3)}; of "
+        f"{settings.machines_drawn} machines drawn from the intervals, and from the ranges of what is not identified, "
+        f"the farthest {farthest}."
     )
 
 
