@@ -14,16 +14,10 @@ from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.roles import words
 from friso.identification.logs.sniff import NUMBER
 from friso.identification.logs.units import RESPONSES, of_decibels, spelled, unit_factor
+from friso.identification.logs.word_lists import channel_words
 from friso.quantities import Quantity, any_sign
 
-_KEYS = {
-    "frequency": frozenset(["f", "freq", "frequency", "frequenz", "w", "omega"]),
-    "magnitude": frozenset(["mag", "magnitude", "gain", "amplitude", "amp", "abs", "modulus", "db"]),
-    "phase": frozenset(["phase", "phi", "ph", "arg", "angle"]),
-    "real": frozenset(["re", "real"]),
-    "imaginary": frozenset(["im", "imag", "imaginary"]),
-    "coherence": frozenset(["coh", "coherence"]),
-}
+_KEYS = channel_words()["response"]
 """Words in a heading that tell what a column is."""
 
 

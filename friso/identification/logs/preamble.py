@@ -7,15 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from friso.identification.logs.units import is_unit, split_heading, unit_factor
+from friso.identification.logs.word_lists import channel_words
 
-RATES = frozenset(
-    {"fs", "fsample", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "abtastrate",
-     "abtastfrequenz"}
-)  # fmt: skip
-STEPS = frozenset(
-    {"dt", "ts", "tsample", "sampletime", "samplingtime", "sampleinterval", "samplinginterval", "sampleperiod",
-     "samplingperiod", "interval", "timestep", "timeincrement", "increment", "deltat", "abtastzeit", "abtastintervall"}
-)  # fmt: skip
+RATES, STEPS = (channel_words()[name] for name in ("sample_rate", "sample_time"))
 """What a sample rate and a sample time are called, in small letters without what stands between them."""
 _BEFORE, _BEHIND = ' \t\f\v#%*/"', ' \t\f\v;,"'
 """What stands around a key and its value, and is no part of them."""

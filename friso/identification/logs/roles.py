@@ -13,119 +13,17 @@ import numpy as np
 from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.units import split_heading, unit_factor, without_accents
+from friso.identification.logs.word_lists import channel_words
 from friso.quantities import quoted
 
-_SET = frozenset(
-    [
-        "ref", "reference", "set", "setpoint", "setpos", "sp", "des", "desired", "target", "cmd", "command",
-        "commanded", "demand", "demanded", "nominal", "traj", "trajectory", "profile", "soll", "consigne", "consigna",
-        "comandata", "comando", "comandada", "riferimento", "referencia", "desiderata", "deseada",
-    ]
-)  # fmt: skip
-_NOT_MEASURED = frozenset(
-    ["err", "error", "pe", "lag", "following", "diff", "max", "min", "limit", "sat", "flag", "status", "enable",
-     "seq", "sequence", "index", "sample", "samples", "secs", "nsecs", "nanosec"]
-)  # fmt: skip
-_CART = frozenset(["cart", "carriage", "slider"])
-_RELATIVE = frozenset(["rel", "relative"])
-_KEYS = {
-    "time": frozenset(
-        [
-            "t",
-            "time",
-            "timestamp",
-            "tout",
-            "zeit",
-            "uhrzeit",
-            "zeitstempel",
-            "tempo",
-            "temps",
-            "heure",
-            "tiempo",
-            "hora",
-            "tijd",
-            "stamp",
-        ]
-    ),
-    "position": frozenset(
-        [
-            "pos",
-            "position",
-            "lage",
-            "positie",
-            "theta",
-            "enc",
-            "encoder",
-            "displacement",
-            "angle",
-            "winkel",
-            "angulo",
-            "angolo",
-            "posizione",
-            "posicion",
-            "posicao",
-        ]
-    ),
-    "velocity": frozenset(
-        [
-            "vel",
-            "velo",
-            "velocity",
-            "speed",
-            "geschw",
-            "geschwindigkeit",
-            "drehzahl",
-            "rpm",
-            "snelheid",
-            "dq",
-            "qdot",
-            "dot",
-            "vitesse",
-            "velocidad",
-            "velocidade",
-            "velocita",
-        ]
-    ),
-    "acceleration": frozenset(["acc", "accel", "acceleration", "ddot"]),
-    "force": frozenset(
-        [
-            "force",
-            "torque",
-            "current",
-            "iq",
-            "kraft",
-            "strom",
-            "drehmoment",
-            "forza",
-            "fuerza",
-            "forca",
-            "coppia",
-            "effort",
-            "tau",
-            "thrust",
-            "kracht",
-            "koppel",
-        ]
-    ),
-    "disturbance": frozenset(["disturbance", "injected", "injection"]),
-}
-"""Words in a name that tell what a channel is."""
-
-_CURRENTS = frozenset(["corrente", "corriente", "courant"])
-"""Words of a current at the beginning of a name; behind another word they mean what is now: Tempo corrente."""
-
-_OTHERS_WANTED = frozenset(
-    ["voltage", "tensione", "tension", "spannung", "moment", "comando", "comandata", "comandada"]
+_WORDS = channel_words()
+_SET, _NOT_MEASURED, _CART, _RELATIVE = (_WORDS[name] for name in ("wanted", "not_measured", "cart", "relative"))
+_KEYS, _CURRENTS, _OTHERS_WANTED, MEASURED = (
+    _WORDS[name] for name in ("roles", "currents", "other_wanted", "measured")
 )
-"""Words of something else that may be wanted than a position, where no word of a position stands beside them."""
 
 _LETTERS = frozenset("vfinw")
 """Symbols of what may be wanted and is no position, directly before the word of what is wanted: v_soll."""
-
-MEASURED = frozenset(
-    ["ist", "act", "actual", "fbk", "meas", "measured", "mes", "mesure", "mesuree", "real", "reale", "reel", "reelle"]
-)
-"""Words of what is, and was measured."""
 
 _TOLD_BY_UNIT = {"position": ("m", "rad"), "force": ("N", "N*m", "A"), "velocity": ("m/s", "rad/s")}
 """Units that tell a role where a single channel without one has them."""

@@ -10,14 +10,13 @@ from functools import lru_cache
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
+from friso.identification.logs.word_lists import channel_words, read_lists
 from friso.quantities import Quantity, any_sign, quoted
 
-RMS = ("Arms", "Aeff", "A_rms", "A(rms)")
-"""How amperes of a drive are written that are root mean squares of its phases: peaks are the square root of 2 times as
-large."""
+_WORDS = read_lists("units")
+RMS, COUNTS = (frozenset(_WORDS[name]) for name in ("rms", "counts"))
+"""How amperes of a drive are written that are root mean squares of its phases, and steps of a sensor."""
 
-COUNTS = frozenset({"count", "counts", "cnt", "cnts", "inc", "incs", "increments", "lsb", "digit", "digits", "ticks"})
-"""Texts that mean the steps of a sensor."""
 OTHERS = {
     "m": ("rad",),
     "m/s": ("rad/s",),
@@ -41,48 +40,8 @@ RESPONSES = tuple(
 """Units of frequency responses: positions and their rates over forces, or what stands for these."""
 LONGEST = 100
 """Characters of a unit at most."""
-_SPELLINGS = {
-    "sec": "s",
-    "secs": "s",
-    "seconds": "s",
-    "msec": "ms",
-    "msecs": "ms",
-    "usec": "us",
-    "usecs": "us",
-    "nsec": "ns",
-    "Nm": "N*m",
-    "°": "deg",
-    "degs": "deg",
-    "Volt": "V",
-    "Volts": "V",
-    "volts": "V",
-    "Amp": "A",
-    "Amps": "A",
-    "amps": "A",
-    "Ampere": "A",
-    "Newton": "N",
-    "hz": "Hz",
-    "khz": "kHz",
-    "rev": "turn",
-    "revs": "turn",
-    **dict.fromkeys(("Sec", "SEC", "Seconds", "sec.", "S"), "s"),
-    **dict.fromkeys(("MS", "Msec", "Milliseconds"), "ms"),
-    **dict.fromkeys(("MM", "Millimeter"), "mm"),
-    **dict.fromkeys(("Inch", "Inches"), "in"),
-    **dict.fromkeys(("Grad", "grad", "Deg", "DEG", "Degree", "Degrees"), "deg"),
-    **dict.fromkeys(("RPM", "Rpm", "U/min", "r/min", "1/min", "min-1", "min^-1", "min⁻¹"), "rpm"),
-    **dict.fromkeys(("N-m", "N⋅m"), "N*m"),
-    "Nmm": "N*mm",
-    "Ncm": "N*cm",
-    "mNm": "mN*m",
-    "kNm": "kN*m",
-    "oz-in": "ozf*in",
-    "KN": "kN",
-    "g": "g_0",
-    **dict.fromkeys(RMS, "A"),
-}
-"""How people write units. Grad is the German degree, and neither a gon nor 1e9 rad; g is that
-of an accelerometer, as no log is in grams."""
+_SPELLINGS = {text: unit for unit, texts in _WORDS["spellings"].items() for text in texts} | dict.fromkeys(RMS, "A")
+"""Units as friso takes them, by how people write them."""
 _MEGA = 1e5
 """No log is in megametres, megaseconds or gigaradians: such a text is something else, or written badly."""
 _GLUED = re.compile(
@@ -96,13 +55,7 @@ _QUOTIENT = re.compile(r"(?P<name>.*[^\s_](?<!\sin))[\s_]+(?P<over>[^\s_/\[(]+)\
 _DECIBELS = re.compile(r"dB(?![A-Za-z])(?:\s*(?:rel?\b\.?|ref\b\.?))?\s*[(\[]?([^()\[\]]*)[)\]]?", re.IGNORECASE)
 _RATE = re.compile(r".+_(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|s\^?2)")
 """Names that end with a unit: one that is nothing else (pos_in and pos_min are in no unit), or a letter."""
-_MEASURED_IN = {
-    "s": {"t", "time", "zeit", "tempo", "temps", "tiempo"},
-    "m": {"pos", "position", "x", "ref", "reference", "displacement"},
-    "N": {"force", "f", "kraft", "friction", "forza", "fuerza", "forca"},
-    "A": {"current", "iq", "i", "strom"},
-    "V": {"voltage", "u", "vir", "command"},
-}
+_MEASURED_IN = channel_words()["measured_in"]
 """Words in a name that tell what is measured in these letters."""
 
 
