@@ -19,10 +19,8 @@ from friso.identification.logs.read import file_format, is_frequency_response, r
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
 from friso.identification.logs.signals import Notes, Reading, instants, with_user_units
 from friso.identification.logs.time_base import usual_step
+from friso.identification.settings import IdentificationSettings
 from friso.identification.sources import log_with_signals, unnamed
-
-BINS = 24
-"""Parts of a channel whose means make its small plot."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,8 @@ class ChannelContent:
 
     def course(self) -> np.ndarray:
         """The means over parts of the channel one after the other, at most so many, NaN where there is no number."""
-        parts = np.array_split(self.values, min(BINS, max(self.values.size, 1)))
+        settings = IdentificationSettings.current()
+        parts = np.array_split(self.values, min(settings.bins_of_a_small_plot, max(self.values.size, 1)))
         finite = [part[np.isfinite(part)] for part in parts]
         # divided first: the sum of huge values is infinite
         return np.array([(part / part.size).sum() if part.size else np.nan for part in finite])

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.identification.inverse_model import SMOOTH, FilteredMotion, motion
+from friso.identification.inverse_model import FilteredMotion, motion
 from friso.identification.logs.log import Log
 from friso.identification.output_error.problem import Simulated
+from friso.identification.settings import IdentificationSettings
 from friso.identification.spread import correlation_length
-
-BINS = 40
-"""Places along the rail, and speeds, in which the mean of the residual is taken."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +44,9 @@ class Residual:
 
 def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> SimulationErrors:
     """The errors of a simulated record of some samples of a log; `bandwidth` [Hz] is that of the motion."""
-    measured = motion(log["position"][part], log.sample_time, SMOOTH * bandwidth)
-    modelled = motion(simulated.position, log.sample_time, SMOOTH * bandwidth)
+    settings = IdentificationSettings.current()
+    measured = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * bandwidth)
+    modelled = motion(simulated.position, log.sample_time, settings.smoothing_bandwidths * bandwidth)
     disturbance = log["disturbance"][part] if "disturbance" in log else 0.0
     return SimulationErrors(
         _relative(log["position"][part], simulated.position),
@@ -81,10 +80,11 @@ def _relative(measured: np.ndarray, simulated: np.ndarray) -> float:
 
 def _explained(residual: np.ndarray, along: np.ndarray) -> float:
     """The share of the residual's power in its means over the bins of another signal, corrected for their number."""
-    edges = np.linspace(along.min(), along.max(), BINS + 1)
-    bins = np.clip(np.digitize(along, edges) - 1, 0, BINS - 1)
-    count = np.bincount(bins, minlength=BINS)
-    means = np.bincount(bins, residual, minlength=BINS) / np.maximum(count, 1)
+    settings = IdentificationSettings.current()
+    edges = np.linspace(along.min(), along.max(), settings.bins_of_a_residual + 1)
+    bins = np.clip(np.digitize(along, edges) - 1, 0, settings.bins_of_a_residual - 1)
+    count = np.bincount(bins, minlength=settings.bins_of_a_residual)
+    means = np.bincount(bins, residual, minlength=settings.bins_of_a_residual) / np.maximum(count, 1)
     power = float(np.mean(residual**2))
     independent = len(residual) / correlation_length(residual)
     share = float(np.sum(count * means**2)) / len(residual) / power if power else 0.0

@@ -13,7 +13,7 @@ from friso.errors import InputError
 from friso.identification.doubt import FitCase, KeyCase, judged_fit, judged_keys, raised
 from friso.identification.errors import Residual, SimulationErrors, errors_of, residual_of, unexplained
 from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion, unit_of
+from friso.identification.inverse_model import InverseModel, directions, inverse_model, motion, unit_of
 from friso.identification.logs.log import Log
 from friso.identification.model_error import allowed_for
 from friso.identification.output_error.coverage import Coverage, coverage
@@ -27,6 +27,7 @@ from friso.identification.output_error.repeated import as_far_off_as_repeated, l
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import noise_of
+from friso.identification.settings import IdentificationSettings
 from friso.progress import Progress, between, silent
 from friso.stage.controllers import CONTROLLER
 
@@ -85,12 +86,13 @@ def identify_moves(
     the force is not in newtons, which no loop of a machine allows, estimates are per unit of it. Raises InputError for
     a log without position or force.
     """
+    settings = IdentificationSettings.current()
     check_roles(log, ("position", "force", *(("reference",) if own_loop else ())), () if own_loop else ("force",))
     part = log.longest
     share = _cart_share(log, flat)
     inverse, by_direction = (inverse_model(log, bandwidth, split, share) for split in (False, True))
     follows, loop = _problems(log, part, flat, inverse, own_loop)
-    moved = motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth)
+    moved = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * inverse.bandwidth)
     starts = {parameter.name: parameter.start for parameter in follows.parameters}
     mass, coulomb = starts[MASS], starts.get("friction.coulomb", np.inf)
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
@@ -196,7 +198,12 @@ def _problems(
     log: Log, part: slice, flat: Mapping[str, Any], inverse: InverseModel, own_loop: bool
 ) -> tuple[Problem, Problem | None]:
     """The stage following the log's position, and in its own loop, with all the parameters in its equations."""
-    speed = float(np.abs(motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth).velocity).max())
+    settings = IdentificationSettings.current()
+    speed = float(
+        np.abs(
+            motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * inverse.bandwidth).velocity
+        ).max()
+    )
     levels = _levels(log, flat, inverse)
     position = log["position"][part]
     every = fit_parameters(flat, levels, speed, float(np.ptp(position)), all(directions(position)))

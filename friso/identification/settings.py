@@ -148,10 +148,167 @@ class DoubtSettings(Settings):
     friction_share_of_a_change: float = setting(
         0.1, "", "Share of Coulomb friction by which something has to change to be told."
     )
-    fewest_break_aways: int = setting(3, "", "Break-aways at least that contradict a fit; fewer may be chance.")
     speeds_of_a_start: int = setting(
         50, "", "Speeds at which the curve of a fit is looked at, up to that of a body that has begun to move."
     )
     stribeck_velocities_of_sliding: float = setting(
         2.0, "", "At so many Stribeck velocities 2 % of the effect is left, by the exponent 2; less would be friction."
+    )
+
+
+@dataclass(frozen=True)
+class IdentificationSettings(Settings):
+    """The inverse model, spreads of fits, and the stage file that is written."""
+
+    chance_of_agreement: float = setting(
+        0.01, "", "A scatter less likely than this is a disagreement; 1 in 100 keeps false ones rare."
+    )
+    bins_of_a_small_plot: int = setting(24, "", "Parts of a channel whose means make its small plot.")
+    bins_of_a_residual: int = setting(
+        40, "", "Places and speeds in which the mean residual is taken: fewer hide cogging, more hold noise."
+    )
+    smoothing_bandwidths: float = setting(
+        5.0, "", "Cut-off of the position in bandwidths of the motion (Gautier, Janot, Vandanjon 2013)."
+    )
+    decimation_bandwidths: float = setting(
+        2.0, "", "Cut-off of the decimation in bandwidths of the motion (Gautier, Janot, Vandanjon 2013)."
+    )
+    decimation_pass: float = setting(
+        0.8, "", "Share of half the new sampling frequency that the decimation passes; nearer 1 it aliases."
+    )
+    order_of_smoothing: int = setting(
+        4, "", "Order of the Butterworth filter of the position (Gautier, Janot, Vandanjon 2013)."
+    )
+    order_of_decimation: int = setting(8, "", "Order of the Chebyshev filter before decimation.")
+    ripple_of_decimation: float = setting(0.05, "dB", "Ripple of that filter, common to the force and to all columns.")
+    sampling_of_splines: float = setting(
+        0.15,
+        "",
+        "From this cut-off times sample time on splines take derivatives: differences lose 1 % of the acceleration.",
+    )
+    samples_of_an_edge: int = setting(49, "", "Samples left out at the start, where the filters swing in.")
+    power_share_of_the_motion: float = setting(
+        0.95, "", "Share of the acceleration's power within the bandwidth; nearer 1 it is that of the noise."
+    )
+    power_above_noise: float = setting(
+        4.0, "", "Ratio by which the position's spectrum stands above its noise where it counts."
+    )
+    pieces_of_a_spectrum: int = setting(
+        8, "", "Pieces into which a record is cut for its spectrum (Welch): more scatter less and resolve less."
+    )
+    way_share_of_a_direction: float = setting(
+        0.02, "", "Share of the way gone in a direction at least, for friction to be told from a constant force."
+    )
+    deviations_of_standing_still: float = setting(
+        20.0, "", "Deviations of the position's noise within which nothing has moved."
+    )
+    speed_share_of_sliding: float = setting(
+        0.01, "", "Share of the highest speed below which a stage rests: the velocity's sign is noise there."
+    )
+    time_of_a_left_out_rest: float = setting(
+        0.1, "s", "Rests of this length are left out: friction at rest is what the controller makes it."
+    )
+    rows_of_an_inverse_model: int = setting(20, "", "Rows at least: fewer leave four numbers without an interval.")
+    row_share_of_likeness: float = setting(
+        0.1, "", "Share of the rows over which errors are looked at for likeness: farther ones are few."
+    )
+    blocks_of_time: int = setting(10, "", "Blocks of time in which errors may be alike.")
+    bins_of_place_and_speed: int = setting(
+        20, "", "Bins of place and of speed in which errors may be alike: more hold too few rows."
+    )
+    least_freedom_of_groups: float = setting(
+        3.0, "", "Degrees of freedom at least: some groups are always much alike (our choice)."
+    )
+    eigenvalue_of_likeness: float = setting(
+        1e-6, "", "Share of the largest eigenvalue below which columns count as one: differences are no more precise."
+    )
+    bend_of_made_up_bristles: float = setting(
+        5e-6, "m", "Bristles of a stage made up around a log bend by this, as those of many bearings (our choice)."
+    )
+    made_up_stribeck_velocity: float = setting(
+        1e-3, "m/s", "Stribeck velocity of a stage made up around a log (our choice)."
+    )
+    digits_of_an_uncertainty: int = setting(2, "", "Significant digits of an uncertainty, and so of its value.")
+    share_of_a_least_value: float = setting(
+        1e-3, "", "Share of the upper end at which a range begins that would hold 0: smaller makes no difference."
+    )
+
+
+@dataclass(frozen=True)
+class ExperimentSettings(Settings):
+    """What analyses of kinds of experiment look for in their logs."""
+
+    harmonics_of_an_excitation: float = setting(
+        7.0, "", "From so many harmonics a log is an excitation; moves have 1 to 7, a multisine of 8 equal lines more."
+    )
+    rests_of_moves: float = setting(
+        0.1, "", "Share of the time at rest from which what repeats is moves: an excitation hardly rests."
+    )
+    samples_of_moves: int = setting(
+        40_000, "", "Samples that are used: more moves of one kind take longer and show little more (our choice)."
+    )
+    low_pass_of_a_check: float = setting(
+        0.7, "", "Low-pass of the second fit that checks the first, over that of the first: nearer 1 it repeats it."
+    )
+    low_pass_of_the_motion: float = setting(
+        5.0, "", "Low-pass of the motion over that of the fit: friction depends on faster motion than is fitted."
+    )
+    samples_of_a_presliding_period: int = setting(
+        40, "", "Samples per period of the low-pass: more take longer and show no more."
+    )
+    samples_of_presliding: int = setting(1000, "", "Samples of a record at least: fewer leave an interval of no use.")
+    bending_range: tuple[float, ...] = setting(
+        (1e-6, 5.0), "", "Range of the bristles' bending over that of the motion, from a straight line to slip at once."
+    )
+    stiffness_ratio_of_a_joint: float = setting(
+        3.0, "", "Up to this ratio to the joint's stiffness it may well be the joint that is seen."
+    )
+    low_pass_below_a_mode: float = setting(
+        1 / 3, "", "Highest low-pass over the frequency of the structure's mode, which nothing here describes."
+    )
+    low_pass_of_sliding: float = setting(
+        8.0, "", "Low-pass of the motion over that of the fit: slips are quicker than what is fitted."
+    )
+    samples_of_slow_sliding: int = setting(60_000, "", "Samples that are used: more take longer and show no more.")
+    fewest_samples_of_sliding: int = setting(2000, "", "Samples at least: fewer leave an interval of no use.")
+    stribeck_starts: tuple[float, ...] = setting(
+        (0.2, 0.5), "", "Stribeck velocities, over the RMS velocity, from which the fit starts: one alone may miss."
+    )
+    sliding_bounds: tuple[float, ...] = setting(
+        (0.01, 10.0), "", "Bounds of what is fitted, over RMS velocity and mean friction: no bearing is beyond."
+    )
+    tolerance_of_sliding: float = setting(
+        1e-6, "", "Share of squares and numbers to which the fit comes: far within any interval."
+    )
+    step_of_sliding: float = setting(
+        1e-3, "", "Step over the size of a number for derivatives: smaller ones drown in the runs' tolerance."
+    )
+    stribeck_velocities_gone: float = setting(
+        1.5, "", "Stribeck velocities that the motion has to go: at 1.5 a tenth of the fall is left."
+    )
+    low_pass_of_steps: float = setting(25.0, "Hz", "Low-pass of the force of position steps (thesis, Sec. 4.2.2).")
+    drift_of_a_settled_force: float = setting(
+        0.02, "", "Share of a step by which the force may drift in a settled window beyond the deflection's part."
+    )
+    drift_of_a_settled_place: float = setting(
+        0.1, "", "Share by which the deflection may, where none drifts less: slow integrators take long."
+    )
+    travel_of_a_fixed_cart: float = setting(
+        0.02, "", "Share of the position's steps by which a cart that counts as fixed may follow."
+    )
+    low_pass_of_stick_slip: float = setting(
+        100.0, "Hz", "Low-pass of deflection and velocity: slips are slower than this."
+    )
+    share_of_held_slips: float = setting(
+        0.5, "", "Share of slips before which the force had stopped rising, from which none shows static friction."
+    )
+    share_near_a_peak: float = setting(0.01, "", "Share of its peak within which the force is near it.")
+    duration_near_a_peak: float = setting(
+        4.0, "", "A force near its peak so many times as long as usual had stopped rising."
+    )
+    stroke_share_at_a_stop: float = setting(
+        0.05, "", "Share of the stroke left where the limiter counts as touched: the filter smears it."
+    )
+    stiffness_share_of_a_limiter: float = setting(
+        0.1, "", "Up to this share of the limiter's stiffness a stiffness is the joint's."
     )

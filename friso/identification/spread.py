@@ -7,22 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import t as student
 
+from friso.identification.settings import IdentificationSettings
 from friso.intervals import COVERAGE
-
-LONGEST = 0.1
-"""Share of the rows over which errors are looked at for likeness at most."""
-
-BLOCKS, PLACES = 10, 20
-"""Blocks of time, and bins of place and of speed, in which errors may be alike."""
-
-FEWEST = 3.0
-"""Degrees of freedom at least of the scatter between groups, of which some are always much alike: our choice."""
 
 CONFIDENCE = 0.975
 """Of Student's t at each end of a 95 % interval."""
-
-COLLINEAR = 1e-6
-"""Share of the largest eigenvalue below which columns of a Jacobian count as one: differences are no more precise."""
 
 
 def correlation_length(residual: np.ndarray) -> int:
@@ -31,7 +20,7 @@ def correlation_length(residual: np.ndarray) -> int:
     centred = residual - residual.mean()
     count = len(centred)
     spectrum = np.abs(np.fft.rfft(centred, 2 * count)) ** 2
-    correlation = np.fft.irfft(spectrum)[: max(2, int(LONGEST * count))]
+    correlation = np.fft.irfft(spectrum)[: max(2, int(IdentificationSettings.current().row_share_of_likeness * count))]
     if correlation[0] <= 0:
         return 1
     correlation = correlation / correlation[0]
@@ -45,10 +34,11 @@ def groups_of(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarr
     acceleration [m/s^2]: blocks of time, places, and speeds, speeding up and slowing down apart.
 
     What a model lacks returns with place and speed: a motion that is repeated repeats it, and says nothing new."""
+    settings = IdentificationSettings.current()
     return (
-        np.arange(len(position)) * BLOCKS // len(position),
-        _binned(position, PLACES),
-        2 * _binned(velocity, PLACES) + (velocity * acceleration > 0),
+        np.arange(len(position)) * settings.blocks_of_time // len(position),
+        _binned(position, settings.bins_of_place_and_speed),
+        2 * _binned(velocity, settings.bins_of_place_and_speed) + (velocity * acceleration > 0),
     )
 
 
@@ -90,7 +80,7 @@ def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """The covariance of the sum of scores, shape (n, p), of which neighbouring ones are alike."""
     count = len(scores)
     window = max(correlation_length(series) for series in (residual, *scores.T))
-    window = min(max(window, 1), max(2, int(LONGEST * count)))
+    window = min(max(window, 1), max(2, int(IdentificationSettings.current().row_share_of_likeness * count)))
     middle = scores.T @ scores
     for lag in range(1, window):
         shifted = scores[lag:].T @ scores[:-lag]
@@ -105,15 +95,16 @@ def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
     sums = np.stack([np.bincount(members, column, len(names)) for column in scores.T], axis=1)
     power = np.bincount(members, (scores**2).sum(axis=1), len(names))
     equal = power.sum() ** 2 / (power @ power) if power.any() else 1.0
-    freedom = max(equal - 1, FEWEST)
+    freedom = max(equal - 1, IdentificationSettings.current().least_freedom_of_groups)
     wider = float(student.ppf(CONFIDENCE, freedom)) / COVERAGE
     return wider**2 * (1 + 1 / freedom) * (sums.T @ sums)
 
 
 def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The inverse of columns of length 1 times themselves, and which of these cannot be distinguished from others."""
+    settings = IdentificationSettings.current()
     sizes, directions = np.linalg.eigh(square)
-    collinear = sizes < COLLINEAR * sizes[-1]
+    collinear = sizes < settings.eigenvalue_of_likeness * sizes[-1]
     resolved = directions[:, ~collinear]
-    alike = (np.abs(directions[:, collinear]) > np.sqrt(COLLINEAR)).any(axis=1)
+    alike = (np.abs(directions[:, collinear]) > np.sqrt(settings.eigenvalue_of_likeness)).any(axis=1)
     return resolved / sizes[~collinear] @ resolved.T, alike

@@ -11,16 +11,10 @@ import numpy as np
 from friso.axis import LINEAR
 from friso.equations.controllers.van_dijk import controller_table
 from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import SMOOTH, InverseModel, motion
+from friso.identification.inverse_model import InverseModel, motion
 from friso.identification.logs.log import Log
+from friso.identification.settings import IdentificationSettings
 from friso.stage import Stage
-
-BENDING, STRIBECK_VELOCITY = 5e-6, 1e-3
-"""Length [m] (or angle [rad]) by which bristles bend and Stribeck velocity [m/s] of a stage made up around a log: our
-choice."""
-
-DIGITS = 2
-"""Significant digits of an uncertainty, and so of its value."""
 
 NOT_IDENTIFIED = "not identified: all that is possible"
 
@@ -32,9 +26,13 @@ OUR_CHOICE = "controller, motion, bristles and Stribeck velocity are our choice"
 def made_up(log: Log, inverse: InverseModel) -> Stage:
     """A stage around a log without any: one rigid mass, LuGre friction without Stribeck effect, a controller of our
     choice, and a move as fast as the log's fastest."""
+    settings = IdentificationSettings.current()
     mass, coulomb = (max(inverse.value(name), 1e-6) for name in ("mass", "coulomb"))
-    viscous, stiffness = max(inverse.value("viscous"), 0.0), coulomb / BENDING
-    parts = [motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth) for part in log.segments]
+    viscous, stiffness = max(inverse.value("viscous"), 0.0), coulomb / settings.bend_of_made_up_bristles
+    parts = [
+        motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * inverse.bandwidth)
+        for part in log.segments
+    ]
     axis = log.axis
     top = max(float(np.abs(part.velocity).max()) for part in parts)
     brisk = max(float(np.abs(part.acceleration).max()) for part in parts)
@@ -46,7 +44,7 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
             "model": "lugre",
             "static": f"{coulomb:.6g} {axis.force}",
             "coulomb": f"{coulomb:.6g} {axis.force}",
-            "stribeck_velocity": f"{STRIBECK_VELOCITY:g} {axis.length}/s",
+            "stribeck_velocity": f"{settings.made_up_stribeck_velocity:g} {axis.length}/s",
             "stribeck_exponent": 2,
             "bristle_stiffness": f"{stiffness:.6g} {axis.unit('N/m')}",
             "bristle_damping": f"{math.sqrt(stiffness * mass):.6g} {axis.unit('N*s/m')}",
@@ -130,6 +128,6 @@ def estimate_text(estimate: Estimate) -> str:
 
 def round_uncertainty(half: float) -> tuple[str, int]:
     """An uncertainty rounded up to two digits, as text, and the decimal places of its value."""
-    digits = DIGITS - 1 - math.floor(math.log10(half))
+    digits = IdentificationSettings.current().digits_of_an_uncertainty - 1 - math.floor(math.log10(half))
     up = math.ceil(round(half * 10**digits, 6)) / 10**digits
     return (f"{up:.{digits}f}" if digits > 0 else f"{up:.0f}"), digits

@@ -10,15 +10,12 @@ import numpy as np
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.settings import IdentificationSettings
 from friso.identification.stage_file import estimate_text, identified_stage
 from friso.intervals import uncertain_value
 from friso.quantities import Number, Quantity
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
-
-LEAST = 1e-3
-"""Share of a range's upper end at which one begins that would hold 0 or less, where a key does not allow that: smaller
-values make no difference beside it, and a range over orders of magnitude needs an end."""
 
 STATIC, COULOMB = "friction.static", "friction.coulomb"
 
@@ -101,7 +98,7 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
         return None, f"{ends} is all that is known, the stage file keeps its value: it has to be {field.bound.text}"
     if _allowed(estimate, field):
         return estimate, ""
-    low = LEAST * estimate.high
+    low = IdentificationSettings.current().share_of_a_least_value * estimate.high
     cut = replace(estimate, value=np.nan, low=low, reason=estimate.reason or f"it has to be {field.bound.text}")
     limits = f"{estimate_text(estimate)} was found, but it has to be {field.bound.text}"
     if estimate.low < low and _allowed(cut, field):

@@ -11,6 +11,7 @@ from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
 from friso.identification.output_error.parameters import CURVE, MASS, is_free
 from friso.identification.readings.common import by_direction, robust, stribeck_curve
 from friso.identification.readings.ramps import Ramps, force_ramps
+from friso.identification.readings.settings import ReadingSettings
 from friso.identification.settings import DoubtSettings
 from friso.intervals import COVERAGE
 
@@ -40,7 +41,7 @@ def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramp
     """Return the friction [N] with which motions begin, where it is beyond the interval of static friction."""
     static = determined.get("friction.static")
     sides = [side for _, side in by_direction(ramps.directions)]
-    if static is None or len(ramps.forces) < DoubtSettings.current().fewest_break_aways:
+    if static is None or len(ramps.forces) < ReadingSettings.current().fewest_ramps:
         return None
     if not all(side.any() for side in sides):
         return None

@@ -6,13 +6,14 @@ from collections.abc import Iterator
 
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
 from friso.identification.logs import checks
+from friso.identification.logs.settings import LogSettings
 from friso.quantities import percent
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     """Count the samples at the largest and the smallest force."""
     share = checks.clipped_share(case.log["force"])
-    if share > checks.CLIPPED:
+    if share > LogSettings.current().share_of_clipped_samples:
         words = f"{percent(share)} of the force samples lie at its extremes: the channel clips"
         yield RaisedDoubt(words, share, spoils=True)
 

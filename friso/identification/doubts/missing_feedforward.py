@@ -9,9 +9,9 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
-from friso.identification.inverse_model import SMOOTH, InverseModel, inverse_model, least_squares, motion, unit_of
+from friso.identification.inverse_model import InverseModel, inverse_model, least_squares, motion, unit_of
 from friso.identification.logs.log import Log
-from friso.identification.settings import DoubtSettings
+from friso.identification.settings import DoubtSettings, IdentificationSettings
 from friso.identification.spread import spread_of
 from friso.intervals import COVERAGE
 
@@ -78,12 +78,13 @@ def lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:
 
 def _of_reference(log: Log, bandwidth: float) -> dict[str, np.ndarray]:
     """Return acceleration [m/s^2] and direction of the reference, each of shape (n,); {} without a reference."""
+    settings = IdentificationSettings.current()
     if "reference" not in log:
         return {}
     columns = {name: np.zeros(len(log.time)) for name in (ACCELERATION, DIRECTION)}
     for part in log.segments:
         if part.stop - part.start > DoubtSettings.current().samples_of_a_reference:
-            reference = motion(log["reference"][part], log.sample_time, SMOOTH * bandwidth)
+            reference = motion(log["reference"][part], log.sample_time, settings.smoothing_bandwidths * bandwidth)
             columns[ACCELERATION][part] = reference.acceleration
             columns[DIRECTION][part] = np.sign(np.gradient(log["reference"][part]))
     return columns

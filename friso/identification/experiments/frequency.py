@@ -22,15 +22,9 @@ from friso.identification.logs.log import Log
 from friso.identification.readings.course import Course
 from friso.identification.response.analysis import Bench, analyse, predicted
 from friso.identification.response.two_mass import TwoMass
+from friso.identification.settings import ExperimentSettings
 from friso.identification.stage_keys import shared_masses
 from friso.stage import Stage
-
-FEW = 7.0
-"""Harmonics that an excitation has at least, and as many turns in each period: our choice. A multisine of 8 equal lines
-is one; moves have 1 to 7, or narrow peaks that turn less often than that."""
-
-RESTS = 0.1
-"""Share of the time for which the position rests at most under an excitation."""
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Bench:
@@ -43,10 +37,11 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 def _claims(course: Course) -> str | None:
     """A periodic excitation moves a stage whose reference does not move; it hardly rests, holds many frequencies, and
     turns often."""
+    settings = ExperimentSettings.current()
     repetition = None if course.reference_moves else course.repetition
-    if repetition is None or repetition.rests > RESTS:
+    if repetition is None or repetition.rests > settings.rests_of_moves:
         return None
-    if repetition.harmonics < FEW or repetition.turns < repetition.harmonics:
+    if repetition.harmonics < settings.harmonics_of_an_excitation or repetition.turns < repetition.harmonics:
         return None
     return f"{course.repeats}, with about {repetition.harmonics:.0f} harmonics"
 

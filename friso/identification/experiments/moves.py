@@ -15,40 +15,36 @@ from friso.identification.logs.log import ROLES, Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog, check_roles, identify_moves, simulated_log
 from friso.identification.output_error.problem import why_continuous
 from friso.identification.readings.course import Course
-from friso.identification.readings.friction_velocity import STRAIGHT, distinct
-from friso.identification.readings.ramps import FEW_RAMPS
+from friso.identification.readings.friction_velocity import distinct
+from friso.identification.readings.settings import ReadingSettings
+from friso.identification.settings import ExperimentSettings
 from friso.identification.stage_file import made_up
 from friso.stage import Stage
-
-FEW = 7.0
-"""Harmonics, and turns in each period, that moves which are repeated stay below: our choice."""
 
 WITHOUT_CONTROLLER = (
     "without the machine's own controller the simulated stage follows the logged position; with it (--stage) the "
     "intervals may be narrower, and more may be identified, as far as that loop explains the record"
 )
 
-MOST = 40_000
-"""Samples of a log that are used: more of the same moves would take longer and show little more (our choice)."""
-
-RESTS = 0.1
-"""Share of the time for which the position rests from which on what repeats is taken for moves."""
-
 
 def _claims(course: Course) -> str | None:
     """A reference moves; or it is no series of constant speeds or force ramps, and nothing repeats, the position rests
     in between, or the force turns seldom and holds few frequencies."""
+    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if course.reference_moves:
         return "its reference moves"
-    if distinct(course.speeds) >= STRAIGHT or course.ramps >= FEW_RAMPS:
+    if distinct(course.speeds) >= reading_settings.speeds_of_a_line or course.ramps >= reading_settings.fewest_ramps:
         return None
     repetition = course.repetition
     if repetition is None:
         standing = "reference" in course.log
         return None if standing else f"the {course.signal} does not repeat, and there is no reference that moves"
-    if repetition.rests > RESTS:
+    if repetition.rests > experiment_settings.rests_of_moves:
         return f"{course.repeats}, but the position rests in between"
-    if repetition.harmonics < FEW and repetition.turns < FEW:
+    if (
+        repetition.harmonics < experiment_settings.harmonics_of_an_excitation
+        and repetition.turns < experiment_settings.harmonics_of_an_excitation
+    ):
         return f"{course.repeats}, but rarely reverses and contains few frequencies"
     return None
 
@@ -59,7 +55,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     assert isinstance(whole, Log)
     if prior.from_user:
         check_roles(whole, ("force",))
-    log = whole.excerpt(MOST)
+    log = whole.excerpt(ExperimentSettings.current().samples_of_moves)
     flat = prior.flat(log) if _in_newtons(log) else made_up(log, inverse_model(log, settings.bandwidth)).flat()
     start = {**flat, **{key: estimate.value for key, estimate in prior.estimates.items() if key in flat}}
     return identify_moves(log, start, prior.from_user and "reference" in log, settings.bandwidth, settings.progress)
@@ -71,7 +67,7 @@ def _in_newtons(log: Log) -> bool:
 
 def _around(log: Log) -> Stage | None:
     """A stage around a log whose force is in newtons."""
-    part = log.excerpt(MOST)
+    part = log.excerpt(ExperimentSettings.current().samples_of_moves)
     return made_up(part, inverse_model(part)) if _in_newtons(log) else None
 
 
@@ -87,6 +83,7 @@ def _correlated(result: IdentifiedMoves, estimates: Sequence[Estimate]) -> Corre
 
 def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]:
     """Where the drive that was given is not the one simulated, and where no controller was."""
+    settings = ExperimentSettings.current()
     loops = [result for result in results if result.loop] if stage is not None else []
     reasons = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
     followed = any(result.loop is None for result in results)
@@ -94,7 +91,11 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
     return [
         *(sentence for sentence in dict.fromkeys(reasons) if sentence),
         *([WITHOUT_CONTROLLER] if followed else []),
-        *(f"{log.name}: of a log this long {MOST} samples are used, {_span(log)}, where it moves most" for log in long),
+        *(
+            f"{log.name}: of a log this long {settings.samples_of_moves} samples are used, {_span(log)}, where it "
+            "moves most"
+            for log in long
+        ),
     ]
 
 

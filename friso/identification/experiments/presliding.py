@@ -20,7 +20,6 @@ from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, S
 from friso.identification.logs.log import Log
 from friso.identification.readings.at_bearing import (
     DIRECT,
-    EXPLAINED,
     HELD,
     BearingRecord,
     Between,
@@ -33,8 +32,6 @@ from friso.identification.readings.at_bearing import (
     why_unseen,
 )
 from friso.identification.readings.common import (
-    BLOCKS,
-    LINEARITY,
     Mean,
     by_t,
     correlation_of,
@@ -42,21 +39,11 @@ from friso.identification.readings.common import (
     jackknife,
     solve_normal_equations,
 )
+from friso.identification.readings.settings import ReadingSettings
+from friso.identification.settings import ExperimentSettings
 from friso.identification.stage_keys import shared_masses
 from friso.quantities import percent
 from friso.stage import Stage
-
-CHECKED, MOTION = 0.7, 5.0
-"""Low-pass of a second fit by which the first one is checked, and of the motion, both over that of the first."""
-
-FINE, FEWEST = 40, 1000
-"""Samples per period of the low-pass that are enough; and of a record at least."""
-
-BENDING = (1e-6, 5.0)
-"""Of the bending q over the range of the motion: from a straight line to bristles that are at their end long before."""
-
-SPRING = 3.0
-"""Stiffness over that of the joint up to which it may well be the joint that is seen."""
 
 KEYS = MASS, DAMPING, STIFFNESS = "moving mass", "friction.bristle_damping", "friction.bristle_stiffness"
 UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
@@ -118,14 +105,19 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     speed, which the model leaves out, and bristles of another law bend otherwise. Where much is left, nothing is shown.
     Raises InputError for missing channels.
     """
+    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     record = record_of(log, log.longest, between)
-    if why := why_unseen(record, FEWEST):
+    if why := why_unseen(record, experiment_settings.samples_of_presliding):
         return _nothing(why)
     cutoff, looked_for = cutoff_of(record), between.delay is None
-    tried = [(cutoff, looked_for), (CHECKED * cutoff, looked_for), *([] if looked_for else [(cutoff, True)])]
+    tried = [
+        (cutoff, looked_for),
+        (experiment_settings.low_pass_of_a_check * cutoff, looked_for),
+        *([] if looked_for else [(cutoff, True)]),
+    ]
     best, *others = (_converged_fit(_seen(record, top), between, top, late) for top, late in tried)
     changes = np.array([other.values - best.values for other in others])
-    even = best.doubt + LINEARITY * np.abs(best.values)
+    even = best.doubt + reading_settings.linearity_of_sensors * np.abs(best.values)
     even[KEYS.index(DAMPING)] += between.viscous[1]
     systematic = np.abs(changes).sum(axis=0) + even
     why = _no_bristles(best, between, record.bent is None)
@@ -141,7 +133,11 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
 
 def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
     """With the motion that belongs to a low-pass [Hz], and no more samples than that needs."""
-    return record.seen(MOTION * cutoff, max(int(1 / (FINE * cutoff * record.interval)), 1))
+    settings = ExperimentSettings.current()
+    return record.seen(
+        settings.low_pass_of_the_motion * cutoff,
+        max(int(1 / (settings.samples_of_a_presliding_period * cutoff * record.interval)), 1),
+    )
 
 
 def _nothing(why: str) -> Presliding:
@@ -152,17 +148,19 @@ def _nothing(why: str) -> Presliding:
 
 def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
     """Why the fit is not one of bristles; empty where it is."""
-    if fit.left > EXPLAINED:
+    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
+    if fit.left > reading_settings.share_left_unexplained:
         return f"{percent(fit.left)} of the friction is not explained: {SLIDES}"
     if fit.ends:
         return f"the bristles yield: {SLIDES}"
-    if held and 0 < fit.values[KEYS.index(STIFFNESS)] < SPRING * between.joint:
+    if held and 0 < fit.values[KEYS.index(STIFFNESS)] < experiment_settings.stiffness_ratio_of_a_joint * between.joint:
         return "the stiffness is like that of the joint: is it held?"
     return ""
 
 
 def _estimate(key: str, value: float, error: float, systematic: float) -> Estimate:
-    estimate = by_t(key, UNITS[key], Mean(value, error, BLOCKS - 1), METHOD, systematic, systematic)
+    settings = ReadingSettings.current()
+    estimate = by_t(key, UNITS[key], Mean(value, error, settings.blocks_of_a_mean - 1), METHOD, systematic, systematic)
     if estimate.low > 0:
         return estimate
     why = "the motion is too slow to show it" if key != STIFFNESS else "no force holds the bearing: does it stick?"
@@ -180,6 +178,7 @@ def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late:
 def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
     """Least squares of the force at a low-pass; the bending, in which it is not linear, is looked for. `mass` [kg] is
     believed to move; with `late`, what a little more delay would do is among the columns."""
+    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     equation = _equation(record, between, cutoff, mass, late)
     target, span = equation.target, float(np.ptp(equation.body))
 
@@ -187,7 +186,9 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
         x = equation.columns(float(np.exp(logarithm)) / span)
         return float(np.sum((target - x @ solve_normal_equations(x.T @ x, x.T @ target)) ** 2))
 
-    best: Any = minimize_scalar(off, bounds=tuple(np.log(BENDING)), method="bounded", options={"xatol": 1e-3})
+    best: Any = minimize_scalar(
+        off, bounds=tuple(np.log(experiment_settings.bending_range)), method="bounded", options={"xatol": 1e-3}
+    )
     bending = float(np.exp(best.x)) / span
     x = equation.columns(bending)
     solution = solve_normal_equations(x.T @ x, x.T @ target)
@@ -195,10 +196,10 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
     columns, friction = np.column_stack([x, bends]), target - x[:, 0] * solution[0]
     covariance = jackknife(columns, target)[:3, :3]
     unexplained = target - x @ solution
-    hidden = np.linalg.norm(unexplained) + LINEARITY * np.linalg.norm(friction)
+    hidden = np.linalg.norm(unexplained) + reading_settings.linearity_of_sensors * np.linalg.norm(friction)
     doubt = hidden / np.array([_apart(columns, number) for number in range(len(KEYS))])
     left = float(unexplained.std() / friction.std())
-    ends, more = bending * span > 0.99 * BENDING[1], float(solution[-1]) if late else 0.0
+    ends, more = bending * span > 0.99 * experiment_settings.bending_range[1], float(solution[-1]) if late else 0.0
     curves = (record.time[equation.low_pass.inside], equation.low_pass(equation.body), target, x @ solution)
     return _Fit(solution[:3], covariance, doubt, more, ends, left, *curves)
 

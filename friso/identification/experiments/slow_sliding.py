@@ -21,7 +21,6 @@ from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.logs.log import Log
 from friso.identification.readings.at_bearing import (
-    EXPLAINED,
     HELD,
     BearingRecord,
     Between,
@@ -33,37 +32,10 @@ from friso.identification.readings.at_bearing import (
     record_of,
     why_unseen,
 )
-from friso.identification.readings.common import (
-    BLOCKS,
-    LINEARITY,
-    Mean,
-    by_t,
-    correlation_of,
-    deflections,
-    jackknife,
-    stribeck_curve,
-)
+from friso.identification.readings.common import Mean, by_t, correlation_of, deflections, jackknife, stribeck_curve
+from friso.identification.readings.settings import ReadingSettings
+from friso.identification.settings import ExperimentSettings
 from friso.quantities import percent
-
-BELOW_MODE, CHECKED, MOTION = 1 / 3, 0.7, 8.0
-"""Low-pass of the equation over the frequency of the structure's mode, at most; that of a second fit by which the first
-one is checked, and of the motion, both over that of the first."""
-
-MOST, FEWEST = 60_000, 2000
-"""Samples that are used at most, and that are needed."""
-
-STARTS, BOUNDS = (0.2, 0.5), (0.01, 10.0)
-"""Stribeck velocities from which the fit starts, over the RMS velocity; and bounds of all that is fitted, over that and
-over the mean friction."""
-
-CLOSE = 1e-6
-"""Share of its squares, and of what is fitted, to which the fit comes: far within any interval."""
-
-STEP = 1e-3
-"""Of what is fitted, over its size, for derivatives."""
-
-FASTEST = 1.5
-"""Stribeck velocities which the motion has to go: at this one a tenth of the fall is left."""
 
 NAMES = ("friction.coulomb", "friction.static", "friction.stribeck_velocity")
 UNITS = ("N", "N", "m/s")
@@ -132,8 +104,15 @@ class _Equation:
 
     def derivatives(self, p: np.ndarray) -> np.ndarray:
         """Of the residual, shape (m, 5)."""
+        settings = ExperimentSettings.current()
         residuals_here = self.model(p)
-        return np.stack([(self.model(p + step) - residuals_here) / STEP for step in STEP * np.eye(len(p))], axis=1)
+        return np.stack(
+            [
+                (self.model(p + step) - residuals_here) / settings.step_of_sliding
+                for step in settings.step_of_sliding * np.eye(len(p))
+            ],
+            axis=1,
+        )
 
 
 def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristles | None) -> SlowSliding:
@@ -145,17 +124,22 @@ def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristl
     the friction that is left unexplained; contact, mode and exponent are taken as given. Raises InputError for missing
     channels.
     """
-    record = record_of(log, slice(log.longest.start, min(log.longest.stop, log.longest.start + MOST)), between)
-    why = why_unseen(record, FEWEST) or (DELAY if between.delay is None else "")
+    settings = ExperimentSettings.current()
+    record = record_of(
+        log,
+        slice(log.longest.start, min(log.longest.stop, log.longest.start + settings.samples_of_slow_sliding)),
+        between,
+    )
+    why = why_unseen(record, settings.fewest_samples_of_sliding) or (DELAY if between.delay is None else "")
     if why or contact is None:
         return _nothing(why or BRISTLES)
     cutoff = cutoff_of(record)
-    cutoff = min(cutoff, BELOW_MODE * between.mode.frequency) if between.mode else cutoff
+    cutoff = min(cutoff, settings.low_pass_below_a_mode * between.mode.frequency) if between.mode else cutoff
     sizes = _sizes(record, cutoff)
     equation = _equation(record, between, contact, cutoff, sizes)
-    best = _fitted(equation, [np.log([1.0, 0.5, share]) for share in STARTS])
+    best = _fitted(equation, [np.log([1.0, 0.5, share]) for share in settings.stribeck_starts])
     jacobian, residual = equation.derivatives(best), equation.residual(best)
-    lower = _fitted(_equation(record, between, contact, CHECKED * cutoff, sizes), [best])
+    lower = _fitted(_equation(record, between, contact, settings.low_pass_of_a_check * cutoff, sizes), [best])
     shifts = [lower - best, _parameter_change(np.column_stack([jacobian, equation.late]), residual)[:5]]
     for other in _off(between, contact):
         shifts.append(_parameter_change(jacobian, _equation(record, *other, cutoff, sizes).residual(best) - residual))
@@ -200,7 +184,8 @@ def _equation(
     record: BearingRecord, between: Between, contact: MassOnBristles, cutoff: float, sizes: np.ndarray
 ) -> _Equation:
     """The equation of a record at a low-pass [Hz]."""
-    seen, low_pass = record.seen(MOTION * cutoff), LowPass(record.time, cutoff)
+    settings = ExperimentSettings.current()
+    seen, low_pass = record.seen(settings.low_pass_of_sliding * cutoff), LowPass(record.time, cutoff)
     body, force, inertia = at_bearing(seen, between, contact.mass[0])
     velocity = rate_of(record.time, body)
     friction = force - contact.mass[0] * inertia - between.viscous[0] * velocity
@@ -210,7 +195,8 @@ def _equation(
 
 def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
     """What fits best from any start, shape (5,)."""
-    least, most = BOUNDS
+    settings = ExperimentSettings.current()
+    least, most = settings.sliding_bounds
     low, high = np.array([*np.log([least] * 3), -most, -most]), np.array([*np.log([most] * 3), most, most])
     scale = float(equation.friction.std())
 
@@ -223,7 +209,15 @@ def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
     derived: Any = derivatives
     complete = [np.clip(np.append(start, np.zeros(len(low) - len(start))), low, high) for start in starts]
     fits: Any = [
-        least_squares(off, start, jac=derived, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for start in complete
+        least_squares(
+            off,
+            start,
+            jac=derived,
+            bounds=(low, high),
+            ftol=settings.tolerance_of_sliding,
+            xtol=settings.tolerance_of_sliding,
+        )
+        for start in complete
     ]
     return min(fits, key=lambda fit: fit.cost).x
 
@@ -233,13 +227,14 @@ def _estimates(
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """The three quantities and their correlation, by the logarithms that were fitted, their covariance, shape (3, 3),
     and `shifts` of them, shape (m, 3), and the share of the friction that is `left`."""
+    settings = ReadingSettings.current()
     coulomb, more, stribeck = np.exp(best[:3])
     values = (coulomb, coulomb + more, stribeck)
     turned = np.array([[coulomb, 0, 0], [coulomb, more, 0], [0, 0, stribeck]])  # derivatives by the logarithms
     covariance, shifts = turned @ covariance @ turned.T, shifts @ turned.T
-    even, estimates = (left + LINEARITY) * np.array(values), []
+    even, estimates = (left + settings.linearity_of_sensors) * np.array(values), []
     for i, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
-        mean = Mean(float(values[i]), float(covariance[i, i] ** 0.5), BLOCKS - 1)
+        mean = Mean(float(values[i]), float(covariance[i, i] ** 0.5), settings.blocks_of_a_mean - 1)
         systematic = float(np.abs(shifts[:, i]).sum() + even[i])
         estimates.append(by_t(name, unit, mean, METHOD, systematic, systematic))
     return tuple(estimates), correlation_of(covariance, shifts, even)
@@ -247,13 +242,14 @@ def _estimates(
 
 def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
     """The estimates as far as the motion determines them, whose model leaves a share of the friction unexplained."""
+    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     coulomb, static, stribeck = estimates
     fastest = float(np.abs(velocity).max())
-    if left > EXPLAINED:
+    if left > reading_settings.share_left_unexplained:
         return _unknown(f"{percent(left)} of the friction is not explained by LuGre's bristles")
     if not coulomb.low > 0:
         return _unknown("the force shows no friction: does the bearing slide?")
-    if fastest < FASTEST * stribeck.value:
+    if fastest < experiment_settings.stribeck_velocities_gone * stribeck.value:
         return _unknown(f"no faster than {fastest:.3g} m/s, the motion does not show where friction ceases to fall")
     if not (static.low > coulomb.value and stribeck.low > 0):
         why = "no rise of friction towards rest shows"

@@ -16,30 +16,11 @@ import numpy as np
 from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.logs.log import Log
-from friso.identification.readings.common import (
-    BLOCKS,
-    LINEARITY,
-    Mean,
-    block_mean,
-    by_t,
-    cart,
-    channel,
-    deflection,
-    low_pass,
-    runs,
-)
+from friso.identification.readings.common import Mean, block_mean, by_t, cart, channel, deflection, low_pass, runs
 from friso.identification.readings.course import Course
+from friso.identification.readings.settings import ReadingSettings
+from friso.identification.settings import ExperimentSettings
 from friso.stage import Stage
-
-CUTOFF = 25.0
-"""Low-pass of the force [Hz] (Sec. 4.2.2)."""
-
-SETTLED, CREEPING = 0.02, 0.1
-"""Share of a step by which, within a settled window, the force may still drift beyond what goes with the deflection,
-and by which the deflection may, where none drifts less: a slow integrator takes long to pull a spring all the way."""
-
-FIXED = 0.02
-"""Share of the steps of the position by which the cart may follow and still count as fixed."""
 
 STARTS = np.linspace(0.1, 0.7, 7)
 """Shares of a plateau after which it may have settled, tried in turn."""
@@ -85,13 +66,15 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
     Windows are the plateaus of the reference, or of the position where there is none. Without two steps between settled
     windows the stiffness is unknown. Raises InputError for a log without position or force in SI units.
     """
+    settings = ExperimentSettings.current()
     position, force = channel(log, "position"), channel(log, "force")
     measured = deflection(log)
     deflected = position if measured is None else measured
     smooth = [
-        np.concatenate([low_pass(x[s], log.sample_time, CUTOFF) for s in log.segments]) for x in (force, deflected)
+        np.concatenate([low_pass(x[s], log.sample_time, settings.low_pass_of_steps) for s in log.segments])
+        for x in (force, deflected)
     ]
-    spans = [s for part in log.segments for s in _plateaus(log, part, CUTOFF)]
+    spans = [s for part in log.segments for s in _plateaus(log, part, settings.low_pass_of_steps)]
     scale, secant = _scale(position, spans), _secant(smooth[1], smooth[0], spans)
     settled = [_settled_window(log, span, smooth[0], smooth[1], scale, secant) for span in spans]
     windows = tuple(w for w in settled if w is not None)
@@ -149,15 +132,20 @@ def _settled_window(
 ) -> Window | None:
     """The part of a plateau that has settled: the deflection hardly drifts, and the force drifts by no more than goes
     with that, but for a share of a step or what noise explains."""
+    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     length = span.stop - span.start
-    margin = min(length // 10, int(1 / (CUTOFF * log.sample_time)))
-    for allowed, share in product((SETTLED, CREEPING), STARTS):
+    margin = min(length // 10, int(1 / (experiment_settings.low_pass_of_steps * log.sample_time)))
+    for allowed, share in product(
+        (experiment_settings.drift_of_a_settled_force, experiment_settings.drift_of_a_settled_place), STARTS
+    ):
         chosen = slice(span.start + int(share * length), span.stop - margin)
-        if chosen.stop - chosen.start < 2 * BLOCKS:
+        if chosen.stop - chosen.start < 2 * reading_settings.blocks_of_a_mean:
             continue
         bent, creep = _drifting(position[chosen])
         beyond, drift = _drifting(force[chosen] - secant * position[chosen])
-        if creep <= allowed * scale and drift <= SETTLED * float(np.subtract(*np.percentile(force, [95, 5]))):
+        if creep <= allowed * scale and drift <= experiment_settings.drift_of_a_settled_force * float(
+            np.subtract(*np.percentile(force, [95, 5]))
+        ):
             time = log.time[[chosen.start, chosen.stop - 1]]
             level = beyond.value + secant * bent.value
             return Window(time[0], time[1], bent.value, level, float(np.hypot(beyond.error, drift / 12**0.5)))
@@ -189,7 +177,7 @@ def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str,
     shared = float(np.sum(np.diff(np.concatenate(([0.0], x, [0.0]))) ** 2)) / float(x @ x) / 2
     within = float(np.sum((x * noise) ** 2) / (x @ x) ** 2)
     variance = max(max(1.0, shared) * spread / float(x @ x), within)
-    linear = LINEARITY * abs(slope)
+    linear = ReadingSettings.current().linearity_of_sensors * abs(slope)
     estimate = by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method, linear, linear)
     if estimate.low > 0:
         return estimate
@@ -220,7 +208,7 @@ def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple
         return None, ()
     marks = [slice(*np.searchsorted(log.time, (w.start, w.end))) for w in windows]
     followed, went = (np.ptp([x[m].mean() for m in marks]) for x in (moved, position))
-    if followed <= FIXED * went:
+    if followed <= ExperimentSettings.current().travel_of_a_fixed_cart * went:
         return True, ()
     finding = f"The cart is not fixed: it moved by {followed:.3g} m while the stage moved by {went:.3g} m"
     return False, (f"{finding}; the deflection of the joint was measured nevertheless.",)

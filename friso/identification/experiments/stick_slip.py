@@ -28,29 +28,16 @@ from friso.identification.readings.common import (
 )
 from friso.identification.readings.loading import METHOD as LOADED
 from friso.identification.readings.loading import stiffness_of_loading
-from friso.identification.readings.rate_effect import BRISTLE_RATE, static_friction
-from friso.identification.readings.slips import SLIDING, VISIBLE, slips
+from friso.identification.readings.rate_effect import static_friction
+from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.slips import slips
+from friso.identification.settings import ExperimentSettings
 from friso.intervals import COVERAGE
 from friso.stage import Stage
-
-CUTOFF = 100.0
-"""Low-pass of deflection and velocity [Hz]."""
-
-HELD = 0.5
-"""Share of the slips before which the force had stopped rising, from which none shows static friction."""
-
-NEAR, LONG = 0.01, 4.0
-"""Near its peak is within this share of it; a force that is there so many times as long as usual had stopped rising."""
-
-AT_STOP = 0.05
-"""Share of the stroke that is left where the limiter counts as touched: it smears in the filter."""
 
 STOPPED = "the force on the cart stops rising before it slips: the limiter was touched, or the sensor is at its end"
 
 KEY = "friction.static"
-
-FAR_BELOW = 0.1
-"""Share of the limiter's stiffness up to which a stiffness is the joint's."""
 
 
 @dataclass(frozen=True)
@@ -87,42 +74,45 @@ def static_from_stick_slip(
     stiffness: Estimate | float | None = None,
     stage_mass: float = 0.0,
     stroke: float = np.inf,
-    bristle_rate: float = BRISTLE_RATE,
 ) -> StickSlip:
     """Static friction from slow motion that sticks and slips.
 
     With the joint's `stiffness` [N/m] (an Estimate brings its interval) the force on the cart is that times the
     deflection measured; without, the actuator force less `stage_mass` [kg] times the acceleration of the position. How
-    far the finite force rate lowers it is extrapolated or bounded, see `rate_effect`, with `bristle_rate` [N/s].
+    far the finite force rate lowers it is extrapolated or bounded, see `rate_effect`.
     Slips from a deflection at the `stroke` [m] of the joint tell nothing of it. What the record cannot show is unknown
     with its reason. Raises InputError for missing channels or an unusable stiffness.
     """
-    deflected, pushed = _deflection(log, CUTOFF), _actuator(log, stage_mass, CUTOFF)
+    settings = ExperimentSettings.current()
+    deflected, pushed = (
+        _deflection(log, settings.low_pass_of_stick_slip),
+        _actuator(log, stage_mass, settings.low_pass_of_stick_slip),
+    )
     pull, relative_error = _pull(log, stiffness, deflected, pushed)
     body = on_bearing(log)
     cart_velocity = np.zeros_like(body)
     rows: list[tuple[float, ...]] = []
     shares, loads = [], []
     for part in log.segments:
-        breaks = slips(body[part], log.sample_time, CUTOFF)
+        breaks = slips(body[part], log.sample_time, settings.low_pass_of_stick_slip)
         cart_velocity[part] = breaks.speed
         shares.append(breaks.share)
         marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.fastest, breaks.directions, strict=True)
         for onset, start, rest, top, direction in marks:
             at, force, before, rising, held = _peak(
-                direction * pull[part], log.sample_time, CUTOFF, (rest, onset, start, top)
+                direction * pull[part], log.sample_time, settings.low_pass_of_stick_slip, (rest, onset, start, top)
             )
             at += part.start
             bent = np.nan if deflected is None else float(direction * deflected[at])
             unseen = _unseen(direction * breaks.speed[onset + 1 : top + 1]) * log.sample_time
-            late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / CUTOFF)
+            late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / settings.low_pass_of_stick_slip)
             place = (float(log.time[at]), float(body[at]), float(direction))
-            held = held or abs(bent) > (1 - AT_STOP) * stroke
+            held = held or abs(bent) > (1 - settings.stroke_share_at_a_stop) * stroke
             loads += [] if held else [slice(part.start + rest, part.start + onset)]
             rows.append((*place, bent, force, rising, float(abs(breaks.speed[top])), held, late))
     table = np.array([row for row in rows if row[5] > 0 or row[7]]).reshape(-1, 9).T
-    joint_stiffness = _stiffness(log, deflected, loads, CUTOFF)
-    return _answer(table, pull, cart_velocity, (relative_error, bristle_rate), joint_stiffness, _why(shares))
+    joint_stiffness = _stiffness(log, deflected, loads, settings.low_pass_of_stick_slip)
+    return _answer(table, pull, cart_velocity, relative_error, joint_stiffness, _why(shares))
 
 
 def _smooth(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
@@ -180,14 +170,19 @@ def _peak(
     """Where the pull peaks between visible motion and top speed, its height, that at the onset of visible motion, the
     rate at which it rose over the last third of the rest, and whether it had stopped rising: it stayed within a
     hundredth of its peak for several times as long as its usual rate takes, and the filter smears."""
+    settings = ExperimentSettings.current()
     rest, onset, start, top = marks
     at = start + int(np.argmax(pull[start : top + 1]))
     begin = max(onset - max((onset - rest) // 3, 5), 0)
     rising = (pull[onset] - pull[begin]) / ((onset - begin) * sample_time)
     tenths = np.unique(np.linspace(rest, onset, 11).astype(int))
     usual = float(np.median(np.diff(pull[tenths]) / (np.diff(tenths) * sample_time)))
-    near = float((pull[rest : at + 1] > (1 - NEAR) * pull[at]).sum()) * sample_time
-    held = near > LONG * (NEAR * abs(pull[at] / usual) + 1 / cutoff) if usual > 0 else True
+    near = float((pull[rest : at + 1] > (1 - settings.share_near_a_peak) * pull[at]).sum()) * sample_time
+    held = (
+        near > settings.duration_near_a_peak * (settings.share_near_a_peak * abs(pull[at] / usual) + 1 / cutoff)
+        if usual > 0
+        else True
+    )
     return at, float(pull[at]), float(pull[onset]), float(rising), bool(held)
 
 
@@ -195,16 +190,17 @@ def _unseen(speed: np.ndarray) -> float:
     """For how many samples motion may have been hidden in noise before its speed, from then to its highest, shape (n,),
     stood out: had it grown by a power of two in the time that its first doubling took. A body that speeds up evenly was
     hidden for less."""
+    settings = ReadingSettings.current()
     first, top = float(speed[0]), float(speed[-1])
-    if not first > VISIBLE * top:
+    if not first > settings.speed_share_of_an_onset * top:
         return 0.0
     doubled = int(np.argmax(speed >= min(2 * first, top)))
-    return doubled * float(np.log2(first / (VISIBLE * top)))
+    return doubled * float(np.log2(first / (settings.speed_share_of_an_onset * top)))
 
 
 def _why(shares: list[float]) -> str:
     """Why there are no slips, for a reason."""
-    if shares and min(shares) > SLIDING:
+    if shares and min(shares) > ReadingSettings.current().time_share_of_sliding:
         return "the cart slides all the time"
     return "the cart shows no slips out of rest"
 
@@ -213,21 +209,21 @@ def _answer(
     table: np.ndarray,
     pull: np.ndarray,
     velocity: np.ndarray,
-    uncertainty: tuple[float, float],
+    relative_error: float,
     stiffness: Estimate,
     why: str,
 ) -> StickSlip:
+    settings = ExperimentSettings.current()
     times, places, directions, bent, forces, rates, speeds, held, late = table
-    relative_error, bristle_rate = uncertainty
 
     def static(chosen: np.ndarray, words: str) -> Estimate:
         if not chosen.any():
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", f"{why}{words}", 0.0)
-        if held[chosen].mean() > HELD:
+        if held[chosen].mean() > settings.share_of_held_slips:
             low = max(0.0, float(forces[chosen].mean() * (1 - relative_error * COVERAGE)))
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", STOPPED, low)
         used = chosen & (rates > 0)  # held ones may have none
-        return static_friction(KEY, forces[used], rates[used], bristle_rate, relative_error, late[used].mean())
+        return static_friction(KEY, forces[used], rates[used], relative_error, late[used].mean())
 
     masks = dict(by_direction(directions))
     means = {name: _mean(f"break-away force, {name}", forces[m], relative_error, why) for name, m in masks.items()}
@@ -335,9 +331,10 @@ def _estimates(result: StickSlip, stage: Stage | None) -> tuple[Estimate, ...]:
 
 def _of_joint(stiffness: Estimate, stage: Stage | None) -> bool:
     """Whether a stiffness is that of the stage's joint, and not of the limiter that holds it."""
+    settings = ExperimentSettings.current()
     if stage is None or stage.joint is None or not stiffness.determined:
         return False
-    return bool(stiffness.value < FAR_BELOW * stage.flat()["joint.limiter_stiffness"])
+    return bool(stiffness.value < settings.stiffness_share_of_a_limiter * stage.flat()["joint.limiter_stiffness"])
 
 
 KIND = ExperimentKind[StickSlip](

@@ -19,24 +19,13 @@ from friso.errors import InputError
 from friso.identification.kind import Prior
 from friso.identification.laws.dragging import DraggedRecord, blocks, dragged_record
 from friso.identification.laws.fit import LawFit, LawProblem
+from friso.identification.laws.settings import LawSettings
 from friso.identification.logs.log import Log
 from friso.identification.readings.at_bearing import believed_between
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.tables import FRICTION, FrictionSection, friction_law
 from friso.stage.transmission import MOTOR_FRICTION, moving_mass
-
-PIECES = 5
-"""Parts at least into which the records are cut, in time: fewer differences decide nothing."""
-
-LEVEL = 0.05
-"""Probability at most with which a law that predicts as well as the best is called worse."""
-
-LEAST_WORSE = 0.01
-"""Difference of errors, as shares of the friction's standard deviation, up to which laws predict alike."""
-
-EXPLAINED = 0.3
-"""Share of the friction's standard deviation up to which a prediction is one."""
 
 
 @dataclass(frozen=True)
@@ -72,16 +61,17 @@ class LawComparison:
     @property
     def explained(self) -> bool:
         """Whether any law predicts the record."""
-        return self.predictions[0].error < EXPLAINED
+        return self.predictions[0].error < LawSettings.current().error_of_a_prediction
 
     @property
     def supported(self) -> tuple[LawPrediction, ...]:
         """The laws that predict the record, and not clearly worse than the best; none where no law predicts it."""
+        settings = LawSettings.current()
         best = self.predictions[0]
         if not self.explained:
             return ()
-        level = LEVEL / max(len(self.predictions) - 1, 1)
-        others = (law for law in self.predictions[1:] if law.error < EXPLAINED)
+        level = settings.chance_of_a_worse_law / max(len(self.predictions) - 1, 1)
+        others = (law for law in self.predictions[1:] if law.error < settings.error_of_a_prediction)
         return (best, *(law for law in others if not _worse(law.errors - best.errors, level)))
 
 
@@ -89,12 +79,16 @@ def _worse(differences: np.ndarray, level: float) -> bool:
     """Whether errors, shape (parts,), are larger than those of another law: by more than parts differ by chance, at a
     level, and by more than `LEAST_WORSE`, on average or, where single parts stand out, in their sign and median. A law
     that could not be run for a part is."""
+    settings = LawSettings.current()
     if not np.isfinite(differences).all():
         return True
     count, level = len(differences), level / 2  # of two tests
     chance = student.ppf(1 - level, count - 1) * differences.std(ddof=1) / np.sqrt(count) if count > 1 else np.inf
     more_often = binomtest(int((differences > 0).sum()), count, alternative="greater").pvalue < level
-    return bool(differences.mean() > max(chance, LEAST_WORSE) or (more_often and np.median(differences) > LEAST_WORSE))
+    return bool(
+        differences.mean() > max(chance, settings.difference_of_worse_laws)
+        or (more_often and np.median(differences) > settings.difference_of_worse_laws)
+    )
 
 
 def comparable() -> list[str]:
@@ -125,7 +119,7 @@ def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Prog
         actual = f'"{model}", from which no fit can begin'
         raise InputError("friction.model", actual, f"one of {', '.join(comparable())}", 'model = "lugre"')
     mass = float(moving_mass(flat))
-    laws, parts = comparable(), blocks(records, PIECES)
+    laws, parts = comparable(), blocks(records, LawSettings.current().parts_left_out)
     predictions = []
     for number, law in enumerate(laws):
         progress(number, len(laws), law)

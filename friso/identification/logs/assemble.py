@@ -16,12 +16,10 @@ from friso.identification.logs.log import ROLES, Log
 from friso.identification.logs.mapping import Mapping, option
 from friso.identification.logs.read import file_format
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
+from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.signals import Notes, Reading, instants, no_time, signal, unused, with_user_units
 from friso.identification.logs.time_base import Track, resample_tracks, track
 from friso.quantities import percent, quoted
-
-LEAST_SAMPLES = 50
-"""Fewer samples than this are refused (our choice: no interval on anything would be worth its name)."""
 
 
 def read_log(
@@ -151,8 +149,9 @@ def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray
 
 def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -> None:
     """Raises LogError for a log that is too short and for a signal that does not change and should."""
-    if base.time.size < LEAST_SAMPLES:
-        raise LogError("log", f"{base.time.size} samples", f"at least {LEAST_SAMPLES} samples", "")
+    settings = LogSettings.current()
+    if base.time.size < settings.samples_of_a_log:
+        raise LogError("log", f"{base.time.size} samples", f"at least {settings.samples_of_a_log} samples", "")
     if not 1e-9 <= base.period <= 3600:
         expected = "1 ns to 1 h between samples: is the time in another unit?"
         raise LogError("time", f"{base.period:g} s between samples", expected, '--unit TIME="ms"')
@@ -166,12 +165,13 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
 
 def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[str]:
     """What the engineer should know of the signals before believing them."""
+    settings = LogSettings.current()
     lines, parts, period = [], base.segments, base.period
     for role, values in signals.items():
         if checks.constant(role, values):
             lines.append(f"{role}: constant throughout")
         share = 0.0 if role in ("reference", "disturbance") else checks.clipped_share(values)
-        if share > checks.CLIPPED:
+        if share > settings.share_of_clipped_samples:
             lines.append(
                 f"{role}: {percent(share, 3)} of the samples lie on flat tops at its extremes: saturated or clipped"
             )

@@ -5,17 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.errors import LogError
-
-CLIPPED, REPEATED = 1e-3, 0.01
-"""Share of the samples in flat tops above which a signal is reported as clipped, and of those that repeat the one
-before up to which it hardly ever repeats a value."""
-
-JUMP, FEW_JUMPS = 10.0, 20
-"""How many times larger than the twentieth largest step one is that is no motion, and that number."""
-
-SLOWEST, ALL = 20, 0.999
-"""Times slower than the log at most that a signal may have been sampled, and share of its bends that count as all: the
-rest is rounding."""
+from friso.identification.logs.settings import LogSettings
 
 
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -86,11 +76,12 @@ def clipped_share(values: np.ndarray) -> float:
     """Share of the samples in flat tops at the extremes, of at least 3 equal samples, that show that the signal is
     clipped: it enters them with a kink, the step before being at least a fifth of the largest step, or it hardly ever
     repeats a value elsewhere."""
+    settings = LogSettings.current()
     steps = np.abs(np.diff(values))
     if values.size < 5 or steps.max() == 0:
         return 0.0
     count, inside = 0, (values[1:] > values.min()) & (values[1:] < values.max())
-    repeats = np.count_nonzero(steps[inside] == 0) > REPEATED * np.count_nonzero(inside)
+    repeats = np.count_nonzero(steps[inside] == 0) > settings.share_of_repeated_values * np.count_nonzero(inside)
     for extreme in (values.max(), values.min()):
         edges = np.flatnonzero(np.diff(np.r_[False, values == extreme, False].astype(np.int8)))
         for start, stop in zip(edges[::2], edges[1::2], strict=True):
@@ -103,13 +94,14 @@ def clipped_share(values: np.ndarray) -> float:
 def jumps(values: np.ndarray) -> tuple[float, int]:
     """The largest step of a signal and the sample behind it, where it is no part of a motion: many times larger than
     all steps but a few; else 0 and 0."""
+    settings = LogSettings.current()
     steps = np.diff(values)
-    if steps.size < FEW_JUMPS:
+    if steps.size < settings.number_of_large_steps:
         return 0.0, 0
     sizes = np.abs(steps)
     largest = int(np.argmax(sizes))
-    usual = np.partition(sizes, -FEW_JUMPS)[-FEW_JUMPS]
-    return (float(steps[largest]), largest + 1) if sizes[largest] > JUMP * usual else (0.0, 0)
+    usual = np.partition(sizes, -settings.number_of_large_steps)[-settings.number_of_large_steps]
+    return (float(steps[largest]), largest + 1) if sizes[largest] > settings.ratio_of_a_jump * usual else (0.0, 0)
 
 
 def samples_held(values: np.ndarray) -> int:
@@ -120,18 +112,22 @@ def samples_held(values: np.ndarray) -> int:
         return 1
     gaps = np.diff(changes)
     n = int(np.gcd.reduce(gaps))
-    return n if 1 < n <= SLOWEST else 1
+    return n if 1 < n <= LogSettings.current().slowest_sampling else 1
 
 
 def interpolated(values: np.ndarray) -> int:
     """Over how many samples a signal runs in straight lines, 1 where it does not: its bends all fall on every n-th
     sample, n up to 20, as those of a slower signal that was resampled."""
+    settings = LogSettings.current()
     bends = np.abs(np.diff(values, 2))
-    if bends.size < 50 * SLOWEST or not bends.any():
+    if bends.size < 50 * settings.slowest_sampling or not bends.any():
         return 1
-    for n in range(SLOWEST, 1, -1):
+    for n in range(settings.slowest_sampling, 1, -1):
         whole = bends[: bends.size // n * n].reshape(-1, n)
-        if whole.sum(axis=0).max() > ALL * whole.sum() and np.count_nonzero(whole.max(axis=1)) >= 50:
+        if (
+            whole.sum(axis=0).max() > settings.share_of_all_bends * whole.sum()
+            and np.count_nonzero(whole.max(axis=1)) >= 50
+        ):
             return n
     return 1
 

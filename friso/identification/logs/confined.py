@@ -16,17 +16,11 @@ from typing import Any
 
 from friso.errors import LogError
 from friso.identification.logs import binary
+from friso.identification.logs.settings import LogSettings
 from friso.platform.system import LIMITS_MEMORY
 
 CPU_SIGNAL = getattr(signal, "SIGXCPU", 0)
 """What ends a process that has taken a processor's time for too long, where the system counts that."""
-
-MEMORY, PER_BYTE = 1 << 30, 12
-"""Memory [B] that reading may take, besides a multiple of the size of the file."""
-
-SECONDS, BYTES_A_SECOND, PATIENCE = 10.0, 5e6, 10.0
-"""Time [s] that a processor may take to read a file, besides that for its size; and how many times as long is waited,
-since a machine that is busy, or a disk that is slow, takes longer."""
 
 
 def content(kind: str, path: Path) -> dict[str, Any]:
@@ -38,9 +32,10 @@ def content(kind: str, path: Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)  # a file is asked for its kind first, and read then
 def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
-    memory = MEMORY + PER_BYTE * size if LIMITS_MEMORY else 0
-    seconds = SECONDS + size / BYTES_A_SECOND
-    patience = PATIENCE * seconds
+    settings = LogSettings.current()
+    memory = settings.memory_of_reading + settings.memory_per_byte * size if LIMITS_MEMORY else 0
+    seconds = settings.time_of_reading + size / settings.speed_of_reading
+    patience = settings.patience_with_a_busy_machine * seconds
     command = [sys.executable, "-P", binary.__file__, kind, str(path), *map(str, (memory, seconds, 2 * patience))]
     try:
         answer = _answer(command, patience, binary.most_bytes(size))

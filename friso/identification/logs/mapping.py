@@ -15,6 +15,7 @@ from friso.axis import KINDS, LINEAR, ROTARY, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.roles import role_of
+from friso.identification.logs.settings import LogSettings
 from friso.platform.system import shell_word
 from friso.quantities import Bound, Quantity, as_toml, quoted
 from friso.stage.files import parsed, text_of
@@ -146,14 +147,14 @@ def option(name: str, left: str, right: str) -> str:
 def sidecar(log: Path, folder: Path | None = None) -> Path:
     """Where the mapping of a log is kept: beside it, or in a folder, where logs of the same name from other folders,
     and those whose long names begin alike, have theirs too."""
+    settings = LogSettings.current()
     if folder is None:
         return log.parent / f"{log.name}{SUFFIX}"
     own = hashlib.sha256(os.fsencode(os.path.abspath(log))).hexdigest()[:8]
-    return folder / f"{log.name.encode(errors='ignore')[:_LONGEST].decode(errors='ignore')}.{own}{SUFFIX}"
-
-
-_LONGEST = 150
-"""Bytes of the name of a log at most in that of its mapping elsewhere."""
+    return (
+        folder
+        / f"{log.name.encode(errors='ignore')[: settings.bytes_of_a_log_name].decode(errors='ignore')}.{own}{SUFFIX}"
+    )
 
 
 def mapping_text(mapping: Mapping) -> str:

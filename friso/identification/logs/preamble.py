@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.units import is_unit, split_heading, unit_factor
 from friso.identification.logs.word_lists import channel_words
 
@@ -15,8 +16,6 @@ _BEFORE, _BEHIND = ' \t\f\v#%*/"', ' \t\f\v;,"'
 """What stands around a key and its value, and is no part of them."""
 _SEPARATOR = re.compile(r"\t\s*[:=;,]|[:=;,\t]")
 _AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?)[\s;,]*(?P<unit>[^\s;,]*)")
-LONGEST = 100
-"""Characters of a value at most that is looked at: an amount with its unit is shorter."""
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:[.,]\d{3})*,\d{3}")
 """Digits in which a comma may group thousands or begin the decimals: 10,000 Hz."""
 _OF_UNITS = re.compile(r"(?:vertical |y )?units?|einheit(?:en)?", re.IGNORECASE)
@@ -36,6 +35,7 @@ class Preamble:
 
 def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Preamble:
     """What the lines above a table with columns of these names tell. Intervals that contradict each other are none."""
+    settings = LogSettings.current()
     lines = [line for line in lines if line.strip()]
     pairs = {line.strip(): pair for line in lines if (pair := _pair(line))}
     pairs |= {f"{name} {value}": (name, value) for name, value in _below_names(lines[-2:], delimiter)}
@@ -45,7 +45,9 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
     for line, (stated, value) in pairs.items():
         name, unit = split_heading(stated)
         key = re.sub(r"[\W\d_]+", "", name.lower())
-        amount = _AMOUNT.fullmatch(value) if key in RATES | STEPS and len(value) < LONGEST else None
+        amount = (
+            _AMOUNT.fullmatch(value) if key in RATES | STEPS and len(value) < settings.characters_of_an_amount else None
+        )
         if amount is None:
             continue
         if _GROUPED.fullmatch(amount["number"]):

@@ -16,15 +16,13 @@ from friso.identification.logs.log import ROLES
 from friso.identification.logs.mapping import Mapping, guess, option
 from friso.identification.logs.preamble import RATES, STEPS
 from friso.identification.logs.roles import AssignedRole, find, is_clock, words
+from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.text import with_times
 from friso.identification.logs.units import FOREIGN, RMS, in_si, is_unit, likely_unit, read_scale, unit_factor
 from friso.quantities import quoted
 
 TURNS = f"--axis {ROTARY.name}"
 """The option that tells a rotary axis."""
-
-LARGEST = 1e30
-"""No instrument measures more in any unit; beyond it, squares of squares overflow."""
 
 
 @dataclass
@@ -109,7 +107,7 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
     with np.errstate(all="ignore"):  # what is no number stays so, and is the business of the time base
         values = values * value
         most = np.abs(values[np.isfinite(values)]).max(initial=0.0)
-    if most > LARGEST:
+    if most > LogSettings.current().largest_value:
         actual = f"values up to {most:.3g} {notes.units.get(role, reading.unit(role))}"
         raise LogError(role, actual, "values that an instrument can measure; is the file damaged?", "", reading.origin)
     return values

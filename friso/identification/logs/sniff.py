@@ -13,16 +13,11 @@ from functools import lru_cache
 from pathlib import Path
 
 from friso.errors import LogError
+from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.units import is_unit, split_heading
 
-HEAD_BYTES = 1 << 18
-"""How much of a file is looked at to find how it is written."""
 REMEMBERED = 4
 """Heads of files of which it is remembered how they are written: each is asked for several times."""
-HEAD_LINES = 1000
-"""How many lines of it are tried with each delimiter."""
-MOST_COLUMNS = 10_000
-"""Columns of a table at most: reading that many takes seconds."""
 _BYTE_ORDER_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _CANDIDATES = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (" ", "."), (" ", ","), (",", ","))
 """Delimiter and decimal sign; of two that fit equally well the first is taken."""
@@ -67,7 +62,7 @@ class TextLayout:
 def decoded_head(path: Path) -> tuple[str, list[str]]:
     """Encoding and the first lines of a text file. Raises LogError for what is no text."""
     with path.open("rb") as file:
-        decoded = _decoded(file.read(HEAD_BYTES))
+        decoded = _decoded(file.read(LogSettings.current().bytes_of_a_head))
     if decoded is None:
         raise LogError(
             "log", f"{path.stat().st_size} bytes that are neither text nor a known format",
@@ -97,7 +92,7 @@ def _decoded(head: bytes) -> tuple[str, tuple[str, ...]] | None:
     if odd > 0.02 * len(text):
         return None
     lines = re.split(r"\r\n|\n|\r", text)
-    is_cut = len(head) == HEAD_BYTES and len(lines) > 1
+    is_cut = len(head) == LogSettings.current().bytes_of_a_head and len(lines) > 1
     return encoding, tuple(lines[:-1] if is_cut or not lines[-1] else lines)
 
 
@@ -144,12 +139,13 @@ def _is_row(cells: list[str], numeric: list[bool], decimal: str, words: bool) ->
 def layout(path: Path) -> TextLayout:
     """How a text with one table of numbers is written: words stand in its rows only where hardly any row goes without.
     Raises LogError where there is none."""
+    settings = LogSettings.current()
     encoding, lines = decoded_head(path)
-    lines = lines[:HEAD_LINES]
+    lines = lines[: settings.lines_of_a_head]
     best = _best_fit(encoding, tuple(lines))
     if best is not None:
-        if best.columns > MOST_COLUMNS:
-            expected = f"at most {MOST_COLUMNS}: one a channel, one row a sample"
+        if best.columns > settings.columns_of_a_table:
+            expected = f"at most {settings.columns_of_a_table}: one a channel, one row a sample"
             raise LogError("log", f"{best.columns} columns", expected, "", str(path))
         _no_open_quote(lines[: best.first], best.delimiter, path)
         return best

@@ -10,6 +10,7 @@ from functools import lru_cache
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
+from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.word_lists import channel_words, read_lists
 from friso.quantities import Quantity, any_sign, quoted
 
@@ -38,12 +39,8 @@ RESPONSES = tuple(
     for force in (torque, "A", "V")
 )
 """Units of frequency responses: positions and their rates over forces, or what stands for these."""
-LONGEST = 100
-"""Characters of a unit at most."""
 _SPELLINGS = {text: unit for unit, texts in _WORDS["spellings"].items() for text in texts} | dict.fromkeys(RMS, "A")
 """Units as friso takes them, by how people write them."""
-_MEGA = 1e5
-"""No log is in megametres, megaseconds or gigaradians: such a text is something else, or written badly."""
 _GLUED = re.compile(
     r"(?P<stem>.*[A-Za-z0-9]?)_(?:(?P<letter>[smNAV])|(?P<unit>"
     r"secs?|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks|hz|khz))"
@@ -73,7 +70,7 @@ def without_accents(name: str) -> str:
 def spelled(text: str) -> str:
     """A unit text as `friso.quantities` takes it: "m/s2" becomes "m/s^2", "µm" "um", "sec" "s"; "" for none. A text too
     long for a unit stays."""
-    if len(text) > LONGEST:
+    if len(text) > LogSettings.current().characters_of_a_unit:
         return text
     text = re.sub(r"(?:(?<!\s)\s+\([A-Z][\w /]*\)|^\(None\))$", "", text.strip())  # TwinCAT: "V (Voltage)", "(None)"
     text = text.replace("µ", "u").replace("μ", "u").replace("Ω", "ohm")
@@ -95,7 +92,7 @@ def unit_factor(unit: str, si_unit: str) -> float | None:
         factor = Quantity(si_unit, any_sign, "").factor(spelled(unit))
     except InputError:
         return None
-    return None if si_unit in ("m", "s", "rad") and factor > _MEGA else factor
+    return None if si_unit in ("m", "s", "rad") and factor > LogSettings.current().largest_length_unit else factor
 
 
 def is_unit(text: str) -> bool:

@@ -17,11 +17,12 @@ from friso.equations.driven import HELD_FORCE, Driven
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import structure
 from friso.errors import InputError
-from friso.identification.inverse_model import SMOOTH, motion
+from friso.identification.inverse_model import motion
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import MASS, FitParameter, stages
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.readings.common import noise_of, robust
+from friso.identification.settings import IdentificationSettings
 from friso.stage.controllers import CONTROLLER
 
 CONTINUOUS = "the controller is simulated in continuous time"
@@ -241,11 +242,14 @@ def tracking(
     that of the motion. A faster one, or the noise itself, would shake the bristles of a stage at rest. A log tells
     neither whether its force is held from sample to sample or follows straight lines, nor how smooth its motion was.
     Raises InputError for a log that never moves for long enough to count."""
+    identification_settings = IdentificationSettings.current()
     settings = OutputErrorSettings.current()
     omega = 2 * np.pi * min(bandwidth, settings.bandwidth_of_holding)
     settling, step = settings.time_constants_of_settling / omega, log.sample_time
     smooth, *sharper = (
-        motion(log["position"][part], log.sample_time, SMOOTH * times * bandwidth).position
+        motion(
+            log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * times * bandwidth
+        ).position
         for times in settings.smoothing_steps
     )
     # held from each sample to the next

@@ -13,7 +13,7 @@ from friso.identification.output_error.identifiable import IdentifiableFit, why_
 from friso.identification.output_error.parameters import MASS, RATIO, SHARE, STRIBECK, keys_of
 from friso.identification.output_error.profile import Profile
 from friso.identification.output_error.settings import OutputErrorSettings
-from friso.identification.readings.common import LINEARITY
+from friso.identification.readings.settings import ReadingSettings
 from friso.intervals import COVERAGE
 
 METHOD = "output error"
@@ -21,6 +21,7 @@ METHOD = "output error"
 
 def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """The keys of the stage file with their intervals, and the correlation of those shown."""
+    reading_settings = ReadingSettings.current()
     settings = OutputErrorSettings.current()
     fit = identified.fit
     parameters = fit.problem.parameters
@@ -32,7 +33,9 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
     covariance = slopes @ spread @ slopes.T
     values = _keys_at(fit, fit.inner)
     shares = [
-        settings.static_error_of_following if key == "friction.static" and not fit.problem.closed else LINEARITY
+        settings.static_error_of_following
+        if key == "friction.static" and not fit.problem.closed
+        else reading_settings.linearity_of_sensors
         for key in keys
     ]
     linear = np.array(shares) * np.abs([values[key] for key in keys]) / COVERAGE

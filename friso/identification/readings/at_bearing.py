@@ -17,27 +17,8 @@ from scipy.signal import bilinear, lfilter, lfilter_zi
 from friso.identification.kind import Prior
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel, deflection, low_pass, motion_bandwidth, robust
+from friso.identification.readings.settings import ReadingSettings
 from friso.stage.transmission import moving_mass
-
-FINER = 8
-"""Points per sample for what a mode of the structure does: a mode of a tenth of the sampling rate is off by 0.05 %."""
-
-LEAST, SAMPLED = 20, 0.2
-"""Periods of the low-pass that a record lasts at least, and the highest frequency of the motion over that of the
-samples."""
-
-EXPLAINED = 0.2
-"""Share of the friction's standard deviation that a model may leave unexplained."""
-
-EDGE = 2.0
-"""Periods of the low-pass at either end of a record that its start and end touch."""
-
-SEEN, ROUNDING = 10.0, 1e-9
-"""Standard deviations of the noise that those of the motion have to reach, and the same over the largest position."""
-
-MOVES, STANDS_OUT, GIVES = 0.02, 3.0, 3.0
-"""A joint bends where its deflection reaches this share of the motion, so many times its sensor's noise, and so many
-times what the contact that holds it gives."""
 
 HELD = "The joint is assumed held, with the limiter's stiffness: no bending shows."
 
@@ -151,7 +132,7 @@ class LowPass:
     @property
     def inside(self) -> slice:
         """The samples which the ends of the record do not touch."""
-        edge = int(EDGE / (self.cutoff * (self.time[1] - self.time[0])))
+        edge = int(ReadingSettings.current().periods_of_an_edge / (self.cutoff * (self.time[1] - self.time[0])))
         return slice(edge, len(self.time) - edge)
 
     def __call__(self, signal: np.ndarray) -> np.ndarray:
@@ -169,27 +150,35 @@ def record_of(log: Log, part: slice, between: Between) -> BearingRecord:
 
 def why_unseen(record: BearingRecord, fewest: int) -> str:
     """Why nothing can be read from a record, of which so many samples are needed; empty where it can."""
+    settings = ReadingSettings.current()
     if len(record.time) < fewest:
         return f"the record has {len(record.time)} samples: {fewest} are needed"
     if not np.ptp(record.force) > 0:
         return "the force does not change"
     highest = motion_bandwidth(record.body, record.interval)
-    if highest * record.interval > SAMPLED:
-        needed = SAMPLED / highest
+    if highest * record.interval > settings.sampled_frequency:
+        needed = settings.sampled_frequency / highest
         sampled = f"one sample in {record.interval:.3g} s"
         return f"{sampled}, and the motion goes up to {highest:.3g} Hz: one in {needed:.3g} s or less is needed"
-    cutoff = max(highest, LEAST / (len(record.time) * record.interval))
+    cutoff = max(highest, settings.periods_of_a_record / (len(record.time) * record.interval))
     motion = float(low_pass(record.position, record.interval, cutoff).std())
     noise = robust(np.diff(record.position, 2)) / 6**0.5
-    if not motion > max(SEEN * noise, ROUNDING * float(np.abs(record.position).max())):
+    if not motion > max(
+        settings.deviations_of_seen_motion * noise,
+        settings.rounding_of_a_position * float(np.abs(record.position).max()),
+    ):
         return f"the motion, {motion:.2g} m RMS, does not stand out from the noise"
     return ""
 
 
 def cutoff_of(record: BearingRecord) -> float:
     """The low-pass [Hz] for a record: where its motion ends, but no slower than its length allows."""
+    settings = ReadingSettings.current()
     highest = motion_bandwidth(record.body, record.interval)
-    return max(min(highest, SAMPLED / (2 * record.interval)), LEAST / (len(record.time) * record.interval))
+    return max(
+        min(highest, settings.sampled_frequency / (2 * record.interval)),
+        settings.periods_of_a_record / (len(record.time) * record.interval),
+    )
 
 
 def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -213,14 +202,24 @@ def rate_of(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
 def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarray | None:
     """The measured deflection [m] of a joint that bends; None where it is not measured, or held and about what its
     contact `gives` [m]."""
+    settings = ReadingSettings.current()
     measured = deflection(log)
-    if measured is None or len(position) < LEAST:
+    if measured is None or len(position) < settings.periods_of_a_record:
         return None
-    bent, cutoff = measured[part], SAMPLED / log.sample_time / 4
+    bent, cutoff = measured[part], settings.sampled_frequency / log.sample_time / 4
     size = low_pass(bent, log.sample_time, cutoff).std()
     noise = low_pass(np.random.default_rng(0).standard_normal(len(bent)), log.sample_time, cutoff).std()
     noise *= robust(np.diff(bent, 2)) / 6**0.5
-    return bent if size > max(STANDS_OUT * noise, MOVES * position.std(), GIVES * gives) else None
+    return (
+        bent
+        if size
+        > max(
+            settings.deviations_of_bending * noise,
+            settings.deflection_share_of_bending * position.std(),
+            settings.contact_ratio_of_bending * gives,
+        )
+        else None
+    )
 
 
 def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:
@@ -235,8 +234,11 @@ def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) 
 
 def _mode_acceleration(time: np.ndarray, acceleration: np.ndarray, mode: StructureMode) -> np.ndarray:
     """Acceleration of the mass of a mode whose base moves with an acceleration [m/s^2], shape (n,)."""
-    omega, step = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / FINER
-    fine = CubicSpline(time, acceleration)(np.linspace(time[0], time[-1], (len(time) - 1) * FINER + 1))
+    settings = ReadingSettings.current()
+    omega, step = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / settings.points_per_sample
+    fine = CubicSpline(time, acceleration)(
+        np.linspace(time[0], time[-1], (len(time) - 1) * settings.points_per_sample + 1)
+    )
     damping = 2 * mode.damping_ratio * omega
     b, a = bilinear([damping, omega**2], [1.0, damping, omega**2], 1 / step)
-    return lfilter(b, a, fine, zi=lfilter_zi(b, a) * fine[0])[0][::FINER]
+    return lfilter(b, a, fine, zi=lfilter_zi(b, a) * fine[0])[0][:: settings.points_per_sample]

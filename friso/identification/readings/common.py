@@ -15,27 +15,14 @@ from scipy.stats import t as student
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import ROLES, Log
+from friso.identification.readings.settings import ReadingSettings
 from friso.intervals import COVERAGE
 
 ORDER = 2
 """Order of the low-pass filter, which goes over the record forth and back: 4 in all."""
 
-BLOCKS = 8
-"""Blocks into which a stretch is cut for its mean: enough for an interval, each long enough to forget the last."""
-
 NORMAL_MAD = 1.4826
 """Standard deviation over median absolute deviation, of a normal distribution."""
-
-LINEARITY = 1e-3
-"""Share by which the ratio of two channels may be off, however often it is read: the linearity of good sensors and
-amplifiers."""
-
-DUST = 1e-12
-"""Steps of a signal below this share of it are rounding of numbers, no digit of a sensor."""
-
-LEVELS, OFF_DIGIT = 8, 0.1
-"""Levels at which a signal stays, from which on these show its digit, and the share of a digit by which they may be off
-it."""
 
 _EXAMPLES = {"force": '--scale force="35.1507 N/V"', "position": '--unit position="mm"'}
 
@@ -117,19 +104,24 @@ def rate(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
     return np.gradient(low_pass(values, sample_time, cutoff), sample_time)
 
 
-CLEAR, STRONG, FLOOR, RESOLVED = 100.0, 1e-3, 0.25, 1000
-"""Power over that of the noise, and over the largest of the acceleration, from which motion is seen; the share of the
-spectrum, at its top, which is taken for noise; and lines of the spectrum."""
-
-
 def motion_bandwidth(position: np.ndarray, sample_time: float) -> float:
     """The highest frequency [Hz] up to which a position, shape (n,), moves, and stands out of its noise, which is taken
     to be white; 0 where it does nowhere."""
-    rates, density = welch(np.diff(position, 2), 1 / sample_time, nperseg=min(len(position) // BLOCKS, 2 * RESOLVED))
+    settings = ReadingSettings.current()
+    rates, density = welch(
+        np.diff(position, 2),
+        1 / sample_time,
+        nperseg=min(len(position) // settings.blocks_of_a_mean, 2 * settings.lines_of_a_spectrum),
+    )
     white = np.sin(np.pi * rates * sample_time) ** 4
-    top = slice(-int(np.ceil(FLOOR * len(rates))), None)
+    top = slice(-int(np.ceil(settings.spectrum_share_of_noise * len(rates))), None)
     noise = white * float(np.median(density[top] / white[top]))
-    return float(rates[density > np.maximum(CLEAR * noise, STRONG * density.max())].max(initial=0.0))
+    return float(
+        rates[
+            density
+            > np.maximum(settings.power_of_clear_motion * noise, settings.power_of_strong_motion * density.max())
+        ].max(initial=0.0)
+    )
 
 
 def robust(values: np.ndarray) -> float:
@@ -159,14 +151,15 @@ def _median(sizes: np.ndarray, digit: float) -> float:
 def digit_of(signal: np.ndarray) -> float:
     """The digit of a signal, shape (n,): that of the levels at which it stays, where these are whole numbers of digits
     apart, which an interpolation between instants leaves as they are; else the smallest step."""
+    settings = ReadingSettings.current()
     steps = np.abs(np.diff(signal))
-    dust = DUST * np.abs(signal).max(initial=0.0)
+    dust = settings.rounding_of_a_signal * np.abs(signal).max(initial=0.0)
     stays = np.sort(signal[1:][steps <= dust])
     apart = np.diff(stays)
     apart = apart[apart > dust]
-    if apart.size >= LEVELS:
+    if apart.size >= settings.levels_of_a_digit:
         digits = apart / apart.min()
-        if np.abs(digits - np.round(digits)).max() <= OFF_DIGIT:
+        if np.abs(digits - np.round(digits)).max() <= settings.error_of_a_digit:
             return float(apart.min())
     real = steps[steps > dust]
     return float(real.min()) if real.size else 0.0
@@ -209,7 +202,7 @@ class Mean:
 
 def block_mean(values: np.ndarray) -> Mean:
     """The mean with the error that its blocks show: neighbouring samples are not independent."""
-    count = min(BLOCKS, len(values))
+    count = min(ReadingSettings.current().blocks_of_a_mean, len(values))
     means = np.array([part.mean() for part in np.array_split(values, count)])
     error = float(means.std(ddof=1) / np.sqrt(count)) if count > 1 else np.inf
     return Mean(float(values.mean()), error, count - 1)
@@ -218,10 +211,15 @@ def block_mean(values: np.ndarray) -> Mean:
 def correlated_mean(values: np.ndarray) -> Mean:
     """The mean of values in a row, of which each may resemble the one before (first-order autoregression): the degrees
     of freedom are those of as many independent ones."""
+    settings = ReadingSettings.current()
     count = len(values)
     off = values - values.mean()
     power = float(off @ off)
-    share = min(max(float(off[1:] @ off[:-1]) / power, 0.0), 0.9) if power > 0 and count >= BLOCKS else 0.0
+    share = (
+        min(max(float(off[1:] @ off[:-1]) / power, 0.0), 0.9)
+        if power > 0 and count >= settings.blocks_of_a_mean
+        else 0.0
+    )
     independent = max(count * (1 - share) / (1 + share), 2.0)
     error = float(values.std(ddof=1) / np.sqrt(independent))
     return Mean(float(values.mean()), error, max(round(independent) - 1, 1))
@@ -249,11 +247,16 @@ def solve_normal_equations(square: np.ndarray, product: np.ndarray) -> np.ndarra
 
 def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Covariance of the coefficients, shape (p, p), of a fit of the target, shape (n,), by columns, shape (n, p)."""
-    parts = zip(np.array_split(columns, BLOCKS), np.array_split(target, BLOCKS), strict=True)
+    settings = ReadingSettings.current()
+    parts = zip(
+        np.array_split(columns, settings.blocks_of_a_mean),
+        np.array_split(target, settings.blocks_of_a_mean),
+        strict=True,
+    )
     square, product = columns.T @ columns, columns.T @ target
     without = np.array([solve_normal_equations(square - x.T @ x, product - x.T @ y) for x, y in parts])
     off = without - without.mean(axis=0)
-    return off.T @ off * (BLOCKS - 1) / BLOCKS
+    return off.T @ off * (settings.blocks_of_a_mean - 1) / settings.blocks_of_a_mean
 
 
 def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray) -> np.ndarray:

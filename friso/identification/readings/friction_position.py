@@ -16,23 +16,9 @@ from scipy.signal import lfilter, periodogram
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import block_mean, by_t, channel, low_pass, on_bearing
-from friso.identification.readings.passes import CUTOFF, Pass, passes
+from friso.identification.readings.passes import Pass, passes
+from friso.identification.readings.settings import ReadingSettings
 from friso.intervals import COVERAGE
-
-POINTS = 400
-"""Places of a map over the whole travel."""
-
-REPEATS = 0.5
-"""Correlation of the maps of two passes from which they repeat each other."""
-
-DRAWS = 300
-"""Random fields by which the interval of the correlation length is found."""
-
-LEAST_LENGTHS = 5.0
-"""Correlation lengths that a pass must hold for its correlation length to be shown."""
-
-HARMONICS = 3
-"""Harmonics reported of each pass."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +60,8 @@ class FrictionPosition:
     @property
     def repeats(self) -> bool:
         """Whether passes over the same places repeat the force: only then it is one of the places."""
-        return self.repeatability.determined and self.repeatability.value >= REPEATS
+        settings = ReadingSettings.current()
+        return self.repeatability.determined and self.repeatability.value >= settings.correlation_of_passes
 
 
 def friction_position(log: Log, mass: float = 0.0, crossover: float | None = None) -> FrictionPosition:
@@ -83,7 +70,8 @@ def friction_position(log: Log, mass: float = 0.0, crossover: float | None = Non
     With the loop's `crossover` [Hz] the verdict also asks whether it is quick enough for the oscillations seen. Raises
     InputError for missing channels.
     """
-    stretches = passes(log, CUTOFF)
+    settings = ReadingSettings.current()
+    stretches = passes(log)
     position, force = on_bearing(log), channel(log, "force")
     if not stretches:
         unknown = _no_repeatability("no stretch of constant velocity")
@@ -92,8 +80,8 @@ def friction_position(log: Log, mass: float = 0.0, crossover: float | None = Non
     travel = [np.ptp(position[p.span]) for p in stretches]
     long = [p for p, length in zip(stretches, travel, strict=True) if length >= 0.2 * max(travel)]
     ends = [position[p.span] for p in long]
-    places = np.linspace(min(x.min() for x in ends), max(x.max() for x in ends), POINTS)
-    maps = tuple(_map(stretch, places, position, force, log.sample_time, (mass, CUTOFF)) for stretch in long)
+    places = np.linspace(min(x.min() for x in ends), max(x.max() for x in ends), settings.points_of_a_friction_map)
+    maps = tuple(_map(stretch, places, position, force, log.sample_time, mass) for stretch in long)
     pairs = _pairs(maps)
     repeatability = _repeatability(maps, pairs)
     separated, verdict = _verdict(maps, repeatability, crossover)
@@ -114,12 +102,11 @@ def _map(
     position: np.ndarray,
     force: np.ndarray,
     sample_time: float,
-    settings: tuple[float, float],
+    mass: float,
 ) -> PassMap:
     """Mean force by place; places are met once, or several times where the motion goes back a little."""
-    mass, cutoff = settings
     x, f = position[stretch.span], force[stretch.span]
-    smooth = low_pass(x, sample_time, cutoff)
+    smooth = low_pass(x, sample_time, ReadingSettings.current().low_pass_of_passes)
     f = f - mass * np.gradient(np.gradient(smooth, sample_time), sample_time)
     step = places[1] - places[0]
     bins = np.clip(np.round((x - places[0]) / step).astype(int), 0, len(places) - 1)
@@ -160,16 +147,17 @@ def _length(fields: np.ndarray) -> np.ndarray:
 def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
     """Where the autocorrelation of the field is 1/e; its interval by the ratio of found to true length of
     random fields with exponential correlation, detrended in the same way."""
+    settings = ReadingSettings.current()
     name, unit, method = "correlation length", "m", "autocorrelation of the force over position falls to 1/e"
     if not np.ptp(flat) > 0:
         return Estimate.unknown(name, unit, method, "the force does not vary along the rail")
     length = float(_length(flat[None])[0])
     count = len(flat)
-    if not length * LEAST_LENGTHS <= count:
-        reason = f"the pass holds fewer than {LEAST_LENGTHS:g} correlation lengths"
-        return Estimate.unknown(name, unit, method, reason, low=count / LEAST_LENGTHS * step)
+    if not length * settings.correlation_lengths_of_a_pass <= count:
+        reason = f"the pass holds fewer than {settings.correlation_lengths_of_a_pass:g} correlation lengths"
+        return Estimate.unknown(name, unit, method, reason, low=count / settings.correlation_lengths_of_a_pass * step)
     share = np.exp(-1 / max(length, 0.5))
-    noise = np.random.default_rng(0).standard_normal((DRAWS, count + int(5 * length) + 1))
+    noise = np.random.default_rng(0).standard_normal((settings.fields_drawn, count + int(5 * length) + 1))
     fields = np.asarray(lfilter([1.0], [1.0, -share], noise, axis=1))[:, -count:]
     trend = np.stack([np.ones(count), np.linspace(-1, 1, count)])
     fields -= fields @ np.linalg.pinv(trend) @ trend
@@ -182,7 +170,7 @@ def _harmonics(flat: np.ndarray, step: float, speed: float) -> tuple[Harmonic, .
     """The strongest lines of the spectrum over the place."""
     rates, power = periodogram(flat, 1 / step, window="hann", scaling="spectrum")
     inner = np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])) + 1
-    best = inner[np.argsort(power[inner])[::-1][:HARMONICS]]
+    best = inner[np.argsort(power[inner])[::-1][: ReadingSettings.current().harmonics_of_a_pass]]
     return tuple(Harmonic(float(1 / rates[i]), float((2 * power[i]) ** 0.5), float(speed * rates[i])) for i in best)
 
 
@@ -247,7 +235,7 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
         reasons.append(f"the motion at {speeds} mm/s is not steady (it sticks and slips, or oscillates)")
     if not repeatability.determined:
         reasons.append(f"repeatability is not shown ({repeatability.reason})")
-    elif repeatability.value < REPEATS:
+    elif repeatability.value < ReadingSettings.current().correlation_of_passes:
         reasons.append(
             f"repeated passes over the same places differ (correlation {repeatability.value:.2f}, 95 % interval "
             f"{repeatability.low:.2f} to {repeatability.high:.2f})"

@@ -10,21 +10,10 @@ import numpy as np
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import Mean, by_direction, by_t, t_value
-from friso.identification.readings.passes import CUTOFF, Pass, on_common_places, passes, places_of
+from friso.identification.readings.passes import Pass, on_common_places, passes, places_of
+from friso.identification.readings.settings import ReadingSettings
 from friso.identification.readings.stribeck import FittedStribeck, Forces, Possible, stribeck_fit
 from friso.intervals import COVERAGE
-
-SPAN = 1.5
-"""Ratio of the greatest to the least speed from which Coulomb and viscous friction can be distinguished."""
-
-SPEEDS, DISTINCT = 5, 1.1
-"""Speeds, each so many times the last, from which a curve of four parameters may be fitted."""
-
-STRAIGHT = 3
-"""Speeds, each so many times the last, from which it shows whether friction is a straight line over them."""
-
-ROUNDING = 1e-9
-"""Of the greatest force: no mean is known better."""
 
 METHOD = "mean forces over stretches of constant velocity"
 
@@ -68,8 +57,8 @@ def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None
     share one, `mass` [kg] times what is left of acceleration taken off. The Stribeck curve has the `exponent` of the
     stage unless the forces refute that, else what the forces leave possible of it is inside all intervals. What the
     speeds present cannot show is unknown, with the reason. Raises InputError for missing channels."""
-    stretches = passes(log, CUTOFF)
-    used = on_common_places(log, [stretch for stretch in stretches if stretch.steady], CUTOFF)
+    stretches = passes(log)
+    used = on_common_places(log, [stretch for stretch in stretches if stretch.steady])
     velocities, forces, errors, swings = np.array([_row(stretch, mass) for stretch in used]).reshape(-1, 4).T
     size = np.abs(forces)
     errors = np.hypot(errors, swings**2 * (size.max(initial=0.0) - size.min(initial=np.inf))) if used else errors
@@ -113,7 +102,7 @@ def _together(
         reason = "fewer than two steady stretches in one of the directions"
         return Estimate.unknown(name, "N", method, reason), _nothing(reason), False
     columns = [sign, np.ones_like(sign)]
-    if np.abs(velocities).max() >= SPAN * np.abs(velocities).min():
+    if np.abs(velocities).max() >= ReadingSettings.current().span_of_speeds * np.abs(velocities).min():
         columns.insert(1, velocities)
     design = np.stack(columns, axis=1)
     even = np.full_like(errors, np.sqrt(np.mean(errors**2)))  # a curve that the line lacks cancels, there and back
@@ -134,7 +123,7 @@ def _together(
 def _deviations(forces: np.ndarray, errors: np.ndarray) -> np.ndarray:
     """Standard deviation [N] of each stretch by its half-width in `errors` [N], but no less than the median: one where
     the velocity swings counts less, one that happens to be even does not count for more than the others."""
-    least = max(float(np.median(errors)), ROUNDING * float(np.abs(forces).max()))
+    least = max(float(np.median(errors)), ReadingSettings.current().rounding_of_a_force * float(np.abs(forces).max()))
     return np.maximum(errors, least) / COVERAGE
 
 
@@ -191,12 +180,13 @@ def _direction(
 ) -> Direction:
     """Fit of one direction or both, friction [N] positive against the motion, with half-widths `errors` [N]; `spent`
     degrees of freedom are gone before, for the constant force; with the `exponent` of the stage, if it tells one."""
+    settings = ReadingSettings.current()
     speeds = np.abs(velocities)
     method = f"{METHOD}, {words}"
     if len(speeds) < 3 + spent:
         return _nothing(f"{len(speeds)} steady stretches {words}: {3 + spent} are needed")
     slowest = f"no steady motion below {speeds.min() * 1e3:.3g} mm/s"
-    if speeds.max() < SPAN * speeds.min():
+    if speeds.max() < settings.span_of_speeds * speeds.min():
         return _one_speed(speeds, friction, method, spent)
     solution, covariance, freedom = _linear(np.stack([np.ones_like(speeds), speeds], axis=1), friction, errors)
     covariance, freedom = covariance * freedom / (freedom - spent), freedom - spent
@@ -209,10 +199,10 @@ def _direction(
         nothing, most = _nothing(reason), max(coulomb.high, 0.0)
         coulomb = Estimate.unknown(coulomb.name, "N", method, reason, 0.0, most)
         return replace(nothing, coulomb=coulomb, viscous=viscous if most else nothing.viscous)
-    if distinct(speeds) < STRAIGHT:
+    if distinct(speeds) < settings.speeds_of_a_line:
         reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction still falls there"
         return _still_falling(coulomb, viscous, reason)
-    if freedom >= STRAIGHT and distinct(speeds) >= SPEEDS:
+    if freedom >= settings.speeds_of_a_line and distinct(speeds) >= settings.speeds_of_a_curve:
         deviations = _deviations(friction, errors)
         plain = float(np.sum(((friction - solution[0] - solution[1] * speeds) / deviations) ** 2))
         forces = Forces(speeds, friction, np.sign(velocities), deviations, _level(deviations, errors), spent > 0)
@@ -247,7 +237,8 @@ def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int
 
 def distinct(speeds: np.ndarray) -> int:
     """How many speeds there are, of shape (n,) [m/s]: those within `DISTINCT` count as one."""
-    return 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(DISTINCT)).sum())
+    settings = ReadingSettings.current()
+    return 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(settings.ratio_of_distinct_speeds)).sum())
 
 
 def _still_falling(coulomb: Estimate, viscous: Estimate, reason: str) -> Direction:

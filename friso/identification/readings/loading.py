@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.readings.common import LINEARITY, Mean, by_t, solve_normal_equations
+from friso.identification.readings.common import Mean, by_t, solve_normal_equations
+from friso.identification.readings.settings import ReadingSettings
 
 KEY, UNIT = "joint.stiffness", "N/m"
 METHOD = "force over deflection while the cart sticks"
-LEAST = 3
 SOFT = "more deflection does not need more force"
 
 
@@ -23,9 +23,10 @@ def stiffness_of_loading(
     joint. The error is that of the jackknife over loads. The cart's creep drops out. Of fewer than three loads it is
     unknown.
     """
+    settings = ReadingSettings.current()
     count = len(loads)
-    if count < LEAST:
-        return Estimate.unknown(KEY, UNIT, METHOD, f"{count} loads between slips: {LEAST} are needed")
+    if count < settings.fewest_loads:
+        return Estimate.unknown(KEY, UNIT, METHOD, f"{count} loads between slips: {settings.fewest_loads} are needed")
     signals = [np.stack([x[s] - x[s].mean() for x in (deflection, rate, acceleration, force)]) for s in loads]
     products = np.array([x @ x.T for x in signals])
     if not products[:, 0, 0].sum() > 0:
@@ -33,7 +34,14 @@ def stiffness_of_loading(
     without = np.array([_spring(products.sum(axis=0) - product) for product in products])
     error = float(np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2)))
     value = _spring(products.sum(axis=0))
-    estimate = by_t(KEY, UNIT, Mean(value, error, count - 1), METHOD, LINEARITY * abs(value), LINEARITY * abs(value))
+    estimate = by_t(
+        KEY,
+        UNIT,
+        Mean(value, error, count - 1),
+        METHOD,
+        settings.linearity_of_sensors * abs(value),
+        settings.linearity_of_sensors * abs(value),
+    )
     return (
         estimate
         if estimate.low > 0

@@ -9,29 +9,8 @@ import numpy as np
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel, low_pass, on_bearing
 from friso.identification.readings.peaks import peak, smoothed
+from friso.identification.readings.settings import ReadingSettings
 from friso.identification.readings.slips import slips
-
-CUTOFF = 100.0
-"""Low-pass of force and velocity [Hz]."""
-
-SMEARED = 2.0
-"""Periods of the low-pass that the second half of a ramp must last for its break-away to be read."""
-
-SAMPLES = 5
-"""Samples of the second half of a ramp from which its rate is read."""
-
-BROAD = 40
-"""To see where its second half begins the push is smoothed over one in so many samples of the rest and the ramp."""
-
-FEW_RAMPS = 3
-"""Ramps that a log shows for static friction of its own."""
-
-LEAST = 20
-"""Samples of a segment that may hold a ramp."""
-
-FROM = 0.5
-"""Share of its force at the break-away from below which a ramp rises: our choice. A body that stops within a ramp and
-goes on has its bristles bent already."""
 
 
 @dataclass(frozen=True)
@@ -59,22 +38,29 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
     (the published definition); without, the force where motion begins to be visible, which contains inertia. Raises
     InputError for a missing channel.
     """
+    settings = ReadingSettings.current()
     force, body = channel(log, "force"), on_bearing(log)
     rows: list[tuple[float, ...]] = []
     threshold, quick, stops = 0.0, 0, 0
     for part in log.segments:
-        if part.stop - part.start < LEAST:
+        if part.stop - part.start < settings.samples_with_a_ramp:
             continue
-        breaks = slips(body[part], log.sample_time, CUTOFF)
+        breaks = slips(body[part], log.sample_time, settings.low_pass_of_ramps)
         threshold = max(threshold, breaks.threshold)
-        pushed = low_pass(force[part], log.sample_time, CUTOFF)
+        pushed = low_pass(force[part], log.sample_time, settings.low_pass_of_ramps)
         marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.fastest, breaks.directions, strict=True)
         for onset, start, rest, fastest, direction in marks:
             push = direction * force[part][rest : start + 1]
-            if _lowest(push) > FROM * float(direction * pushed[start]) > 0:
+            if _lowest(push) > settings.force_share_of_a_start * float(direction * pushed[start]) > 0:
                 stops += 1
                 continue
-            begin, shortest = rest + _half(push), max(SMEARED / (CUTOFF * log.sample_time), SAMPLES)
+            begin, shortest = (
+                rest + _half(push),
+                max(
+                    settings.periods_of_a_ramp / (settings.low_pass_of_ramps * log.sample_time),
+                    settings.samples_of_a_ramp,
+                ),
+            )
             before = pushed[max(rest, start - round(shortest))]
             if start - begin < shortest or direction * (2 * before - pushed[rest] - pushed[start]) < 0:
                 quick += 1
@@ -85,7 +71,9 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
                 # friction opposes the motion: the impulse of the force gives the mass its speed at least
                 heaviest = direction * float(pushed[onset:fastest].sum()) * log.sample_time / abs(breaks.speed[fastest])
                 signals = direction * force[part], direction * body[part]
-                top = peak(*signals, mass or heaviest, log.sample_time, rising, (begin, start), CUTOFF)
+                top = peak(
+                    *signals, mass or heaviest, log.sample_time, rising, (begin, start), settings.low_pass_of_ramps
+                )
                 if mass:
                     at, level, unsure = top.at, top.level, top.unsure
                 else:
@@ -96,7 +84,10 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
     table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 8).T
     notes = []
     if quick:
-        notes.append(f"{quick} ramps rise too fast for a low-pass at {CUTOFF:g} Hz (or the sampling) and are left out.")
+        notes.append(
+            f"{quick} ramps rise too fast for a low-pass at {settings.low_pass_of_ramps:g} Hz (or the sampling) and "
+            "are left out."
+        )
     if stops:
         notes.append(f"{stops} motions continued after a stop within a ramp and are left out: they began from no rest.")
     if len(rows) > table.shape[1]:
@@ -107,10 +98,10 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
 
 def _lowest(push: np.ndarray) -> float:
     """The least value of a push, shape (n,), over the rest before a motion, seen without noise."""
-    return float(smoothed(push, len(push) / BROAD).min())
+    return float(smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp).min())
 
 
 def _half(push: np.ndarray) -> int:
     """The sample, of shape (n,), at which a push has last risen through half of its way, seen without noise."""
-    smooth = smoothed(push, len(push) / BROAD)
+    smooth = smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp)
     return int(np.flatnonzero(smooth <= (smooth[0] + smooth[-1]) / 2)[-1])

@@ -15,22 +15,7 @@ from scipy.stats import f as fisher
 
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.readings.common import t_value
-
-SURE = 0.01
-"""Probability by chance below which a curve is taken for shown, or an exponent for another than stated."""
-
-VELOCITIES, SHAPES = 81, 41
-"""Points of the grid: Stribeck velocities and exponents; first of all there are, then of those that are possible."""
-
-FINER, MARGIN = 2, 2
-"""How often the grid is laid out again around what is possible, and by how many steps further than that: the valley of
-velocities with their exponents may be narrower than a step."""
-
-USUAL = 2.0
-"""Exponent with which a curve has to show alone where forces are few: another one costs a parameter."""
-
-SLOWER, FASTER = 30.0, 2.0
-"""How far below the slowest and above the fastest speed a Stribeck velocity may lie, as ratios."""
+from friso.identification.readings.settings import ReadingSettings
 
 
 @dataclass(frozen=True)
@@ -76,11 +61,16 @@ class Forces:
 def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> FittedStribeck | None:
     """The curve through the forces; None where a straight line, which leaves `plain` (squares over variances), does as
     well. With an `exponent` that is not refuted by the forces it is that one; forces too few to tell leave all."""
+    reading_settings = ReadingSettings.current()
     settings = OutputErrorSettings.current()
     speeds = forces.speeds
-    velocities = np.geomspace(speeds.min() / SLOWER, speeds.max() * FASTER, VELOCITIES)
+    velocities = np.geomspace(
+        speeds.min() / reading_settings.ratio_below_the_slowest,
+        speeds.max() * reading_settings.ratio_above_the_fastest,
+        reading_settings.grid_of_velocities,
+    )
     shapes, left = (
-        np.linspace(settings.stribeck_exponents[0], settings.stribeck_exponents[1], SHAPES),
+        np.linspace(settings.stribeck_exponents[0], settings.stribeck_exponents[1], reading_settings.grid_of_exponents),
         len(speeds) - 5 - forces.both,
     )
     apart = left < 1
@@ -92,11 +82,15 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
     if exponent is not None:
         stated = _Grid(forces, velocities, np.array([exponent]), False).around(left + (not apart))
         worse = (stated.least - grid.least) / max(grid.least / left, 1.0)
-        refuted = not apart and bool(fisher.sf(worse, 1, left) < SURE)
+        refuted = not apart and bool(fisher.sf(worse, 1, left) < reading_settings.chance_of_a_curve)
         if not refuted:
             grid, left = stated, left + (not apart)
     free = len(grid.shapes) > 1 and not apart
-    usual = _Grid(forces, velocities, np.array([USUAL]), False).around(left + free) if free else grid
+    usual = (
+        _Grid(forces, velocities, np.array([reading_settings.usual_exponent]), False).around(left + free)
+        if free
+        else grid
+    )
     if not (_better(plain, grid.least, 2 + free, left) or _better(plain, usual.least, 2, left + free)):
         return None
     return grid.curve(left, refuted, (velocities[0], velocities[-1]))
@@ -104,7 +98,10 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
 
 def _better(plain: float, least: float, more: int, left: int) -> bool:
     """Whether a curve with so many more parameters than a line leaves less than chance would have it."""
-    return least < plain and (least == 0 or bool(fisher.sf((plain - least) / more * left / least, more, left) < SURE))
+    settings = ReadingSettings.current()
+    return least < plain and (
+        least == 0 or bool(fisher.sf((plain - least) / more * left / least, more, left) < settings.chance_of_a_curve)
+    )
 
 
 class _Grid:
@@ -137,14 +134,18 @@ class _Grid:
     def around(self, left: int) -> _Grid:
         """A grid around what is possible with `left` degrees of freedom, a little further than that where this one goes
         on; the same where no curve is."""
+        settings = ReadingSettings.current()
         grid = self
-        for _ in range(FINER if np.isfinite(self.least) and left > 0 else 0):
+        for _ in range(settings.refinements_of_the_grid if np.isfinite(self.least) and left > 0 else 0):
             inside, ends = grid.room(left) >= 0, []
             for points, here in ((grid.velocities, inside.any(axis=1)), (grid.shapes, inside.any(axis=0))):
                 at = np.flatnonzero(here)
-                ends += [points[max(at[0] - MARGIN, 0)], points[min(at[-1] + MARGIN, len(points) - 1)]]
-            shapes = np.linspace(ends[2], ends[3], SHAPES) if len(grid.shapes) > 1 else grid.shapes
-            grid = _Grid(grid.forces, np.geomspace(ends[0], ends[1], VELOCITIES), shapes, grid.apart)
+                ends += [
+                    points[max(at[0] - settings.margin_of_the_grid, 0)],
+                    points[min(at[-1] + settings.margin_of_the_grid, len(points) - 1)],
+                ]
+            shapes = np.linspace(ends[2], ends[3], settings.grid_of_exponents) if len(grid.shapes) > 1 else grid.shapes
+            grid = _Grid(grid.forces, np.geomspace(ends[0], ends[1], settings.grid_of_velocities), shapes, grid.apart)
         return grid
 
     def room(self, left: int) -> np.ndarray:

@@ -23,14 +23,9 @@ from friso.identification.response.period import find_periods
 from friso.identification.response.periodic import multisine
 from friso.identification.response.records import ResponseRecord, from_log, relative_error
 from friso.identification.response.response import Channels, FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 from friso.identification.response.simulated import Explanation, explained
 from friso.identification.response.two_mass import TwoMass, fit_two_mass, widened
-
-ABOVE_FRICTION = 1 / 7
-"""Share of the highest frequency below which friction may bend a response: lines below it are left to a second look."""
-
-RIGID = 0.4
-"""Share of the antiresonance's frequency up to which both masses move as one (to 1/(1 - 0.16) = 1.2)."""
 
 FrequencyRange = tuple[float, float]
 
@@ -67,13 +62,17 @@ def analyse(
     `band` [Hz] is that of the models (default: above where friction bends the response); `period` [s] about that of a
     periodic excitation (default: found). Raises InputError where no response can be estimated.
     """
+    settings = ResponseSettings.current()
     records = {output: [_record(log, output) for log in logs] for output in _outputs(logs)}
     if measured is not None:
         driven, other = as_measured(measured), None
     else:
         driven, other = _clear([_response(of_output, logs[0], output, period) for output, of_output in records.items()])
     warnings = [text for record in records.get("position", []) if record.reference is None for text in feedback(record)]
-    first = band or (float(max(driven.frequency[0], driven.frequency[-1] * ABOVE_FRICTION)), _top(driven))
+    first = band or (
+        float(max(driven.frequency[0], driven.frequency[-1] * settings.frequency_above_friction)),
+        _top(driven),
+    )
     model = _attempt(warnings, "two masses", fit_two_mass, driven, other, first)
     if model and band is None and _below(model, first):
         model = _attempt([], "two masses", fit_two_mass, driven, other, None) or model
@@ -219,7 +218,7 @@ def _friction(
     if not records or departs is None or model is None or not departs.frequency.determined:
         return None, None
     step = records[0].sample_time
-    rigid = RIGID * model["antiresonance frequency"].value
+    rigid = ResponseSettings.current().frequency_of_one_body * model["antiresonance frequency"].value
     limits = (float(driven.frequency[0]) / 2, min(2 * departs.frequency.high, rigid))
     smooth = butter(4, min(2 * float(driven.frequency[-1]), 0.45 / step), fs=1 / step, output="sos")
     speeds = [sosfiltfilt(smooth, np.gradient(record.output, step)) for record in records]

@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 
 DELAY, HELD, COMPLIANCES = range(3)
 """Places of the parameters: the delay [s]; the square of the time for which the force is held [ms^2]; from the
@@ -24,13 +25,6 @@ last on, the compliance for each output."""
 IMAGES = np.array([k for k in range(-8, 9) if k])[:, None]
 """Numbers of the images that count, shape (images, 1): those left out are 0.00002 of the response of a mass at four
 samples per period."""
-
-LATEST = 0.4
-"""Largest delay over the period of the highest frequency. A drive that computes for a sample and holds the force for
-another one acts one and a half samples late: 0.38 of a period at four samples for each."""
-
-USUAL = 0.25
-"""Share of the period of the highest frequency that an unknown sample time usually has at most."""
 
 MILLI = 1e-3
 
@@ -51,14 +45,14 @@ def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, par
 def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.ndarray, np.ndarray]:
     """Lower and upper limits of the parameters, each of shape (COMPLIANCES + outputs,), for a model of a response up to
     `top` [Hz]."""
-    late, longest = LATEST / top, _longest(response, 0.5)
+    late, longest = ResponseSettings.current().periods_of_a_delay / top, _longest(response, 0.5)
     free = np.full(outputs, np.inf)
     return np.array([-late, 0.0, *-free]), np.array([late, (longest / MILLI) ** 2, *free])
 
 
 def believed(response: FrequencyResponse) -> tuple[float, float]:
     """Value and deviation [ms^2] of the square of the time for which the force is held: none to the sample time."""
-    half = (_longest(response, USUAL) / MILLI) ** 2 / 2
+    half = (_longest(response, ResponseSettings.current().periods_of_a_sample) / MILLI) ** 2 / 2
     return half, half
 
 

@@ -10,26 +10,8 @@ from friso.identification.estimate import Estimate
 from friso.identification.response.period import find_periods
 from friso.identification.response.records import ResponseRecord, drift
 from friso.identification.response.response import Channels, FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 from friso.quantities import percent
-
-OWN, OTHER = 60, 8
-"""Past samples of the input, and of the output, from which the input is foretold. Its own past is looked at much
-further back, since an output without feedback remembers the input too."""
-
-LEAST = 600
-"""Samples needed for that."""
-
-SURE = 1e-6
-"""Chance below which the output is said to foretell the input."""
-
-SHARE = 0.05
-"""Share of the input's surprise that the output's past must explain, so that small imperfections do not count."""
-
-GROUPS = 5
-"""Bands, with as many lines each, in which the mean difference of two estimates is tested: a bias is smooth."""
-
-EXACT = 1e-6
-"""Relative difference between periods of an input below which nothing was added to it: it was played from a table."""
 
 
 def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
@@ -41,12 +23,13 @@ def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
     The present sample of the output counts as past, since a position cannot react to a force within the same sample;
     `direct` says that this output can (an acceleration).
     """
-    record = record.checked(LEAST)
+    settings = ResponseSettings.current()
+    record = record.checked(settings.samples_of_a_feedback_test)
     driven, answer = _surprising(record)
     if driven is None or answer is None:
         return ()
     chance, share = _foretold(driven, answer, direct)
-    if chance > SURE or share < SHARE:
+    if chance > settings.chance_of_feedback or share < settings.share_of_surprise:
         return ()
     finding = f"the output predicts {percent(share)} of the innovation of the input (chance {chance:.1g})"
     return (f"{finding}: closed loop, a direct estimate is biased; give the force injected, or a reference that moves",)
@@ -63,23 +46,27 @@ def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray |
         samples = values[periods.start : periods.stop]
         samples = samples - drift(samples, periods.samples)
         parts.append((samples.reshape(periods.count, -1) - samples.reshape(periods.count, -1).mean(axis=0)).ravel())
-    if np.std(parts[0]) <= EXACT * np.std(record.input):
+    if np.std(parts[0]) <= ResponseSettings.current().difference_of_played_periods * np.std(record.input):
         return None, None
     return parts[0], parts[1]
 
 
 def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[float, float]:
     """Chance of the F-test that the output's past does not help, and the share of the surprise that it explains."""
-    target = driven[OWN:]
-    past = [driven[OWN - lag : -lag] for lag in range(1, OWN + 1)]
+    settings = ResponseSettings.current()
+    target = driven[settings.past_of_the_input :]
+    past = [driven[settings.past_of_the_input - lag : -lag] for lag in range(1, settings.past_of_the_input + 1)]
     first = int(direct)
-    other = [answer[OWN - lag : len(answer) - lag] for lag in range(first, OTHER + first)]
+    other = [
+        answer[settings.past_of_the_input - lag : len(answer) - lag]
+        for lag in range(first, settings.past_of_the_output + first)
+    ]
     before, after = (_residual_power(target, columns) for columns in (past, past + other))
-    free = len(target) - OWN - OTHER - 1
+    free = len(target) - settings.past_of_the_input - settings.past_of_the_output - 1
     if not after > 0:
         return 1.0, 0.0
-    statistic = (before - after) / OTHER / (after / free)
-    return float(stats.f.sf(statistic, OTHER, free)), float(1 - after / before)
+    statistic = (before - after) / settings.past_of_the_output / (after / free)
+    return float(stats.f.sf(statistic, settings.past_of_the_output, free)), float(1 - after / before)
 
 
 def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
@@ -92,14 +79,15 @@ def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
 
 def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tuple[str, ...]:
     """A sentence where a direct and an indirect estimate on the same lines differ by more than their deviations."""
+    settings = ResponseSettings.current()
     _same_lines(direct, indirect)
     weight = 1 / (direct.deviation**2 + indirect.deviation**2)
-    off = np.array_split(weight * (direct.response - indirect.response), GROUPS)
+    off = np.array_split(weight * (direct.response - indirect.response), settings.bands_of_a_bias)
     sums = [
         2 * abs(np.sum(part)) ** 2 / np.sum(scale)
-        for part, scale in zip(off, np.array_split(weight, GROUPS), strict=True)
+        for part, scale in zip(off, np.array_split(weight, settings.bands_of_a_bias), strict=True)
     ]
-    chance = float(stats.chi2.sf(np.sum(sums), 2 * GROUPS))
+    chance = float(stats.chi2.sf(np.sum(sums), 2 * settings.bands_of_a_bias))
     if chance > 1e-3:
         return ()
     return (f"direct and indirect estimates differ (chance {chance:.1g}): the direct one is biased by the loop",)

@@ -12,13 +12,8 @@ from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.response.fitting import refined
 from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 from friso.intervals import COVERAGE
-
-WINDOW = 9
-"""Neighbouring lines that are judged together: scatter averages out over them, a departure does not."""
-
-CHANCE = 0.01
-"""Chance below which a window of lines counts as off the model."""
 
 RANDOM = np.sqrt(2 / np.pi)
 """Damping by Coulomb friction F under a velocity of normal distribution with standard deviation v, over F/v (Gelb,
@@ -48,38 +43,43 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
     the model is taken to hold as well as it can. The interval is the last window that is off. Raises InputError for
     fewer than 36 lines.
     """
+    settings = ResponseSettings.current()
     frequency = response.frequency
-    if len(frequency) < 4 * WINDOW:
+    if len(frequency) < 4 * settings.lines_of_a_window:
         raise InputError(
-            "response", f"{len(frequency)} lines", f"at least {4 * WINDOW} lines", "a multisine of 100 lines"
+            "response",
+            f"{len(frequency)} lines",
+            f"at least {4 * settings.lines_of_a_window} lines",
+            "a multisine of 100 lines",
         )
     ratio = response.response / model(frequency)
     weight = 2 * np.abs(response.response) ** 2 / response.scatter() ** 2
-    half, ones = len(frequency) // 2, np.ones(WINDOW)
+    half, ones = len(frequency) // 2, np.ones(settings.lines_of_a_window)
     pulls = np.abs(np.convolve(weight * (ratio - 1), ones, "valid")) ** 2 / np.convolve(weight, ones, "valid") / 2
     scale = max(float(np.mean(pulls[half:])), 1.0)
-    limit = scale * stats.f.ppf(1 - CHANCE, 2, max(np.median(response.degrees), 2.0))
+    limit = scale * stats.f.ppf(1 - settings.chance_of_a_departure, 2, max(np.median(response.degrees), 2.0))
     off = np.flatnonzero(pulls[:half] > limit)
-    name, method = "departure frequency", f"mean over {WINDOW} lines, against the linear model"
+    name, method = "departure frequency", f"mean over {settings.lines_of_a_window} lines, against the linear model"
     if not off.size:
         reason = "the response follows the model down to its lowest line"
         onset = Estimate.unknown(name, "Hz", method, reason, 0.0, float(frequency[0]))
         return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(None)))
-    last = int(off[-1]) + WINDOW - 1
-    low, high = frequency[last - WINDOW + 1], frequency[last]
-    middle = float(frequency[last - WINDOW // 2])
+    last = int(off[-1]) + settings.lines_of_a_window - 1
+    low, high = frequency[last - settings.lines_of_a_window + 1], frequency[last]
+    middle = float(frequency[last - settings.lines_of_a_window // 2])
     onset = Estimate(name, "Hz", middle, float(low), float(high), method)
     return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(0, last + 1)))
 
 
 def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, float]:
     """Whether distortion is more than noise on some lines, and its ratio to it."""
+    settings = ResponseSettings.current()
     noise, distortion = response.noise[part], response.distortion[part]
     if not np.all(np.isfinite(distortion)) or not np.all(noise > 0):
         return None, np.nan
     ratio = np.median((noise**2 + distortion**2) / noise**2)
     degrees = float(np.median(response.degrees))
-    return bool(ratio > stats.f.ppf(1 - CHANCE, degrees, 10 * degrees)), float(np.sqrt(ratio))
+    return bool(ratio > stats.f.ppf(1 - settings.chance_of_a_departure, degrees, 10 * degrees)), float(np.sqrt(ratio))
 
 
 @dataclass(frozen=True)

@@ -11,19 +11,13 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 
 ResponseModel = Callable[[np.ndarray], np.ndarray]
 """From parameters (p,) to complex responses (outputs, lines)."""
 
 
 NOTHING: Mapping[int, tuple[float, float]] = MappingProxyType({})
-
-CLOSE = 1e-6
-"""Relative change of the sum of squares, or of the parameters, that ends a fit: far below what noise does to them."""
-
-
-LOOSE = 1e3
-"""Factor to either side from which an interval to first order says nothing about a positive quantity."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +53,7 @@ class ResponseFit:
         self, name: str, unit: str, method: str, of: Callable[[np.ndarray], float], positive: bool = False
     ) -> Estimate:
         """What follows from the parameters, with its interval to first order; a `positive` one in the logarithm."""
+        settings = ResponseSettings.current()
         value, deviation = self._at(of)
         if not np.isfinite(value) or (positive and not value > 0):
             return Estimate.unknown(name, unit, method, "the fitted model does not have it")
@@ -67,9 +62,9 @@ class ResponseFit:
         plain = Estimate.normal(name, unit, value, deviation, method)
         if not positive:
             return plain
-        factor = np.exp(min(plain.half_width / value, np.log(2 * LOOSE)))
-        if not factor < LOOSE:
-            reason = f"its interval spans more than a factor of {LOOSE:g} to either side"
+        factor = np.exp(min(plain.half_width / value, np.log(2 * settings.factor_of_a_loose_interval)))
+        if not factor < settings.factor_of_a_loose_interval:
+            reason = f"its interval spans more than a factor of {settings.factor_of_a_loose_interval:g} to either side"
             return Estimate.unknown(name, unit, method, reason, 0.0)
         return Estimate(name, unit, value, value / factor, value * factor, method)
 
@@ -104,6 +99,7 @@ def refined(
     allows for that (Newey, West 1987, doi:10.2307/1913610). What is `believed` of parameters, by place a value and its
     deviation, counts as one more observation each; limits only keep the fit from going astray.
     """
+    settings = ResponseSettings.current()
     weight = np.sqrt(2) / deviation
     places = list(believed)
     middle, reach = np.array(list(believed.values())).reshape(-1, 2).T
@@ -117,7 +113,15 @@ def refined(
             return np.concatenate([np.stack([error.real, error.imag], axis=-1).ravel(), off])
 
         limits = (lower, upper)
-        return least_squares(residuals, first, bounds=limits, x_scale="jac", ftol=CLOSE, xtol=CLOSE, max_nfev=200)
+        return least_squares(
+            residuals,
+            first,
+            bounds=limits,
+            x_scale="jac",
+            ftol=settings.tolerance_of_a_fit,
+            xtol=settings.tolerance_of_a_fit,
+            max_nfev=200,
+        )
 
     def reduced(solution: OptimizeResult) -> float:
         return float(np.sum(solution.fun[:count] ** 2)) / free

@@ -14,23 +14,11 @@ from scipy import stats
 
 from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 from friso.intervals import COVERAGE
-
-WIGGLE = 0.02
-"""Relative scatter that a straight line may have beyond its noise: drives, guides and cables are never quite straight.
-Where neighbouring lines scatter by more than their noise, that counts instead."""
-
-APART = 1.5
-"""Two lines are two only if the level between them leaves both by this factor: a mode, not a bend."""
 
 TURNED = np.radians(30)
 """Phase by which a line of the band may be off, beyond its noise (delay, damping, a mode nearby)."""
-
-LINES, OCTAVES = 4, 0.4
-"""The least number of frequency lines and width of a band."""
-
-EDGES = 300
-"""At most so many frequencies are tried as ends of a band."""
 
 KINDS: Mapping[int, str] = {0: "stiffness line", 1: "damping line", 2: "mass line"}
 """Names of the lines by minus their slope."""
@@ -91,7 +79,7 @@ def straight_lines(
 def _clear(response: FrequencyResponse, slope: int, band: tuple[int, int, float]) -> bool:
     """Whether the slope of a band is known well enough to tell it from the slopes one less and one more."""
     frequency, level, _, relative = (quantity[band[0] : band[1] + 1] for quantity in _flat(response, slope, band[2]))
-    weight = 1 / (relative**2 / 2 + WIGGLE**2)
+    weight = 1 / (relative**2 / 2 + ResponseSettings.current().scatter_of_a_straight_line ** 2)
     octave = np.log(frequency) - np.average(np.log(frequency), weights=weight)
     spread = np.sum(weight * octave**2)
     return bool(abs(np.sum(weight * octave * level) / spread) + 2 / np.sqrt(spread) < 0.5)
@@ -106,7 +94,7 @@ def _parted(
     between = level[lower[1] + 1 : upper[0]]
     means = [np.mean(level[band[0] : band[1] + 1]) for band in (lower, upper)]
     off = np.abs(between[:, None] - means).min(axis=1, initial=np.inf)
-    return bool(np.any(off > np.log(APART)))
+    return bool(np.any(off > np.log(ResponseSettings.current().factor_between_lines)))
 
 
 def _widest(
@@ -122,22 +110,27 @@ def _widest(
 
 def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, stop: int) -> tuple[int, int] | None:
     """The widest band from start to stop with acceptable chi-square and phase, by sums over all pairs of ends."""
-    if stop - start < LINES:
+    settings = ResponseSettings.current()
+    if stop - start < settings.lines_of_a_band:
         return None
     frequency, level, phase, relative = (quantity[start:stop] for quantity in _flat(response, slope, sign))
-    weight = 2 / (relative**2 + 2 * WIGGLE**2)
+    weight = 2 / (relative**2 + 2 * settings.scatter_of_a_straight_line**2)
     sums = np.stack([weight, weight * level, weight * level**2, np.abs(phase) > TURNED + 2 * relative])
     sums = np.concatenate([np.zeros((4, 1)), np.cumsum(sums, axis=1)], axis=1)
-    step = max(1, -(-len(frequency) // EDGES))
+    step = max(1, -(-len(frequency) // settings.edges_tried))
     first, last = np.arange(0, len(frequency), step)[:, None], np.arange(0, len(frequency), step)[None, :]
     count = last - first + 1
     total, linear, square, turned = sums[:, np.maximum(last + 1, first)] - sums[:, np.minimum(first, last + 1)]
     with np.errstate(divide="ignore", invalid="ignore"):
         chi = square - linear**2 / total
-        good = (count >= LINES) & (turned == 0) & (chi <= stats.chi2.ppf(0.95, np.maximum(count - 1, 1)))
+        good = (
+            (count >= settings.lines_of_a_band)
+            & (turned == 0)
+            & (chi <= stats.chi2.ppf(0.95, np.maximum(count - 1, 1)))
+        )
     width = np.where(good, np.log2(frequency[last] / frequency[first]), -1.0)
     i, j = np.unravel_index(np.argmax(width), width.shape)
-    if width[i, j] < OCTAVES:
+    if width[i, j] < settings.octaves_of_a_band:
         return None
     return start + int(first[i, 0]), start + int(last[0, j])
 
@@ -177,7 +170,7 @@ def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) ->
     the scatter on 23 machines drawn at random (`benchmarks/identify.py`).
     """
     _, level, phase, relative = (quantity[band] for quantity in _flat(response, slope, sign))
-    weight = 1 / (relative**2 / 2 + WIGGLE**2)
+    weight = 1 / (relative**2 / 2 + ResponseSettings.current().scatter_of_a_straight_line ** 2)
     columns, coefficients = _bent(_bends(response, slope, band), level, weight)
     inverse = np.linalg.inv(columns.T @ (weight[:, None] * columns))
     residual = level - columns @ coefficients
@@ -214,7 +207,7 @@ def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndar
     """Shapes (lines,) in which the line may bend: towards the nearer mode, above it or below; both if there is none."""
     frequency, level = _flat(response, slope, 1.0)[:2]
     inside, mean = frequency[band], np.mean(level[band])
-    gone = frequency[np.abs(level - mean) > np.log(APART)]
+    gone = frequency[np.abs(level - mean) > np.log(ResponseSettings.current().factor_between_lines)]
     above, below = gone[gone > inside[-1]], gone[gone < inside[0]]
     up = above[0] / inside[-1] if above.size else np.inf
     down = inside[0] / below[-1] if below.size else np.inf

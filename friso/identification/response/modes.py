@@ -20,22 +20,9 @@ from friso.identification.response.rational import (
     simplest_model,
 )
 from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 
 METHOD = "rational fit of the response"
-
-MOST = 4
-"""Modes at most."""
-
-LEAST = 0.01
-"""Relative error of the response below which no model is trusted; keeps a few strong lines from ruling the fit."""
-
-
-EXPLAINED = 3.0
-"""Sum of squares over degrees of freedom up to which a fit counts as right."""
-
-CANCELS = 1.0
-"""Distance of a resonance from an antiresonance, over the smaller of their half-widths, up to which they nearly cancel:
-the response then changes by a factor of two at most, over so narrow a band that any unevenness may look like it."""
 
 
 @dataclass(frozen=True)
@@ -64,29 +51,28 @@ class Modes:
         return rational(self.fit.parameters, self.shape, 1j * frequency / self.scale)
 
 
-def fit_modes(
-    response: FrequencyResponse, band: tuple[float, float] | None = None, rigid: bool | None = None, most: int = MOST
-) -> Modes:
+def fit_modes(response: FrequencyResponse, band: tuple[float, float] | None = None, rigid: bool | None = None) -> Modes:
     """Modes of a force-to-position response in a `band` [Hz] (default: all lines).
 
     `rigid` says whether the mass moves freely (default: what fits better). Raises InputError for fewer than 12 lines.
     """
+    settings = ResponseSettings.current()
     part = response if band is None else response.between(*band)
     part = part.at(part.frequency > 0)
     if len(part.frequency) < 12:
         raise InputError("band", f"{len(part.frequency)} lines", "at least 12 lines for a fit of modes", "3 to 20 Hz")
     scale = float(np.sqrt(part.frequency[0] * part.frequency[-1]))
     s = 1j * part.frequency / scale
-    deviation = np.hypot(part.scatter(), LEAST * np.abs(part.response))
+    deviation = np.hypot(part.scatter(), settings.error_of_a_response * np.abs(part.response))
     kinds = (True, False) if rigid is None else (rigid,)
-    rows = [row for kind in kinds for row in orders(s, part.response, deviation, kind, most)]
+    rows = [row for kind in kinds for row in orders(s, part.response, deviation, kind, settings.modes_at_most)]
     shape, start, *_ = simplest_model(rows)
     low, high = bounds(shape, s)
     fit = refined(lambda p: rational(p, shape, s)[None], start, part.response[None], deviation[None], low, high)
     limits = (float(part.frequency[0]), float(part.frequency[-1]))
     low_level, high_level = (_level(fit, shape, scale, which, response) for which in ("low", "high"))
     warnings = [*_cancelling(fit, shape, scale, limits)]
-    if fit.reduced > EXPLAINED:
+    if fit.reduced > settings.misfit_of_a_right_model:
         warnings.append(f"the fit misses by more than the deviations (reduced chi-square {fit.reduced:.3g})")
     estimates = _pairs(fit, shape, scale, limits)
     return Modes(
@@ -110,12 +96,13 @@ def _described(shape: RationalShape, rows: list[Row]) -> str:
 
 def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> Iterator[str]:
     """A sentence for each resonance within the band that an antiresonance nearly cancels."""
+    settings = ResponseSettings.current()
     poles, zeros = poles_and_zeros(fit.parameters, shape)
     for pole in sorted(poles, key=abs):
         if not zeros.size or not band[0] <= abs(pole) * scale <= band[1]:
             continue
         zero = zeros[np.argmin(np.abs(zeros - pole))]
-        if abs(zero - pole) <= CANCELS * min(-pole.real, abs(zero.real)):
+        if abs(zero - pole) <= settings.widths_of_cancelling * min(-pole.real, abs(zero.real)):
             yield (
                 f"a resonance at {abs(pole) * scale:.4g} Hz and an antiresonance at {abs(zero) * scale:.4g} Hz nearly "
                 "cancel: an unevenness of the response looks like this, too, and may be no mode"

@@ -8,17 +8,7 @@ import numpy as np
 from scipy import fft
 
 from friso.errors import InputError
-
-QUIET = 0.01
-"""Share of the input's peak-to-peak value below which a trailing stretch counts as switched off."""
-
-LIKE = 0.2
-"""Mean squared change from one period to the next, in units of twice the variance, of an input that repeats."""
-
-
-SLIP, GROWS = 0.02, 2.0
-"""Such a change from one period to the next that at least so many times as much has changed after two is a slip of the
-generator's clock against the recorder's, by a share of a sample each period: two in a row change four times as much."""
+from friso.identification.response.settings import ResponseSettings
 
 
 @dataclass(frozen=True)
@@ -73,7 +63,8 @@ def repetition(signal: np.ndarray) -> np.ndarray:
 
 def _switched_off(signal: np.ndarray) -> int:
     """One past the last sample before the input rests for good, if it does so for more than 10 samples."""
-    moving = np.flatnonzero(np.abs(signal - signal[-1]) > QUIET * np.ptp(signal))
+    settings = ResponseSettings.current()
+    moving = np.flatnonzero(np.abs(signal - signal[-1]) > settings.amplitude_switched_off * np.ptp(signal))
     stop = int(moving[-1]) + 1 if moving.size else 0
     return stop if len(signal) - stop > max(10, len(signal) // 200) else len(signal)
 
@@ -83,7 +74,7 @@ def _shortest(change: np.ndarray) -> int:
     away = np.flatnonzero(change > 0.5)
     first = int(away[0]) if away.size else len(change)
     lags = np.arange(max(first, 2), len(change))
-    if not lags.size or change[lags].min() > LIKE:
+    if not lags.size or change[lags].min() > ResponseSettings.current().change_between_periods:
         raise _not_periodic("an input that does not repeat within half the record")
     good = lags[change[lags] <= 1.5 * change[lags].min() + 1e-9]
     return min([_lowest(change, int(good[0])), *_slipping(change, lags)[:1]])
@@ -91,10 +82,15 @@ def _shortest(change: np.ndarray) -> int:
 
 def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
     """The lags, of those given, at which a signal repeats but for a slip of its clock."""
+    settings = ResponseSettings.current()
     inner = lags[2 * lags < len(change)]
     inner = inner[inner + 1 < len(change)]
-    lowest = (change[inner] <= change[inner - 1]) & (change[inner] <= change[inner + 1]) & (change[inner] < SLIP)
-    return [int(lag) for lag in inner[lowest] if change[2 * lag] > GROWS * change[lag]]
+    lowest = (
+        (change[inner] <= change[inner - 1])
+        & (change[inner] <= change[inner + 1])
+        & (change[inner] < settings.change_of_a_slip)
+    )
+    return [int(lag) for lag in inner[lowest] if change[2 * lag] > settings.growth_of_a_slip * change[lag]]
 
 
 def _lowest(change: np.ndarray, lag: int) -> int:
@@ -110,7 +106,7 @@ def _near(change: np.ndarray, expected: float) -> int:
         raise _not_periodic(f"a period of {expected:g} samples in a record of {2 * len(change) - 2}")
     lags = np.arange(max(low, 2), min(high, len(change)))
     best = int(lags[np.argmin(change[lags])])
-    if change[best] > LIKE:
+    if change[best] > ResponseSettings.current().change_between_periods:
         raise _not_periodic(f"an input that does not repeat near {expected:g} samples")
     return best
 

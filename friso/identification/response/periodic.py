@@ -15,15 +15,7 @@ import numpy as np
 from friso.errors import InputError
 from friso.identification.response.records import ResponseRecord, Spectra, spectra
 from friso.identification.response.response import Channels, FrequencyResponse
-
-LINES = 5
-"""Neighbouring lines that share their relative variance where few realisations would leave it all too uncertain."""
-
-CLOCKS, EQUAL = 1e-3, 1e-6
-"""Share by which the periods of realisations may differ, as those of clocks do, and up to which they are equal."""
-
-FEW = 10
-"""Real degrees of freedom per line from which a variance stands on its own."""
+from friso.identification.response.settings import ResponseSettings
 
 
 def multisine(
@@ -74,16 +66,17 @@ def multisine(
 
 def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
     """The realisations, if they have the same lines, and what to say of their clocks. Raises InputError."""
+    settings = ResponseSettings.current()
     if not records:
         raise InputError("records", "none", "at least one record", "two realisations of a multisine")
     spacings = np.array([realisation.frequency[0] for realisation in records])
     apart = float(np.ptp(spacings) / spacings.min())
     counts = np.array([len(realisation.frequency) for realisation in records])
-    if apart > CLOCKS or np.ptp(counts) > 1 + CLOCKS * counts.min():
+    if apart > settings.period_tolerance or np.ptp(counts) > 1 + settings.period_tolerance * counts.min():
         text = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
         raise InputError("records", text, "realisations with the same period and sample time", "5 s each")
     records = [_first_lines(realisation, int(counts.min())) for realisation in records]
-    if apart <= EQUAL:
+    if apart <= settings.tolerance_of_equal_periods:
         return records, []
     mean = float(spacings.mean())
     lines = np.arange(1, counts.min() + 1) * mean
@@ -120,12 +113,13 @@ def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
 
 def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The deviation of the mean, from how realisations differ, and its degrees of freedom, each (lines,)."""
+    settings = ResponseSettings.current()
     outputs, inputs = _relative(records, excited)
     count = len(records)
     squares = np.sum(np.abs(outputs - response * inputs) ** 2, axis=0)
     relative = squares / (count * (count - 1)) / np.abs(outputs.mean(axis=0)) ** 2
     freedom = 2 * (count - 1)
-    width = 1 if freedom >= FEW else min(LINES, len(relative))
+    width = 1 if freedom >= settings.freedom_of_a_variance else min(settings.lines_sharing_variance, len(relative))
     window = np.ones(width)
     shared = np.convolve(np.ones(len(relative)), window, "same")
     relative = np.convolve(relative, window, "same") / shared
@@ -137,6 +131,7 @@ def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarr
 
     What the input itself holds there is taken off with the interpolated response. NaN where there are no such lines.
     """
+    settings = ResponseSettings.current()
     places = np.flatnonzero(excited)
     free = np.setdiff1d(np.arange(places[0], places[-1] + 1), places)
     if len(free) < 2:
@@ -144,6 +139,6 @@ def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarr
     parts = [np.interp(free, places, part) for part in (np.real(response), np.imag(response))]
     left = realisation.output[:, free] - (parts[0] + 1j * parts[1]) * realisation.input[:, free]
     power = np.abs(left.mean(axis=0)) ** 2 - np.var(left, axis=0, ddof=1) / len(left)
-    near = np.argsort(np.abs(free[:, None] - places), axis=0, kind="stable")[:LINES]
+    near = np.argsort(np.abs(free[:, None] - places), axis=0, kind="stable")[: settings.lines_sharing_variance]
     local = np.maximum(power[near].mean(axis=0), 0.0)
     return np.sqrt(local) / np.abs(realisation.input.mean(axis=0)[places])

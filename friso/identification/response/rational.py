@@ -13,17 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from friso.identification.response.fitting import CLOSE, ResponseFit
-
-CLEAR = 10.0
-"""By how much the information criterion must fall for another mode (Kass, Raftery 1995: very strong evidence)."""
-
-WORTH = 0.8
-"""The share of the sum of squares that another mode may leave at most. The model's error is not independent from line
-to line, so that the criterion alone would go on fitting the wiggles of friction."""
-
-PLACES, DAMPINGS = 60, (0.003, 0.01, 0.03, 0.1, 0.3)
-"""Frequencies and damping ratios at which a further mode is tried."""
+from friso.identification.response.fitting import ResponseFit
+from friso.identification.response.settings import ResponseSettings
 
 
 @dataclass(frozen=True)
@@ -85,7 +76,11 @@ def simplest_model(rows: list[Row]) -> Row:
 
 
 def _better(larger: Row, smaller: Row) -> bool:
-    return larger.bic < smaller.bic - CLEAR and larger.squares < WORTH * smaller.squares
+    settings = ResponseSettings.current()
+    return (
+        larger.bic < smaller.bic - settings.criterion_of_a_mode
+        and larger.squares < settings.squares_left_by_a_mode * smaller.squares
+    )
 
 
 def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
@@ -128,10 +123,11 @@ def _another(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
     """Nonlinear parameters with one more mode, at the place and damping that leave the least."""
+    settings = ResponseSettings.current()
     before = shape.modes - 1
     best, best_parameters = np.inf, nonlinear
-    for place in np.geomspace(np.abs(s[0]), np.abs(s[-1]), PLACES):
-        for damping in DAMPINGS:
+    for place in np.geomspace(np.abs(s[0]), np.abs(s[-1]), settings.frequencies_tried):
+        for damping in settings.dampings_tried:
             start = np.insert(np.append(nonlinear, np.log(damping)), 2 + before, np.log(place))
             left = _linear_parameters(_columns(start, shape, s), values, deviation)[1]
             if left @ left < best:
@@ -143,12 +139,15 @@ def _eliminated(
     start: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
     """Nonlinear parameters refined with the linear ones eliminated (Golub, Pereyra 1973)."""
+    settings = ResponseSettings.current()
 
     def left(nonlinear: np.ndarray) -> np.ndarray:
         return _linear_parameters(_columns(nonlinear, shape, s), values, deviation)[1]
 
     lower, upper = (limit[: shape.nonlinear] for limit in bounds(shape, s))
-    return least_squares(left, np.clip(start, lower, upper), bounds=(lower, upper), ftol=CLOSE, max_nfev=60).x
+    return least_squares(
+        left, np.clip(start, lower, upper), bounds=(lower, upper), ftol=settings.tolerance_of_a_fit, max_nfev=60
+    ).x
 
 
 def _completed(

@@ -12,21 +12,7 @@ from friso.errors import InputError
 from friso.identification.logs.log import Log
 from friso.identification.response.period import Periods, find_periods
 from friso.identification.response.response import Channels
-
-WEAK = 0.01
-"""Amplitude, over that of the strongest line, below which a line does not count as excited (-40 dB)."""
-
-CLEAR = 3.0
-"""How many standard deviations of its mean an excited line stands out of the noise."""
-
-GAP, SHARE = 2.5, 0.95
-"""A step down between line amplitudes that parts those meant from the rest, if the former hold that power."""
-
-SLIPPED = 0.05
-"""Samples by which a generator's clock slips over the record from which on it is taken anew."""
-
-FAR = 1.5
-"""A leading period is a transient if it lies this much further off than any period of the second half."""
+from friso.identification.response.settings import ResponseSettings
 
 
 @dataclass(frozen=True)
@@ -116,7 +102,7 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
     driving = _harmonics(record.driving, periods)
     warnings = periods.warnings
     slip = _slip(driving, periods.samples)
-    if abs(slip) * periods.count > SLIPPED:
+    if abs(slip) * periods.count > ResponseSettings.current().samples_of_a_slip:
         text = (
             f"a period has {periods.samples + slip:.7g} samples, because the clocks differ: resampled to whole periods"
         )
@@ -199,14 +185,19 @@ def _same_excitation(driving: np.ndarray) -> np.ndarray:
 
 def _excited(driving: np.ndarray) -> np.ndarray:
     """Which lines the external signal holds on purpose, shape (lines,)."""
+    settings = ResponseSettings.current()
     mean = np.abs(driving.mean(axis=0))
     noise = np.std(driving, axis=0, ddof=1) / np.sqrt(len(driving)) if len(driving) > 1 else 0 * mean
-    excited = (mean > WEAK * mean.max()) & (mean > CLEAR * noise)
+    excited = (mean > settings.amplitude_of_an_excited_line * mean.max()) & (
+        mean > settings.deviations_of_an_excited_line * noise
+    )
     sizes = np.sort(mean[excited])[::-1]
     if sizes.size > 2:
         steps = sizes[:-1] / sizes[1:]
         cut = int(np.argmax(steps))
-        if steps[cut] > GAP and np.sum(sizes[: cut + 1] ** 2) > SHARE * np.sum(sizes**2):
+        if steps[cut] > settings.step_between_lines and np.sum(
+            sizes[: cut + 1] ** 2
+        ) > settings.power_of_meant_lines * np.sum(sizes**2):
             excited &= mean >= sizes[cut]
     return excited
 
@@ -223,7 +214,7 @@ def _transient_periods(reaction: np.ndarray) -> int:
         return 0
     later = np.arange(count - last, count)
     off = np.array([_distance(reaction[number], reaction[later[later != number]]) for number in range(count)])
-    return int(np.flatnonzero(off <= FAR * off[later].max())[0])
+    return int(np.flatnonzero(off <= ResponseSettings.current().distance_of_a_transient * off[later].max())[0])
 
 
 def _distance(single: np.ndarray, others: np.ndarray) -> float:

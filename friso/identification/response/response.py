@@ -9,16 +9,10 @@ import numpy as np
 from scipy import stats
 
 from friso.errors import InputError
+from friso.identification.response.settings import ResponseSettings
 
 if TYPE_CHECKING:
     from control import FrequencyResponseData
-
-
-COHERENT = 0.5
-"""Coherence from which on, where it is known, a line is used."""
-
-NEIGHBOURS = 15
-"""Lines from which the scatter between neighbours is taken."""
 
 
 @dataclass(frozen=True)
@@ -117,15 +111,18 @@ class FrequencyResponse:
 
         The warnings list the lines left out. Raises InputError where none is left: excitation too weak.
         """
+        settings = ResponseSettings.current()
         enough = np.abs(self.response) >= ratio * self.deviation
         if self.coherence is not None:
-            enough &= self.coherence >= COHERENT
+            enough &= self.coherence >= settings.coherence_of_a_line
         if not enough.any():
             best = np.max(np.abs(self.response) / np.maximum(self.deviation, np.finfo(float).tiny), initial=0.0)
             text = f"no line stands out of the noise (at best {best:.2g} standard deviations)"
             if self.coherence is not None and self.coherence.size:
                 text += f", coherence at most {np.max(self.coherence):.2g}"
-            expected = f"a response of {ratio:g} deviations and a coherence of {COHERENT:g} on some line"
+            expected = (
+                f"a response of {ratio:g} deviations and a coherence of {settings.coherence_of_a_line:g} on some line"
+            )
             raise InputError("excitation", text, expected, "a larger force, or a longer record")
         if enough.all():
             return self
@@ -143,7 +140,7 @@ class FrequencyResponse:
         if len(size) < 3 or not np.all(size > 0):
             return self.deviation
         second = np.abs(np.diff(np.log(size), 2)) / np.sqrt(6)
-        width = min(NEIGHBOURS, len(second))
+        width = min(ResponseSettings.current().lines_of_a_scatter, len(second))
         medians = np.median(np.lib.stride_tricks.sliding_window_view(second, width), axis=1)
         places = np.arange(len(size)) - 1 - (width - 1) / 2
         rough = 1.4826 * np.interp(places, np.arange(len(medians)), medians)  # normal distribution: median to deviation

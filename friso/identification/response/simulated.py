@@ -12,9 +12,7 @@ from friso.identification.response.departure import Drag
 from friso.identification.response.periodic import multisine
 from friso.identification.response.records import ResponseRecord
 from friso.identification.response.response import FrequencyResponse
-
-PERIODS = 10
-"""Simulated, of which the first four are left out: the start from rest is forgotten by friction within one or two."""
+from friso.identification.response.settings import ResponseSettings
 
 
 @dataclass(frozen=True)
@@ -42,16 +40,19 @@ def explained(
     Compared with the `measured` response between `limits` [Hz]; the factors, of which 1 must be one, show how the
     response depends on the amplitude. Raises InputError where `drag` has no friction level or 1 is missing.
     """
+    settings = ResponseSettings.current()
     if not drag.coulomb.value > 0:
         raise InputError("friction.coulomb", "no level found in the departure", "a level above 0", "0.087 V")
     if 1.0 not in factors:
         raise InputError("factors", f"{list(factors)}", "factors with 1 among them, the recorded input", "(0.5, 1, 2)")
     forces = np.concatenate([factor * drag.sign * np.stack(inputs) for factor in factors])
     spring = max(drag.stiffness.value, 0.0)
-    positions = slid(np.tile(forces, PERIODS), sample_time, drag.mass.value, drag.coulomb.value, spring)[0]
+    positions = slid(
+        np.tile(forces, settings.periods_simulated), sample_time, drag.mass.value, drag.coulomb.value, spring
+    )[0]
     settled = slice(4 * forces.shape[1], None)
     records = [
-        ResponseRecord(drag.sign * np.tile(force, PERIODS)[settled], position[settled], sample_time)
+        ResponseRecord(drag.sign * np.tile(force, settings.periods_simulated)[settled], position[settled], sample_time)
         for force, position in zip(forces, positions, strict=True)
     ]
     groups = {factor: records[i * len(inputs) : (i + 1) * len(inputs)] for i, factor in enumerate(factors)}

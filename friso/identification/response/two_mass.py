@@ -14,18 +14,10 @@ from friso.identification.response.beyond import COMPLIANCES, DELAY, HELD, belie
 from friso.identification.response.fitting import ResponseFit, deviations, refined
 from friso.identification.response.modes import fit_modes
 from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 from friso.intervals import COVERAGE
 
 METHOD = "two-mass model fitted to the response"
-
-RATIOS = (1.05, 1.2, 1.5, 2.0, 3.0)
-"""Resonance over antiresonance from which the fit starts."""
-
-MISSES = 0.4
-"""Root mean square of the logarithm of response over model beyond which a model is none of the response."""
-
-EXPLAINED = 3.0
-"""Sum of squares over degrees of freedom up to which a model counts as right."""
 
 FAR = np.log(30.0)
 """Logarithm of the factor by which masses and stiffness may move from the start; twice that for damping."""
@@ -146,7 +138,7 @@ def _sign(response: np.ndarray) -> float:
 def _follows(values: np.ndarray, model: np.ndarray) -> None:
     """Raises InputError where a model is nowhere near the response, shape (outputs, lines)."""
     off = float(np.sqrt(np.mean(np.abs(np.log(np.abs(values) / np.abs(model))) ** 2)))
-    if off > MISSES:
+    if off > ResponseSettings.current().misfit_of_no_model:
         text = f"a response that two masses and a joint miss by a factor of {np.exp(off):.2g} on average"
         expected = "the response of a driven mass, and of the other one: are the two positions exchanged?"
         raise InputError("response", text, expected, '--band "3 Hz .. 20 Hz"')
@@ -182,6 +174,7 @@ def _best(
 ) -> ResponseFit:
     """The best of the fits from the most promising mass ratio, from the modes `seen` and from the next ratio; the first
     one that explains the data."""
+    settings = ResponseSettings.current()
     reach = np.array([FAR] * 3 + [2 * FAR])
 
     def model(parameters: np.ndarray) -> np.ndarray:
@@ -201,16 +194,17 @@ def _best(
         lower = np.array([*(start[:DRAG] - reach), 0.0, 0.0, *outside[0]])
         upper = np.array([*(start[:DRAG] + reach), np.inf, np.inf, *outside[1]])
         fits.append(refined(model, start, values, deviation, lower, upper, held))
-        if fits[-1].reduced < EXPLAINED:
+        if fits[-1].reduced < settings.misfit_of_a_right_model:
             break
     return min(fits, key=lambda fit: fit.squares)
 
 
 def _starts(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
     """Starts at the highest place of the first acceleration inside the band, with several mass ratios."""
+    settings = ResponseSettings.current()
     level = np.abs(values[0]) * (2 * np.pi * frequency) ** 2
     resonance = frequency[1 + int(np.argmax(level[1:-1]))]
-    for ratio in RATIOS:
+    for ratio in settings.resonance_ratios:
         other = 1 - 1 / ratio**2
         stiffness = other * (2 * np.pi * resonance / ratio) ** 2
         damping = 0.1 * np.sqrt(stiffness * other)
@@ -228,7 +222,7 @@ def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
         yield "the driven mass goes against the input: its sign was reversed"
     if signs[0] != signs[1]:
         yield "the second output has the opposite sign of the first: it was reversed"
-    if fit.reduced > EXPLAINED:
+    if fit.reduced > ResponseSettings.current().misfit_of_a_right_model:
         yield f"the model is not right to the precision of the data (reduced chi-square {fit.reduced:.3g})"
 
 

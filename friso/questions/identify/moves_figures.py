@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.identification.inverse_model import EDGE, SMOOTH, motion
+from friso.identification.inverse_model import motion
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves
 from friso.identification.output_error.parameters import FitParameter
@@ -12,6 +12,7 @@ from friso.identification.output_error.problem import Simulated
 from friso.identification.output_error.profile import Profile
 from friso.identification.quality import steady_friction
 from friso.identification.readings.common import cart, low_pass, on_bearing
+from friso.identification.settings import IdentificationSettings
 from friso.questions.identify.kind_view import TIME
 from friso.questions.identify.numbers import digits, name_of, unit_of
 from friso.shown.drawing.figure import (
@@ -118,7 +119,12 @@ def _difference(time: Array, left: Array, unit: str) -> Panel:
 
 def _residual(moves: IdentifiedMoves, name: str) -> Figure:
     """The residual force over place and speed."""
-    moved = motion(moves.log["position"][moves.part], moves.log.sample_time, SMOOTH * moves.inverse.bandwidth)
+    settings = IdentificationSettings.current()
+    moved = motion(
+        moves.log["position"][moves.part],
+        moves.log.sample_time,
+        settings.smoothing_bandwidths * moves.inverse.bandwidth,
+    )
     left, axis = moves.fit.residual, Axis("Residual force", moves.force_unit)
     panels = (
         Panel("", Axis("Position", "m"), axis, (Series(moved.position, left, "", VERMILLION, width=0.5),)),
@@ -133,15 +139,18 @@ def _residual(moves: IdentifiedMoves, name: str) -> Figure:
 
 def _friction(moves: IdentifiedMoves, name: str) -> Figure:
     """Force less inertia over velocity, and the friction found."""
+    settings = IdentificationSettings.current()
     flat = moves.flat
     masses = [flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage")]
-    step, cutoff = moves.log.sample_time, SMOOTH * moves.inverse.bandwidth
+    step, cutoff = moves.log.sample_time, settings.smoothing_bandwidths * moves.inverse.bandwidth
     moved, stage = (
         motion(position[moves.part], step, cutoff) for position in (on_bearing(moves.log), moves.log["position"])
     )
     force = low_pass(moves.log["force"][moves.part], step, cutoff)
     friction = force - masses[0] * moved.acceleration - masses[1] * stage.acceleration
-    inner = slice(EDGE, -EDGE)  # at the ends of a record the filter swings in
+    inner = slice(
+        settings.samples_of_an_edge, -settings.samples_of_an_edge
+    )  # at the ends of a record the filter swings in
     loops = Series(moved.velocity[inner], friction[inner], "measured force less inertia", GREY, width=0.6)
     top = float(np.abs(moved.velocity).max())
     reach = 1.1 * float(np.percentile(np.abs(friction), 99.5))
