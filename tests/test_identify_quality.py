@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, cast
 
@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from variants import VARIANTS
 
 from friso.identification.combine import combined
-from friso.identification.doubt import KeyCase, RaisedDoubt, RecordCase, ValueCase, causes, judged_keys
+from friso.identification.doubt import DOUBTS, Doubt, KeyCase, RaisedDoubt, RecordCase, ValueCase, causes, judged_keys
 from friso.identification.doubts import (
     differing_halves,
     gaps,
@@ -521,6 +521,37 @@ def test_noise_has_no_cause() -> None:
     noise = 300 * np.random.default_rng(1).standard_normal(len(log.time))
     other = replace(log, signals={**log.signals, "force": noise + 0.2 * log["force"]})
     assert causes_of(other) == []
+
+
+# --- the registry -----------------------------------------------------------------------------------------------------
+
+
+def test_every_doubt_says_what_it_looks_at_and_what_would_decide_it() -> None:
+    for name, doubt in DOUBTS.items():
+        assert DOUBTS.one_line(name)
+        assert all((doubt.looks_at, doubt.consequence, doubt.decided_by)), name
+        assert all(DOUBTS[other].moment == doubt.moment for other in doubt.after), name
+
+
+def test_a_doubt_that_is_added_is_asked_in_its_order_and_has_its_consequences() -> None:
+    """One file is all that a further effect takes: here one that refuses the mass, and one that is asked before it."""
+    asked = []
+
+    def find(name: str, refuses: dict[str, str]) -> Callable[[KeyCase], Iterator[RaisedDoubt]]:
+        def raised(case: KeyCase) -> Iterator[RaisedDoubt]:
+            asked.append(name)
+            yield RaisedDoubt(refuses=refuses)
+
+        return raised
+
+    mass = Estimate.normal("masses.cart", "kg", 6.0, 0.1, "output error")
+    with pytest.MonkeyPatch.context() as patch:
+        for name, refuses, after in (("a-load", {"masses.cart": "a load"}, ("z-play",)), ("z-play", {}, ())):
+            made_up_doubt = Doubt("key", find(name, refuses), "play", "refused", "a dial gauge", after)
+            patch.setitem(DOUBTS.added, name, (made_up_doubt, "made up"))
+        case = judged_keys(key_case([mass], {"masses.cart": 6.0}, acceleration=np.ones(3)))
+    assert asked == ["z-play", "a-load"]
+    assert case.estimates[0].reason == "a load"
 
 
 # --- rests ------------------------------------------------------------------------------------------------------------

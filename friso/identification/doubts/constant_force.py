@@ -25,7 +25,7 @@ DOUBT = Doubt(
     "cause",
     find,
     "the constant force of the inverse model beside its friction",
-    "told",
+    "reported",
     "the force at rest, in several orientations",
     after=("clipped-force",),
 )

@@ -21,4 +21,4 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     yield RaisedDoubt(words, share)
 
 
-DOUBT = Doubt("record", find, "gaps between samples", "told", "a record exported without gaps")
+DOUBT = Doubt("record", find, "gaps between samples", "reported", "a record exported without gaps")

@@ -18,4 +18,4 @@ def find(case: tuple[Stage, Sequence[Estimate]]) -> Iterator[RaisedDoubt]:
             yield RaisedDoubt(f"{sentence}: a wrong unit or --scale of a channel?")
 
 
-DOUBT = Doubt("stage", find, "values that no positioning stage has", "told", "units and scales of the channels")
+DOUBT = Doubt("stage", find, "values that no positioning stage has", "reported", "units and scales of the channels")

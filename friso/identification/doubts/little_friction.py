@@ -42,5 +42,5 @@ def _sentence(case: ValueCase, value: float, least: float) -> str:
 
 
 DOUBT = Doubt(
-    "value", find, "the Coulomb friction of the inverse model", "told", "a log of the whole force of the drive"
+    "value", find, "the Coulomb friction of the inverse model", "reported", "a log of the whole force of the drive"
 )

@@ -33,7 +33,7 @@ DOUBT = Doubt(
     "otherwise",
     find,
     "the spectrum of the residual",
-    "told",
+    "reported",
     "a frequency response, or passes at two speeds: cogging moves with the speed, a mode does not",
     after=("perhaps-feedforward",),
 )

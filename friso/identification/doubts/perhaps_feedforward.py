@@ -26,6 +26,6 @@ DOUBT = Doubt(
     "otherwise",
     find,
     "the fit of the inverse model with acceleration and direction of the reference",
-    "told",
+    "reported",
     "a log of the whole force of the drive",
 )

@@ -25,7 +25,7 @@ DOUBT = Doubt(
     "fault",
     find,
     "the smallest step of the position beside its travel",
-    "told",
+    "reported",
     "a log with more digits",
     after=("position-jump",),
 )

@@ -18,4 +18,4 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
         yield RaisedDoubt(words, size, "m")
 
 
-DOUBT = Doubt("fault", find, "steps of the position between samples", "told", "the record cut at the jump")
+DOUBT = Doubt("fault", find, "steps of the position between samples", "reported", "the record cut at the jump")

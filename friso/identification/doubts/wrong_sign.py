@@ -20,4 +20,4 @@ def find(bench: Bench) -> Iterator[RaisedDoubt]:
     )
 
 
-DOUBT = Doubt("response", find, "the phase of the mass line", "told", "a push by hand with both channels in view")
+DOUBT = Doubt("response", find, "the phase of the mass line", "reported", "a push by hand with both channels in view")
