@@ -85,9 +85,7 @@ class FitCase(RecordCase):
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
         """The case after a finding: its consequences for the fit, and the finding among those of the quality."""
         quality = replace(
-            self.quality,
-            findings=(*self.quality.findings, finding),
-            spoilt=self.quality.spoilt or finding.spoils,
+            self.quality, findings=(*self.quality.findings, finding), spoilt=self.quality.spoilt or finding.spoils
         )
         fit, inverse = finding.fit or self.fit, finding.inverse or self.inverse
         return replace(self, fit=fit, inverse=inverse, quality=quality, refused={**finding.refuses, **self.refused})

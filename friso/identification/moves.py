@@ -165,12 +165,7 @@ def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | 
     others = [np.linalg.norm(record.position - simulated.position, axis=1) for _, record in problem.simulated(drawn)]
     away = np.nan_to_num(np.concatenate(others), nan=np.inf)
     errors = errors_of(log, part, simulated, moves.inverse.bandwidth)
-    return SimulatedLog(
-        part,
-        simulated,
-        errors,
-        float(away.max()) / float(np.linalg.norm(log["position"][part])),
-    )
+    return SimulatedLog(part, simulated, errors, float(away.max()) / float(np.linalg.norm(log["position"][part])))
 
 
 def _same_kind(problem: Problem, log: Log, part: slice, set_up: Mapping[str, Any] | None, changed: set[str]) -> Problem:

@@ -20,4 +20,6 @@ def find(case: tuple[LawComparison, Stage]) -> Iterator[RaisedDoubt]:
         )
 
 
-DOUBT = Doubt("laws", find, "what each friction law predicts of records left out", "reported", "a record before sliding")
+DOUBT = Doubt(
+    "laws", find, "what each friction law predicts of records left out", "reported", "a record before sliding"
+)

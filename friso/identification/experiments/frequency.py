@@ -10,14 +10,7 @@ import numpy as np
 from friso.identification.combine import Correlated, determined
 from friso.identification.doubt import words_of
 from friso.identification.estimate import Estimate
-from friso.identification.kind import (
-    AnalysisSettings,
-    ExperimentKind,
-    Predictor,
-    Prior,
-    Source,
-    independent,
-)
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Predictor, Prior, Source, independent
 from friso.identification.logs.log import Log
 from friso.identification.readings.course import Course
 from friso.identification.response.analysis import Bench, analyse, predicted

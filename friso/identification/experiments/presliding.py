@@ -276,10 +276,5 @@ def _correlated(result: Presliding, estimates: Sequence[Estimate]) -> Correlated
 
 
 KIND = ExperimentKind[Presliding](
-    _analyse,
-    _estimates,
-    _correlated,
-    after=("constant-speed", "frequency", "moves"),
-    foreign=("force",),
-    per_unit=True,
+    _analyse, _estimates, _correlated, after=("constant-speed", "frequency", "moves"), foreign=("force",), per_unit=True
 )

@@ -272,10 +272,7 @@ def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
     bristles = ["friction.bristle_stiffness", "friction.bristle_damping"]
     if not masses or not all(key in prior.estimates for key in (*masses, *bristles)):
         return None
-    mass = (
-        sum(prior.estimates[key].value for key in masses),
-        sum(prior.estimates[key].half_width for key in masses),
-    )
+    mass = (sum(prior.estimates[key].value for key in masses), sum(prior.estimates[key].half_width for key in masses))
     stiffness, damping = ((prior.estimates[key].value, prior.estimates[key].half_width) for key in bristles)
     return MassOnBristles(mass, stiffness, damping, flat.get("friction.stribeck_exponent", 2.0))
 

@@ -70,10 +70,7 @@ class StickSlip:
 
 
 def static_from_stick_slip(
-    log: Log,
-    stiffness: Estimate | float | None = None,
-    stage_mass: float = 0.0,
-    stroke: float = np.inf,
+    log: Log, stiffness: Estimate | float | None = None, stage_mass: float = 0.0, stroke: float = np.inf
 ) -> StickSlip:
     """Static friction from slow motion that sticks and slips.
 
@@ -206,12 +203,7 @@ def _why(shares: list[float]) -> str:
 
 
 def _answer(
-    table: np.ndarray,
-    pull: np.ndarray,
-    velocity: np.ndarray,
-    relative_error: float,
-    stiffness: Estimate,
-    why: str,
+    table: np.ndarray, pull: np.ndarray, velocity: np.ndarray, relative_error: float, stiffness: Estimate, why: str
 ) -> StickSlip:
     settings = ExperimentSettings.current()
     times, places, directions, bent, forces, rates, speeds, held, late = table

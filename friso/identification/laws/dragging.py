@@ -13,14 +13,7 @@ from friso.engine.kernel import kernel
 from friso.equations.dragged import Dragged
 from friso.identification.laws.settings import LawSettings
 from friso.identification.logs.log import Log
-from friso.identification.readings.at_bearing import (
-    Between,
-    LowPass,
-    at_bearing,
-    cutoff_of,
-    record_of,
-    why_unseen,
-)
+from friso.identification.readings.at_bearing import Between, LowPass, at_bearing, cutoff_of, record_of, why_unseen
 from friso.stage.tables import friction_law
 
 

@@ -97,12 +97,7 @@ def friction_position(log: Log, mass: float = 0.0, crossover: float | None = Non
 
 
 def _map(
-    stretch: Pass,
-    places: np.ndarray,
-    position: np.ndarray,
-    force: np.ndarray,
-    sample_time: float,
-    mass: float,
+    stretch: Pass, places: np.ndarray, position: np.ndarray, force: np.ndarray, sample_time: float, mass: float
 ) -> PassMap:
     """Mean force by place; places are met once, or several times where the motion goes back a little."""
     x, f = position[stretch.span], force[stretch.span]

@@ -171,12 +171,7 @@ def _nothing(reason: str) -> Direction:
 
 
 def _direction(
-    velocities: np.ndarray,
-    friction: np.ndarray,
-    errors: np.ndarray,
-    words: str,
-    exponent: float | None,
-    spent: int = 0,
+    velocities: np.ndarray, friction: np.ndarray, errors: np.ndarray, words: str, exponent: float | None, spent: int = 0
 ) -> Direction:
     """Fit of one direction or both, friction [N] positive against the motion, with half-widths `errors` [N]; `spent`
     degrees of freedom are gone before, for the constant force; with the `exponent` of the stage, if it tells one."""

@@ -22,11 +22,7 @@ _SPEEDS = np.geomspace(1e-4, 10, 2001)
 
 
 def break_away(
-    force_rate: float,
-    static: float,
-    coulomb: float,
-    bristle_stiffness: float,
-    stribeck_velocity: float,
+    force_rate: float, static: float, coulomb: float, bristle_stiffness: float, stribeck_velocity: float
 ) -> float:
     """Least force [N] at which LuGre friction breaks away while the force rises at `force_rate` [N/s]."""
     level = stribeck_curve(_SPEEDS, coulomb, static, 1.0)
@@ -44,11 +40,7 @@ def share_below(force_rate: float) -> float:
 
 
 def static_friction(
-    name: str,
-    forces: np.ndarray,
-    rates: np.ndarray,
-    relative_error: float = 0.0,
-    late: float = 0.0,
+    name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float = 0.0, late: float = 0.0
 ) -> Estimate:
     """Static friction [N] from break-away forces [N] at force rates [N/s], both positive, shape (n,).
 

@@ -75,17 +75,7 @@ def fit_modes(response: FrequencyResponse, band: tuple[float, float] | None = No
     if fit.reduced > settings.misfit_of_a_right_model:
         warnings.append(f"the fit misses by more than the deviations (reduced chi-square {fit.reduced:.3g})")
     estimates = _pairs(fit, shape, scale, limits)
-    return Modes(
-        shape,
-        fit,
-        scale,
-        estimates,
-        low_level,
-        high_level,
-        _described(shape, rows),
-        limits,
-        tuple(warnings),
-    )
+    return Modes(shape, fit, scale, estimates, low_level, high_level, _described(shape, rows), limits, tuple(warnings))
 
 
 def _described(shape: RationalShape, rows: list[Row]) -> str:
