@@ -33,10 +33,12 @@ NO_COLUMNS: Mapping[str, np.ndarray] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class InverseModel:
-    """The fit: `estimates` and the plain `solution` by name (of the mass: "mass"; per direction "... forward" and
-    "... backward"), the `columns`, shape (rows, columns), and their `covariance`, times [s] and forces [N] of the rows,
-    measured and fitted, of shape (rows,), and the relative `error`, norm of the residual over that of the force.
-    `bandwidth` [Hz] is the motion's."""
+    """A fit of force = M a + F_v v + F_c sign(v) + offset to a log, with what it rests on.
+
+    It has `estimates`, and the plain `solution` by name (of the mass: "mass"; per direction "... forward" and "...
+    backward"). The `columns`, shape (rows, columns), have the `covariance` of their coefficients; `time` [s] and forces
+    [N], `measured` and `fitted`, have the shape (rows,). `bandwidth` [Hz] is the motion's.
+    """
 
     estimates: tuple[Estimate, ...]
     solution: Mapping[str, float]
@@ -49,10 +51,11 @@ class InverseModel:
 
     @property
     def error(self) -> float:
+        """The norm of what is left of the force, over the norm of the force."""
         return float(np.linalg.norm(self.measured - self.fitted) / np.linalg.norm(self.measured))
 
     def value(self, name: str) -> float:
-        """What least squares made of the column called so, whether the log shows it or not."""
+        """Return what least squares made of a column by name, whether the log shows it or not."""
         return self.solution[name]
 
     def estimate(self, name: str) -> Estimate:
@@ -62,7 +65,9 @@ class InverseModel:
 
 @dataclass(frozen=True)
 class FilteredMotion:
-    """Position [m], velocity [m/s] and acceleration [m/s^2] without the noise beyond the cut-off frequency, (n,)."""
+    """Position [m], velocity [m/s] and acceleration [m/s^2] without noise beyond a cut-off
+    frequency, shape (n,).
+    """
 
     position: np.ndarray
     velocity: np.ndarray
@@ -70,7 +75,12 @@ class FilteredMotion:
 
 
 def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredMotion:
-    """The motion of a measured position, shape (n,) [m], smoothed forward and back at the cut-off frequency [Hz]."""
+    """Smooth a measured position [m], shape (n,), forward and back at a cut-off frequency [Hz],
+    and differentiate it.
+
+    Where the cut-off is near the sampling frequency derivatives are those of a spline: differences would lose a part of
+    the acceleration.
+    """
     settings = IdentificationSettings.current()
     smooth, filtered = position, cutoff < 0.5 / sample_time
     if filtered:
@@ -88,8 +98,11 @@ def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredM
 
 
 def bandwidth_of(log: Log) -> float:
-    """The bandwidth [Hz] of the motion of a log, none of it across gaps: that below which its acceleration has 95 % of
-    its power, as far as the position stands out of its noise. Raises InputError where it does nowhere."""
+    """Read the bandwidth [Hz] of the motion off a log, none of it across gaps.
+
+    It is the frequency below which the acceleration has 95 % of its power, as far as the position stands out of its
+    noise. Raises InputError where it does nowhere.
+    """
     settings = IdentificationSettings.current()
     lengths = [part.stop - part.start for part in log.segments]
     pieces = min(max(lengths), max(256, sum(lengths) // settings.pieces_of_a_spectrum))
@@ -107,7 +120,9 @@ def bandwidth_of(log: Log) -> float:
 
 
 def directions(position: np.ndarray) -> tuple[bool, bool]:
-    """Whether a motion, shape (n,) [m], goes forward, and whether it goes back; its noise does neither."""
+    """Tell whether a motion [m], shape (n,), goes forward, and whether it goes back; its noise
+    does neither.
+    """
     settings = IdentificationSettings.current()
     steps = np.diff(
         position[
@@ -127,14 +142,17 @@ def inverse_model(
     averaged: int = 1,
     extra: Mapping[str, np.ndarray] = NO_COLUMNS,
 ) -> InverseModel:
-    """Mass, viscous and Coulomb friction and offset of a log with position and force.
+    """Fit mass, viscous and Coulomb friction and offset to a log with position and force.
 
     With `by_direction`, both frictions have a value for each direction, and there is no offset, which could not be
     distinguished from a difference of the Coulomb frictions. `bandwidth` [Hz] is that of the motion, read off the log
     by default. Of a stage on a joint, `cart_share` is the share of the mass that moves with the measured cart, as does
-    friction. `averaged`: samples over which the log's force is averaged, as then are the columns. `extra` columns by
-    name, shape (n,), are fitted besides, and what they explain is taken out of the measured force. Raises InputError
-    for a log too short."""
+    friction.
+
+    `averaged` is the number of samples over which the log's force is averaged, as then are the columns. `extra` columns
+    by name, shape (n,), are fitted besides, and what they explain is taken out of the measured force. Raises InputError
+    for a log too short.
+    """
     settings = IdentificationSettings.current()
     band = bandwidth or bandwidth_of(log)
     longest = max(part.stop - part.start for part in log.segments) * log.sample_time
@@ -177,13 +195,16 @@ def inverse_model(
 
 
 def least_squares(columns: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit a force [N], shape (rows,), by columns; return the solution, shape (columns,), and what it leaves [N]."""
+    """Fit a force [N], shape (rows,), by columns, shape (rows, columns).
+
+    Returns the solution, shape (columns,), and what it leaves [N], shape (rows,).
+    """
     solution = np.linalg.lstsq(columns, force, rcond=None)[0]
     return solution, force - columns @ solution
 
 
 def _other_sign(log: Log) -> str:
-    """The scale with which the force of a log was read, with the other sign."""
+    """Return the scale with which the force of a log was read, with the other sign."""
     scales = [re.search(r"; ([+-]?)(\d\S* \S+/[^,/]+)", line) for line in log.read if line.startswith("force:")]
     scale = next((match for match in scales if match), None)
     if scale is None:
@@ -192,14 +213,20 @@ def _other_sign(log: Log) -> str:
 
 
 def unit_of(unit: str, log: Log) -> str:
-    """The unit of a quantity of mechanics where the force of a log stands in the newton's place: with a force in volts
-    a mass is in V*s^2/m instead of kg."""
+    """Return the unit of a quantity of mechanics where the force of a log stands in the newton's
+    place.
+
+    With a force in volts a mass is in V*s^2/m instead of kg.
+    """
     if log.unit("force") == ROLES["force"]:
         return unit
     return re.sub(r"\bN\b", log.unit("force"), unit.replace("kg", "N*s^2/m"))
 
 
 def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
+    """Make an estimate from a coefficient and its variance, which is infinite where directions
+    are missing.
+    """
     if np.isfinite(variance):
         return Estimate.normal(name, unit, value, float(np.sqrt(variance)), METHOD)
     return Estimate.unknown(
@@ -208,7 +235,7 @@ def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
 
 
 def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Which rows belong to a stretch of slow ones that lasts, shape (rows,)."""
+    """Tell which rows belong to a stretch of slow ones that lasts, shape (rows,)."""
     settings = IdentificationSettings.current()
     ends = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(int)))
     rests = np.zeros(len(slow), bool)
@@ -232,7 +259,9 @@ _NAMES = {
 def _rows(
     log: Log, part: slice, band: float, by_direction: bool, cart_share: float, averaged: int, extra: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Times, columns of the inverse model with the extra ones, forces and positions of a segment, decimated."""
+    """Return times, columns with the extra ones, forces and positions of a segment, filtered and
+    decimated.
+    """
     settings = IdentificationSettings.current()
     if part.stop - part.start < 2 * settings.samples_of_an_edge:
         return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]) + extra.shape[1])), np.zeros(0), np.zeros(0)
@@ -260,7 +289,9 @@ def _rows(
 
 
 def _decimated(columns: np.ndarray, step: int) -> np.ndarray:
-    """Every so many-th row, after a filter forward and back that keeps what is beyond half the new frequency out."""
+    """Keep every `step`th row, after a filter forward and back that keeps out what is too fast
+    for that.
+    """
     settings = IdentificationSettings.current()
     if step == 1:
         return columns

@@ -38,12 +38,15 @@ either direction alone."""
 
 @dataclass(frozen=True)
 class IdentifiedMoves:
-    """What was found: both fits of the inverse model, the output-error `fit`, the profiles of all parameters by name,
-    the estimates by key of the stage file with the `correlation` of the shown ones, what the motion covers, the
-    simulated record of the fit and its errors, and `part`, the samples of the log used.
+    """What an analysis of moves found.
+
+    It has both fits of the inverse model, the output-error `fit`, the profiles of all parameters by name, the estimates
+    by key of the stage file with the `correlation` of the shown ones, what the motion covers, the simulated record of
+    the fit and its errors, and `part`, the samples of the log used.
 
     `loop` is the machine's own closed loop, which was simulated; without it (None) the stage followed the log, and the
-    simulated force is what it took to hold it there, which the model does not explain."""
+    simulated force is what it took to hold it there, which the model does not explain.
+    """
 
     log: Log
     part: slice
@@ -79,7 +82,8 @@ class IdentifiedMoves:
 def identify_moves(
     log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth: float | None = None, progress: Progress = silent
 ) -> IdentifiedMoves:
-    """Mass, friction and what else the moves of a log show of a stage given as flat keys.
+    """Identify mass, friction and what else the moves of a log show of a stage given as flat
+    keys.
 
     With `own_loop` the stage's controller is the machine's, and the closed loop is simulated on the log's reference;
     else the model follows the log's position. `bandwidth` [Hz] is the motion's, read off the force by default. Where
@@ -139,9 +143,12 @@ def _with_estimates(doubted: FitCase, answer: IdentifiableFit, covered: Coverage
 
 @dataclass(frozen=True)
 class SimulatedLog:
-    """Another log of the same axis, simulated: the samples used, the record, and its errors; and how far the farthest
-    of the machines drawn from the estimates goes from that record, `apart`, as a share of the position: infinitely far
-    where one does not keep to finite numbers."""
+    """Another log of the same axis, simulated.
+
+    It has the samples used, the record and its errors; `apart` is how far the farthest of the machines drawn from the
+    estimates goes from that record, as a share of the position: infinitely far where one does not keep to finite
+    numbers.
+    """
 
     part: slice
     simulated: Simulated
@@ -150,9 +157,9 @@ class SimulatedLog:
 
 
 def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | None = None) -> SimulatedLog:
-    """Another log of the same axis simulated with the estimates; `set_up` are the flat keys of the stage as it was
-    set up for that log, whose controller and changed keys count.
+    """Simulate another log of the same axis with the estimates.
 
+    `set_up` are the flat keys of the stage as it was set up for that log, whose controller and changed keys count.
     Raises InputError where the machine's own loop is not known.
     """
     if moves.loop is None:
@@ -169,7 +176,9 @@ def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | 
 
 
 def _same_kind(problem: Problem, log: Log, part: slice, set_up: Mapping[str, Any] | None, changed: set[str]) -> Problem:
-    """The same stage and parameters on another log, with the controller and the `changed` keys of its set-up."""
+    """Set up the stage and its parameters on another log, with the controller and the `changed`
+    keys of its set-up.
+    """
     check_roles(log, ("position", "force", "reference"))
     flat = dict(problem.flat)
     if set_up is not None:
@@ -179,7 +188,10 @@ def _same_kind(problem: Problem, log: Log, part: slice, set_up: Mapping[str, Any
 
 
 def check_roles(log: Log, roles: Sequence[str], foreign: Sequence[str] = ()) -> None:
-    """Raises InputError for a role that a log does not have, or in another unit than SI, but for the `foreign`."""
+    """Check that a log has its roles in SI units, but for the `foreign` ones.
+
+    Raises InputError for a role that is missing, or in another unit.
+    """
     for role in roles:
         if role not in log:
             actual = f"a log with {', '.join(log.signals) or 'no signals'}"
@@ -192,7 +204,9 @@ def check_roles(log: Log, roles: Sequence[str], foreign: Sequence[str] = ()) -> 
 def _problems(
     log: Log, part: slice, flat: Mapping[str, Any], inverse: InverseModel, own_loop: bool
 ) -> tuple[Problem, Problem | None]:
-    """The stage following the log's position, and in its own loop, with all the parameters in its equations."""
+    """Set up the stage following the log's position, and in its own loop, with all the
+    parameters of its equations.
+    """
     settings = IdentificationSettings.current()
     speed = float(
         np.abs(
@@ -209,17 +223,20 @@ def _problems(
 
 
 def _cart_share(log: Log, flat: Mapping[str, Any]) -> float:
-    """The share of the mass that moves with the cart, where that is measured apart from a stage on a free joint."""
+    """Return the share of the mass that moves with the cart, where that is measured apart from a
+    stage on a free joint.
+    """
     if not is_free(flat) or not ("cart_position" in log or "relative_position" in log):
         return 0.0
     return flat["masses.cart"] / (flat["masses.cart"] + flat["masses.stage"])
 
 
 def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[str, float]:
-    """Where the fit starts: at the inverse model's values, as far as it shows them and is one of this stage.
+    """Return where the fit starts: at the inverse model's values, as far as it shows them and is
+    one of this stage.
 
-    It knows one body. What it does not tell from 0 starts within its interval; all of a stage on a free joint whose
-    cart is not measured starts at the stage given.
+    The inverse model knows one body. What it does not tell from 0 starts within its interval; all of a stage on a free
+    joint whose cart is not measured starts at the stage given.
     """
     if is_free(flat) and not _cart_share(log, flat):
         mass = flat["masses.cart"] + flat["masses.stage"]

@@ -30,8 +30,10 @@ from friso.stage.transmission import MOTOR_FRICTION, moving_mass
 
 @dataclass(frozen=True)
 class LawPrediction:
-    """A law as all records together show it, and by how much its predictions of each part that was left out are off, as
-    a share of the friction's standard deviation there, shape (parts,)."""
+    """A law fitted to all records, with its errors in predicting parts that were left out.
+
+    The errors, shape (parts,), are shares of the friction's standard deviation in each part.
+    """
 
     fit: LawFit
     errors: np.ndarray
@@ -49,8 +51,11 @@ class LawPrediction:
 
 @dataclass(frozen=True)
 class LawComparison:
-    """The laws, the best first; the names of the logs; those that were left out, with the reason; how many parts were
-    predicted; and whether fits began from the stage as it was known before any log (`unseen`)."""
+    """The friction laws by how well they predict, the best first.
+
+    `logs` are the names of those used, `left_out` those that were not, with the reason, and `parts` how many parts were
+    predicted. `unseen` says whether fits began from the stage as it was known before any log.
+    """
 
     predictions: tuple[LawPrediction, ...]
     logs: tuple[str, ...]
@@ -65,7 +70,9 @@ class LawComparison:
 
     @property
     def supported(self) -> tuple[LawPrediction, ...]:
-        """The laws that predict the record, and not clearly worse than the best; none where no law predicts it."""
+        """The laws that predict the record, and not clearly worse than the best; none where no law
+        predicts it.
+        """
         settings = LawSettings.current()
         best = self.predictions[0]
         if not self.explained:
@@ -76,9 +83,12 @@ class LawComparison:
 
 
 def _worse(differences: np.ndarray, level: float) -> bool:
-    """Whether errors, shape (parts,), are larger than those of another law: by more than parts differ by chance, at a
-    level, and by more than `LEAST_WORSE`, on average or, where single parts stand out, in their sign and median. A law
-    that could not be run for a part is."""
+    """Tell whether errors, shape (parts,), are larger than those of another law by more than
+    chance.
+
+    They are by more than parts differ by chance, at a level, and by more than laws that predict alike differ: on
+    average or, where single parts stand out, in their sign and median. A law that could not be run for a part is worse.
+    """
     settings = LawSettings.current()
     if not np.isfinite(differences).all():
         return True
@@ -92,7 +102,7 @@ def _worse(differences: np.ndarray, level: float) -> bool:
 
 
 def comparable() -> list[str]:
-    """The laws that stick and can be made from what is measured."""
+    """List the laws that stick and can be made from what is measured."""
     return [
         name
         for name, law in FRICTION.classes.items()
@@ -101,9 +111,12 @@ def comparable() -> list[str]:
 
 
 def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Progress = silent) -> LawComparison:
-    """Fit every law to the same logs, and let each predict what it was not fitted to: begun from the stage before any
-    log (`prior`), or from the `stage` that all logs show where no fit can begin from its law. Raises InputError where
-    no log shows friction before sliding, and for a stage whose law does not stick."""
+    """Fit every law to the same logs, and let each predict what it was not fitted to.
+
+    Fits begin from the stage before any log (`prior`), or from the `stage` that all logs show where no fit can begin
+    from its law. Raises InputError where no log shows friction before sliding, and for a stage whose law does not
+    stick.
+    """
     records, left_out = _records(logs, prior)
     if not records:
         reasons = "; ".join(f"{name}: {why}" for name, why in left_out.items()) or "no log over time"
@@ -130,7 +143,7 @@ def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Prog
 
 
 def _records(logs: Sequence[Log], prior: Prior) -> tuple[list[DraggedRecord], dict[str, str]]:
-    """What can be read from the logs, and why from others nothing can."""
+    """Read records from the logs, and say of others why nothing can be read from them."""
     records, left_out = [], {}
     for log in logs:
         if not {"position", "force"} <= {*log.signals}:
@@ -145,6 +158,7 @@ def _records(logs: Sequence[Log], prior: Prior) -> tuple[list[DraggedRecord], di
 
 
 def _prediction(problem: LawProblem, parts: Sequence[Sequence[np.ndarray]]) -> LawPrediction:
+    """Fit a law to all records and to all but each part in turn, and predict that part."""
     starts = problem.everywhere()  # not the fit to all records, which has seen what is left out
     whole = problem.fitted([np.ones(len(r.force), bool) for r in problem.records], starts)
     errors = []

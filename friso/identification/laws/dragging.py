@@ -19,8 +19,11 @@ from friso.stage.tables import friction_law
 
 @dataclass(frozen=True)
 class DraggedRecord:
-    """A log by its name. Over time [s], shape (n,): the position [m] of the body on the bearing; and low-passed,
-    inside, shape (m,): the force [N] that has arrived and the acceleration [m/s^2] of the whole moving mass."""
+    """A log as a body that is dragged along what was measured.
+
+    Over time [s] it has the position [m] of the body on the bearing, shape (n,); low-passed, inside the record, the
+    force [N] that has arrived and the acceleration [m/s^2] of the whole moving mass, shape (m,).
+    """
 
     name: str
     position: np.ndarray
@@ -30,12 +33,16 @@ class DraggedRecord:
 
     @property
     def interval(self) -> float:
-        """Between samples [s]."""
+        """Time between samples [s]."""
         return float(self.low_pass.time[1] - self.low_pass.time[0])
 
     def friction(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-        """Friction force [N] of laws of one structure, given as flat keys to numbers or arrays of shape (runs,), along
-        the record, low-passed, shape (runs, m); NaN for runs that failed. The bristles begin unbent."""
+        """Return the friction force [N] of laws of one structure along the record, low-passed, shape
+        (runs, m).
+
+        The laws are given as flat keys to numbers or arrays of shape (runs,); runs that failed are NaN. The bristles
+        begin unbent.
+        """
         settings = LawSettings.current()
         law = flat["friction.model"]
         first = {key: value[0] if np.ndim(value) else value for key, value in flat.items()}
@@ -57,7 +64,10 @@ class DraggedRecord:
 
 
 def dragged_record(log: Log, between: Between) -> DraggedRecord | str:
-    """The longest stretch of a log; or why nothing can be read from it. Raises InputError for missing channels."""
+    """Read the longest stretch of a log; or say why nothing can be read from it.
+
+    Raises InputError for missing channels.
+    """
     settings = LawSettings.current()
     whole = record_of(log, log.longest, between)
     if why := why_unseen(whole, settings.samples_of_a_dragged_record):
@@ -73,8 +83,11 @@ def dragged_record(log: Log, between: Between) -> DraggedRecord | str:
 
 
 def blocks(records: Sequence[DraggedRecord], pieces: int) -> list[list[np.ndarray]]:
-    """What is left out by turns, by record, as masks of shape (m,): each record as a whole, where there are as many as
-    `pieces` are wanted; of fewer, pieces in time, as many of each."""
+    """Choose what is left out by turns, by record, as masks of shape (m,).
+
+    Each record is left out as a whole, where there are as many as `pieces` are wanted; of fewer, pieces in time, as
+    many of each.
+    """
     cuts = -(-pieces // len(records))
     parts = []
     for out in records:

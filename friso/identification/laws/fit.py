@@ -21,7 +21,9 @@ FAR = {"mass": 3.0, "coulomb": 30.0, "gap": 100.0, "stribeck_velocity": 100.0, "
 
 @dataclass(frozen=True)
 class LawFit:
-    """A law fitted to records: the mass [kg], the keys of the law [SI], and the numbers behind them."""
+    """A law fitted to records: the mass [kg], the keys of the law [SI], and the numbers behind
+    them.
+    """
 
     law: str
     mass: float
@@ -31,7 +33,10 @@ class LawFit:
 
 @dataclass(frozen=True)
 class LawProblem:
-    """A law, what is known beforehand (mass [kg] and friction), and the Stribeck exponent, which is not fitted."""
+    """A law to be fitted to records, with the mass [kg] and the friction known beforehand.
+
+    The Stribeck exponent is as known beforehand, and is not fitted.
+    """
 
     law: str
     mass: float
@@ -40,7 +45,7 @@ class LawProblem:
 
     @property
     def names(self) -> list[str]:
-        """Of the numbers that are fitted; each as a logarithm."""
+        """Names of the numbers that are fitted, each as a logarithm."""
         return [*FAR, *friction_law(self.law).shape]
 
     @property
@@ -63,14 +68,14 @@ class LawProblem:
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of the numbers, shape (parameters,) each."""
+        """Lower and upper bounds of the numbers, each of shape (parameters,)."""
         far, shape = np.log(list(FAR.values())), friction_law(self.law).shape.values()
         centre = self.start[: len(far)]
         low, high = ([np.log(limits[end]) for limits in shape] for end in (0, 2))
         return np.concatenate([centre - far, low]), np.concatenate([centre + far, high])
 
     def keys(self, numbers: np.ndarray) -> dict[str, float]:
-        """The keys of the law [SI] for some numbers, shape (parameters,)."""
+        """Return the keys of the law [SI] for some numbers, shape (parameters,)."""
         value = dict(zip(self.names, np.exp(numbers), strict=True))
         static = value["coulomb"] + value["gap"]
         before = self.before.levels
@@ -86,8 +91,10 @@ class LawProblem:
         return law.shaped(measured, {name: value[name] for name in law.shape})
 
     def errors(self, rows: np.ndarray) -> list[np.ndarray]:
-        """What is left of the force [N] in each record, about its mean, shape (rows, m), for numbers of shape (rows,
-        parameters); infinite where a run failed."""
+        """Return what is left of the force [N] in each record, about its mean, shape (rows, m).
+
+        The numbers have the shape (rows, parameters). What is left is infinite where a run failed.
+        """
         columns = [self.keys(row) for row in rows]
         flat = {key: np.array([keys[key] for keys in columns]) for key in columns[0]}
         # numbers that decide on the equations are the same in all rows
@@ -101,8 +108,10 @@ class LawProblem:
         return left
 
     def fitted(self, used: Sequence[np.ndarray], starts: np.ndarray) -> LawFit:
-        """The fit from the best of some starts, shape (starts, parameters), to the samples that are `used` of each
-        record, masks of shape (m,)."""
+        """Fit the law from the best of some starts to the samples that are `used` of each record.
+
+        The starts have the shape (starts, parameters), and `used` holds a mask of shape (m,) for each record.
+        """
         settings = LawSettings.current()
         weights = [mask / np.sqrt(max(int(mask.sum()), 1)) / record.force.std() for mask, record in self._pairs(used)]
 
@@ -132,17 +141,22 @@ class LawProblem:
         return LawFit(self.law, float(np.exp(best[0])), self.keys(best), best)
 
     def everywhere(self) -> np.ndarray:
-        """Starts, shape (starts, parameters): bristles softer and stiffer than known beforehand."""
+        """Return starts, shape (starts, parameters), with bristles softer and stiffer than known
+        beforehand.
+        """
         settings = LawSettings.current()
         starts = np.tile(self.start, (len(settings.stiffness_factors), 1))
         starts[:, self.names.index("stiffness")] += np.log(settings.stiffness_factors)
         return starts
 
     def _pairs(self, used: Sequence[np.ndarray]) -> list[tuple[np.ndarray, DraggedRecord]]:
+        """Pair the masks with their records."""
         return list(zip(used, self.records, strict=True))
 
     def _weighed(self, rows: np.ndarray, weights: Sequence[np.ndarray]) -> np.ndarray:
-        """Residuals of all records, shape (rows, samples); a large number where a run failed."""
+        """Return the residuals of all records, shape (rows, samples), weighed; a large number where
+        a run failed.
+        """
         settings = LawSettings.current()
         with np.errstate(invalid="ignore"):  # a run that failed, where its weight is 0
             parts = [left * weight for left, weight in zip(self.errors(rows), weights, strict=True)]

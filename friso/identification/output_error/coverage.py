@@ -13,9 +13,12 @@ from friso.identification.readings.common import turns_of
 
 @dataclass(frozen=True)
 class Coverage:
-    """Speeds of steady motion [m/s], ascending, one per stretch, and for each stretch between
-    turning points the ways [m] gone at its samples, NaN where inertia outweighed friction. Below `resolution` [m] of
-    position nothing is seen, below `slowest` [m/s] no speed."""
+    """What the motion of a record covers: steady speeds, and starts of motions.
+
+    `steady` holds speeds of steady motion [m/s], ascending, one per stretch. `starts` holds, for each stretch between
+    turning points, the ways [m] gone at its samples, NaN where inertia outweighed friction. Below `resolution` [m] of
+    position nothing is seen, below `slowest` [m/s] no speed.
+    """
 
     steady: np.ndarray
     starts: tuple[np.ndarray, ...]
@@ -23,7 +26,10 @@ class Coverage:
     slowest: float
 
     def shows_speed(self, speed: float) -> bool:
-        """Whether there is steady motion both below and above a speed [m/s], near it."""
+        """Tell whether there is steady motion both below and above a speed [m/s], near it.
+
+        A Stribeck velocity shows in how friction falls about it, and steady motion on one side of it shows no fall.
+        """
         settings = OutputErrorSettings.current()
         below = (self.steady >= speed / settings.speed_factor_of_coverage) & (self.steady < speed)
         above = (self.steady > speed) & (self.steady <= speed * settings.speed_factor_of_coverage)
@@ -37,7 +43,11 @@ class Coverage:
         return float(speeds[widest]), float(speeds[widest + 1])
 
     def shows_length(self, length: float) -> bool:
-        """Whether bristles are seen bending by a length [m], again and again."""
+        """Tell whether bristles are seen bending by a length [m], again and again.
+
+        The bend has to stand out of the noise of the position over several samples of several starts: one start may be
+        chance.
+        """
         settings = OutputErrorSettings.current()
         passes = [
             np.sum((distance > settings.deviations_of_a_bend * self.resolution) & (distance < length))
@@ -47,7 +57,11 @@ class Coverage:
 
 
 def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: float, sample_time: float) -> Coverage:
-    """What a motion of shape (n,) shows, of a mass [kg] with this Coulomb friction [N]."""
+    """Find what a motion covers: at which speeds it is steady, and how its starts go.
+
+    The motion, of shape (n,), is that of a mass [kg] with a Coulomb friction [N], sampled every `sample_time` [s]. It
+    is steady where inertia stays below a share of that friction for long enough.
+    """
     settings = OutputErrorSettings.current()
     rough = position - moved.position
     steps = np.abs(np.diff(position))
@@ -71,8 +85,11 @@ def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: 
 
 
 def _starts(position: np.ndarray, moved: FilteredMotion, mass_per_force: float, swing: float) -> tuple[np.ndarray, ...]:
-    """Ways [m] gone from each turning point to the next at the samples at which inertia was small; a swing that is less
-    than `swing` [m] turns nothing."""
+    """Return the ways [m] gone from each turning point to the next, where inertia was small.
+
+    A swing that is less than `swing` [m] turns nothing. Samples at which inertia outweighs friction are NaN: the force
+    does not show the bristles there.
+    """
     ends = np.unique([0, *turns_of(position, swing)])
     calm = mass_per_force * np.abs(moved.acceleration) < OutputErrorSettings.current().friction_share_of_inertia
     pieces = zip(ends, [*ends[1:], len(position)], strict=True)
@@ -80,5 +97,5 @@ def _starts(position: np.ndarray, moved: FilteredMotion, mass_per_force: float, 
 
 
 def _speeds(speed: np.ndarray, length: int) -> np.ndarray:
-    """The mean speeds of the pieces of a stretch."""
+    """Return the mean speeds [m/s] of the pieces of a stretch, each of about `length` samples."""
     return np.array([piece.mean() for piece in np.array_split(speed, max(1, len(speed) // length))])

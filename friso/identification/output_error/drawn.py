@@ -15,10 +15,12 @@ from friso.intervals import COVERAGE
 def drawn_from(
     estimates: Sequence[Estimate], correlation: np.ndarray, parameters: Sequence[FitParameter], inner: np.ndarray
 ) -> np.ndarray:
-    """Fitted numbers, shape (draws, parameters), of machines within the `estimates`, about those of the fit, `inner`.
+    """Draw machines from what a record leaves open, as fitted numbers, shape (draws,
+    parameters).
 
-    What is determined is drawn as its intervals and their `correlation` say, what is not evenly from the range that is
-    left, or of the logarithm; a parameter of which nothing is known from all of its own range.
+    They are drawn about the numbers of the fit, `inner`. What is determined is drawn as its intervals and their
+    `correlation` say. What is not is drawn evenly from the range that is left, or evenly in its logarithm; a parameter
+    without any range is drawn from all of its own.
     """
     settings = OutputErrorSettings.current()
     rng = np.random.default_rng(settings.seed_of_draws)
@@ -44,7 +46,7 @@ def drawn_from(
 
 
 def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
-    """Values from all of the range of a parameter, shape (draws,)."""
+    """Draw values evenly from the whole range of a parameter, shape (draws,)."""
     settings = OutputErrorSettings.current()
     return parameter.outer(
         rng.uniform(parameter.inner(parameter.low), parameter.inner(parameter.high), settings.machines_drawn)
@@ -52,7 +54,9 @@ def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
 
 
 def _of_parameter(name: str, values: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """A parameter of the machines drawn, whose keys have these values; None where these do not tell it."""
+    """Return a parameter of drawn machines from the values of their keys; None where keys do not
+    tell it.
+    """
     if name in (MASS, SHARE):
         masses = [values[key] for key in ("masses.cart", "masses.stage") if key in values]
         if not masses or (name == SHARE and len(masses) < 2):

@@ -21,8 +21,11 @@ from friso.progress import Progress, Tally, share_of, silent
 
 @dataclass(frozen=True)
 class OutputErrorFit:
-    """The fitted numbers `inner`, shape (parameters,), of which `free` were fitted; their `covariance`, shape (free,
-    free), and the residual [N], shape (n,)."""
+    """A fit of the whole model to a log, with how well its numbers are known.
+
+    `inner` holds the fitted numbers, shape (parameters,), of which those numbered in `free` were fitted. Their
+    `covariance` has the shape (free, free), and the `residual` [N] the shape (n,).
+    """
 
     problem: Problem
     inner: np.ndarray
@@ -32,22 +35,27 @@ class OutputErrorFit:
 
     @property
     def cost(self) -> float:
+        """The mean square of the residual [N^2]."""
         return float(np.mean(self.residual**2))
 
     @property
     def left(self) -> float:
-        """What the fit leaves [N], RMS, where it counts."""
+        """What the fit leaves of the force [N], RMS over the samples that count."""
         return float(np.sqrt(np.sum(self.residual**2) / max(float(self.problem.counted.sum()), 1.0)))
 
     def explains(self, noise: float, closely: bool = False) -> bool:
-        """Whether it leaves about the `noise` [N] of the log's force, or `closely` no more than that."""
+        """Tell whether the fit leaves about the `noise` [N] of the log's force, or `closely` no more
+        than that.
+
+        Of a stage that is held to the log a part of the noise alone passes into the residual.
+        """
         settings = OutputErrorSettings.current()
         times = settings.noise_ratio_of_a_closed_fit if closely else settings.noise_ratio_of_an_explained_record
         return self.left < times * noise * self.problem.passes
 
     @property
     def independent(self) -> float:
-        """So many independent samples the residual is worth."""
+        """How many independent samples the residual is worth: neighbouring ones are alike."""
         return max(float(self.problem.counted.sum()), 1.0) / correlation_length(self.residual)
 
     @property
@@ -58,32 +66,41 @@ class OutputErrorFit:
         return {**self.problem.flat, **keys_of(self.problem.flat, values)}
 
     def linearised(self) -> tuple[np.ndarray, np.ndarray]:
-        """The residual, shape (n,), and its derivatives to the fitted numbers, shape (n, free)."""
+        """Return the residual, shape (n,), and its derivatives to the fitted numbers, shape (n,
+        free).
+        """
         mask = np.isin(np.arange(len(self.inner)), self.free)
         return self.problem.linearised(self.inner, mask)
 
     def value(self, name: str) -> float:
-        """The SI value of a parameter."""
+        """Return the value of a parameter in SI units."""
         names = [parameter.name for parameter in self.problem.parameters]
         i = names.index(name)
         return float(self.problem.parameters[i].outer(self.inner[i]))
 
 
 def first_values(parameters: Sequence[FitParameter]) -> np.ndarray:
-    """The fitted numbers at which the parameters start, shape (parameters,)."""
+    """Return the fitted numbers at which the parameters start, shape (parameters,)."""
     return np.array([parameter.inner(parameter.start) for parameter in parameters])
 
 
 def fit(problem: Problem, free: Sequence[int], starts: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
-    """Fit the free parameters, given by number, of a problem, from some starts, shape (starts, parameters), the best of
-    which are refined; the others stay as in the first of them."""
+    """Fit the free parameters of a problem, given by number, from several starts.
+
+    The starts have the shape (starts, parameters). All are simulated, and the best of them refined. Parameters that are
+    not free stay as in the first start.
+    """
     return fits([problem], free, starts, progress)[0]
 
 
 def fits(
     problems: Sequence[Problem], free: Sequence[int], starts: np.ndarray, progress: Progress = silent
 ) -> list[OutputErrorFit]:
-    """The same of problems that differ in nothing but what counts."""
+    """Fit several problems that differ in nothing but the samples that count, from the same
+    starts.
+
+    The starts are simulated once for all of them.
+    """
     pieces, works = _parts(problems[0], len(starts)), 1 + len(problems)
     ranked = _ranked(problems, pieces, starts, share_of(progress, 0, works))
     return [
@@ -95,8 +112,11 @@ def fits(
 def _fit(
     problem: Problem, pieces: Sequence[slice], free: Sequence[int], tried: np.ndarray, progress: Progress
 ) -> OutputErrorFit:
-    """Fit from the best starts. What one of them is worth shows after a few iterations, on pieces of a long record: of
-    a stage that sticks and slips the best of the starts as they are lead to other optima."""
+    """Refine the best starts in rounds, of which each keeps fewer, and the last one to the end.
+
+    What a start is worth shows after a few iterations, on pieces of a long record: of a stage that sticks and slips the
+    starts that are best as they are lead to other optima.
+    """
     settings = OutputErrorSettings.current()
     mask = np.zeros(tried.shape[1], bool)
     mask[list(free)] = True
@@ -114,9 +134,12 @@ def _fit(
 
 
 def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.ndarray:
-    """Many starts over the ranges of the free parameters, shape (starts, parameters), behind the `first`: they
-    find parameters that not every motion shows. Core parameters start about the inverse model's values: a first fit
-    of them alone to motion that sticks and slips can be anywhere."""
+    """Lay many starts over the ranges of the free parameters, shape (starts, parameters), behind
+    the `first`.
+
+    They find parameters that not every motion shows. Core parameters start about the inverse model's values, for a
+    first fit of them alone to motion that sticks and slips can end anywhere.
+    """
     settings = OutputErrorSettings.current()
     low, high = bounds_of(problem)
     core = np.array([parameter.core for parameter in problem.parameters])
@@ -135,8 +158,11 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
 
 
 def nearby(fit: OutputErrorFit) -> np.ndarray:
-    """Starts that another problem's fit allows, shape (starts, parameters), itself the first: drawn from its covariance
-    `FAR` times as wide."""
+    """Draw starts that another problem's fit allows, shape (starts, parameters), behind that fit
+    itself.
+
+    They are drawn from its covariance, several times as wide: the loop of a stage that hunts has optima of its own.
+    """
     settings = OutputErrorSettings.current()
     low, high = (end[list(fit.free)] for end in bounds_of(fit.problem))
     deviation = np.sqrt(np.diag(fit.covariance))
@@ -157,7 +183,9 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
 def _ranked(
     problems: Sequence[Problem], pieces: Sequence[slice], starts: np.ndarray, progress: Progress
 ) -> list[np.ndarray]:
-    """Of each problem the best starts, shape (tried, parameters), the first one always among them."""
+    """Return the best starts of each problem, shape (tried, parameters), the first start always
+    among them.
+    """
     settings = OutputErrorSettings.current()
     if len(starts) <= settings.starts_refined_first:
         return [starts] * len(problems)
@@ -173,8 +201,11 @@ def _ranked(
 
 
 def _parts(problem: Problem, starts: int) -> list[slice]:
-    """What of a record the starts are simulated over: all of a short one; of a long one its beginning in closed loop,
-    whose state is not known later on, and else stretches from all over it: slow motion may come last."""
+    """Choose the stretches of a record over which starts are simulated.
+
+    All of a short record is. Of a long one in closed loop it is the beginning, for its state later on is unknown; else
+    stretches from all over it, since slow motion may come last.
+    """
     settings = OutputErrorSettings.current()
     count, most = len(problem.target), int(settings.samples_of_all_starts / starts)
     if count <= most or problem.closed:
@@ -186,7 +217,11 @@ def _parts(problem: Problem, starts: int) -> list[slice]:
 
 
 def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
-    """The end of the fit, and how well it is known."""
+    """Refine a fit to the end, and find how well its numbers are known.
+
+    Deviations allow for neighbouring errors that are alike, and for inputs that the log allows just as well
+    (`unsettled`).
+    """
     settings = OutputErrorSettings.current()
     mask = np.isin(np.arange(len(inner)), free)
     best = refine_fit(
@@ -202,8 +237,12 @@ def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progres
 
 
 def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.ndarray:
-    """The covariance of fitted numbers, shape (free, free), with deviations whose intervals hold those about what other
-    inputs make of them, which are `moved` by so much, each of shape (free,): one of these is true, not one between."""
+    """Widen a covariance, shape (free, free), so that intervals hold what other inputs make of
+    the numbers.
+
+    Each of `moved`, shape (free,), says how far one of these inputs moves the fitted numbers. One input is true, and
+    not one in between: half of the distance would be an interval that never holds the truth.
+    """
     if not moved:
         return covariance
     wanted = np.sqrt(np.diag(covariance)) + np.linalg.norm(moved, axis=0) / COVERAGE
@@ -215,7 +254,9 @@ def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.nd
 
 
 def _moved_by(inputs: Inputs, problem: Problem, best: np.ndarray, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """By how much the fitted numbers move, shape (free,), with other inputs, which a log allows just as well."""
+    """Return how far other inputs, which a log allows just as well, move the fitted numbers,
+    shape (free,).
+    """
     settings = OutputErrorSettings.current()
     change = replace(problem, inputs=inputs).residuals(best[None])[0] - rest
     if not np.isfinite(change).all():

@@ -12,11 +12,11 @@ from friso.identification.output_error.settings import OutputErrorSettings
 
 
 def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
-    """The best of fits to a log whose position is smoothed less and less.
+    """Smooth the position of a log less and less, as long as the fit gets better.
 
     Smoothing blurs where a stage breaks away: of one that stuck and slipped, the exponent of the Stribeck curve came
-    out at 1.47 for 2 and the bristles a fifth too soft, without any noise as well. Too little of it leaves the noise of
-    the position to the force.
+    out at 1.47 for 2 and the bristles a fifth too soft, without any noise as well. Too little smoothing leaves the
+    noise of the position to the force.
     """
     while fit.problem.sharper:
         sharper = polished(fit.problem.held_to(0), fit.free, fit.inner)
@@ -27,10 +27,10 @@ def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
 
 
 def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
-    """The better of two fits to a log, with its force held between the samples and not.
+    """Choose whether the force of a log is held between its samples or follows straight lines.
 
-    Half a sample apart, they move the damping of the bristles by half a sample times their stiffness. The other one no
-    longer counts where the better explains the record, to the `noise` [N] of its force, and the other clearly less.
+    Half a sample apart, the two move the damping of the bristles by half a sample times their stiffness. The worse one
+    no longer counts where the better explains the record, to the `noise` [N] of its force, and the worse clearly less.
     """
     settings = OutputErrorSettings.current()
     problem = fit.problem

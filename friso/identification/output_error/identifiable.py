@@ -29,9 +29,12 @@ well each is known; the last is the fit of those that are shown."""
 
 @dataclass(frozen=True)
 class IdentifiableFit:
-    """The fit, profiles by name of the parameters that not every motion shows, where they were asked about, and which
-    of these the record does show; `refuted` are parameters that something else in the record contradicts, with the
-    reason."""
+    """A fit, with the parameters of it that the record shows.
+
+    `profiles` holds, by name, those of the parameters that not every motion shows, as far as they were asked about, and
+    `shown` the names that the record does show. `refuted` are parameters that something else in the record contradicts,
+    with the reason.
+    """
 
     fit: OutputErrorFit
     profiles: Mapping[str, Profile]
@@ -47,13 +50,16 @@ def fit_identifiable(
     noise: float,
     progress: Progress = silent,
 ) -> IdentifiableFit:
-    """The fit and what of it to believe; `bandwidth` [Hz] is that of the motion, `noise` [N] the force's.
+    """Fit the whole model to a log, and decide what of the fit to believe.
+
+    `bandwidth` [Hz] is that of the motion, and `noise` [N] that of the force.
 
     A closed loop that explains the record to its noise has the first and last word, if need be from where the stage
     that follows the log leads. Where none does, that stage decides which parameters are shown, since a loop that hunts
     soon gets out of step, and the loop has no more to say than their values, unless it cannot follow. Where the fit is
-    clearly better with those that are not shown it keeps them: their effect is there, and without it friction and mass
-    would have to explain it."""
+    clearly better with parameters that are not shown it keeps them: their effect is there, and without it friction and
+    mass would have to explain it.
+    """
     names = [parameter.name for parameter in follows.parameters]
     core = {parameter.name for parameter in follows.parameters if parameter.core}
     part = between(progress, 0, PLAIN, "moves: mass and sliding friction along the log")
@@ -85,7 +91,10 @@ def fit_identifiable(
 def _identifiable_on_log(
     follows: Problem, plain: OutputErrorFit, core: set[str], covered: Coverage, noise: float, progress: Progress
 ) -> IdentifiableFit:
-    """What the stage that follows the log shows."""
+    """Fit the stage that follows the log, and find which parameters it shows.
+
+    `plain` is the fit of the `core` parameters alone. Parameters that the motion cannot show are not tried.
+    """
     names = [parameter.name for parameter in follows.parameters]
     hopeful = {name for name in names if name not in core and _may_show(name, covered, follows)}
     if not hopeful:
@@ -111,8 +120,11 @@ def _identifiable_on_log(
 def believed(
     full: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress, explained: bool = False
 ) -> IdentifiableFit:
-    """A fit with the profiles of all that not every motion shows; one that has `explained` the record is believed
-    wherever its profiles are sharp. Where a profile finds a fit that is clearly better, that one takes its place."""
+    """Profile all parameters that not every motion shows, and decide which of them to believe.
+
+    A fit that has `explained` the record is believed wherever its profiles are sharp; another one only where the motion
+    also covers what the parameter does. Where a profile finds a fit that is clearly better, that one takes its place.
+    """
     names = [parameter.name for parameter in full.problem.parameters]
     asked = [i for i in full.free if names[i] not in core]
     profiles: dict[str, Profile] = {}
@@ -132,7 +144,7 @@ def believed(
 
 
 def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
-    """Whether a fit with more parameters is better by more than chance would make it, with a probability of 99 %."""
+    """Tell whether a fit with more parameters is better by more than chance would make it."""
     settings = OutputErrorSettings.current()
     more = len(full.free) - len(plain.free)
     return bool(
@@ -141,16 +153,23 @@ def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
 
 
 def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -> bool:
-    """Whether a closed loop follows: its residual is no larger than that of the stage that follows the log, where that
-    counts, both within the motion's bandwidth [Hz], since the latter knows no noise above it."""
+    """Tell whether a closed loop follows the log: its residual is about that of the stage held
+    to the log.
+
+    Both are compared within the motion's bandwidth [Hz], and where the latter counts, since it holds no noise above
+    that.
+    """
     step, counted = looped.problem.inputs.sample_time, direct.problem.counted > 0
     powers = [np.sum(low_pass(fit.residual, step, bandwidth)[counted] ** 2) for fit in (looped, direct)]
     return bool(powers[0] <= OutputErrorSettings.current().residual_ratio_out_of_step ** 2 * powers[1])
 
 
 def bounds_as_much(looped: OutputErrorFit, direct: OutputErrorFit) -> bool:
-    """Whether a closed loop bounds all that the stage that follows the log does. Of a stage that sticks and slips it
-    may end where a few break-aways, a little late or early, are all that its derivatives know."""
+    """Tell whether a closed loop bounds all numbers that the stage which follows the log does.
+
+    Of a stage that sticks and slips, a loop may end where a few break-aways, a little late or early, are all that its
+    derivatives know.
+    """
     bounded = [
         {i for i, variance in zip(fit.free, np.diag(fit.covariance), strict=True) if np.isfinite(variance)}
         for fit in (looped, direct)
@@ -159,17 +178,20 @@ def bounds_as_much(looped: OutputErrorFit, direct: OutputErrorFit) -> bool:
 
 
 def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
+    """Return the places of the chosen names."""
     return tuple(i for i, name in enumerate(names) if name in chosen)
 
 
 def _complete(identifiable: set[str], optional: set[str]) -> set[str]:
-    """Without either of the Stribeck effect's parameters, the other one means nothing."""
+    """Drop the Stribeck curve from what is shown where one of its two parameters is not: alone,
+    neither means anything.
+    """
     effect = set(STRIBECK) & optional
     return identifiable if effect <= identifiable else identifiable - set(CURVE)
 
 
 def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
-    """Whether the motion covers anything that the parameter could show itself in."""
+    """Tell whether the motion covers anything in which a parameter could show itself."""
     parameter = next(candidate for candidate in problem.parameters if candidate.name == name)
     if name in CURVE:
         return bool(covered.steady.size) and covered.steady[0] < covered.steady[-1] / 10
@@ -179,7 +201,7 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
 
 
 def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
-    """Whether a profile closes on both sides, and near by."""
+    """Tell whether a profile closes on both sides, and near the fit."""
     settings = OutputErrorSettings.current()
     parameter = next(one for one in full.problem.parameters if one.name == seen.name)
     closed = not (seen.open_low or seen.open_high)
@@ -187,7 +209,7 @@ def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
 
 
 def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
-    """Whether the motion covers where a parameter acts."""
+    """Tell whether the motion covers the speeds, or the ways, at which a fitted parameter acts."""
     if name in CURVE:
         return covered.shows_speed(full.value("friction.stribeck_velocity"))
     if name in BRISTLES:
@@ -199,7 +221,7 @@ def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
 
 
 def why_not_shown(name: str, covered: Coverage) -> str:
-    """Why a parameter is not shown, in a sentence."""
+    """Say in a sentence why a parameter is not shown."""
     if name in CURVE:
         low, high = covered.gap
         if not np.isfinite(high):

@@ -25,9 +25,10 @@ BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
 
 @dataclass(frozen=True)
 class FitParameter:
-    """A parameter with its SI unit, start value and range; of a `logarithmic` one the logarithm is fitted.
+    """A parameter of the fit with its SI unit, start value and range.
 
-    `core` ones are shown by any motion; the others are asked about one by one.
+    Of a `logarithmic` one the logarithm is fitted. `core` parameters are shown by any motion; the others are asked
+    about one by one.
     """
 
     name: str
@@ -39,16 +40,18 @@ class FitParameter:
     core: bool = True
 
     def inner(self, value: Any) -> Any:
-        """The number that is fitted."""
+        """Return the number that is fitted for an SI value: its logarithm, or the value itself."""
         return np.log(value) if self.logarithmic else value
 
     def outer(self, inner: Any) -> Any:
-        """The SI value."""
+        """Return the SI value of a fitted number."""
         return np.exp(inner) if self.logarithmic else inner
 
 
 def bends(flat: Mapping[str, Any]) -> tuple[float, float]:
-    """Lengths [m], or angles [rad] on a rotary axis, by which bristles bend at least and at most before they slip."""
+    """Return the least and the largest length [m] that bristles bend before they slip; angles
+    [rad] on a rotary axis.
+    """
     settings = OutputErrorSettings.current()
     if axis_of(flat) == LINEAR:
         return settings.shortest_bristle_bend, settings.longest_bristle_bend
@@ -57,8 +60,10 @@ def bends(flat: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def stribeck_up_to(flat: Mapping[str, Any]) -> float:
-    """The highest Stribeck velocity [m/s] that is believed of a bearing; on a rotary axis [rad/s], at the radius in the
-    middle of those that bearings have."""
+    """Return the highest Stribeck velocity [m/s] that is believed of a bearing.
+
+    On a rotary axis it is in rad/s, at the radius in the middle of those that bearings have.
+    """
     settings = OutputErrorSettings.current()
     return (
         settings.highest_stribeck_velocity
@@ -68,20 +73,22 @@ def stribeck_up_to(flat: Mapping[str, Any]) -> float:
 
 
 def is_free(flat: Mapping[str, Any]) -> bool:
-    """Whether a stage given as flat keys has a joint that moves."""
+    """Tell whether a stage given as flat keys has a joint that moves."""
     return "joint.stiffness" in flat and not flat["joint.locked"]
 
 
 def fit_parameters(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
 ) -> list[FitParameter]:
-    """The parameters of a stage given as flat keys, that a log may show.
+    """List the parameters of a stage given as flat keys that a log may show, with their starts
+    and ranges.
 
-    `levels` holds first values, of mass, Coulomb and viscous friction and offset, from the inverse model; `speed` [m/s]
-    is the highest of the log, `travel` [m] how far it goes: no bristle bends further, and no Stribeck velocity is
+    `levels` holds first values, of mass, Coulomb and viscous friction and offset, from the inverse model. `speed` [m/s]
+    is the highest of the log, and `travel` [m] how far it goes: no bristle bends further, and no Stribeck velocity is
     higher unless bearings have such. Where it does not go `both_ways`, a constant force and an asymmetry cannot be
     distinguished from friction, and are left out. Raises InputError for a friction law that is not among those that can
-    be fitted."""
+    be fitted.
+    """
     mass = levels["mass"]
     parameters = [FitParameter(MASS, "kg", mass, mass / 5, mass * 5)]
     if friction_law(flat["friction.model"]).fitted:
@@ -108,6 +115,7 @@ def fit_parameters(
 def _friction(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
 ) -> list[FitParameter]:
+    """List the parameters of friction."""
     settings = OutputErrorSettings.current()
     coulomb, viscous = levels["coulomb"], levels["viscous"]
     parameters = [
@@ -133,27 +141,33 @@ def _friction(
 
 
 def _exponent(stated: float) -> FitParameter:
-    """The exponent of the Stribeck curve, from a little below what the stage has: 1 and 2 have equations of their own,
-    in which it does not occur."""
+    """Return the exponent of the Stribeck curve as a parameter.
+
+    It starts a little below what the stage has: 1 and 2 have equations of their own, in which no exponent occurs.
+    """
     settings = OutputErrorSettings.current()
     start, (least, most) = settings.exponent_share_of_a_start * stated, settings.stribeck_exponents
     return FitParameter(EXPONENT, "", start, min(least, start), max(most, start), logarithmic=False, core=False)
 
 
 def _slow(name: str, unit: str, flat: Mapping[str, Any], low: float, high: float) -> FitParameter:
-    """A parameter that slow motion alone shows, from what the stage has, in a range that holds that too."""
+    """Return a parameter that slow motion alone shows; it starts at what the stage has, which
+    widens its range if need be.
+    """
     start = float(flat[name])
     return FitParameter(name, unit, start, float(min(low, start)), float(max(high, start)), core=False)
 
 
 def stages(flat: Mapping[str, Any], parameters: Sequence[FitParameter], inner: np.ndarray) -> dict[str, Any]:
-    """The flat keys of the stages that the numbers fitted, shape (runs, parameters), make of a stage."""
+    """Return the flat keys of the stages that fitted numbers, shape (runs, parameters), make of
+    a stage.
+    """
     values = {parameter.name: parameter.outer(column) for parameter, column in zip(parameters, inner.T, strict=True)}
     return {**flat, **keys_of(flat, values)}
 
 
 def keys_of(flat: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys of the stage file to SI values from values of parameters, numbers or arrays."""
+    """Turn values of parameters, numbers or arrays, into SI values of keys of the stage file."""
     keys = {name: value for name, value in values.items() if name not in (MASS, SHARE, RATIO)}
     bodies = [name for name in ("masses.cart", "masses.stage") if name in flat]
     total = sum(flat[name] for name in bodies)

@@ -17,9 +17,12 @@ WORSE = float(chi2.ppf(0.95, 1))
 
 @dataclass(frozen=True)
 class Profile:
-    """Values of a parameter, ascending [SI], the mean squares of the residual with the other ones fitted [N^2], and
-    what that may at most be inside the 95 % interval; `low` and `high` are the interval's ends, those of the range
-    where it ends nowhere before (`open_low`, `open_high`)."""
+    """How much worse a fit gets as one parameter is moved away, all others following.
+
+    `values` of the parameter, ascending [SI], have `cost`, the mean squares of the residual [N^2]; inside the 95 %
+    interval that is at most `limit`. `low` and `high` are the interval's ends, or those of the range where it ends
+    nowhere before (`open_low`, `open_high`).
+    """
 
     name: str
     values: np.ndarray
@@ -32,10 +35,10 @@ class Profile:
 
 
 def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: float) -> tuple[Profile, Refined]:
-    """The profile of parameter `number`, with the `others` fitted at each of its values, and what these fits are.
+    """Profile parameter `number`, with the `others` fitted at each of its values.
 
     `best` is the mean square [N^2] of the fit that others are compared with. The values reach as far as the interval,
-    or over the whole range.
+    or over the whole range. Returns the profile and the fits behind it.
     """
     settings = OutputErrorSettings.current()
     low, high = (float(end[number]) for end in bounds_of(fit.problem))
@@ -58,7 +61,7 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
 
 
 def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray) -> Refined:
-    """The fits at values of a parameter, shape (values,), the others free."""
+    """Fit the other parameters at each of some values of one, shape (values,)."""
     settings = OutputErrorSettings.current()
     starts = np.repeat(fit.inner[None], len(values), axis=0)
     starts[:, number] = values
@@ -78,7 +81,9 @@ def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:
-    """Where the profile crosses the limit, on both sides of its lowest value, and on which side it does not."""
+    """Find where a profile crosses the limit on both sides of its lowest value, and on which
+    side it does not.
+    """
     lowest = int(np.argmin(cost))
     left, right = values[0], values[-1]
     inside = cost <= max(limit, cost[lowest])
@@ -91,7 +96,10 @@ def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, fl
 
 
 def _crossing(values: np.ndarray, cost: np.ndarray, limit: float, outside: int, inside: int) -> float:
-    """Where the profile crosses the limit between two values, by the square root of what it is worse."""
+    """Find where a profile crosses the limit between two values.
+
+    The square root of what it is worse grows in proportion to the distance.
+    """
     if not np.isfinite(cost[outside]):
         return values[inside]
     base = min(cost[inside], limit)

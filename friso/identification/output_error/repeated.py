@@ -22,14 +22,15 @@ from friso.progress import Progress
 def as_far_off_as_repeated(
     once: OutputErrorFit, log: Log, part: slice, bandwidth: float, noise: float, progress: Progress
 ) -> OutputErrorFit:
-    """The fit of a stage that followed `part` of a log, with deviations no smaller than what fits to simulated logs
-    are off by.
+    """Widen a fit to a log to what fits to simulated logs of the fitted machine are off by.
 
+    The stage followed `part` of the log; `noise` [N] is that of its force, and `bandwidth` [Hz] that of its motion.
     Noise of the position blurs where a stage breaks away, and noise of the force breaks it away early or late: what the
     stage that follows makes of that is no error about the fitted values that a Jacobian could tell, but one to one side
-    (parametric bootstrap: Efron, Tibshirani 1993, chapter 6). `noise` [N] is that of the log's force. A fit that leaves
-    more than those to the simulated logs do is off by as much more than they are: noise that has led it away, as that
-    of a force in coarse digits does, moves the machine it made less than it moved the true one.
+    (parametric bootstrap: Efron, Tibshirani 1993, chapter 6).
+
+    A fit that leaves more than those to the simulated logs do is off by as much more than they are: noise that has led
+    it away, as that of a force in coarse digits does, moves the machine it made less than it moved the true one.
     """
     settings = OutputErrorSettings.current()
     free = np.isin(np.arange(len(once.inner)), once.free)
@@ -54,9 +55,11 @@ def as_far_off_as_repeated(
 
 
 def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
-    """The fit of a stage that followed a log which it does not explain to its noise, with a deviation of the damping of
-    the bristles that allows for one sample: what holds the stage to the log knows no better when it breaks away, and a
-    delay passes for damping, times the stiffness."""
+    """Widen the damping of the bristles by what one sample of delay does to it.
+
+    That is for a stage that followed a log which it does not explain to its noise: what holds it to the log knows no
+    better when it breaks away, and a delay passes for damping, times the stiffness.
+    """
     names = [parameter.name for parameter in fit.problem.parameters]
     places = {names[number]: place for place, number in enumerate(fit.free)}
     if not {"friction.bristle_stiffness", "friction.bristle_damping"} <= places.keys():
@@ -71,8 +74,11 @@ def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
 def _simulated_logs(
     once: OutputErrorFit, log: Log, part: slice, bandwidth: float, noise: float, progress: Progress
 ) -> Iterator[Problem]:
-    """Problems like that of a fit, of logs that the stage it made leaves when it does as it did there: the force is
-    that of the log and of the controller that held it, the position is its own, and either has the log's noise."""
+    """Yield problems like that of a fit, of simulated logs whose truth is the fitted machine.
+
+    Their force is that of the log and of the controller that held the stage to it, their position is the stage's own,
+    and either has the log's noise.
+    """
     settings = OutputErrorSettings.current()
     problem = once.problem
     record, rng = problem.record(once.inner), np.random.default_rng(settings.seed_of_repetitions)

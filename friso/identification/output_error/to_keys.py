@@ -20,7 +20,11 @@ METHOD = "output error"
 
 
 def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    """The keys of the stage file with their intervals, and the correlation of those shown."""
+    """Turn a fit into estimates of keys of the stage file, with the correlation of those shown.
+
+    Intervals reach as far as profiles do, and allow for the linearity of sensors; what the record does not show is a
+    range with the reason.
+    """
     reading_settings = ReadingSettings.current()
     settings = OutputErrorSettings.current()
     fit = identified.fit
@@ -62,8 +66,10 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
 
 
 def _to_the_farther_end(deviation: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Deviations that reach, about `values` fitted as logarithms, as far as the upper end of the interval of the
-    logarithm does: that of half a value is 0.65 of it above, and 0.4 below."""
+    """Return deviations that reach as far as the upper end of an interval of the logarithm.
+
+    About half a value, such an interval reaches 0.65 of the value above it and 0.4 below.
+    """
     size = np.abs(values)
     relative = np.divide(deviation, size, out=np.zeros_like(size), where=size > 0)
     farther = size * np.expm1(COVERAGE * np.minimum(relative, 1.0)) / COVERAGE
@@ -75,7 +81,7 @@ _OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}
 
 
 def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
-    """Why parameters, or keys that hang on them, are not shown."""
+    """Say why parameters, or keys that hang on them, are not shown."""
     settings = OutputErrorSettings.current()
     fit = identified.fit
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
@@ -103,7 +109,9 @@ def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
 
 
 def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.ndarray:
-    """The covariance of the fitted numbers with spreads that reach as far as the profiles do."""
+    """Widen the covariance of fitted numbers so that their intervals reach as far as the
+    profiles do.
+    """
     spread = np.sqrt(np.diag(fit.covariance))
     factors = np.ones(len(fit.free))
     for i, number in enumerate(fit.free):
@@ -118,6 +126,7 @@ def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.nda
 
 
 def _keys_at(fit: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
+    """Return the keys of the stage file that fitted numbers make."""
     values = {
         parameter.name: parameter.outer(number) for parameter, number in zip(fit.problem.parameters, inner, strict=True)
     }
@@ -125,7 +134,9 @@ def _keys_at(fit: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
 
 
 def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
-    """The keys of the stage file, and their derivatives to the fitted numbers, shape (keys, parameters)."""
+    """Return the keys of the stage file, and their derivatives to the fitted numbers, shape
+    (keys, parameters).
+    """
     at = _keys_at(fit, fit.inner)
     step = 1e-6
     moved = [_keys_at(fit, fit.inner + step * row) for row in np.eye(len(fit.inner))]
@@ -133,8 +144,10 @@ def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
 
 
 def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
-    """What is possible of a key that is not shown: all that is believed of any bearing, since what a fit makes of such
-    a parameter, it makes up for what the model lacks."""
+    """Return what is possible of a key that is not shown: all that is believed of any bearing.
+
+    What a fit makes of such a parameter, it makes up for what the model lacks, and is no bound.
+    """
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     parameter = parameters[owner]
     if owner == RATIO:
