@@ -28,8 +28,11 @@ WITHOUT_CONTROLLER = (
 
 
 def _claims(course: Course) -> str | None:
-    """A reference moves; or it is no series of constant speeds or force ramps, and nothing repeats, the position rests
-    in between, or the force turns seldom and holds few frequencies."""
+    """Claim a log whose reference moves, or in which nothing repeats as an excitation does.
+
+    It is no series of constant speeds or force ramps; the position rests in between, or the force turns seldom and
+    holds few frequencies.
+    """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if course.reference_moves:
         return "its reference moves"
@@ -50,7 +53,9 @@ def _claims(course: Course) -> str | None:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> IdentifiedMoves:
-    """With a stage that was given and a reference, in the machine's own loop; from what other experiments show."""
+    """Analyse a log in the machine's own loop, where stage and reference are given, from what
+    other experiments show.
+    """
     (whole,) = logs
     assert isinstance(whole, Log)
     if prior.from_user:
@@ -62,27 +67,28 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _in_newtons(log: Log) -> bool:
+    """Tell whether the force of a log is in newtons."""
     return log.unit("force") == ROLES["force"]
 
 
 def _around(log: Log) -> Stage | None:
-    """A stage around a log whose force is in newtons."""
+    """Make up a stage around a log whose force is in newtons."""
     part = log.excerpt(ExperimentSettings.current().samples_of_moves)
     return made_up(part, inverse_model(part)) if _in_newtons(log) else None
 
 
 def _estimates(result: IdentifiedMoves, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Keys of the stage file, which are in newtons."""
+    """Return estimates of keys of the stage file, which are in newtons."""
     return result.estimates if _in_newtons(result.log) else ()
 
 
 def _correlated(result: IdentifiedMoves, estimates: Sequence[Estimate]) -> Correlated:
-    """Those that are shown, as the fit correlates them."""
+    """Return the estimates that are shown, as the fit correlates them."""
     return (result.correlated, result.correlation) if estimates else ((), np.zeros((0, 0)))
 
 
 def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]:
-    """Where the drive that was given is not the one simulated, and where no controller was."""
+    """Say where the drive that was given is not the one simulated, and where no controller was."""
     settings = ExperimentSettings.current()
     loops = [result for result in results if result.loop] if stage is not None else []
     reasons = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
@@ -100,18 +106,24 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
 
 
 def _span(log: Log) -> str:
+    """The span of a log in words."""
     start, end = (round(float(log.time[k]), 9) + 0.0 for k in (0, -1))  # not -2e-16 s
     return f"{start:.6g} to {end:.6g} s"
 
 
 def _predict(result: IdentifiedMoves, log: Log, prior: Prior, settings: AnalysisSettings) -> SimulatedLog | None:
+    """Simulate another log with a reference; None where the machine's own loop is not known."""
     if "reference" not in log or result.loop is None:
         return None
     return simulated_log(result, log, prior.flat(log) or None)
 
 
 def _check_prediction(logs: Sequence[Source], other: Log, prior: Prior) -> None:
-    """Raises InputError where none of the logs will be simulated in the machine's own loop, or the other cannot be."""
+    """Check that a log will be identified in the machine's own loop, and that the other can be
+    simulated.
+
+    Raises InputError where either is not so.
+    """
     check_roles(other, ("position", "force", "reference"))
     prior.flat(other)
     if not prior.from_user:

@@ -47,8 +47,11 @@ DELAY = "the drive's delay is needed: give it in [drive] of the stage file, --st
 
 @dataclass(frozen=True)
 class MassOnBristles:
-    """Moving mass [kg], stiffness [N/m] and damping [N s/m] of the bristles as other experiments show them, each with
-    the half-width of its interval; the exponent of the Stribeck curve."""
+    """Mass and bristles as other experiments show them.
+
+    Moving mass [kg], stiffness [N/m] and damping [N s/m] of the bristles each have the half-width of their interval;
+    `exponent` is that of the Stribeck curve.
+    """
 
     mass: tuple[float, float]
     stiffness: tuple[float, float]
@@ -58,10 +61,13 @@ class MassOnBristles:
 
 @dataclass(frozen=True)
 class SlowSliding:
-    """Coulomb and static friction [N] and Stribeck velocity [m/s], and the `correlation` of the three, shape (3, 3).
-    Over time [s], shape (n,): the velocity [m/s] of the body on the bearing, its friction [N], low-passed, and that of
-    the model (empty where there is none); and the share of the friction's standard deviation that it leaves
-    unexplained; the exponent of its Stribeck curve."""
+    """Friction that slow sliding shows.
+
+    `estimates` are Coulomb and static friction [N] and Stribeck velocity [m/s], with the `correlation` of shape (3, 3).
+    Over time [s], shape (n,), there are the velocity [m/s] of the body on the bearing, its friction [N], low-passed,
+    and that of the model (empty where there is none). `unexplained` is the share of the friction's standard deviation
+    that the model leaves.
+    """
 
     estimates: tuple[Estimate, ...]
     correlation: np.ndarray
@@ -76,10 +82,13 @@ class SlowSliding:
 
 @dataclass(frozen=True)
 class _Equation:
-    """The low-pass; the moves [m] of the body on the bearing between samples, shape (n - 1,), and its velocity [m/s],
-    shape (n,); the friction [N] at the low-pass without the viscous, and what a later force does to it, per second,
-    shape (m,); what is known of the bristles; the `sizes` of what is fitted: of Coulomb friction, of what static
-    friction is more, of the Stribeck velocity, of the constant force and of that of the bristles at the start."""
+    """The equation of a record of slow sliding at a low-pass.
+
+    It has the moves [m] of the body on the bearing between samples, shape (n - 1,), and its velocity [m/s], shape (n,);
+    at the low-pass, shape (m,), the friction [N] without the viscous part, and what a later force does to it, per
+    second. `sizes` are those of what is fitted: of Coulomb friction, of what static friction is more, of the Stribeck
+    velocity, of the constant force and of that of the bristles at the start.
+    """
 
     low_pass: LowPass
     moves: np.ndarray
@@ -90,8 +99,10 @@ class _Equation:
     sizes: np.ndarray
 
     def model(self, p: np.ndarray) -> np.ndarray:
-        """Friction [N] at the low-pass, shape (m,), of the logarithms of the first three over their `sizes`, and of the
-        other two over theirs."""
+        """Return the friction [N] of the model at the low-pass, shape (m,).
+
+        Of what is fitted, the first three are logarithms over their `sizes`, the other two shares of theirs.
+        """
         coulomb, more, stribeck, constant, start = np.append(np.exp(p[:3]), p[3:]) * self.sizes
         stiffness, damping = self.contact.stiffness[0], self.contact.damping[0]
         speed = np.abs(self.velocity)
@@ -100,10 +111,11 @@ class _Equation:
         return self.low_pass(stiffness * z + damping * (self.velocity - speed * z / ends)) + constant
 
     def residual(self, p: np.ndarray) -> np.ndarray:
+        """Return model less measured friction [N], shape (m,)."""
         return self.model(p) - self.friction
 
     def derivatives(self, p: np.ndarray) -> np.ndarray:
-        """Of the residual, shape (m, 5)."""
+        """Return the derivatives of the residual, shape (m, 5)."""
         settings = ExperimentSettings.current()
         residuals_here = self.model(p)
         return np.stack(
@@ -116,13 +128,15 @@ class _Equation:
 
 
 def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristles | None) -> SlowSliding:
-    """Static and Coulomb friction and Stribeck velocity from a log of position and force in which the bearing slides
-    slowly, there and back. Of a log with gaps the longest stretch is used, and of that no more than `MOST` samples.
+    """Estimate friction over speed from a log in which the bearing slides slowly, there and
+    back.
 
-    A joint is held, or its deflection is measured. The intervals contain what a lower low-pass changes, what the
-    intervals of the known mass, bristles and viscous friction do, what the delay does that fits best, and the share of
-    the friction that is left unexplained; contact, mode and exponent are taken as given. Raises InputError for missing
-    channels.
+    It shows static and Coulomb friction and Stribeck velocity. Of a log with gaps the longest stretch is used, and of
+    that no more than the settings say. A joint is held, or its deflection is measured.
+
+    The intervals contain what a lower low-pass changes, what the intervals of the known mass, bristles and viscous
+    friction do, what the delay does that fits best, and the share of the friction that is left unexplained; contact,
+    mode and exponent are taken as given. Raises InputError for missing channels.
     """
     settings = ExperimentSettings.current()
     record = record_of(
@@ -154,28 +168,32 @@ def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristl
 
 
 def _off(between: Between, contact: MassOnBristles) -> list[tuple[Between, MassOnBristles]]:
-    """What is known, with each in turn at the end of its interval."""
+    """Return what is known beforehand, with each quantity in turn at the end of its interval."""
     doubted = {key: getattr(contact, key) for key in ("mass", "stiffness", "damping")}
     others = [(between, replace(contact, **{key: (sum(value), value[1])})) for key, value in doubted.items()]
     return [*others, (replace(between, viscous=(sum(between.viscous), between.viscous[1])), contact)]
 
 
 def _parameter_change(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """By how much a residual, shape (m,), moves what is fitted, whose derivatives are of shape (m, p)."""
+    """Return by how much a residual, shape (m,), moves what is fitted, whose derivatives are of
+    shape (m, p).
+    """
     return -np.linalg.lstsq(jacobian, residual, rcond=None)[0]
 
 
 def _nothing(why: str) -> SlowSliding:
+    """Return a result that shows nothing, for a reason."""
     none = np.empty(0)
     return SlowSliding(_unknown(why), np.eye(3), none, none, none, none, np.nan)
 
 
 def _unknown(why: str) -> tuple[Estimate, ...]:
+    """Return the three quantities as not determined, for a reason."""
     return tuple(Estimate.unknown(*key, METHOD, why) for key in zip(NAMES, UNITS, strict=True))
 
 
 def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
-    """Of what is fitted: the mean force [N], and the RMS velocity [m/s]."""
+    """Return the sizes of what is fitted: the mean force [N], and the RMS velocity [m/s]."""
     level, low_pass = float(np.abs(record.force - record.force.mean()).mean()), LowPass(record.time, cutoff)
     return np.array([level, level, float(low_pass(rate_of(record.time, record.body)).std()), level, level])
 
@@ -183,7 +201,7 @@ def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
 def _equation(
     record: BearingRecord, between: Between, contact: MassOnBristles, cutoff: float, sizes: np.ndarray
 ) -> _Equation:
-    """The equation of a record at a low-pass [Hz]."""
+    """Set up the equation of a record at a low-pass [Hz]."""
     settings = ExperimentSettings.current()
     seen, low_pass = record.seen(settings.low_pass_of_sliding * cutoff), LowPass(record.time, cutoff)
     body, force, inertia = at_bearing(seen, between, contact.mass[0])
@@ -194,7 +212,7 @@ def _equation(
 
 
 def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
-    """What fits best from any start, shape (5,)."""
+    """Return what fits best from any start, shape (5,)."""
     settings = ExperimentSettings.current()
     least, most = settings.sliding_bounds
     low, high = np.array([*np.log([least] * 3), -most, -most]), np.array([*np.log([most] * 3), most, most])
@@ -225,8 +243,11 @@ def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
 def _estimates(
     best: np.ndarray, covariance: np.ndarray, shifts: np.ndarray, left: float
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    """The three quantities and their correlation, by the logarithms that were fitted, their covariance, shape (3, 3),
-    and `shifts` of them, shape (m, 3), and the share of the friction that is `left`."""
+    """Turn fitted logarithms into the three quantities and their correlation.
+
+    The logarithms have a covariance, shape (3, 3), and `shifts` of them, shape (m, 3); a share of the friction is
+    `left`.
+    """
     settings = ReadingSettings.current()
     coulomb, more, stribeck = np.exp(best[:3])
     values = (coulomb, coulomb + more, stribeck)
@@ -241,7 +262,10 @@ def _estimates(
 
 
 def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
-    """The estimates as far as the motion determines them, whose model leaves a share of the friction unexplained."""
+    """Return the estimates as far as the motion determines them.
+
+    Their model leaves a share of the friction unexplained.
+    """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     coulomb, static, stribeck = estimates
     fastest = float(np.abs(velocity).max())
@@ -260,13 +284,14 @@ def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> SlowSliding:
+    """Analyse a log with the mass and the bristles that other experiments show."""
     (log,) = logs
     assert isinstance(log, Log)
     return stribeck_from_slow_sliding(log, believed_between(prior, log), _bristles(prior, log))
 
 
 def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
-    """The mass and the bristles that other experiments show; None where they do not."""
+    """Return the mass and the bristles that other experiments show; None where they do not."""
     flat = prior.flat(log)
     masses = [key for key in flat if key.startswith("masses.")]
     bristles = ["friction.bristle_stiffness", "friction.bristle_damping"]
@@ -278,7 +303,7 @@ def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
 
 
 def _correlated(result: SlowSliding, estimates: Sequence[Estimate]) -> Correlated:
-    """As the fit has it."""
+    """Return the estimates that are shown, as the fit correlates them."""
     certain = determined(estimates)
     rows = [result.estimates.index(estimate) for estimate in certain]
     return certain, result.correlation[np.ix_(rows, rows)]

@@ -32,8 +32,10 @@ METHOD = "differences of force over differences of deflection between settled po
 
 @dataclass(frozen=True)
 class Window:
-    """A settled window: from `start` to `end` [s], mean deflection [m] and force [N], with the standard error of the
-    force at that deflection by block means, the rest of a drift included."""
+    """A settled window from `start` to `end` [s], with mean deflection [m] and force [N].
+
+    `force_error` is the standard error of the force at that deflection by block means, the rest of a drift included.
+    """
 
     start: float
     end: float
@@ -44,9 +46,12 @@ class Window:
 
 @dataclass(frozen=True)
 class StepStiffness:
-    """The stiffness [N/m], of all steps and of those up and down; `hysteresis` [N], by how much more force stands at a
-    deflection reached from below than from above; the settled `windows`; the force [N] low-passed, shape (n,); whether
-    the cart was fixed (None: not measured)."""
+    """The stiffness [N/m] of a joint from position steps with the cart fixed.
+
+    It is that of all steps and of those up and down; `hysteresis` [N] is by how much more force stands at a deflection
+    reached from below than from above. There are the settled `windows`, the force [N] low-passed, shape (n,), and
+    whether the cart was fixed (None: not measured).
+    """
 
     stiffness: Estimate
     up: Estimate
@@ -61,7 +66,8 @@ class StepStiffness:
 
 
 def stiffness_from_steps(log: Log) -> StepStiffness:
-    """Stiffness from steps of the position with the cart fixed, the force low-passed at `CUTOFF` [Hz].
+    """Estimate the stiffness from steps of the position with the cart fixed, the force
+    low-passed.
 
     Windows are the plateaus of the reference, or of the position where there is none. Without two steps between settled
     windows the stiffness is unknown. Raises InputError for a log without position or force in SI units.
@@ -94,7 +100,9 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
 
 
 def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
-    """Stretches of a segment over which the reference, else the position, keeps its level, long enough to average."""
+    """Find stretches of a segment over which the reference, else the position, keeps its level
+    long enough to average.
+    """
     least = int(np.ceil(4 / (cutoff * log.sample_time)))
     if part.stop - part.start < 2 * least:
         return []
@@ -113,14 +121,20 @@ def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
 
 
 def _scale(position: np.ndarray, spans: list[slice]) -> float:
-    """The size of the larger steps [m]: the median of those that are not small against the largest."""
+    """Return the size of the larger steps [m]: the median of those that are not small against
+    the largest.
+    """
     levels = np.array([np.median(position[s][(s.stop - s.start) // 2 :]) for s in spans])
     sizes = np.abs(np.diff(levels))
     return float(np.median(sizes[sizes >= 0.3 * sizes.max()])) if len(sizes) else 0.0
 
 
 def _secant(position: np.ndarray, force: np.ndarray, spans: list[slice]) -> float:
-    """About how much force [N/m] goes with the deflection, by the later half of each plateau; 0 without two of them."""
+    """Return about how much force [N/m] goes with the deflection, by the later half of each
+    plateau.
+
+    It is 0 without two plateaus.
+    """
     levels = np.array([[np.median(x[s][(s.stop - s.start) // 2 :]) for x in (position, force)] for s in spans])
     if len(levels) < 2 or not np.ptp(levels[:, 0]) > 0:
         return 0.0
@@ -130,8 +144,11 @@ def _secant(position: np.ndarray, force: np.ndarray, spans: list[slice]) -> floa
 def _settled_window(
     log: Log, span: slice, force: np.ndarray, position: np.ndarray, scale: float, secant: float
 ) -> Window | None:
-    """The part of a plateau that has settled: the deflection hardly drifts, and the force drifts by no more than goes
-    with that, but for a share of a step or what noise explains."""
+    """Return the part of a plateau that has settled; None without one.
+
+    The deflection hardly drifts there, and the force drifts by no more than goes with that, but for a share of a step
+    or what noise explains.
+    """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     length = span.stop - span.start
     margin = min(length // 10, int(1 / (experiment_settings.low_pass_of_steps * log.sample_time)))
@@ -153,14 +170,16 @@ def _settled_window(
 
 
 def _drifting(values: np.ndarray) -> tuple[Mean, float]:
-    """The mean, and by how much the values drift over the window beyond what their scatter explains (two errors)."""
+    """Return the mean, and by how much values drift over a window beyond what their scatter
+    explains (two errors).
+    """
     mean = block_mean(values)
     shift = values[len(values) // 2 :].mean() - values[: len(values) // 2].mean()
     return mean, float(max(abs(2 * shift) - 4 * mean.error, 0.0))
 
 
 def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str, plateaus: int) -> Estimate:
-    """Least squares of the differences of force on those of deflection through the origin.
+    """Fit the differences of force on those of deflection by a line through the origin.
 
     Neighbouring differences share a window: the variance is the larger of that of independent differences (a force that
     wanders) and of differences of independent windows (noise), and no less than the noise within the windows says.
@@ -185,7 +204,9 @@ def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str,
 
 
 def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
-    """Force = offset + stiffness * deflection + half the hysteresis * direction of the step before."""
+    """Fit force = offset + stiffness * deflection + half the hysteresis * direction of the step
+    before.
+    """
     name, unit, method = "hysteresis", "N", "force at a deflection reached from below minus from above"
     x, force = np.array([[w.position, w.force] for w in windows]).reshape(-1, 2).T
     if len(x) < 5 or len(set(direction := np.sign(np.diff(x)))) < 2:
@@ -200,7 +221,7 @@ def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
 
 
 def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple[bool | None, tuple[str, ...]]:
-    """Whether the cart stood still between the windows, and what to say of it."""
+    """Tell whether the cart stood still between the windows, and what to say of it."""
     moved = cart(log)
     if moved is None:
         return None, ("The cart is assumed fixed: no channel shows whether it is.",)
@@ -215,18 +236,21 @@ def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StepStiffness:
+    """Analyse a log of position steps."""
     (log,) = logs
     assert isinstance(log, Log)
     return stiffness_from_steps(log)
 
 
 def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ...]:
-    """The stiffness, but not for a stage that has no joint."""
+    """Return the stiffness, but not for a stage that has no joint."""
     return (replace(result.stiffness, name=KEY),) if stage is None or stage.joint else ()
 
 
 def _claims(course: Course) -> str | None:
-    """The position rests in several places, without a reference that moves, and the force rises with the place."""
+    """Claim a log whose position rests in several places, without a reference that moves, where
+    force rises with place.
+    """
     if course.reference_moves or not course.against_a_spring:
         return None
     return "the position rests here and there, and the force follows from the place, as against a spring"

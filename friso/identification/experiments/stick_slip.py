@@ -42,12 +42,16 @@ KEY = "friction.static"
 
 @dataclass(frozen=True)
 class StickSlip:
-    """Static friction [N], in all and per direction; mean break-away force [N] per direction as measured at its force
-    rate, and its range over the slips (5 to 95 %); a force common to both directions (sensor offset, or unequal
-    friction); the joint's `stiffness` [N/m] as force and deflection of this log show it. Per slip, shape (n,): time
-    [s], place on the rail [m], direction, peak deflection [m] (NaN without sensor), break-away force [N] in that
-    direction, force rate [N/s], highest speed of the cart [m/s]. Over time, shape (samples,): force on the cart [N] and
-    its speed [m/s]."""
+    """Static friction from slow motion that sticks and slips.
+
+    Static friction [N] is that in all and per direction; there are the mean break-away force [N] per direction as
+    measured at its force rate, and its range over the slips (5 to 95 %); a force common to both directions (sensor
+    offset, or unequal friction); and the joint's `stiffness` [N/m] as force and deflection of this log show it.
+
+    Per slip, shape (n,): time [s], place on the rail [m], direction, peak deflection [m] (NaN without sensor),
+    break-away force [N] in that direction, force rate [N/s], highest speed of the cart [m/s]. Over time, shape
+    (samples,): force on the cart [N] and its speed [m/s].
+    """
 
     static: Estimate
     forward: Estimate
@@ -72,13 +76,13 @@ class StickSlip:
 def static_from_stick_slip(
     log: Log, stiffness: Estimate | float | None = None, stage_mass: float = 0.0, stroke: float = np.inf
 ) -> StickSlip:
-    """Static friction from slow motion that sticks and slips.
+    """Estimate static friction from slow motion that sticks and slips.
 
     With the joint's `stiffness` [N/m] (an Estimate brings its interval) the force on the cart is that times the
     deflection measured; without, the actuator force less `stage_mass` [kg] times the acceleration of the position. How
-    far the finite force rate lowers it is extrapolated or bounded, see `rate_effect`.
-    Slips from a deflection at the `stroke` [m] of the joint tell nothing of it. What the record cannot show is unknown
-    with its reason. Raises InputError for missing channels or an unusable stiffness.
+    far the finite force rate lowers it is extrapolated or bounded, see `rate_effect`. Slips from a deflection at the
+    `stroke` [m] of the joint tell nothing of it. What the record cannot show is unknown with its reason. Raises
+    InputError for missing channels or an unusable stiffness.
     """
     settings = ExperimentSettings.current()
     deflected, pushed = (
@@ -113,17 +117,20 @@ def static_from_stick_slip(
 
 
 def _smooth(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
+    """Low-pass values of a log at a cut-off [Hz], segment by segment."""
     return np.concatenate([low_pass(values[s], log.sample_time, cutoff) for s in log.segments])
 
 
 def _deflection(log: Log, cutoff: float) -> np.ndarray | None:
-    """Deflection of the joint [m], low-passed; None where it is not measured."""
+    """Return the deflection of the joint [m], low-passed; None where it is not measured."""
     measured = deflection(log)
     return None if measured is None else _smooth(log, measured, cutoff)
 
 
 def _actuator(log: Log, stage_mass: float, cutoff: float) -> np.ndarray | None:
-    """Force of the actuator less the stage's inertia [N], low-passed; None where it is not measured."""
+    """Return the force of the actuator less the stage's inertia [N], low-passed; None where it
+    is not measured.
+    """
     if "force" not in log:
         return None
     force = _smooth(log, channel(log, "force"), cutoff)
@@ -133,13 +140,16 @@ def _actuator(log: Log, stage_mass: float, cutoff: float) -> np.ndarray | None:
 
 
 def _rate(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
+    """Differentiate values of a log, low-passed at a cut-off [Hz], segment by segment."""
     return np.concatenate([rate(values[s], log.sample_time, cutoff) for s in log.segments])
 
 
 def _pull(
     log: Log, stiffness: Estimate | float | None, deflected: np.ndarray | None, pushed: np.ndarray | None
 ) -> tuple[np.ndarray, float]:
-    """Force on the cart [N], low-passed, and the relative standard deviation of its scale."""
+    """Return the force on the cart [N], low-passed, and the relative standard deviation of its
+    scale.
+    """
     if stiffness is None:
         return channel(log, "force") if pushed is None else pushed, 0.0  # raises: neither of the two is known
     value, half = (stiffness.value, stiffness.half_width) if isinstance(stiffness, Estimate) else (stiffness, 0.0)
@@ -151,7 +161,7 @@ def _pull(
 
 
 def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutoff: float) -> Estimate:
-    """The joint's stiffness as this log shows it."""
+    """Estimate the joint's stiffness as this log shows it."""
     pushed = _actuator(log, 0.0, cutoff)
     if deflected is None or pushed is None or "position" not in log:
         reason = "force, position and deflection are not all measured"
@@ -164,9 +174,12 @@ def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutof
 def _peak(
     pull: np.ndarray, sample_time: float, cutoff: float, marks: tuple[int, int, int, int]
 ) -> tuple[int, float, float, float, bool]:
-    """Where the pull peaks between visible motion and top speed, its height, that at the onset of visible motion, the
-    rate at which it rose over the last third of the rest, and whether it had stopped rising: it stayed within a
-    hundredth of its peak for several times as long as its usual rate takes, and the filter smears."""
+    """Find where the pull peaks between visible motion and top speed, and how high.
+
+    Returns its place and height, the pull at the onset of visible motion, the rate at which it rose over the last third
+    of the rest, and whether it had stopped rising: it stayed within a hundredth of its peak for several times as long
+    as its usual rate takes, and the filter smears.
+    """
     settings = ExperimentSettings.current()
     rest, onset, start, top = marks
     at = start + int(np.argmax(pull[start : top + 1]))
@@ -184,9 +197,11 @@ def _peak(
 
 
 def _unseen(speed: np.ndarray) -> float:
-    """For how many samples motion may have been hidden in noise before its speed, from then to its highest, shape (n,),
-    stood out: had it grown by a power of two in the time that its first doubling took. A body that speeds up evenly was
-    hidden for less."""
+    """Count the samples for which motion may have been hidden in noise.
+
+    Its speed, from when it stood out to its highest, has the shape (n,): it had grown by a power of two in the time
+    that its first doubling took. A body that speeds up evenly was hidden for less.
+    """
     settings = ReadingSettings.current()
     first, top = float(speed[0]), float(speed[-1])
     if not first > settings.speed_share_of_an_onset * top:
@@ -196,7 +211,7 @@ def _unseen(speed: np.ndarray) -> float:
 
 
 def _why(shares: list[float]) -> str:
-    """Why there are no slips, for a reason."""
+    """Say why there are no slips."""
     if shares and min(shares) > ReadingSettings.current().time_share_of_sliding:
         return "the cart slides all the time"
     return "the cart shows no slips out of rest"
@@ -205,6 +220,7 @@ def _why(shares: list[float]) -> str:
 def _answer(
     table: np.ndarray, pull: np.ndarray, velocity: np.ndarray, relative_error: float, stiffness: Estimate, why: str
 ) -> StickSlip:
+    """Make the result of all slips."""
     settings = ExperimentSettings.current()
     times, places, directions, bent, forces, rates, speeds, held, late = table
 
@@ -250,7 +266,7 @@ def _answer(
 
 
 def _notes(count: int, offset: Estimate) -> tuple[str, ...]:
-    """What to know before believing it."""
+    """Say what to know before believing the result."""
     notes = []
     if count and not offset.determined:
         notes.append("The zero of the force on the cart is used as measured; slips in one direction cannot verify it.")
@@ -263,6 +279,7 @@ def _notes(count: int, offset: Estimate) -> tuple[str, ...]:
 
 
 def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Estimate:
+    """Return the mean break-away force of one direction."""
     method = "mean of the peaks of the force on the cart before slips"
     if len(forces) < 2:
         return Estimate.unknown(name, "N", method, f"{len(forces)} slips: {why}" if not len(forces) else "1 slip")
@@ -273,8 +290,11 @@ def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Est
 
 
 def _both(forward: Estimate, backward: Estimate) -> Estimate:
-    """The mean of both directions, in which a common offset drops out; that of the only one in which the cart slips.
-    What one direction shows and the other bounds is a bound: the offset is not known."""
+    """Return the mean of both directions, in which a common offset drops out.
+
+    Where the cart slips in one direction alone it is that one's. What one direction shows and the other bounds is a
+    bound: the offset is not known.
+    """
     if not (forward.determined and backward.determined):
         seen, unseen = (forward, backward) if forward.determined else (backward, forward)
         if not unseen.low > 0:  # no slips at all
@@ -292,7 +312,7 @@ def _both(forward: Estimate, backward: Estimate) -> Estimate:
 
 
 def _offset(forward: Estimate, backward: Estimate) -> Estimate:
-    """Half of what the forward break-away exceeds the backward one by."""
+    """Return half of what the forward break-away exceeds the backward one by."""
     name, method = (
         "offset of the force on the cart",
         "half the difference of the break-away forces forward and backward",
@@ -305,7 +325,9 @@ def _offset(forward: Estimate, backward: Estimate) -> Estimate:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StickSlip:
-    """With the joint's stiffness as other experiments show it; else as this log does; else as the stage file has it."""
+    """Analyse logs with the joint's stiffness as other experiments show it; else as this log
+    does; else as the stage has it.
+    """
     (log,) = logs
     assert isinstance(log, Log)
     flat, (_, mass) = prior.flat(log), prior.masses(log)
@@ -317,12 +339,14 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _estimates(result: StickSlip, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Static friction, and the stiffness where it is that of the stage's joint."""
+    """Return static friction, and the stiffness where it is that of the stage's joint."""
     return (result.static, *([result.stiffness] if _of_joint(result.stiffness, stage) else ()))
 
 
 def _of_joint(stiffness: Estimate, stage: Stage | None) -> bool:
-    """Whether a stiffness is that of the stage's joint, and not of the limiter that holds it."""
+    """Tell whether a stiffness is that of the stage's joint, and not of the limiter that holds
+    it.
+    """
     settings = ExperimentSettings.current()
     if stage is None or stage.joint is None or not stiffness.determined:
         return False

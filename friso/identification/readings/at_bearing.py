@@ -25,8 +25,11 @@ HELD = "The joint is assumed held, with the limiter's stiffness: no bending show
 
 @dataclass(frozen=True)
 class StructureMode:
-    """The first mode of a structure on the side of the force and the sensor: a `share` of the moving mass on a spring
-    of its own, and the frequency [Hz] and damping ratio that it has there, the rest being held."""
+    """The first mode of a structure on the side of the force and the sensor.
+
+    A `share` of the moving mass stands on a spring of its own; `frequency` [Hz] and damping ratio are those that it has
+    there, the rest being held.
+    """
 
     share: float
     frequency: float
@@ -35,10 +38,13 @@ class StructureMode:
 
 @dataclass(frozen=True)
 class Between:
-    """What lies between the force that is commanded and the bearing: its `delay` [s] (None: not known) and the
-    `bandwidth` of the current loop [Hz]; the `mass` [kg] that is believed to move and the share of it that is `beyond`
-    the joint; the stiffness [N/m] of the `contact` that holds the joint, and of the `joint` itself; the `mode` of the
-    structure; the viscous friction [N s/m] and the half-width of its interval."""
+    """What lies between the force that is commanded and the bearing.
+
+    `delay` [s] (None: not known) and `bandwidth` of the current loop [Hz] are the drive's. `mass` [kg] is believed to
+    move, of which a share is `beyond` the joint; `contact` [N/m] is the stiffness of what holds the joint, and `joint`
+    [N/m] that of the joint itself. `mode` is that of the structure. `viscous` holds the viscous friction [N s/m] and
+    the half-width of its interval.
+    """
 
     delay: float | None = None
     bandwidth: float = np.inf
@@ -55,11 +61,11 @@ DIRECT = Between()
 
 
 def machine_between(flat: Mapping[str, Any]) -> Between:
-    """What lies between the commanded force and the bearing of a stage given as flat keys, a joint being held by its
-    limiter.
+    """Return what lies between the commanded force and the bearing of a stage given as flat
+    keys.
 
-    The frequency of the parasitic mode is that of both parts of the stage's mass against each other; with the other one
-    held, that of the part on the spring is lower.
+    A joint is taken to be held by its limiter. The frequency of the parasitic mode is that of both parts of the stage's
+    mass against each other; with the other one held, that of the part on the spring is lower.
     """
     drive, joint, mode = (
         {key.removeprefix(name): value for key, value in flat.items() if key.startswith(name)}
@@ -82,8 +88,11 @@ def machine_between(flat: Mapping[str, Any]) -> Between:
 
 
 def believed_between(prior: Prior, log: Log) -> Between:
-    """What lies between force and bearing, as other experiments show it or else the stage file has it, which states no
-    viscous friction better than to its whole size. Raises InputError."""
+    """Return what lies between force and bearing, as other experiments show it or else the stage
+    file has it.
+
+    A stage file states no viscous friction better than to its whole size. Raises InputError.
+    """
     believed = machine_between(prior.believed(log))
     viscous = prior.estimates.get("friction.viscous")
     return replace(believed, viscous=(believed.viscous[0], viscous.half_width if viscous else believed.viscous[0]))
@@ -91,8 +100,11 @@ def believed_between(prior: Prior, log: Log) -> Between:
 
 @dataclass(frozen=True)
 class BearingRecord:
-    """Time [s], position of the body on which the force acts, deflection of the joint that carries it [m] (None: it
-    is held), and force [N], shape (n,)."""
+    """A stretch of a log of a body on a bearing.
+
+    Over `time` [s] it has the position [m] of the body on which the force acts, the deflection [m] of the joint that
+    carries it (None: it is held), and the force [N], each of shape (n,).
+    """
 
     time: np.ndarray
     position: np.ndarray
@@ -101,21 +113,23 @@ class BearingRecord:
 
     @property
     def interval(self) -> float:
-        """Between samples [s]."""
+        """Time between samples [s]."""
         return float(self.time[1] - self.time[0])
 
     @property
     def body(self) -> np.ndarray:
-        """About where the body on the bearing is [m], shape (n,)."""
+        """Position [m] of the body on the bearing, shape (n,), but for what a contact gives."""
         return self.position if self.bent is None else self.position - self.bent
 
     def beginning(self, count: int) -> BearingRecord:
-        """The first so many samples."""
+        """Return the first so many samples."""
         bent = None if self.bent is None else self.bent[:count]
         return BearingRecord(self.time[:count], self.position[:count], bent, self.force[:count])
 
     def seen(self, cutoff: float, step: int = 1) -> BearingRecord:
-        """With the motion low-passed at a frequency [Hz], about its start, and every `step`th sample."""
+        """Return the record with its motion low-passed at a frequency [Hz], about its start, and
+        every `step`th sample.
+        """
         place = low_pass(self.position, self.interval, cutoff)
         bent = None if self.bent is None else low_pass(self.bent, self.interval, cutoff)[::step]
         force = self.force if step == 1 else low_pass(self.force, self.interval, cutoff)
@@ -124,7 +138,7 @@ class BearingRecord:
 
 @dataclass(frozen=True)
 class LowPass:
-    """At a `cutoff` [Hz] over time [s], shape (n,)."""
+    """A low-pass at a `cutoff` [Hz] over time [s], shape (n,)."""
 
     time: np.ndarray
     cutoff: float
@@ -136,12 +150,15 @@ class LowPass:
         return slice(edge, len(self.time) - edge)
 
     def __call__(self, signal: np.ndarray) -> np.ndarray:
-        """The signal, shape (n,), low-passed, inside."""
+        """Return a signal, shape (n,), low-passed, without what the ends touch."""
         return low_pass(signal, float(self.time[1] - self.time[0]), self.cutoff)[self.inside]
 
 
 def record_of(log: Log, part: slice, between: Between) -> BearingRecord:
-    """A part of a log. Raises InputError for missing channels."""
+    """Read a part of a log as a record of the body on the bearing.
+
+    Raises InputError for missing channels.
+    """
     position, force = channel(log, "position")[part], channel(log, "force")[part]
     return BearingRecord(
         log.time[part], position, _bent(log, part, position, float(force.std()) / between.contact), force
@@ -149,7 +166,9 @@ def record_of(log: Log, part: slice, between: Between) -> BearingRecord:
 
 
 def why_unseen(record: BearingRecord, fewest: int) -> str:
-    """Why nothing can be read from a record, of which so many samples are needed; empty where it can."""
+    """Say why nothing can be read from a record, of which so many samples are needed; "" where
+    it can.
+    """
     settings = ReadingSettings.current()
     if len(record.time) < fewest:
         return f"the record has {len(record.time)} samples: {fewest} are needed"
@@ -172,7 +191,9 @@ def why_unseen(record: BearingRecord, fewest: int) -> str:
 
 
 def cutoff_of(record: BearingRecord) -> float:
-    """The low-pass [Hz] for a record: where its motion ends, but no slower than its length allows."""
+    """Choose the low-pass [Hz] for a record: where its motion ends, but no slower than its
+    length allows.
+    """
     settings = ReadingSettings.current()
     highest = motion_bandwidth(record.body, record.interval)
     return max(
@@ -182,9 +203,12 @@ def cutoff_of(record: BearingRecord) -> float:
 
 
 def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position [m] of the body on the bearing, the force [N] that has arrived, and the acceleration [m/s^2] that it
-    gives to the whole moving mass, shape (n,) each: inertia is the mass times that. `mass` [kg] counts where a contact
-    gives way, by the force that goes through it."""
+    """Return the position [m] of the body on the bearing, the force [N] that has arrived, and
+    the acceleration [m/s^2].
+
+    Each has the shape (n,). The acceleration is that of the whole moving mass: inertia is the mass times that. `mass`
+    [kg] counts where a contact gives way, by the force that goes through it.
+    """
     time, acceleration = record.time, rate_of(record.time, rate_of(record.time, record.position))
     force, before = _force_after_delay(time, record.force, between), between.beyond * acceleration
     if between.mode is not None:
@@ -195,13 +219,15 @@ def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np
 
 
 def rate_of(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
-    """Time derivative of a signal at times [s], both of shape (n,), by a spline."""
+    """Differentiate a signal at times [s], both of shape (n,), by a spline."""
     return CubicSpline(time, signal)(time, 1)
 
 
 def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarray | None:
-    """The measured deflection [m] of a joint that bends; None where it is not measured, or held and about what its
-    contact `gives` [m]."""
+    """Return the measured deflection [m] of a joint that bends.
+
+    None where it is not measured, or where it is held and about what its contact `gives` [m].
+    """
     settings = ReadingSettings.current()
     measured = deflection(log)
     if measured is None or len(position) < settings.periods_of_a_record:
@@ -223,7 +249,9 @@ def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarr
 
 
 def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:
-    """The force [N] that a command [N], shape (n,), has become: late by the delay and by the current loop."""
+    """Return the force [N] that a command [N], shape (n,), has become: late by the delay and by
+    the current loop.
+    """
     late = CubicSpline(time, command)(np.maximum(time - (between.delay or 0.0), time[0]))
     if not np.isfinite(between.bandwidth):
         return late
@@ -233,7 +261,9 @@ def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) 
 
 
 def _mode_acceleration(time: np.ndarray, acceleration: np.ndarray, mode: StructureMode) -> np.ndarray:
-    """Acceleration of the mass of a mode whose base moves with an acceleration [m/s^2], shape (n,)."""
+    """Return the acceleration of the mass of a mode whose base moves with an acceleration
+    [m/s^2], shape (n,).
+    """
     settings = ReadingSettings.current()
     omega, step = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / settings.points_per_sample
     fine = CubicSpline(time, acceleration)(

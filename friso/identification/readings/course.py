@@ -19,8 +19,11 @@ from friso.identification.response.period import find_periods
 
 @dataclass(frozen=True)
 class Repetition:
-    """What repeats in a log: every so many `samples`, with about so many `harmonics`, turning so many times in between,
-    while the position rests for a share of the time."""
+    """What repeats in a log.
+
+    It repeats every so many `samples`, with about so many `harmonics`, and turns so many times in between, while the
+    position rests for a share of the time.
+    """
 
     samples: int
     harmonics: float
@@ -30,7 +33,7 @@ class Repetition:
 
 @dataclass(frozen=True)
 class Course:
-    """How a log goes."""
+    """How a log goes of which nobody has said what experiment it is."""
 
     log: Log
 
@@ -41,12 +44,14 @@ class Course:
 
     @property
     def signal(self) -> str:
-        """The role of what drives it from outside: the force injected, else a reference that moves, else the force."""
+        """The role of what drives the log from outside: the force injected, else a reference that
+        moves, else the force.
+        """
         return external(self.log) or "force"
 
     @cached_property
     def repetition(self) -> Repetition | None:
-        """What repeats in this signal; None where nothing does."""
+        """What repeats in the driving signal; None where nothing does."""
         part = self.log.longest
         try:
             periods = find_periods(self.log[self.signal][part])
@@ -58,8 +63,10 @@ class Course:
 
     @cached_property
     def speeds(self) -> np.ndarray:
-        """The constant speeds [m/s], shape (n,), where most of the way goes at such, which no reference tells; none
-        where the position has no SI unit."""
+        """The constant speeds [m/s], shape (n,), where most of the way goes at such.
+
+        No reference tells them; there are none where the position has no SI unit.
+        """
         settings = ReadingSettings.current()
         part, position = self.log.longest, self.log["position"]
         try:
@@ -73,8 +80,11 @@ class Course:
 
     @cached_property
     def ramps(self) -> int:
-        """How often the force rises evenly from none until the body moves off, where that is most of what happens and
-        no reference moves; 0 where it is not, or where the position has no SI unit."""
+        """How often the force rises evenly from none until the body moves off.
+
+        That counts where it is most of what happens and no reference moves; 0 where it is not, or where the position
+        has no SI unit.
+        """
         settings = ReadingSettings.current()
         log = self.log
         try:
@@ -88,8 +98,11 @@ class Course:
         return len(even) if sum(even) > settings.log_share_of_ramps * len(log.time) * log.sample_time else 0
 
     def _from_none(self, at: float, force: float, lasts: float) -> bool:
-        """Whether the force rests at none and then rises evenly, for as long as it lasts [s], to what it is at an
-        instant [s]."""
+        """Tell whether the force rests at none and then rises evenly to what it is at an instant
+        [s].
+
+        The rise lasts for some time [s].
+        """
         settings = ReadingSettings.current()
 
         def mean(first: float, last: float) -> float:
@@ -111,15 +124,19 @@ class Course:
         return bool(np.ptp(position) > settings.share_of_most_of_a_way * np.abs(np.diff(position)).sum())
 
     def _slides(self, stretch: Pass) -> bool:
-        """Whether the force changes less over a stretch than it holds the body back: else a spring, as bristles are
-        before they slide, sets the speed at which a force that rises moves it."""
+        """Tell whether the force changes less over a stretch than it holds the body back.
+
+        Else a spring, as bristles are before they slide, sets the speed at which a force that rises moves the body.
+        """
         force = self.log["force"][stretch.span]
         half = len(force) // 2
         return bool(abs(force[half:].mean() - force[:half].mean()) < abs(force.mean()))
 
     @cached_property
     def against_a_spring(self) -> bool:
-        """Whether nothing but the place tells the force with which the position rests here and there."""
+        """Whether nothing but the place tells the force with which the position rests here and
+        there.
+        """
         settings = ReadingSettings.current()
         part = self.log.longest
         position, force = self.log["position"][part], self.log["force"][part]
@@ -141,7 +158,7 @@ class Course:
 
     @property
     def words(self) -> str:
-        """The whole of it in words."""
+        """How the log goes, in words."""
         repetition = self.repetition
         if repetition is None:
             return "a log whose reference stands still, with nothing periodic in it"
@@ -150,8 +167,11 @@ class Course:
 
 
 def _on_a_spring(places: np.ndarray, forces: np.ndarray) -> bool:
-    """Whether the forces at the places of successive rests, each shape (n,), rise as those of a spring do, from
-    whichever side a place was reached."""
+    """Tell whether the forces at places of successive rests, each shape (n,), rise as those of a
+    spring do.
+
+    They have to do so from whichever side a place was reached.
+    """
     settings = ReadingSettings.current()
     if len(places) < settings.places_of_a_spring or not (np.ptp(places) > 0 and np.ptp(forces) > 0):
         return False
@@ -172,22 +192,25 @@ def _on_a_spring(places: np.ndarray, forces: np.ndarray) -> bool:
 
 
 def external(log: Log) -> str | None:
-    """The role of what moves a loop from outside: the force injected, else a reference that moves; None without one.
+    """Return the role of what moves a loop from outside: the force injected, else a reference
+    that moves.
 
-    A reference that is held constant excites nothing.
+    None without one: a reference that is held constant excites nothing.
     """
     roles = ("disturbance", "reference")
     return next((role for role in roles if role in log and np.ptp(log[role][log.longest]) > 0), None)
 
 
 def _harmonics(period: np.ndarray) -> float:
-    """How many harmonics of equal power would spread as those of a signal over one period, shape (samples,), do."""
+    """Count the harmonics of equal power that would spread as those of a signal over one period,
+    shape (samples,).
+    """
     power = np.abs(np.fft.rfft(period)[1:]) ** 2
     return float(power.sum() ** 2 / np.sum(power**2))
 
 
 def _rest(position: np.ndarray, samples: int) -> float:
-    """Share of the time in which the position stays within `STILL` of its travel for a tenth of a period.
+    """Return the share of the time in which the position hardly moves for a tenth of a period.
 
     A sine does so at no time: about its turning points it moves by 2.4 % of its travel.
     """
@@ -197,7 +220,9 @@ def _rest(position: np.ndarray, samples: int) -> float:
 
 
 def _turns(period: np.ndarray) -> int:
-    """How often a signal over one period, shape (samples,), turns back by more than `BACK` of its range."""
+    """Count how often a signal over one period, shape (samples,), turns back by a share of its
+    range.
+    """
     least, turns, direction, last = ReadingSettings.current().range_share_of_a_turn * np.ptp(period), 0, 1.0, period[0]
     for value in period:
         if (value - last) * direction > 0:

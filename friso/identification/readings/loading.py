@@ -16,12 +16,14 @@ SOFT = "more deflection does not need more force"
 def stiffness_of_loading(
     deflection: np.ndarray, rate: np.ndarray, acceleration: np.ndarray, force: np.ndarray, loads: list[slice]
 ) -> Estimate:
-    """The stiffness [N/m] from the deflection [m] and its rate [m/s], the acceleration of the stage [m/s^2] and the
-    actuator's force [N], all low-passed, shape (n,), over the `loads`, each between two slips.
+    """Estimate the stiffness [N/m] of a joint that is loaded between slips of the cart.
 
-    Least squares of a spring, a damper and a mass, with an offset for each load: after a slip the stage swings on its
-    joint. The error is that of the jackknife over loads. The cart's creep drops out. Of fewer than three loads it is
-    unknown.
+    The deflection [m] and its rate [m/s], the acceleration of the stage [m/s^2] and the actuator's force [N] are
+    low-passed, shape (n,); each of the `loads` lies between two slips.
+
+    Least squares fits a spring, a damper and a mass, with an offset for each load: after a slip the stage swings on its
+    joint. The error is that of the jackknife over loads. The cart's creep drops out. Of fewer than three loads the
+    stiffness is unknown.
     """
     settings = ReadingSettings.current()
     count = len(loads)
@@ -50,5 +52,7 @@ def stiffness_of_loading(
 
 
 def _spring(products: np.ndarray) -> float:
-    """Coefficient of the first signal in a fit of the last by the others, from the scalar products of all."""
+    """Return the coefficient of the first signal in a fit of the last by the others, from the
+    scalar products of all.
+    """
     return float(solve_normal_equations(products[:-1, :-1], products[:-1, -1])[0])

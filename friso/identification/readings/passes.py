@@ -15,8 +15,11 @@ from friso.identification.readings.settings import ReadingSettings
 
 @dataclass(frozen=True)
 class Pass:
-    """A stretch of constant velocity: where it is in the log, mean velocity [m/s] and its standard deviation, below and
-    above the cutoff, the mean force [N] by blocks, and the mean acceleration [m/s^2]."""
+    """A stretch of constant velocity in a log.
+
+    It has its `span`, the mean velocity [m/s] and its standard deviation, below and above the cutoff, the mean force
+    [N] by blocks, and the mean acceleration [m/s^2].
+    """
 
     span: slice
     velocity: float
@@ -27,6 +30,7 @@ class Pass:
 
     @property
     def steady(self) -> bool:
+        """Whether the velocity hardly swings, slowly or quickly."""
         settings = ReadingSettings.current()
         return self.swing <= settings.swing_of_a_steady_pass * abs(
             self.velocity
@@ -34,7 +38,8 @@ class Pass:
 
 
 def passes(log: Log) -> tuple[Pass, ...]:
-    """All stretches over which the reference, or the body itself where there is none, goes at constant velocity.
+    """Find all stretches over which the reference, or the body itself without one, goes at
+    constant velocity.
 
     With a reference the motion may be unsteady, which each states. Raises InputError for missing position or force.
     """
@@ -54,8 +59,11 @@ def passes(log: Log) -> tuple[Pass, ...]:
 
 
 def on_common_places(log: Log, stretches: Sequence[Pass]) -> tuple[Pass, ...]:
-    """Passes of a log, each cut to the way that all of them go, where friction is that of the same places; as they are
-    where that is too little."""
+    """Cut passes of a log to the way that all of them go, where friction is that of the same
+    places.
+
+    They stay as they are where that way is too short.
+    """
     settings = ReadingSettings.current()
     position, velocity = on_bearing(log), _velocity(log)
     covered = [(float(position[single.span].min()), float(position[single.span].max())) for single in stretches]
@@ -72,13 +80,15 @@ def on_common_places(log: Log, stretches: Sequence[Pass]) -> tuple[Pass, ...]:
 
 
 def places_of(log: Log, stretches: Sequence[Pass]) -> tuple[float, float]:
-    """The lowest and highest position [m] in passes of a log; NaN without any."""
+    """Return the lowest and highest position [m] in passes of a log; NaN without any."""
     places = [on_bearing(log)[stretch.span] for stretch in stretches]
     return (min(place.min() for place in places), max(place.max() for place in places)) if places else (np.nan, np.nan)
 
 
 def _velocity(log: Log) -> np.ndarray:
-    """Velocity [m/s] of the body on the bearing, shape (n,); NaN in segments that are too short."""
+    """Return the velocity [m/s] of the body on the bearing, shape (n,); NaN in segments that are
+    too short.
+    """
     settings = ReadingSettings.current()
     position = on_bearing(log)
     velocity = np.full(len(position), np.nan)
@@ -89,7 +99,7 @@ def _velocity(log: Log) -> np.ndarray:
 
 
 def _of_reference(log: Log, part: slice) -> list[slice]:
-    """Where the reference moves at one velocity, less what the axis takes to settle on it."""
+    """Find where the reference moves at one velocity, less what the axis takes to settle on it."""
     settings = ReadingSettings.current()
     reference = channel(log, "reference")[part]
     velocity = np.gradient(low_pass(reference, log.sample_time, settings.low_pass_of_passes), log.sample_time)
@@ -100,8 +110,11 @@ def _of_reference(log: Log, part: slice) -> list[slice]:
 
 
 def _of_motion(velocity: np.ndarray, sample_time: float) -> list[slice]:
-    """Where the body itself keeps its velocity: its acceleration is within the noise, or small against the largest and
-    its velocity. Where none of a stretch does the latter it swings, and is no less a stretch."""
+    """Find where the body itself keeps its velocity.
+
+    Its acceleration is within the noise there, or small against the largest and its velocity. Where none of a stretch
+    does the latter it swings, and is no less a stretch.
+    """
     settings = ReadingSettings.current()
     smooth = low_pass(velocity, sample_time, settings.low_pass_of_passes / 2)
     acceleration, speed = np.abs(np.gradient(smooth, sample_time)), np.abs(smooth)
@@ -122,7 +135,9 @@ def _of_motion(velocity: np.ndarray, sample_time: float) -> list[slice]:
 
 
 def _trimmed(mask: np.ndarray, sample_time: float, share: float) -> list[slice]:
-    """The stretches of a mask without their ends: what the filter smears, and a share of the start to settle."""
+    """Return the stretches of a mask without their ends: what the filter smears, and a share of
+    the start to settle.
+    """
     settings = ReadingSettings.current()
     edge, least = (
         int(1 / (settings.low_pass_of_passes * sample_time)),
@@ -137,6 +152,7 @@ def _trimmed(mask: np.ndarray, sample_time: float, share: float) -> list[slice]:
 
 
 def _pass(log: Log, span: slice, velocity: np.ndarray) -> Pass:
+    """Describe a stretch of constant velocity."""
     went, force = velocity[span], block_mean(channel(log, "force")[span])
     acceleration = float((went[-1] - went[0]) / ((span.stop - span.start - 1) * log.sample_time))
     position = on_bearing(log)
@@ -145,7 +161,9 @@ def _pass(log: Log, span: slice, velocity: np.ndarray) -> Pass:
 
 
 def _digit(position: np.ndarray) -> float:
-    """The digit [m] of which all steps of a position are whole numbers; 0 if there is none."""
+    """Return the digit [m] of which all steps of a position are whole numbers; 0 if there is
+    none.
+    """
     settings = ReadingSettings.current()
     steps = np.abs(np.diff(position))
     steps = steps[steps > settings.rounding_of_a_step * steps.max(initial=0.0)]
@@ -156,8 +174,12 @@ def _digit(position: np.ndarray) -> float:
 
 
 def _quick_swing(position: np.ndarray, sample_time: float, digit: float) -> float:
-    """Standard deviation of the velocity [m/s] in the lines of its spectrum above the cutoff [Hz] that stand clear of
-    noise: a stage that swings quickly goes smoothly for the filter. What is less than a digit [m] is no motion."""
+    """Return the standard deviation of the velocity [m/s] in lines of its spectrum above the
+    cutoff [Hz].
+
+    Lines count that stand clear of noise: a stage that swings quickly goes smoothly for the filter. What is less than a
+    digit [m] is no motion.
+    """
     settings = ReadingSettings.current()
     window = np.hanning(len(position))
     lines = np.abs(np.fft.rfft(detrend(position) * window)) ** 2 * 2 / (len(position) * np.sum(window**2))

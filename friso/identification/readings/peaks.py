@@ -24,7 +24,9 @@ GAUSSIAN = 0.1325
 
 @dataclass(frozen=True)
 class Peak:
-    """Where the friction is greatest (index), its level [N], and by how much [N] that may be off to either side."""
+    """Where the friction is greatest (index), its level [N], and by how much [N] that may be off
+    to either side.
+    """
 
     at: int
     level: float
@@ -32,8 +34,10 @@ class Peak:
 
 
 def smoothed(values: np.ndarray, width: float) -> np.ndarray:
-    """Values, shape (n,), under a Gaussian of `width` samples; the ends go on as they came, mirrored about their last
-    value."""
+    """Smooth values, shape (n,), by a Gaussian of `width` samples.
+
+    The ends go on as they came, mirrored about their last value.
+    """
     settings = ReadingSettings.current()
     more = min(int(settings.deviations_of_a_kernel * width) + 1, len(values) - 1)
     longer = np.pad(values, more, mode="reflect", reflect_type="odd")
@@ -41,12 +45,14 @@ def smoothed(values: np.ndarray, width: float) -> np.ndarray:
 
 
 def scatter(values: np.ndarray) -> float:
-    """Standard deviation of white noise on values that change slowly, by second differences; 0 of fewer than 3."""
+    """Return the standard deviation of white noise on values that change slowly, by second
+    differences; 0 of fewer than 3.
+    """
     return float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6)) if len(values) > 2 else 0.0
 
 
 def _second(values: np.ndarray) -> np.ndarray:
-    """Second differences, shape (n,); 0 at the ends."""
+    """Return second differences, shape (n,); 0 at the ends."""
     return np.pad(np.diff(values, 2), 1)
 
 
@@ -59,9 +65,12 @@ def peak(
     marks: tuple[int, int],
     cutoff: float,
 ) -> Peak:
-    """The greatest force [N] less `mass` [kg] times the second derivative of the position [m], both of shape (n,) and
-    in the direction of the motion, between two `marks` (indices), over the first half of which the body rests. The
-    force rises at `rising` [N/s]; nothing above the `cutoff` [Hz] counts."""
+    """Find the greatest friction before a body breaks away.
+
+    That is the force [N] less `mass` [kg] times the second derivative of the position [m], both of shape (n,) and in
+    the direction of the motion, between two `marks` (indices), over the first half of which the body rests. The force
+    rises at `rising` [N/s]; nothing above the `cutoff` [Hz] counts.
+    """
     settings = ReadingSettings.current()
     begin, start = marks
     rest = slice(begin, (begin + start) // 2)

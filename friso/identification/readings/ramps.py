@@ -15,9 +15,13 @@ from friso.identification.readings.slips import slips
 
 @dataclass(frozen=True)
 class Ramps:
-    """Per ramp, shape (n,): time [s], place [m], direction, break-away force [N] in that direction, force rate [N/s],
-    by how much [N] noise and smoothing may have moved that force to either side, by how much it may be too large where
-    the mass is not known, and the speed [m/s] that the body has at most by then; the threshold [m/s] of the speed."""
+    """Ramps of the force from rest, each until the body moves off.
+
+    Per ramp, shape (n,), there are time [s], place [m], direction, break-away force [N] in that direction, force rate
+    [N/s], by how much [N] noise and smoothing may have moved that force to either side, by how much it may be too large
+    where the mass is not known, and the speed [m/s] that the body has at most by then. `threshold` [m/s] is that of the
+    speed.
+    """
 
     times: np.ndarray
     places: np.ndarray
@@ -32,7 +36,7 @@ class Ramps:
 
 
 def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
-    """The ramps in a log, each from rest of the body on the bearing.
+    """Find the ramps of the force in a log, each from rest of the body on the bearing.
 
     With the `mass` [kg] that moves, a break-away force is the greatest friction, force less inertia, as motion begins
     (the published definition); without, the force where motion begins to be visible, which contains inertia. Raises
@@ -97,11 +101,15 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
 
 
 def _lowest(push: np.ndarray) -> float:
-    """The least value of a push, shape (n,), over the rest before a motion, seen without noise."""
+    """Return the least value of a push, shape (n,), over the rest before a motion, seen without
+    noise.
+    """
     return float(smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp).min())
 
 
 def _half(push: np.ndarray) -> int:
-    """The sample, of shape (n,), at which a push has last risen through half of its way, seen without noise."""
+    """Return the sample, of shape (n,), at which a push has last risen through half of its way,
+    seen without noise.
+    """
     smooth = smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp)
     return int(np.flatnonzero(smooth <= (smooth[0] + smooth[-1]) / 2)[-1])

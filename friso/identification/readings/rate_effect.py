@@ -24,7 +24,9 @@ _SPEEDS = np.geomspace(1e-4, 10, 2001)
 def break_away(
     force_rate: float, static: float, coulomb: float, bristle_stiffness: float, stribeck_velocity: float
 ) -> float:
-    """Least force [N] at which LuGre friction breaks away while the force rises at `force_rate` [N/s]."""
+    """Return the least force [N] at which LuGre friction breaks away while the force rises at
+    `force_rate` [N/s].
+    """
     level = stribeck_curve(_SPEEDS, coulomb, static, 1.0)
     creep = 1 - force_rate / (bristle_stiffness * stribeck_velocity * _SPEEDS)
     return float(max(np.max(level * creep), coulomb))
@@ -42,7 +44,8 @@ def share_below(force_rate: float) -> float:
 def static_friction(
     name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float = 0.0, late: float = 0.0
 ) -> Estimate:
-    """Static friction [N] from break-away forces [N] at force rates [N/s], both positive, shape (n,).
+    """Estimate static friction [N] from break-away forces [N] at force rates [N/s], both
+    positive, shape (n,).
 
     Rates that spread are extrapolated to 0; otherwise the interval reaches up to what `share_below` allows.
     `relative_error` is a standard deviation common to all forces, such as that of a stiffness; by up to `late` [N] they
@@ -60,7 +63,10 @@ def static_friction(
 
 
 def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float) -> Estimate:
-    """At one rate: the mean break-away is too low by at most the bound, and half of it is put in the value."""
+    """Estimate static friction from one rate: the mean break-away is too low by at most a bound.
+
+    Half of the bound is put in the value.
+    """
     settings = ReadingSettings.current()
     mean = correlated_mean(forces)
     share = share_below(float(np.median(rates)))
@@ -83,14 +89,20 @@ def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: f
 
 
 def _slow_enough() -> float:
-    """The force rate [N/s], to a tenth, up to which ramps of one rate show static friction."""
+    """Return the force rate [N/s], to a tenth, up to which ramps of one rate show static
+    friction.
+    """
     settings = ReadingSettings.current()
     rates = settings.least_bristle_rate * np.geomspace(1e-6, 1, 145)
     return float(max(rate for rate in rates if share_below(rate) <= 2 * settings.share_extrapolated))
 
 
 def _extrapolated(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float) -> Estimate:
-    """A straight line over rate^(2/3) at the lower rates; half of the way extrapolated widens it."""
+    """Extrapolate break-away forces to rate 0 by a straight line over rate^(2/3) at the lower
+    rates.
+
+    Half of the way extrapolated widens the interval.
+    """
     settings = ReadingSettings.current()
     near = rates <= max(settings.range_of_rates * rates.min(), np.sort(rates)[2])
     if np.ptp(rates[near]) == 0:

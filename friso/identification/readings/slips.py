@@ -12,9 +12,13 @@ from friso.identification.readings.settings import ReadingSettings
 
 @dataclass(frozen=True)
 class Slips:
-    """Indices, each of shape (n,): `onsets` of visible motion (out of the noise, and a hundredth of the highest speed),
-    `starts` of the slip (above the threshold), where the rest before it began, the fastest sample; direction +1 or -1;
-    the speed [m/s] of the body, shape (samples,); the threshold [m/s]; the share of time above it."""
+    """Where a body that sticks begins to slip.
+
+    Indices, each of shape (n,): `onsets` of visible motion (out of the noise, and a hundredth of the highest speed),
+    `starts` of the slip (above the threshold), where the rest before it began, and the fastest sample. `directions` are
+    +1 or -1; `speed` [m/s] is that of the body, shape (samples,), with its `threshold` [m/s] and the share of time
+    above it.
+    """
 
     onsets: np.ndarray
     starts: np.ndarray
@@ -27,7 +31,9 @@ class Slips:
 
 
 def slips(position: np.ndarray, sample_time: float, cutoff: float) -> Slips:
-    """The slips of a body of this position [m], shape (n,), differentiated below `cutoff` [Hz]."""
+    """Find the slips of a body of this position [m], shape (n,), differentiated below `cutoff`
+    [Hz].
+    """
     settings = ReadingSettings.current()
     speed = rate(position, sample_time, cutoff)
     size = np.abs(speed)

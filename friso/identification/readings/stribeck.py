@@ -20,7 +20,9 @@ from friso.identification.readings.settings import ReadingSettings
 
 @dataclass(frozen=True)
 class Possible:
-    """The best value of a parameter, what the forces leave possible of it, and whether that ends within the grid."""
+    """The best value of a parameter, what the forces leave possible of it, and whether that ends
+    within the grid.
+    """
 
     value: float
     low: float
@@ -30,9 +32,12 @@ class Possible:
 
 @dataclass(frozen=True)
 class FittedStribeck:
-    """Coulomb [N], viscous [N s/m] and static friction [N], the Stribeck velocity [m/s], the exponent, and the constant
-    force [N] along the axis by which friction was too large forward, each with its range; the covariance of the first
-    five (of four where the exponent was given), SI; and whether an exponent that was given was `refuted`."""
+    """A Stribeck curve through forces at some speeds, with what these leave open.
+
+    Each has its range: Coulomb [N], viscous [N s/m] and static friction [N], the Stribeck velocity [m/s], the exponent,
+    and the constant force [N] along the axis by which friction was too large forward. The covariance is that of the
+    first five (of four where the exponent was given), SI; an exponent that was given may be `refuted`.
+    """
 
     coulomb: Possible
     viscous: Possible
@@ -46,9 +51,12 @@ class FittedStribeck:
 
 @dataclass(frozen=True)
 class Forces:
-    """Friction [N] against the motion at some speeds [m/s], its directions (1, -1), and the standard deviation [N] of
-    each as a weight, all of shape (n,); the standard deviation [N] that all levels share; and whether directions share
-    one curve, beside a constant force."""
+    """Friction [N] against the motion at some speeds [m/s], shape (n,), to which a curve is
+    fitted.
+
+    `directions` are 1 or -1; `deviations` [N] weigh each force, and `level` [N] is a deviation that all levels share.
+    Directions may share one curve, beside a constant force.
+    """
 
     speeds: np.ndarray
     friction: np.ndarray
@@ -59,8 +67,11 @@ class Forces:
 
 
 def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> FittedStribeck | None:
-    """The curve through the forces; None where a straight line, which leaves `plain` (squares over variances), does as
-    well. With an `exponent` that is not refuted by the forces it is that one; forces too few to tell leave all."""
+    """Fit a Stribeck curve to forces; None where a straight line does as well.
+
+    The line leaves `plain` (squares over variances). An `exponent` that is not refuted by the forces is that of the
+    curve; forces too few to tell leave all exponents possible.
+    """
     reading_settings = ReadingSettings.current()
     settings = OutputErrorSettings.current()
     speeds = forces.speeds
@@ -97,7 +108,9 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
 
 
 def _better(plain: float, least: float, more: int, left: int) -> bool:
-    """Whether a curve with so many more parameters than a line leaves less than chance would have it."""
+    """Tell whether a curve with so many more parameters than a line leaves less than chance
+    would have it.
+    """
     settings = ReadingSettings.current()
     return least < plain and (
         least == 0 or bool(fisher.sf((plain - least) / more * left / least, more, left) < settings.chance_of_a_curve)
@@ -105,12 +118,15 @@ def _better(plain: float, least: float, more: int, left: int) -> bool:
 
 
 class _Grid:
-    """The least squares of all that is linear, at each Stribeck velocity and exponent, shapes (velocities, exponents):
-    `cost` (squares over variances; infinite where friction would not rise towards rest), the solutions (.., p) and
-    their covariance (.., p, p) with all deviations as stated. Exponents taken `apart` are each as good as the best."""
+    """Least squares of all that is linear, at each Stribeck velocity and exponent of a grid.
+
+    Shapes are (velocities, exponents): `cost` (squares over variances; infinite where friction would not rise towards
+    rest), the solutions (.., p) and their covariance (.., p, p) with all deviations as stated. Exponents taken `apart`
+    are each as good as the best.
+    """
 
     def __init__(self, forces: Forces, velocities: np.ndarray, shapes: np.ndarray, apart: bool) -> None:
-        """Shapes (velocities,) and (exponents,)."""
+        """Solve the grid; its points have the shapes (velocities,) and (exponents,)."""
         self.forces, self.velocities, self.shapes, self.apart = forces, velocities, shapes, apart
         speeds = forces.speeds
         decay = np.exp(-((speeds / velocities[:, None, None]) ** shapes[:, None]))
@@ -132,8 +148,10 @@ class _Grid:
         return float(self.cost.min())
 
     def around(self, left: int) -> _Grid:
-        """A grid around what is possible with `left` degrees of freedom, a little further than that where this one goes
-        on; the same where no curve is."""
+        """Lay a grid around what is possible with `left` degrees of freedom.
+
+        It goes a little further where this one goes on; where no curve is possible it is this one.
+        """
         settings = ReadingSettings.current()
         grid = self
         for _ in range(settings.refinements_of_the_grid if np.isfinite(self.least) and left > 0 else 0):
@@ -149,14 +167,19 @@ class _Grid:
         return grid
 
     def room(self, left: int) -> np.ndarray:
-        """By how much less than chance allows, with `left` degrees of freedom, each point leaves more than the best."""
+        """Return by how much less than chance allows each point leaves more than the best.
+
+        `left` is the number of degrees of freedom.
+        """
         least = self.cost.min(axis=0, keepdims=True) if self.apart else np.array([[self.least]])
         least = np.where(np.isfinite(least), least, 0.0)
         return t_value(left) ** 2 * np.maximum(least / left, 1.0) - (self.cost - least)
 
     def curve(self, left: int, refuted: bool, outer: tuple[float, float]) -> FittedStribeck:
-        """The best curve with its ranges, of `left` degrees of freedom; those that reach an `outer` Stribeck velocity
-        or exponent are not closed."""
+        """Return the best curve with its ranges, of `left` degrees of freedom.
+
+        Ranges that reach an `outer` Stribeck velocity or exponent are not closed.
+        """
         settings = OutputErrorSettings.current()
         forces, open_shape = self.forces, len(self.shapes) > 1
         best = np.unravel_index(int(np.argmin(self.cost)), self.cost.shape)
@@ -189,8 +212,7 @@ class _Grid:
         )
 
     def _covariance(self, best: tuple[int, int], scatter: float, open_shape: bool) -> np.ndarray:
-        """Of Coulomb, viscous and static friction, Stribeck velocity and, where it is open, exponent, SI, by the slope
-        at the best curve."""
+        """Return the covariance of the curve's parameters, SI, by the slope at the best curve."""
         forces, speeds = self.forces, self.forces.speeds
         velocity, shape = float(self.velocities[best[0]]), float(self.shapes[best[1]])
         ratio = speeds / velocity
@@ -209,7 +231,9 @@ class _Grid:
 
 
 def _between(points: np.ndarray, inside: np.ndarray, ratios: bool) -> tuple[float, float]:
-    """The least and the greatest point of a grid that lie inside, each by half a step further out."""
+    """Return the least and the greatest point of a grid that lie inside, each by half a step
+    further out.
+    """
     (at,) = np.nonzero(inside)
     scale = np.log(points) if ratios else points
     step = float(scale[1] - scale[0]) if len(points) > 1 else 0.0
