@@ -544,12 +544,12 @@ def test_a_doubt_that_is_added_is_asked_in_its_order_and_has_its_consequences() 
 
         return raised
 
-    mass = Estimate.normal("masses.cart", "kg", 6.0, 0.1, "output error")
+    mass = Estimate.normal("masses.stage", "kg", 6.0, 0.1, "output error")
     with pytest.MonkeyPatch.context() as patch:
-        for name, refuses, after in (("a-load", {"masses.cart": "a load"}, ("z-play",)), ("z-play", {}, ())):
+        for name, refuses, after in (("a-load", {"masses.stage": "a load"}, ("z-play",)), ("z-play", {}, ())):
             made_up_doubt = Doubt("key", find(name, refuses), "play", "refused", "a dial gauge", after)
             patch.setitem(DOUBTS.added, name, (made_up_doubt, "made up"))
-        case = judged_keys(key_case([mass], {"masses.cart": 6.0}, acceleration=np.ones(3)))
+        case = judged_keys(key_case([mass], VARIANTS["rigid"].flat(), acceleration=np.ones(3)))
     assert asked == ["z-play", "a-load"]
     assert case.estimates[0].reason == "a load"
 

@@ -3,7 +3,7 @@
 A law with more numbers always fits better; what it predicts of what it was not fitted to need not be better (cross-
 validation). A law is supported unless it clearly predicts worse than the best: by more than chance would have it (a t
 test of the differences by parts and one of their signs, at a level that counts all laws: Bonferroni), and by more than
-`LEAST_WORSE`.
+a difference of errors up to which laws predict alike.
 """
 
 from __future__ import annotations

@@ -9,9 +9,10 @@ from friso.identification.logs.settings import LogSettings
 
 
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """A channel without samples that repeat the one before, stamp [s] and value; and how many there were.
+    """Return a channel without samples that repeat the one before, stamp [s] and value; and how
+    many there were.
 
-    Raises LogError for time that decreases and for another value at the same stamp.
+    Raises LogError for time that decreases and for another value at one stamp.
     """
     steps = np.diff(time)
     back = np.flatnonzero(steps < 0)
@@ -40,11 +41,11 @@ COUNTER_BITS = 64
 
 
 def unwrapped(values: np.ndarray) -> tuple[np.ndarray, int]:
-    """Whole numbers of a counter with the jumps of its overflow taken out, and its bits; unchanged with 0 bits where
-    it is no counter that overflows.
+    """Take the jumps of its overflow out of a counter's whole numbers, and return its bits.
 
-    A counter of b bits steps back by nearly 2^b; every other step is below 2^b/4, and with 2^b added the step
-    back is at most twice as large as those (a square wave fails this).
+    Values are unchanged, with 0 bits, where it is no counter that overflows. A counter of b bits steps back by nearly
+    2^b; every other step is below 2^b/4, and with 2^b added the step back is at most twice as large as those (a square
+    wave fails this).
     """
     finite = values[np.isfinite(values)]
     if finite.size < 3 or np.any(finite != np.round(finite)) or np.abs(finite).max() > 2.0**COUNTER_BITS:
@@ -62,20 +63,23 @@ def unwrapped(values: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def constant(name: str, values: np.ndarray) -> bool:
-    """Whether a signal does not change at all."""
+    """Tell whether a signal does not change at all."""
     return bool(np.ptp(values) == 0)
 
 
 def rises_evenly(values: np.ndarray) -> bool:
-    """Whether values rise as those of a clock do, and no measured motion does."""
+    """Tell whether values rise as those of a clock do, and no measured motion does."""
     steps = np.diff(values)
     return bool(values.size > 2 and steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-3, atol=0))
 
 
 def clipped_share(values: np.ndarray) -> float:
-    """Share of the samples in flat tops at the extremes, of at least 3 equal samples, that show that the signal is
-    clipped: it enters them with a kink, the step before being at least a fifth of the largest step, or it hardly ever
-    repeats a value elsewhere."""
+    """Return the share of samples in flat tops at the extremes that show that a signal is
+    clipped.
+
+    A flat top has at least 3 equal samples. The signal enters it with a kink, the step before being at least a fifth of
+    the largest step, or it hardly ever repeats a value elsewhere.
+    """
     settings = LogSettings.current()
     steps = np.abs(np.diff(values))
     if values.size < 5 or steps.max() == 0:
@@ -92,8 +96,11 @@ def clipped_share(values: np.ndarray) -> float:
 
 
 def jumps(values: np.ndarray) -> tuple[float, int]:
-    """The largest step of a signal and the sample behind it, where it is no part of a motion: many times larger than
-    all steps but a few; else 0 and 0."""
+    """Return the largest step of a signal and the sample behind it, where it is no part of a
+    motion.
+
+    It is many times larger than all steps but a few; else 0 and 0.
+    """
     settings = LogSettings.current()
     steps = np.diff(values)
     if steps.size < settings.number_of_large_steps:
@@ -105,8 +112,10 @@ def jumps(values: np.ndarray) -> tuple[float, int]:
 
 
 def samples_held(values: np.ndarray) -> int:
-    """For how many samples each value is held, 1 where the signal changes at any sample: the changes all fall on every
-    n-th sample, n up to 20 (a signal that changes more rarely is one of steps)."""
+    """Return for how many samples each value is held; 1 where the signal changes at any sample.
+
+    The changes all fall on every n-th sample, n up to 20 (a signal that changes more rarely is one of steps).
+    """
     changes = np.flatnonzero(np.diff(values) != 0)
     if changes.size < 50:
         return 1
@@ -116,8 +125,10 @@ def samples_held(values: np.ndarray) -> int:
 
 
 def interpolated(values: np.ndarray) -> int:
-    """Over how many samples a signal runs in straight lines, 1 where it does not: its bends all fall on every n-th
-    sample, n up to 20, as those of a slower signal that was resampled."""
+    """Return over how many samples a signal runs in straight lines; 1 where it does not.
+
+    Its bends all fall on every n-th sample, n up to 20, as those of a slower signal that was resampled.
+    """
     settings = LogSettings.current()
     bends = np.abs(np.diff(values, 2))
     if bends.size < 50 * settings.slowest_sampling or not bends.any():
@@ -135,8 +146,11 @@ def interpolated(values: np.ndarray) -> int:
 def velocity_factor(
     position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]
 ) -> tuple[float, float]:
-    """Ratio of the measured velocity [m/s] to the derivative of position [m], sampled every `period` [s]
-    (least squares, both smoothed over 11 samples) and their correlation; NaN and 0 where there is nothing to compare.
+    """Return the ratio of the measured velocity [m/s] to the derivative of position [m], and
+    their correlation.
+
+    Both are sampled every `period` [s], and smoothed over 11 samples; the ratio is that of least squares. NaN and 0
+    where there is nothing to compare.
     """
     from scipy.signal import savgol_filter
 
@@ -165,8 +179,10 @@ _FACTORS = {
 
 
 def velocity_warning(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
-    """What is wrong between position [m] and velocity [m/s], "" for nothing; a factor points to wrong units or
-    counts."""
+    """Say what is wrong between position [m] and velocity [m/s], "" for nothing.
+
+    Both are sampled every `period` [s]; a factor points to wrong units or counts.
+    """
     ratio, correlation = velocity_factor(position, velocity, period, parts)
     if abs(correlation) < 0.8:
         return (

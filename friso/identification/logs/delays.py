@@ -10,8 +10,10 @@ from friso.identification.logs.settings import LogSettings
 
 
 def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
-    """A line that offers the delay of the velocity [m/s] behind the derivative of position [m], "" for none; both are
-    sampled every `period` [s]."""
+    """Offer the delay of the velocity [m/s] behind the derivative of position [m], "" for none.
+
+    Both are sampled every `period` [s].
+    """
     part = max(parts, key=lambda span: span.stop - span.start)
     slope, speed = _smoothed(position[part], 1, period), _smoothed(velocity[part], 0, period)
     return _line(
@@ -23,8 +25,8 @@ def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, par
 
 
 def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: list[slice]) -> str:
-    """A line that offers the delay of the motion [m] behind the force [N], "" for none; both are sampled every `period`
-    [s].
+    """Offer the delay of the motion [m] behind the force [N], "" for none; both are sampled
+    every `period` [s].
 
     For each lag the force is fitted by acceleration, velocity, its sign, position and a constant: against acceleration
     alone friction would look like a delay, and so would a spring. The lag with the least residual counts.
@@ -38,8 +40,11 @@ def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: li
 
 
 def lag(first: np.ndarray, second: np.ndarray) -> float:
-    """By how many samples the second signal comes after the first: the peak of their cross-correlation, to a fraction
-    of a sample by a parabola; NaN where its height is below 0.5 or it lies at the border of +-`MOST`."""
+    """Return by how many samples the second signal comes after the first.
+
+    It is the peak of their cross-correlation, to a fraction of a sample by a parabola; NaN where its height is below
+    0.5 or it lies at the border of what is searched.
+    """
     settings = LogSettings.current()
     first, second = first - first.mean(), second - second.mean()
     middle = first[settings.longest_delay_samples : -settings.longest_delay_samples]
@@ -54,13 +59,17 @@ def lag(first: np.ndarray, second: np.ndarray) -> float:
 
 
 def fitted_lag(effect: np.ndarray, causes: np.ndarray) -> float:
-    """By how many samples the causes, of shape (n, p), come after what they sum up to by least squares: the lag with
-    the largest share explained, to a fraction of a sample; NaN where that share is below 0.5 or at the border."""
+    """Return by how many samples causes, shape (n, p), come after what they sum up to by least
+    squares.
+
+    It is the lag with the largest share explained, to a fraction of a sample; NaN where that share is below 0.5 or at
+    the border.
+    """
     return _peak(_explained(effect, causes), 0.5)
 
 
 def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
-    """The same; NaN where no lag at all leaves little more."""
+    """Return the lag that fits best; NaN where no lag at all leaves little more."""
     settings = LogSettings.current()
     shares = _explained(effect, causes)
     return (
@@ -71,7 +80,7 @@ def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
 
 
 def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
-    """The share of an effect that its causes explain at each lag, of -MOST to MOST samples."""
+    """Return the share of an effect that its causes explain at each lag that is searched."""
     settings = LogSettings.current()
     middle = (
         effect[settings.longest_delay_samples : -settings.longest_delay_samples]
@@ -88,7 +97,9 @@ def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
 
 
 def _peak(heights: np.ndarray, least: float) -> float:
-    """Where heights at -MOST ... MOST have their peak, by the parabola through the three highest; NaN below `least`."""
+    """Return where heights have their peak, by the parabola through the three highest; NaN below
+    `least`.
+    """
     i = int(np.argmax(heights))
     if heights[i] < least or i in (0, heights.size - 1):
         return np.nan
@@ -98,8 +109,11 @@ def _peak(heights: np.ndarray, least: float) -> float:
 
 
 def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, float]:
-    """Mean of the estimates of the blocks of a record and half its 95 % interval (Student); NaN where fewer than
-    half of them show one."""
+    """Return the mean of the estimates of the blocks of a record and half its 95 % interval
+    (Student).
+
+    NaN where fewer than half of the blocks show one.
+    """
     settings = LogSettings.current()
     from scipy.stats import t as student
 
@@ -115,8 +129,10 @@ def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, 
 
 
 def _line(late: str, early: str, estimate: tuple[float, float], period: float) -> str:
-    """The words for an estimate in samples, "" where its interval holds 0, it is below a quarter of a sample, or the
-    blocks differ by samples: then the motion does not show a delay."""
+    """Write an estimate in samples in words, "" where the motion does not show a delay.
+
+    Its interval holds 0 then, it is below a quarter of a sample, or the blocks differ by samples.
+    """
     value, half = estimate
     if not np.isfinite(value) or abs(value) <= max(half, LogSettings.current().shortest_delay_samples) or half > 1:
         return ""
@@ -128,7 +144,9 @@ def _line(late: str, early: str, estimate: tuple[float, float], period: float) -
 
 
 def _smoothed(values: np.ndarray, order: int, period: float) -> np.ndarray:
-    """Derivative of this order, smoothed, without the ends; all values where there are too few."""
+    """Return the derivative of this order, smoothed, without the ends; all values where there
+    are too few.
+    """
     settings = LogSettings.current()
     from scipy.signal import savgol_filter
 

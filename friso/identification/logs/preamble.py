@@ -24,8 +24,11 @@ _OF_UNIT = re.compile(r"(?:units?|einheit)(?: of)? (?P<after>.+)|(?P<before>.+?)
 
 @dataclass(frozen=True)
 class Preamble:
-    """The sampling `interval` [s], where a line states it with its unit; numbers without a unit by name; units by the
-    name of the column; and what was read, a line each."""
+    """What the lines above a table tell of it.
+
+    It has the sampling `interval` [s], where a line states it with its unit; numbers without a unit by name; units by
+    the name of the column; and what was read, a line each.
+    """
 
     interval: float | None = None
     scalars: Mapping[str, float] = field(default_factory=dict)
@@ -34,7 +37,10 @@ class Preamble:
 
 
 def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Preamble:
-    """What the lines above a table with columns of these names tell. Intervals that contradict each other are none."""
+    """Read what the lines above a table with columns of these names tell.
+
+    Intervals that contradict each other are none.
+    """
     settings = LogSettings.current()
     lines = [line for line in lines if line.strip()]
     pairs = {line.strip(): pair for line in lines if (pair := _pair(line))}
@@ -65,7 +71,9 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
 
 
 def _below_names(lines: Sequence[str], delimiter: str) -> list[tuple[str, str]]:
-    """Names and the numbers below them in the two rows above a table, which scopes write beside names and units."""
+    """Return names and the numbers below them in the two rows above a table, which scopes write
+    beside names and units.
+    """
     if len(lines) < 2:
         return []
     names, values = ([cell.strip() for cell in line.split(delimiter)] for line in lines)
@@ -73,7 +81,7 @@ def _below_names(lines: Sequence[str], delimiter: str) -> list[tuple[str, str]]:
 
 
 def _pair(line: str) -> tuple[str, str] | None:
-    """Key and value of a line that has both."""
+    """Return key and value of a line that has both."""
     line = line.lstrip(_BEFORE)
     if (separator := _SEPARATOR.search(line)) is None:
         return None
@@ -85,7 +93,9 @@ def _pair(line: str) -> tuple[str, str] | None:
 
 
 def _seconds(number: float, unit: str) -> float | None:
-    """A sample time or rate in seconds; None without a unit of either, or for what is not positive."""
+    """Return a sample time or rate in seconds; None without a unit of either, or for what is not
+    positive.
+    """
     for si, power in (("s", 1), ("Hz", -1)):
         if number > 0 and unit and (size := unit_factor(unit, si)) is not None:
             return (number * size) ** power
@@ -93,7 +103,9 @@ def _seconds(number: float, unit: str) -> float | None:
 
 
 def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) -> dict[str, str]:
-    """The units of columns where a line lists them, with or without a word for units in front."""
+    """Return the units of columns where a line lists them, with or without a word for units in
+    front.
+    """
     for line in lines:
         key, value = _pair(line) or ("", "")
         listed = _OF_UNITS.fullmatch(key) is not None
@@ -109,13 +121,15 @@ def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) ->
 
 
 def _horizontal(lines: Iterable[str]) -> str:
-    """The unit of the first column of a scope's table, where a line tells it."""
+    """Return the unit of the first column of a scope's table, where a line tells it."""
     pairs = [pair for line in lines if (pair := _pair(line))]
     return next((value.split(",")[0] for key, value in pairs if key.lower() in ("horizontal units", "x units")), "")
 
 
 def _units_by_name(pairs: Iterable[tuple[str, str]], names: Sequence[str]) -> dict[str, str]:
-    """The units of columns where lines tell them one by one: "position unit: mm", or "position: mm"."""
+    """Return the units of columns where lines tell them one by one: "position unit: mm", or
+    "position: mm".
+    """
     plain = {name.lower(): name for name in names if name}
     units = {}
     for key, value in pairs:

@@ -27,7 +27,7 @@ _OTHERS = {
 
 
 def file_format(path: Path) -> str:
-    """The format of a file by its content, a name of `FORMATS`.
+    """Return the format of a file by its content, a name of `FORMATS`.
 
     Raises LogError for what cannot be read: missing, a folder, empty, too large, no text and no known format.
     """
@@ -61,19 +61,28 @@ def file_format(path: Path) -> str:
 
 
 def read_table(path: Path | str) -> ChannelTable:
-    """The channels of a log of any format. Raises LogError."""
+    """Read the channels of a log of any format.
+
+    Raises LogError.
+    """
     path = Path(path)
     return FORMATS[file_format(path)].read(path)
 
 
 def is_frequency_response(path: Path | str) -> bool:
-    """Whether a file holds a frequency response instead of signals over time. Raises LogError as `file_format`."""
+    """Tell whether a file holds a frequency response instead of signals over time.
+
+    Raises LogError as `file_format`.
+    """
     path = Path(path)
     return FORMATS[file_format(path)].holds_response(path)
 
 
 def read_frequency_response(path: Path | str) -> MeasuredResponse:
-    """The frequency response in a file of a format that can hold one. Raises LogError."""
+    """Read the frequency response in a file of a format that can hold one.
+
+    Raises LogError.
+    """
     path = Path(path)
     form = FORMATS[file_format(path)]
     if form.read_response is None:

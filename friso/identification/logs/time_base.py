@@ -17,8 +17,11 @@ from friso.quantities import percent
 
 @dataclass
 class Track:
-    """A channel with even instants within each segment: `time` [s] and `values` of shape (n,), those that were lost and
-    `bridged` true in an array of that shape; what was done to it."""
+    """A channel with even instants within each segment.
+
+    `time` [s] and `values` have the shape (n,), those that were lost and `bridged` are true in an array of that shape;
+    `read` and `warnings` say what was done to it.
+    """
 
     time: np.ndarray
     values: np.ndarray
@@ -30,11 +33,11 @@ class Track:
 
 
 def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
-    """A channel cleaned of what is no number and of repeated stamps [s], bridged where a few samples are lost, split at
-    longer gaps, on even instants.
+    """Clean a channel, and put it on even instants.
 
-    Raises LogError for too little, for time that decreases, for stamps that are repeated with other values, and for
-    sampling that is not even.
+    What is no number and repeated stamps [s] are left out, a few lost samples bridged, longer gaps split it. Raises
+    LogError for too little, for time that decreases, for stamps that are repeated with other values, and for sampling
+    that is not even.
     """
     settings = LogSettings.current()
     read: list[str] = []
@@ -67,13 +70,15 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
 
 
 def usual_step(steps: np.ndarray) -> float:
-    """The mean [s] of the steps of time, shape (n,), that are no gaps."""
+    """Return the mean [s] of the steps of time, shape (n,), that are no gaps."""
     return float(steps[~_gaps(steps)].mean())
 
 
 def _gaps(steps: np.ndarray) -> np.ndarray:
-    """Which steps of time, shape (n,), are gaps: the samples behind one stay late, while a step that only scatter made
-    long has short ones beside it."""
+    """Tell which steps of time, shape (n,), are gaps.
+
+    The samples behind a gap stay late, while a step that only scatter made long has short ones beside it.
+    """
     settings = LogSettings.current()
     usual = float(np.median(steps))
     if steps.size >= settings.steps_averaged:
@@ -87,8 +92,11 @@ def _gaps(steps: np.ndarray) -> np.ndarray:
 
 
 def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Instants and values of shape (n,) with those that are lost behind each of them but the last, shape (n - 1,), and
-    which these are: evenly in between, on a cubic spline through the others."""
+    """Fill in lost samples evenly, on a cubic spline through the others.
+
+    So many are `lost` behind each sample but the last, shape (n - 1,). Returns instants and values, and which of them
+    were lost.
+    """
     if not lost.any():
         return time, values, np.zeros(time.size, bool)
     places = np.repeat(np.arange(lost.size), lost)
@@ -100,7 +108,10 @@ def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np
 
 
 def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """The samples that are numbers, and how many are not between the first and the last. Raises LogError."""
+    """Return the samples that are numbers, and how many are not between the first and the last.
+
+    Raises LogError.
+    """
     finite = np.isfinite(time) & np.isfinite(values)
     if finite.size < 2:
         raise LogError(name, f"{finite.size} sample{'s' * (finite.size != 1)}", "a record over time", "")
@@ -112,8 +123,11 @@ def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.n
 
 
 def _evened(name: str, raw: Track) -> Track:
-    """The track on even instants: its own where the stamps scatter little, or no more than their digits make them, else
-    interpolated, which the notes say."""
+    """Put a track on even instants.
+
+    They are its own where the stamps scatter little, or no more than their digits make them; else it is interpolated,
+    which the notes say.
+    """
     settings = LogSettings.current()
     order, about = np.empty_like(raw.time), np.empty_like(raw.time)
     for part in raw.segments:
@@ -152,10 +166,11 @@ def _evened(name: str, raw: Track) -> Track:
 
 
 def _rounded(raw: Track, even: np.ndarray) -> float:
-    """The digit [s] to which stamps of an `even` clock, shape (n,) [s], seem rounded; 0 where they scatter otherwise.
+    """Return the digit [s] to which stamps of an `even` clock, shape (n,) [s], seem rounded; 0
+    where they scatter otherwise.
 
     Between neighbours such a clock has one of two whole numbers of digits, and no stamp is further from it than a
-    digit, half of which is the clock's own offset and rate, which are read off the same stamps.
+    digit, half of which is the clock's own offset and rate, which are read off the stamps too.
     """
     settings = LogSettings.current()
     bridges = raw.bridged[1:] | raw.bridged[:-1]
@@ -173,9 +188,11 @@ def _rounded(raw: Track, even: np.ndarray) -> float:
 
 
 def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]:
-    """All tracks at the instants of the coarsest one that all of them cover: these instants as a track, and the values
-    by name. Others are interpolated linearly within their own segments only. Raises LogError where nothing is
-    covered by all."""
+    """Bring all tracks to the instants of the coarsest one that all of them cover.
+
+    Returns these instants as a track, and the values by name. Others are interpolated linearly within their own
+    segments only. Raises LogError where nothing is covered by all.
+    """
     settings = LogSettings.current()
     base_name = max(tracks, key=lambda name: round(np.log(tracks[name].period), 4))
     base = tracks[base_name]
@@ -222,14 +239,16 @@ def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.nd
 
 
 def _same_instants(first: Track, second: Track) -> bool:
-    """Whether two tracks have the same instants, to a hundredth of a sample time."""
+    """Tell whether two tracks have the same instants, to a hundredth of a sample time."""
     settings = LogSettings.current()
     same = first.time.size == second.time.size and first.segments == second.segments
     return same and bool(np.all(np.abs(first.time - second.time) <= settings.scatter_of_even_stamps * second.period))
 
 
 def _coincident(base: Track, other: Track) -> bool:
-    """Whether the instants of the base within the other's first segment are instants of the other as well."""
+    """Tell whether the instants of the base within the other's first segment are instants of the
+    other as well.
+    """
     part = other.segments[0]
     inside = base.time[(base.time >= other.time[part.start]) & (base.time <= other.time[part.stop - 1])]
     steps = (inside - other.time[part.start]) / other.period
@@ -237,7 +256,9 @@ def _coincident(base: Track, other: Track) -> bool:
 
 
 def _at(base: Track, other: Track, values: np.ndarray) -> np.ndarray:
-    """Values of a track, shape (n,), at the instants of the base, NaN outside of its segments."""
+    """Return values of a track, shape (n,), at the instants of the base, NaN outside of its
+    segments.
+    """
     resampled = np.full(base.time.size, np.nan)
     slack = LogSettings.current().scatter_of_even_stamps * other.period
     for part in other.segments:
@@ -248,6 +269,6 @@ def _at(base: Track, other: Track, values: np.ndarray) -> np.ndarray:
 
 
 def _runs(covered: np.ndarray, part: slice) -> list[slice]:
-    """The stretches of a segment where all is covered."""
+    """Return the stretches of a segment where all is covered."""
     edges = np.flatnonzero(np.diff(np.r_[False, covered[part], False].astype(np.int8)))
     return [slice(part.start + int(a), part.start + int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -57,19 +57,24 @@ _MEASURED_IN = channel_words()["measured_in"]
 
 
 def likely_unit(words: Iterable[str]) -> str:
-    """The unit in which what the words of a name tell is measured; "" for none. A single letter is no word."""
+    """Return the unit in which what the words of a name tell is measured; "" for none.
+
+    A single letter is no word.
+    """
     long_words = {word for word in words if len(word) > 1}
     return next((unit for unit, names in _MEASURED_IN.items() if names & long_words), "")
 
 
 def without_accents(name: str) -> str:
-    """A name in plain letters: "força" is "forca"."""
+    """Return a name in plain letters: "força" is "forca"."""
     return "".join(sign for sign in unicodedata.normalize("NFD", name) if not unicodedata.combining(sign))
 
 
 def spelled(text: str) -> str:
-    """A unit text as `friso.quantities` takes it: "m/s2" becomes "m/s^2", "µm" "um", "sec" "s"; "" for none. A text too
-    long for a unit stays."""
+    """Return a unit text as `friso.quantities` takes it; "" for none.
+
+    "m/s2" becomes "m/s^2", "µm" "um", "sec" "s". A text too long for a unit stays.
+    """
     if len(text) > LogSettings.current().characters_of_a_unit:
         return text
     text = re.sub(r"(?:(?<!\s)\s+\([A-Z][\w /]*\)|^\(None\))$", "", text.strip())  # TwinCAT: "V (Voltage)", "(None)"
@@ -81,13 +86,15 @@ def spelled(text: str) -> str:
 
 
 def _below(part: str, before: str) -> str:
-    """A part of a unit, in brackets where it is a product below a stroke: the Nm of rad/Nm."""
+    """Return a part of a unit, in brackets where it is a product below a stroke: the Nm of
+    rad/Nm.
+    """
     return f"({part})" if before == "/" and "*" in part else part
 
 
 @lru_cache(maxsize=1024)
 def unit_factor(unit: str, si_unit: str) -> float | None:
-    """SI value of 1 `unit`, or None where it is not of the kind of `si_unit`."""
+    """Return the SI value of 1 `unit`, or None where it is not of the kind of `si_unit`."""
     try:
         factor = Quantity(si_unit, any_sign, "").factor(spelled(unit))
     except InputError:
@@ -96,14 +103,17 @@ def unit_factor(unit: str, si_unit: str) -> float | None:
 
 
 def is_unit(text: str) -> bool:
-    """Whether a text is a unit that a log could have."""
+    """Tell whether a text is a unit that a log could have."""
     text = spelled(text)
     is_special = text.lower() in COUNTS or text == "%" or of_decibels(text) is not None
     return is_special or any(unit_factor(text, unit) is not None for unit in _KINDS)
 
 
 def of_decibels(text: str) -> str | None:
-    """What decibels are of, "" for nothing told: of "dB re 1 m/N" it is "1 m/N"; None for no decibels."""
+    """Return what decibels are of, "" for nothing told; None for no decibels.
+
+    Of "dB re 1 m/N" it is "1 m/N".
+    """
     match = _DECIBELS.fullmatch(text)
     return None if match is None else match[1].strip()
 
@@ -127,10 +137,12 @@ _KINDS = (
 
 
 def split_heading(heading: str) -> tuple[str, str]:
-    """Name and unit of a heading: "Position (mm)" is ("Position", "mm"). A text in square brackets is always a unit
-    unless it is an index; one in parentheses only where it is a known unit ("current (filtered)" has none), as one
-    behind a stroke or "in": "x/mm", "Kraft in N"; of "Speed m/s" the stroke is in the unit, and "Gain A/V" has none.
-    Else a name may end with its unit, and keeps it: "angle_deg"."""
+    """Split a heading into name and unit: "Position (mm)" is ("Position", "mm").
+
+    A text in square brackets is always a unit unless it is an index; one in parentheses only where it is a known unit
+    ("current (filtered)" has none), as one behind a stroke or "in": "x/mm", "Kraft in N"; of "Speed m/s" the stroke is
+    in the unit, and "Gain A/V" has none. Else a name may end with its unit, and keeps it: "angle_deg".
+    """
     heading = heading.strip()
     quotient = _QUOTIENT.fullmatch(heading)
     if quotient is not None and is_unit(unit := f"{quotient['over']}/{quotient['under']}"):
@@ -149,8 +161,11 @@ def split_heading(heading: str) -> tuple[str, str]:
 
 
 def _last_part(name: str) -> str:
-    """The unit with which a name ends, "" for none: "tempo_ms" is in ms, "vel_mm_s" in mm/s. A single letter is
-    one where the name says what is measured in it: "force_N", but not "pos_s"."""
+    """Return the unit with which a name ends, "" for none: "tempo_ms" is in ms, "vel_mm_s" in
+    mm/s.
+
+    A single letter is one where the name says what is measured in it: "force_N", but not "pos_s".
+    """
     if rate := _RATE.fullmatch(name):
         return f"{rate['length']}/{rate['time'].replace('^', '')}"
     match = _GLUED.fullmatch(name)
@@ -161,8 +176,11 @@ def _last_part(name: str) -> str:
 
 
 def in_si(unit: str, role_unit: str) -> tuple[float, str]:
-    """Factor, and the unit that values have with it: that of the role where possible, else one of `OTHERS`, else the
-    unit as it stands with factor 1 ("1" for no unit)."""
+    """Return a factor, and the unit that values have with it.
+
+    It is that of the role where possible, else one that may stand in its place, else the unit as it stands with factor
+    1 ("1" for no unit).
+    """
     for target in (role_unit, *OTHERS.get(role_unit, ())):
         value = unit_factor(unit, target) if unit else None
         if value is not None:
@@ -172,9 +190,12 @@ def in_si(unit: str, role_unit: str) -> tuple[float, str]:
 
 
 def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR) -> tuple[float, str]:
-    """Factor of a scale such as "35.1507 N/V" for a channel of this unit, to the SI unit of the role on that axis; and
-    what was taken for the channel's unit. A channel without a unit has the one below the scale's stroke. Raises
-    LogError."""
+    """Return the factor of a scale such as "35.1507 N/V" for a channel, and what was taken for
+    the channel's unit.
+
+    The factor leads to the SI unit of the role on that axis. A channel without a unit has the one below the scale's
+    stroke. Raises LogError.
+    """
     match = re.fullmatch(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S.*?)\s*/\s*(\([^()]+\)|[^/]+)\s*", text)
     role_unit = axis.unit(ROLES[role])
     example = f'--scale {role}="35.1507 {role_unit}/V"'
@@ -199,7 +220,10 @@ def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR)
 
 
 def _scale_part(text: str, role_unit: str, scale: str, example: str) -> float:
-    """The SI value above the stroke. Raises LogError."""
+    """Return the SI value above the stroke.
+
+    Raises LogError.
+    """
     try:
         return float(Quantity(role_unit, any_sign, "").read(text))
     except InputError:

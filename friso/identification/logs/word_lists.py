@@ -21,6 +21,9 @@ def channel_words() -> dict[str, Any]:
 
 
 def _joined(table: dict[str, Any]) -> dict[str, Any]:
+    """Join the lists of a table whose values are lists, one for each language; tables within it
+    by themselves.
+    """
     return {
         key: frozenset(word for words in value.values() for word in words)
         if all(isinstance(words, list) for words in value.values())

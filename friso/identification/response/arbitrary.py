@@ -19,9 +19,10 @@ OVERLAP = 1 / 36
 
 
 def welch(record: ResponseRecord, resolution: float, channels: Channels | None = None) -> FrequencyResponse:
-    """The response by Hann segments of 1/`resolution` [Hz] that overlap by half, with coherence.
+    """Estimate a response by Hann segments of 1/`resolution` [Hz] that overlap by half, with
+    coherence.
 
-    H1 where the record has no reference. Its variance is that of the output not coherent with the external signal
+    It is H1 where the record has no reference. Its variance is that of the output not coherent with the external signal
     (Bendat, Piersol, Random Data, 4th ed., ch. 9), over the effective number of segments. Leakage is no part of it: a
     mode sharper than the resolution comes out too low. Raises InputError for fewer than 4 segments.
     """
@@ -56,11 +57,11 @@ def welch(record: ResponseRecord, resolution: float, channels: Channels | None =
 
 
 def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -> FrequencyResponse:
-    """The response by the local polynomial method, free of leakage (Pintelon, Schoukens, 2nd ed., ch. 7).
+    """Estimate a response by the local polynomial method, free of leakage.
 
-    About every line, response and transient are polynomials of order 2 in the frequency over 17 lines of the spectrum
-    of the whole record; what these leave over is the noise. One line in 9 is given, so that neighbours share little.
-    Raises InputError for a record of fewer than 200 samples.
+    The method is that of Pintelon, Schoukens, 2nd ed., ch. 7: about every line, response and transient are polynomials
+    of order 2 in the frequency over 17 lines of the spectrum of the whole record; what these leave over is the noise.
+    One line in 9 is given, so that neighbours share little. Raises InputError for a record of fewer than 200 samples.
     """
     settings = ResponseSettings.current()
     record = record.checked(200)
@@ -110,6 +111,7 @@ def _response(
     coherence: np.ndarray | None,
     sample_time: float,
 ) -> FrequencyResponse:
+    """Make a response of an arbitrary excitation."""
     unknown = np.full(len(frequency), np.nan)
     warnings = ("noise and nonlinear distortion cannot be distinguished: the deviation covers both",)
     return FrequencyResponse(

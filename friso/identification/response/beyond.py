@@ -30,8 +30,12 @@ MILLI = 1e-3
 
 
 def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-    """Responses (outputs, lines) over frequencies [Hz] with delay, hold and a compliance for each output, of a `model`
-    that tells those of the masses, shape (outputs, n), at any frequencies [Hz], shape (n,), negative ones included."""
+    """Add delay, hold and a compliance for each output to the responses of masses, shape
+    (outputs, lines).
+
+    The `model` tells those of the masses, shape (outputs, n), at any frequencies [Hz], shape (n,), negative ones
+    included.
+    """
     delay, held, compliances = parameters[DELAY], MILLI * np.sqrt(parameters[HELD]), parameters[COMPLIANCES:, None]
     masses = model(frequency) * np.sinc(frequency * held)
     if held > 0:
@@ -43,19 +47,26 @@ def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, par
 
 
 def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper limits of the parameters, each of shape (COMPLIANCES + outputs,), for a model of a response up to
-    `top` [Hz]."""
+    """Return lower and upper limits of the parameters, each of shape (COMPLIANCES + outputs,).
+
+    They are for a model of a response up to `top` [Hz].
+    """
     late, longest = ResponseSettings.current().periods_of_a_delay / top, _longest(response, 0.5)
     free = np.full(outputs, np.inf)
     return np.array([-late, 0.0, *-free]), np.array([late, (longest / MILLI) ** 2, *free])
 
 
 def believed(response: FrequencyResponse) -> tuple[float, float]:
-    """Value and deviation [ms^2] of the square of the time for which the force is held: none to the sample time."""
+    """Return value and deviation [ms^2] of the square of the time for which the force is held.
+
+    It may be held for none of the sample time, or for all of it.
+    """
     half = (_longest(response, ResponseSettings.current().periods_of_a_sample) / MILLI) ** 2 / 2
     return half, half
 
 
 def _longest(response: FrequencyResponse, share: float) -> float:
-    """The sample time [s], or where it is not known this share of the period of the highest frequency."""
+    """Return the sample time [s], or where it is not known a share of the period of the highest
+    frequency.
+    """
     return response.sample_time or share / float(response.frequency[-1])

@@ -15,11 +15,13 @@ from friso.quantities import percent
 
 
 def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
-    """What speaks for a controller acting from output to input, as sentences; empty where nothing does.
+    """Say in sentences what speaks for a controller acting from output to input; () where
+    nothing does.
 
     Without a loop the output's past cannot help to foretell the input beyond the input's own past (Granger 1969,
-    doi:10.2307/1912791; for feedback: Caines, Chan 1975, doi:10.1109/TAC.1975.1101008). An input that repeats is
-    taken without its periodic part; one that repeats exactly cannot hold any reaction. Slow or weak loops stay unseen.
+    doi:10.2307/1912791; for feedback: Caines, Chan 1975, doi:10.1109/TAC.1975.1101008). An input that repeats is taken
+    without its periodic part; one that repeats exactly cannot hold any reaction. Slow or weak loops stay unseen.
+
     The present sample of the output counts as past, since a position cannot react to a force within the same sample;
     `direct` says that this output can (an acceleration).
     """
@@ -36,7 +38,9 @@ def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
 
 
 def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Input and output without their periodic part, if they have one; None where nothing is left of the input."""
+    """Return input and output without their periodic part, if they have one; None where nothing
+    is left of the input.
+    """
     try:
         periods = find_periods(record.input)
     except InputError:
@@ -52,7 +56,9 @@ def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray |
 
 
 def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[float, float]:
-    """Chance of the F-test that the output's past does not help, and the share of the surprise that it explains."""
+    """Return the chance of an F-test that the output's past does not help, and the share of the
+    surprise it explains.
+    """
     settings = ResponseSettings.current()
     target = driven[settings.past_of_the_input :]
     past = [driven[settings.past_of_the_input - lag : -lag] for lag in range(1, settings.past_of_the_input + 1)]
@@ -70,7 +76,7 @@ def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[flo
 
 
 def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
-    """Sum of squares that a regression on columns, and a constant, leaves."""
+    """Return the sum of squares that a regression on columns, and a constant, leaves."""
     matrix = np.stack([np.ones(len(target)), *columns], axis=1)
     matrix /= np.linalg.norm(matrix, axis=0)
     residual = target - matrix @ np.linalg.lstsq(matrix, target, rcond=1e-13)[0]
@@ -78,7 +84,9 @@ def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
 
 
 def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tuple[str, ...]:
-    """A sentence where a direct and an indirect estimate on the same lines differ by more than their deviations."""
+    """Say where a direct and an indirect estimate on the same lines differ by more than their
+    deviations.
+    """
     settings = ResponseSettings.current()
     _same_lines(direct, indirect)
     weight = 1 / (direct.deviation**2 + indirect.deviation**2)
@@ -94,16 +102,19 @@ def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tupl
 
 
 def measured_open_loop(plant: FrequencyResponse, controller: np.ndarray) -> FrequencyResponse:
-    """L = C G from the plant and the controller's known response (lines,), complex, [input per output unit]."""
+    """Return L = C G from the plant and the controller's response (lines,), complex, [input per
+    output unit].
+    """
     loop = plant.times(np.asarray(controller), "loop", plant.channels.input_unit)
     return FrequencyResponse(**{**vars(loop), "channels": Channels("error", "1", "loop", "1")})
 
 
 def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
-    """Frequencies [Hz] at which |L| passes 1, by rising frequency, each with its interval; none is an answer too.
+    """Return frequencies [Hz] at which |L| passes 1, by rising frequency, each with its
+    interval; () is an answer too.
 
-    Interpolated in logarithms; the interval follows from that of the magnitude and the slope over the lines nearby.
-    Three passages (or five, ...) that the noise does not tell apart are one.
+    They are interpolated in logarithms; the interval follows from that of the magnitude and the slope over the lines
+    nearby. Three passages (or five, ...) that the noise does not tell apart are one.
     """
     size, place = np.log(np.abs(loop.response)), np.log(loop.frequency)
     band = loop.band()
@@ -125,10 +136,13 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
 
 
 def _merged_passage(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
-    """Low end, centre and high end of passages taken for one: the middle one, and all that they span."""
+    """Return low end, centre and high end of passages taken for one: the middle one, and all
+    that they span.
+    """
     return min(low for low, _, _ in group), group[len(group) // 2][1], max(high for _, _, high in group)
 
 
 def _same_lines(first: FrequencyResponse, second: FrequencyResponse) -> None:
+    """Check that two responses have the same lines."""
     if not np.array_equal(first.frequency, second.frequency):
         raise InputError("response", "responses on different lines", "the same lines", "both from the same record")

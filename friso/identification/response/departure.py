@@ -22,10 +22,11 @@ Vander Velde 1968, table E.2: random-input describing function of the ideal rela
 
 @dataclass(frozen=True)
 class Departure:
-    """Below `frequency` a response differs from the model; `excess` (lines,) is |G/G_model|, on lines `lines` [Hz].
+    """Where a response leaves its linear model at low frequency.
 
-    `differ` says whether realisations differ there by more than noise (chance below 1 %), None where there is one
-    only; `ratio` is their scatter over the noise.
+    Below `frequency` it differs from the model; `excess` (lines,) is |G/G_model|, on lines `lines` [Hz]. `differ` says
+    whether realisations differ there by more than noise (chance below 1 %), None where there is one only; `ratio` is
+    their scatter over the noise.
     """
 
     frequency: Estimate
@@ -36,7 +37,7 @@ class Departure:
 
 
 def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndarray]) -> Departure:
-    """Where the response leaves `model`, a function of frequencies [Hz], at its low end.
+    """Find where a response leaves `model`, a function of frequencies [Hz], at its low end.
 
     The mean of the ratio of response to model, over windows of neighbouring lines, is tested against 1 (F with the
     degrees of the deviations) in the lower half of the lines; the scale of the test is that of the upper half, where
@@ -72,7 +73,7 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
 
 
 def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, float]:
-    """Whether distortion is more than noise on some lines, and its ratio to it."""
+    """Tell whether distortion is more than noise on some lines, and return its ratio to it."""
     settings = ResponseSettings.current()
     noise, distortion = response.noise[part], response.distortion[part]
     if not np.all(np.isfinite(distortion)) or not np.all(noise > 0):
@@ -84,7 +85,8 @@ def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, floa
 
 @dataclass(frozen=True)
 class Drag:
-    """What acts on a rigid mass besides its inertia, at low frequency: a spring and a damper that replace friction.
+    """What acts on a rigid mass besides its inertia, at low frequency: a spring and a damper
+    that replace friction.
 
     `coulomb` is the friction level that damps as much at the velocity of this record (a random one of standard
     deviation `velocity`), `sign` is -1 where the output goes against the input; `left` is the share of the departure
@@ -104,13 +106,14 @@ class Drag:
 def friction_from_departure(
     response: FrequencyResponse, velocities: Sequence[np.ndarray], limits: tuple[float, float], sign: float = 1.0
 ) -> Drag:
-    """The friction level that explains how a response leaves its mass line between `limits` [Hz].
+    """Return the friction level that explains how a response leaves its mass line between
+    `limits` [Hz].
 
     `velocities` are those of the realisations, each of shape (n,), [output unit/s]. Under a broad-band excitation
     Coulomb friction F acts as a damper sqrt(2/pi) F/standard deviation of the velocity: 1/(m s^2 + d s + k) is fitted.
     The interval covers that of the damping and the difference between two distributions of the velocity, normal and
-    sinusoidal (gain 4/pi over the amplitude). Valid while the body slides most of the time. `sign` is -1 where the
-    output goes against the input. Raises InputError for fewer than 8 lines.
+    sinusoidal (gain 4/pi over the amplitude). It is valid while the body slides most of the time. `sign` is -1 where
+    the output goes against the input. Raises InputError for fewer than 8 lines.
     """
     part = response.between(*limits)
     if len(part.frequency) < 8:
@@ -142,7 +145,9 @@ def friction_from_departure(
 
 
 def _coulomb(damping: Estimate, velocity: float, unit: str) -> Estimate:
-    """The Coulomb level behind an equivalent damping, with the describing functions of random and sinusoidal motion."""
+    """Return the Coulomb level behind an equivalent damping, by describing functions of random
+    and sinusoidal motion.
+    """
     method = "damping at low frequency, as Coulomb friction under random motion"
     if damping.high <= 0:
         reason = "the response shows no damping at low frequency"

@@ -22,7 +22,10 @@ NOTHING: Mapping[int, tuple[float, float]] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class ResponseFit:
-    """Parameters (p,), their covariance (p, p), the sum of squares in units of the variance, and the counts of data."""
+    """Parameters (p,) fitted to responses, with their covariance (p, p).
+
+    `squares` is the sum of squares in units of the variance, and `count` the number of data.
+    """
 
     parameters: np.ndarray
     covariance: np.ndarray
@@ -36,12 +39,16 @@ class ResponseFit:
 
     @property
     def bic(self) -> float:
-        """Bayesian information criterion, scale of the variance unknown (Schwarz 1978, doi:10.1214/aos/1176344136)."""
+        """Bayesian information criterion, scale of the variance unknown (Schwarz 1978,
+        doi:10.1214/aos/1176344136).
+        """
         return self.count * np.log(self.squares / self.count) + len(self.parameters) * np.log(self.count)
 
     def _at(self, of: Callable[[np.ndarray], float]) -> tuple[float, float]:
-        """What follows from the parameters, and its deviation to first order; NaN or infinite where one is left open,
-        beside whose value others overflow."""
+        """Return what follows from the parameters, and its deviation to first order.
+
+        It is NaN or infinite where a parameter is left open, beside whose value others overflow.
+        """
         steps = 1e-4 * np.sqrt(np.maximum(np.diag(self.covariance), 1e-30))
         beside = [_number(of, self.parameters + h) - _number(of, self.parameters - h) for h in np.diag(steps)]
         with np.errstate(all="ignore"):
@@ -52,7 +59,10 @@ class ResponseFit:
     def estimate(
         self, name: str, unit: str, method: str, of: Callable[[np.ndarray], float], positive: bool = False
     ) -> Estimate:
-        """What follows from the parameters, with its interval to first order; a `positive` one in the logarithm."""
+        """Estimate what follows from the parameters, with its interval to first order.
+
+        The interval of a `positive` quantity is one of its logarithm.
+        """
         settings = ResponseSettings.current()
         value, deviation = self._at(of)
         if not np.isfinite(value) or (positive and not value > 0):
@@ -70,7 +80,7 @@ class ResponseFit:
 
 
 def _number(of: Callable[[np.ndarray], float], parameters: np.ndarray) -> float:
-    """What follows from parameters; NaN where they are so large that nothing does."""
+    """Return what follows from parameters; NaN where they are so large that nothing does."""
     try:
         with np.errstate(all="ignore"):
             return float(of(parameters))
@@ -79,7 +89,9 @@ def _number(of: Callable[[np.ndarray], float], parameters: np.ndarray) -> float:
 
 
 def deviations(response: FrequencyResponse) -> np.ndarray:
-    """Deviations as weights, (lines,): not below a thousandth of the response, which no model is right to."""
+    """Return deviations as weights, (lines,): not below a thousandth of the response, which no
+    model is right to.
+    """
     return np.hypot(response.scatter(), 1e-3 * np.abs(response.response))
 
 
@@ -92,7 +104,8 @@ def refined(
     upper: np.ndarray | float = np.inf,
     believed: Mapping[int, tuple[float, float]] = NOTHING,
 ) -> ResponseFit:
-    """The model's parameters by least squares, weighted by the deviations; responses of shape (outputs, lines).
+    """Fit a model's parameters by least squares, weighted by the deviations; responses have the
+    shape (outputs, lines).
 
     The errors of one line may be correlated between outputs, and those of neighbouring lines with each other, since a
     model is never quite right: the covariance is the larger of the plain one, scaled by the residual, and one that
@@ -143,7 +156,7 @@ def refined(
 
 
 def _long_run(scores: np.ndarray) -> np.ndarray:
-    """Covariance of the sum of scores (lines, p) that are correlated over some lines."""
+    """Return the covariance of the sum of scores (lines, p) that are correlated over some lines."""
     total = scores.T @ scores
     reach = int(4 * (len(scores) / 100) ** (2 / 9))
     for lag in range(1, min(reach, len(scores) - 1) + 1):
@@ -153,7 +166,9 @@ def _long_run(scores: np.ndarray) -> np.ndarray:
 
 
 def _larger(plain: np.ndarray, robust: np.ndarray) -> np.ndarray:
-    """The plain covariance with its deviations raised to those of the robust one where they are larger."""
+    """Raise the deviations of the plain covariance to those of the robust one where these are
+    larger.
+    """
     ratio = np.diag(robust) / np.maximum(np.diag(plain), np.finfo(float).tiny)
     raised = np.sqrt(np.maximum(ratio, 1.0))
     return plain * raised[:, None] * raised

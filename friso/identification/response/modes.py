@@ -27,10 +27,11 @@ METHOD = "rational fit of the response"
 
 @dataclass(frozen=True)
 class Modes:
-    """The fit over `band` [Hz], its resonances and antiresonances by frequency: ("resonance 1 frequency", ...).
+    """A fit of modes over `band` [Hz], with its resonances and antiresonances by frequency.
 
-    `order` says how the number of modes was chosen; `low_level` and `high_level` are the acceleration per input below
-    and above all modes (the mass lines), unknown without a rigid body.
+    They are called "resonance 1 frequency" and the like. `order` says how the number of modes was chosen; `low_level`
+    and `high_level` are the acceleration per input below and above all modes (the mass lines), unknown without a rigid
+    body.
     """
 
     shape: RationalShape
@@ -44,15 +45,16 @@ class Modes:
     warnings: tuple[str, ...]
 
     def __getitem__(self, name: str) -> Estimate:
+        """Return an estimate by name."""
         return next(estimate for estimate in self.estimates if estimate.name == name)
 
     def predict(self, frequency: np.ndarray) -> np.ndarray:
-        """The fitted response at frequencies [Hz], complex, same shape."""
+        """Return the fitted response at frequencies [Hz], complex, of their shape."""
         return rational(self.fit.parameters, self.shape, 1j * frequency / self.scale)
 
 
 def fit_modes(response: FrequencyResponse, band: tuple[float, float] | None = None, rigid: bool | None = None) -> Modes:
-    """Modes of a force-to-position response in a `band` [Hz] (default: all lines).
+    """Fit modes to a force-to-position response in a `band` [Hz] (default: all lines).
 
     `rigid` says whether the mass moves freely (default: what fits better). Raises InputError for fewer than 12 lines.
     """
@@ -79,13 +81,13 @@ def fit_modes(response: FrequencyResponse, band: tuple[float, float] | None = No
 
 
 def _described(shape: RationalShape, rows: list[Row]) -> str:
-    """How the order was chosen."""
+    """Say how the order was chosen."""
     orders = ", ".join(f"{row.shape.words}: {row.bic:.4g}" for row in rows)
     return f"{shape.words} by the Bayesian information criterion ({orders})"
 
 
 def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> Iterator[str]:
-    """A sentence for each resonance within the band that an antiresonance nearly cancels."""
+    """Yield a sentence for each resonance within the band that an antiresonance nearly cancels."""
     settings = ResponseSettings.current()
     poles, zeros = poles_and_zeros(fit.parameters, shape)
     for pole in sorted(poles, key=abs):
@@ -100,7 +102,9 @@ def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tupl
 
 
 def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> tuple[Estimate, ...]:
-    """Frequencies and damping ratios of resonances and antiresonances within the band, by frequency."""
+    """Return frequencies and damping ratios of resonances and antiresonances within the band, by
+    frequency.
+    """
     estimates: list[Estimate] = []
     for kind, which in (("resonance", 0), ("antiresonance", 1)):
         inside = [
@@ -119,7 +123,7 @@ def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[flo
 
 
 def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.ndarray], complex]:
-    """The root that is nearest to a given one, as a function of the parameters."""
+    """Return the root that is nearest to a given one, as a function of the parameters."""
 
     def nearest(parameters: np.ndarray) -> complex:
         candidates = poles_and_zeros(parameters, shape)[which]
@@ -129,7 +133,9 @@ def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.nd
 
 
 def _level(fit: ResponseFit, shape: RationalShape, scale: float, which: str, response: FrequencyResponse) -> Estimate:
-    """Acceleration per input below all modes (the rigid body alone) or above all (with their residues)."""
+    """Return the acceleration per input below all modes (the rigid body alone) or above all
+    (with their residues).
+    """
     unit = f"{response.channels.output_unit}/s^2/{response.channels.input_unit}"
     name = f"mass line level, {'below' if which == 'low' else 'above'} the modes"
     if not shape.rigid:

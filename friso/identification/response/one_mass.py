@@ -19,7 +19,8 @@ MASS, DRAG, SPRING, BEYOND = range(4)
 
 
 def needs_two(model: TwoMass, driven: FrequencyResponse, other: FrequencyResponse | None = None) -> bool:
-    """Whether two masses explain responses, over the band of their model, considerably better than one mass does.
+    """Tell whether two masses explain responses, over the band of their model, much better than
+    one mass does.
 
     The one mass has viscous friction and a spring to ground, and like the two what the drive and all that lies above
     the band add. An F-test says whether chance explains the difference; since the mode may lie at any line, its level
@@ -37,9 +38,11 @@ def needs_two(model: TwoMass, driven: FrequencyResponse, other: FrequencyRespons
 def fit_one_mass(
     responses: list[FrequencyResponse], signs: tuple[float, ...], band: tuple[float, float]
 ) -> ResponseFit:
-    """One mass fitted to the responses of one or two outputs on the same lines in a band [Hz], signs of -1 reversed:
-    the best of the fits from several corners of friction and spring inside and below the band; parameters as in the
-    module."""
+    """Fit one mass to the responses of one or two outputs on the same lines in a band [Hz].
+
+    Signs of -1 are reversed. It is the best of the fits from several corners of friction and spring inside and below
+    the band; parameters are as in the module.
+    """
     held = {BEYOND + HELD: believed(responses[0])}
     outside = bounds(responses[0], band[1], len(responses))
     responses = [response.between(*band) for response in responses]
@@ -60,7 +63,9 @@ def fit_one_mass(
 
 
 def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Responses of one mass as each output has it, shape (outputs, lines), over frequencies [Hz]."""
+    """Return responses of one mass as each output has it, shape (outputs, lines), over
+    frequencies [Hz].
+    """
     mass, outputs = np.exp(parameters[MASS]), len(parameters) - BEYOND - COMPLIANCES
 
     def masses(frequency: np.ndarray) -> np.ndarray:
@@ -71,7 +76,9 @@ def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
 
 
 def _starts(values: np.ndarray, frequency: np.ndarray) -> list[np.ndarray]:
-    """Starts with corners of friction and spring at none or some of the frequencies, as large as the first response."""
+    """Return starts with corners of friction and spring at none or some frequencies, as large as
+    the first response.
+    """
     settings = ResponseSettings.current()
     places = 2 * np.pi * np.array([0.0, *np.geomspace(frequency[0] / 3, frequency[-1], 6)])
     starts = []

@@ -22,18 +22,20 @@ class Periods:
 
     @property
     def count(self) -> int:
+        """How many whole periods there are."""
         return (self.stop - self.start) // self.samples
 
     def cut(self, signal: np.ndarray) -> np.ndarray:
-        """The signal by periods, shape (periods, samples)."""
+        """Cut a signal into periods, shape (periods, samples)."""
         return signal[self.start : self.stop].reshape(self.count, self.samples)
 
 
 def find_periods(signal: np.ndarray, expected: float | None = None) -> Periods:
-    """The whole periods of an input, shape (n,), counted back from the last sample at which it repeats.
+    """Find the whole periods of an input, shape (n,), counted back from the last sample at which
+    it repeats.
 
-    `expected` is about how many samples a period has: it is then looked for within 2 % of that. Raises InputError
-    where the signal does not repeat, or has fewer than two periods.
+    `expected` is about how many samples a period has: it is then looked for within 2 % of that. Raises InputError where
+    the signal does not repeat, or has fewer than two periods.
     """
     stop = _switched_off(signal)
     if np.unique(signal[:stop]).size < 2:
@@ -51,7 +53,9 @@ def find_periods(signal: np.ndarray, expected: float | None = None) -> Periods:
 
 
 def repetition(signal: np.ndarray) -> np.ndarray:
-    """Mean squared change of a signal, shape (n,), over a lag, in units of twice its variance, for lags 0 to n/2."""
+    """Return the mean squared change of a signal, shape (n,), over lags 0 to n/2, in units of
+    twice its variance.
+    """
     centred = signal - signal.mean()
     n, lags = len(centred), np.arange(len(centred) // 2 + 1)
     size = fft.next_fast_len(2 * n, real=True)
@@ -62,7 +66,9 @@ def repetition(signal: np.ndarray) -> np.ndarray:
 
 
 def _switched_off(signal: np.ndarray) -> int:
-    """One past the last sample before the input rests for good, if it does so for more than 10 samples."""
+    """Return one past the last sample before the input rests for good, if it does so for more
+    than 10 samples.
+    """
     settings = ResponseSettings.current()
     moving = np.flatnonzero(np.abs(signal - signal[-1]) > settings.amplitude_switched_off * np.ptp(signal))
     stop = int(moving[-1]) + 1 if moving.size else 0
@@ -70,7 +76,9 @@ def _switched_off(signal: np.ndarray) -> int:
 
 
 def _shortest(change: np.ndarray) -> int:
-    """The shortest lag at which the signal repeats as well as at any, once it has changed at all."""
+    """Return the shortest lag at which the signal repeats as well as at any, once it has changed
+    at all.
+    """
     away = np.flatnonzero(change > 0.5)
     first = int(away[0]) if away.size else len(change)
     lags = np.arange(max(first, 2), len(change))
@@ -81,7 +89,7 @@ def _shortest(change: np.ndarray) -> int:
 
 
 def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
-    """The lags, of those given, at which a signal repeats but for a slip of its clock."""
+    """Return the lags at which a signal repeats but for a slip of its clock."""
     settings = ResponseSettings.current()
     inner = lags[2 * lags < len(change)]
     inner = inner[inner + 1 < len(change)]
@@ -94,13 +102,14 @@ def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
 
 
 def _lowest(change: np.ndarray, lag: int) -> int:
-    """Down from a lag to the next local minimum."""
+    """Go down from a lag to the next local minimum."""
     while lag + 1 < len(change) and change[lag + 1] < change[lag]:
         lag += 1
     return lag
 
 
 def _near(change: np.ndarray, expected: float) -> int:
+    """Return the lag near an expected one at which the signal repeats best."""
     low, high = int(0.98 * expected), int(np.ceil(1.02 * expected)) + 1
     if not 2 <= expected < len(change):
         raise _not_periodic(f"a period of {expected:g} samples in a record of {2 * len(change) - 2}")
@@ -112,7 +121,9 @@ def _near(change: np.ndarray, expected: float) -> int:
 
 
 def _repeating(signal: np.ndarray, samples: int) -> tuple[int, int]:
-    """The stretch that repeats: no late start or ragged end, where most samples are unlike those a period off."""
+    """Return the stretch that repeats: no late start or ragged end, where most samples are
+    unlike those a period off.
+    """
     change = np.abs(signal[samples:] - signal[:-samples])
     unlike = change > 8 * 1.4826 * np.median(change) + 1e-5 * np.ptp(signal)
     width = max(3, samples // 50)
@@ -124,6 +135,7 @@ def _repeating(signal: np.ndarray, samples: int) -> tuple[int, int]:
 
 
 def _not_periodic(problem: str) -> InputError:
+    """The error for an input that does not repeat."""
     return InputError(
         "period", problem, "an input that repeats at least twice", "a multisine of 5 s, repeated 20 times"
     )

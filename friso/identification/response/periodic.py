@@ -21,7 +21,8 @@ from friso.identification.response.settings import ResponseSettings
 def multisine(
     records: Sequence[ResponseRecord], period: float | None = None, channels: Channels | None = None
 ) -> FrequencyResponse:
-    """The response on the excited lines, from one or more realisations of a periodic excitation.
+    """Estimate the response on the excited lines, from one or more realisations of a periodic
+    excitation.
 
     A realisation is a record with phases of its own; if it has a reference, the response is the indirect one, that of
     output and input to the reference. `period` [s] is about how long a period is (default: found). The deviation covers
@@ -65,7 +66,10 @@ def multisine(
 
 
 def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
-    """The realisations, if they have the same lines, and what to say of their clocks. Raises InputError."""
+    """Bring realisations to the same lines, and say what there is to say of their clocks.
+
+    Raises InputError for those that do not have them.
+    """
     settings = ResponseSettings.current()
     if not records:
         raise InputError("records", "none", "at least one record", "two realisations of a multisine")
@@ -85,13 +89,13 @@ def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
 
 
 def _first_lines(realisation: Spectra, count: int) -> Spectra:
-    """The first so many lines of a realisation."""
+    """Return the first so many lines of a realisation."""
     names = ("frequency", "reference", "excited", "input", "output")
     return replace(realisation, **{name: getattr(realisation, name)[..., :count] for name in names})
 
 
 def _averaged(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The response and the deviation of it by noise, each (lines,)."""
+    """Return the response and its deviation by noise, each (lines,)."""
     outputs, inputs = _relative(records, excited)
     gain = inputs.mean(axis=0)
     response = outputs.mean(axis=0) / gain
@@ -105,14 +109,18 @@ def _averaged(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Output and input over the external signal, averaged over periods, each (realisations, lines)."""
+    """Return output and input over the external signal, averaged over periods, each
+    (realisations, lines).
+    """
     outputs = [realisation.output[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
     inputs = [realisation.input[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
     return np.array(outputs), np.array(inputs)
 
 
 def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The deviation of the mean, from how realisations differ, and its degrees of freedom, each (lines,)."""
+    """Return the deviation of the mean, from how realisations differ, and its degrees of
+    freedom, each (lines,).
+    """
     settings = ResponseSettings.current()
     outputs, inputs = _relative(records, excited)
     count = len(records)
@@ -127,9 +135,11 @@ def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) ->
 
 
 def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarray) -> np.ndarray:
-    """Distortion (lines,) from what the output holds, beyond noise, at lines in the band that are not excited.
+    """Return distortion (lines,) from what the output holds, beyond noise, at lines that are not
+    excited.
 
-    What the input itself holds there is taken off with the interpolated response. NaN where there are no such lines.
+    They are lines in the band. What the input itself holds there is taken off with the interpolated response. NaN where
+    there are no such lines.
     """
     settings = ResponseSettings.current()
     places = np.flatnonzero(excited)

@@ -19,7 +19,9 @@ from friso.identification.response.settings import ResponseSettings
 
 @dataclass(frozen=True)
 class RationalShape:
-    """What a model is made of: a rigid body or not, its number of modes, and a constant for those beyond the band."""
+    """What a rational model is made of: a rigid body or not, its modes, and a constant for those
+    beyond the band.
+    """
 
     rigid: bool
     modes: int
@@ -27,18 +29,21 @@ class RationalShape:
 
     @property
     def nonlinear(self) -> int:
-        """Parameters in front of the linear ones: viscous pole, delay; logarithms of frequencies, then of dampings."""
+        """Parameters in front of the linear ones: viscous pole, delay; logarithms of frequencies,
+        then of dampings.
+        """
         return 2 + 2 * self.modes
 
     @property
     def words(self) -> str:
+        """The shape in words."""
         parts = [f"{self.modes} mode{'s' if self.modes != 1 else ''}"]
         parts += ["rigid body"] * self.rigid + ["constant"] * self.constant
         return " + ".join(parts)
 
 
 class Row(NamedTuple):
-    """A model that was tried: parameters (p,), criterion, sum of squares."""
+    """A model that was tried: its shape, parameters (p,), criterion, and sum of squares."""
 
     shape: RationalShape
     parameters: np.ndarray
@@ -47,7 +52,7 @@ class Row(NamedTuple):
 
 
 def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool, most: int) -> list[Row]:
-    """Shape, parameters and criterion with 0, 1, ... modes, as long as one more helps; the last also with constant."""
+    """Fit 0, 1, ... modes, as long as one more helps; the last model also with a constant."""
     rows: list[Row] = []
     nonlinear = np.zeros(2)
     for modes in range(most + 1):
@@ -66,7 +71,7 @@ def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool
 
 
 def simplest_model(rows: list[Row]) -> Row:
-    """The simplest model that no larger one beats clearly."""
+    """Return the simplest model that no larger one beats clearly."""
     ordered = sorted(rows, key=lambda row: (len(row.parameters), not row.shape.rigid))
     best = ordered[0]
     for row in ordered[1:]:
@@ -76,6 +81,7 @@ def simplest_model(rows: list[Row]) -> Row:
 
 
 def _better(larger: Row, smaller: Row) -> bool:
+    """Tell whether a larger model beats a smaller one clearly."""
     settings = ResponseSettings.current()
     return (
         larger.bic < smaller.bic - settings.criterion_of_a_mode
@@ -84,7 +90,7 @@ def _better(larger: Row, smaller: Row) -> bool:
 
 
 def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
-    """What the linear parameters multiply, complex, shape (linear, lines)."""
+    """Return what the linear parameters multiply, complex, shape (linear, lines)."""
     viscous, delay = nonlinear[:2]
     omega, damping = np.exp(nonlinear[2 : 2 + shape.modes]), np.exp(nonlinear[2 + shape.modes : shape.nonlinear])
     parts = [1 / (s * (s + viscous))[None]] if shape.rigid else []
@@ -95,12 +101,16 @@ def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.n
 
 
 def rational(parameters: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
-    """The response at complex frequencies s [rad/s], shape (lines,), of parameters of this shape."""
+    """Return the response at complex frequencies s [rad/s], shape (lines,), of parameters of
+    this shape.
+    """
     return parameters[shape.nonlinear :] @ _columns(parameters[: shape.nonlinear], shape, s)
 
 
 def _linear_parameters(columns: np.ndarray, values: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The best real linear parameters and the weighted residuals, real and imaginary part after each other."""
+    """Return the best real linear parameters and the weighted residuals, real and imaginary part
+    after each other.
+    """
     weight = np.sqrt(2) / deviation
     matrix, right = (columns * weight).T, values * weight
     matrix, right = np.concatenate([matrix.real, matrix.imag]), np.concatenate([right.real, right.imag])
@@ -110,7 +120,9 @@ def _linear_parameters(columns: np.ndarray, values: np.ndarray, deviation: np.nd
 
 
 def bounds(shape: RationalShape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Limits of all parameters: modes within an octave of the band, damping ratios from 1e-4 to 2, delays of a turn."""
+    """Return limits of all parameters: modes within an octave of the band, damping ratios 1e-4
+    to 2, delays of a turn.
+    """
     low, high, linear = np.abs(s[0]), np.abs(s[-1]), int(shape.rigid) + shape.modes + int(shape.constant)
     rest = np.full(linear, np.inf)
     omega, damping = np.full(shape.modes, np.log(low / 2)), np.full(shape.modes, np.log(1e-4))
@@ -122,7 +134,9 @@ def bounds(shape: RationalShape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 def _another(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
-    """Nonlinear parameters with one more mode, at the place and damping that leave the least."""
+    """Return nonlinear parameters with one more mode, at the place and damping that leave the
+    least.
+    """
     settings = ResponseSettings.current()
     before = shape.modes - 1
     best, best_parameters = np.inf, nonlinear
@@ -138,7 +152,7 @@ def _another(
 def _eliminated(
     start: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
-    """Nonlinear parameters refined with the linear ones eliminated (Golub, Pereyra 1973)."""
+    """Refine nonlinear parameters with the linear ones eliminated (Golub, Pereyra 1973)."""
     settings = ResponseSettings.current()
 
     def left(nonlinear: np.ndarray) -> np.ndarray:
@@ -153,7 +167,7 @@ def _eliminated(
 def _completed(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> Row:
-    """The model with all its parameters, and how good it is."""
+    """Return the model with all its parameters, and how good it is."""
     linear, left = _linear_parameters(_columns(nonlinear, shape, s), values, deviation)
     parameters = np.concatenate([nonlinear, linear])
     squares = float(left @ left)
@@ -161,7 +175,9 @@ def _completed(
 
 
 def poles_and_zeros(parameters: np.ndarray, shape: RationalShape) -> tuple[np.ndarray, np.ndarray]:
-    """Poles of the modes and zeros of the response, those with positive imaginary part, in units of the scale."""
+    """Return poles of the modes and zeros of the response, those with positive imaginary part,
+    in units of the scale.
+    """
     omega, damping = np.exp(parameters[2 : 2 + shape.modes]), np.exp(parameters[2 + shape.modes : shape.nonlinear])
     linear = parameters[shape.nonlinear :]
     factors = [np.array([1.0, parameters[0], 0.0])] if shape.rigid else []

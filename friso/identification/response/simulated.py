@@ -17,10 +17,11 @@ from friso.identification.response.settings import ResponseSettings
 
 @dataclass(frozen=True)
 class Explanation:
-    """Simulated `responses` by the factor on the recorded input, and what they leave of the measured departure.
+    """A simulation of friction, and what it leaves of the departure of a measured response.
 
-    `left` is the share of the departure from the mass line, in units of the deviations, that the simulation with the
-    recorded input leaves; 0 explains all of it, 1 nothing.
+    `responses` are simulated, by the factor on the recorded input. `left` is the share of the departure from the mass
+    line, in units of the deviations, that the simulation with the recorded input leaves; 0 explains all of it, 1
+    nothing.
     """
 
     responses: Mapping[float, FrequencyResponse]
@@ -35,9 +36,10 @@ def explained(
     limits: tuple[float, float],
     factors: Sequence[float] = (0.5, 1.0, 2.0),
 ) -> Explanation:
-    """What Coulomb friction, spring and mass of `drag` make of one period of each realisation's input, (n,) each.
+    """Simulate what Coulomb friction, spring and mass of `drag` make of one period of each
+    realisation's input, (n,).
 
-    Compared with the `measured` response between `limits` [Hz]; the factors, of which 1 must be one, show how the
+    It is compared with the `measured` response between `limits` [Hz]; the factors, of which 1 must be one, show how the
     response depends on the amplitude. Raises InputError where `drag` has no friction level or 1 is missing.
     """
     settings = ResponseSettings.current()
@@ -63,11 +65,12 @@ def explained(
 def slid(
     force: np.ndarray, sample_time: float, mass: float, coulomb: float, stiffness: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Position [m] and velocity [m/s], each (lanes, n), of a mass [kg] on a spring [N/m] with Coulomb friction [N]
-    under forces [N] (lanes, n).
+    """Return position [m] and velocity [m/s], each (lanes, n), of a mass [kg] on a spring [N/m]
+    with Coulomb friction [N].
 
-    Time stepping that treats sticking exactly (Moreau 1988, doi:10.1007/978-3-7091-2624-0_1): friction stops the mass
-    where it can within the step. From rest; the error is of first order in the sample time.
+    It is under forces [N] (lanes, n), from rest. Time stepping treats sticking exactly (Moreau 1988,
+    doi:10.1007/978-3-7091-2624-0_1): friction stops the mass where it can within the step. The error is of first order
+    in the sample time.
     """
     position, velocity = np.zeros(len(force)), np.zeros(len(force))
     positions, velocities = np.empty_like(force), np.empty_like(force)
@@ -81,7 +84,9 @@ def slid(
 
 
 def _unexplained(drag: Drag, measured: FrequencyResponse, simulated: FrequencyResponse) -> float:
-    """The share of the departure from the mass line that the simulation leaves, in units of the deviations."""
+    """Return the share of the departure from the mass line that the simulation leaves, in units
+    of the deviations.
+    """
     real, imaginary = (
         np.interp(measured.frequency, simulated.frequency, part(simulated.response)) for part in (np.real, np.imag)
     )
