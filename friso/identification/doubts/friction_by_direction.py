@@ -37,12 +37,9 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     starts = everywhere(both.problem, free, both.inner) if case.quality.lacks_something else both.inner[None]
     progress = between(case.progress, 0, 1, "moves: forward and backward motion alone")
     alone = fits(problems, free, starts, progress)
-    deviation = np.sqrt(np.diag(both.covariance))
     off = np.abs([one.inner - both.inner for one in alone]).max(axis=0)[list(both.free)] / COVERAGE
-    usable = np.isfinite(deviation) & (deviation > 0)
-    wider = np.divide(np.maximum(off - deviation, 0.0), deviation, out=np.zeros_like(off), where=usable) + 1
     left = sum(one.cost for one in alone) * len(counted) / counted.sum()
-    reaching = replace(both, covariance=both.covariance * np.outer(wider, wider))
+    reaching = both.with_deviations(np.maximum(off, both.deviation))
     if left >= settings.cost_share_of_either_direction * both.left**2:
         yield RaisedDoubt(fit=reaching)
         return

@@ -57,10 +57,7 @@ def explained_by(
 
 def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:
     """Return the fit with deviations whose intervals reach `further`, shape (free,), each way."""
-    deviation = np.sqrt(np.diag(fit.covariance))
-    usable = np.isfinite(deviation) & (deviation > 0)
-    wider = np.divide(further, COVERAGE * deviation, out=np.zeros_like(further), where=usable) + 1
-    return replace(fit, covariance=fit.covariance * np.outer(wider, wider))
+    return fit.with_deviations(fit.deviation + further / COVERAGE)
 
 
 def effect_of(force: np.ndarray, fit: OutputErrorFit, rest: np.ndarray) -> np.ndarray:

@@ -65,6 +65,20 @@ class OutputErrorFit:
         values = {parameter.name: parameter.outer(inner) for parameter, inner in parameters}
         return {**self.problem.flat, **keys_of(self.problem.flat, values)}
 
+    @property
+    def deviation(self) -> np.ndarray:
+        """Standard deviations of the fitted numbers, shape (free,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def with_deviations(self, wanted: np.ndarray) -> OutputErrorFit:
+        """Return the fit with these deviations, shape (free,), of its numbers, correlated as before.
+
+        A deviation that is 0 or not finite stays: nothing is known of what it would be with another size.
+        """
+        usable = np.isfinite(self.deviation) & (self.deviation > 0)
+        wider = np.divide(wanted, self.deviation, out=np.ones(len(self.free)), where=usable)
+        return replace(self, covariance=self.covariance * np.outer(wider, wider))
+
     def linearised(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the residual, shape (n,), and its derivatives to the fitted numbers, shape (n,
         free).
@@ -165,7 +179,7 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
     """
     settings = OutputErrorSettings.current()
     low, high = (end[list(fit.free)] for end in bounds_of(fit.problem))
-    deviation = np.sqrt(np.diag(fit.covariance))
+    deviation = fit.deviation
     usable = np.isfinite(deviation) & (deviation > 0)
     correlation = np.eye(len(fit.free))
     part = fit.covariance[np.ix_(usable, usable)]

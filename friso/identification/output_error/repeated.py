@@ -48,10 +48,7 @@ def as_far_off_as_repeated(
     off = off * float(student.ppf(CONFIDENCE, settings.repetitions_of_a_fit)) / COVERAGE
     usual = float(np.mean([fit.cost[0] for fit in again]))
     off *= np.sqrt(max(1.0, once.cost / usual)) if 0 < usual < np.inf else 1.0
-    deviation = np.sqrt(np.diag(once.covariance))
-    finite = np.isfinite(deviation) & (deviation > 0)
-    wider = np.divide(np.maximum(off, deviation), deviation, out=np.ones_like(off), where=finite)
-    return replace(once, covariance=once.covariance * np.outer(wider, wider))
+    return once.with_deviations(np.maximum(off, once.deviation))
 
 
 def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:

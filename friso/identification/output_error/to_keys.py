@@ -90,7 +90,7 @@ def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
         for name, parameter in parameters.items()
         if name not in identified.shown and not parameter.core
     } | dict(identified.refuted)
-    for number, deviation in zip(fit.free, np.sqrt(np.diag(fit.covariance)), strict=True):
+    for number, deviation in zip(fit.free, fit.deviation, strict=True):
         parameter = fit.problem.parameters[number]
         most = settings.widest_logarithm if parameter.logarithmic else (parameter.high - parameter.low) / 2
         if not COVERAGE * deviation < most:
@@ -112,7 +112,7 @@ def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.nda
     """Widen the covariance of fitted numbers so that their intervals reach as far as the
     profiles do.
     """
-    spread = np.sqrt(np.diag(fit.covariance))
+    spread = fit.deviation
     factors = np.ones(len(fit.free))
     for i, number in enumerate(fit.free):
         parameter = fit.problem.parameters[number]

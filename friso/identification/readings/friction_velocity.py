@@ -187,16 +187,9 @@ def _level(deviations: np.ndarray, errors: np.ndarray) -> float:
 
 def _nothing(reason: str) -> Direction:
     """Return a direction of which nothing is known, for a reason."""
-    names = (
-        ("coulomb", "N"),
-        ("viscous", "N s/m"),
-        ("static", "N"),
-        ("stribeck_velocity", "m/s"),
-        ("stribeck_exponent", ""),
-    )
-    unknown = [Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in names]
-    coulomb, viscous, static, velocity, exponent = unknown
-    return Direction(coulomb, viscous, static, velocity, exponent, np.empty((0, 0)))
+    units = {"coulomb": "N", "viscous": "N s/m", "static": "N", "stribeck_velocity": "m/s", "stribeck_exponent": ""}
+    unknown = (Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in units.items())
+    return Direction(*unknown, np.empty((0, 0)))
 
 
 def _direction(
@@ -252,15 +245,9 @@ def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int
     half = t_value(count - 1 - spent) * float(friction.std(ddof=1)) / count**0.5
     top = float(friction.mean()) + half
     reason = f"all speeds about {speeds.mean() * 1e3:.3g} mm/s: Coulomb and viscous friction cannot be distinguished"
-    nothing = _nothing(reason)
-    return Direction(
-        Estimate.unknown("friction.coulomb", "N", method, reason, 0.0, top),
-        Estimate.unknown("friction.viscous", "N s/m", method, reason, 0.0, top / float(speeds.mean())),
-        nothing.static,
-        nothing.stribeck_velocity,
-        nothing.stribeck_exponent,
-        nothing.covariance,
-    )
+    coulomb = Estimate.unknown("friction.coulomb", "N", method, reason, 0.0, top)
+    viscous = Estimate.unknown("friction.viscous", "N s/m", method, reason, 0.0, top / float(speeds.mean()))
+    return replace(_nothing(reason), coulomb=coulomb, viscous=viscous)
 
 
 def distinct(speeds: np.ndarray) -> int:
@@ -275,15 +262,9 @@ def _still_falling(coulomb: Estimate, viscous: Estimate, reason: str) -> Directi
     A Stribeck effect at the speeds at hand makes the start of a straight line through the forces too high and its slope
     too low.
     """
-    nothing = _nothing(reason)
-    return Direction(
-        Estimate.unknown(coulomb.name, "N", coulomb.method, reason, high=coulomb.high),
-        Estimate.unknown(viscous.name, "N s/m", viscous.method, reason, low=viscous.low),
-        nothing.static,
-        nothing.stribeck_velocity,
-        nothing.stribeck_exponent,
-        nothing.covariance,
-    )
+    high = Estimate.unknown(coulomb.name, "N", coulomb.method, reason, high=coulomb.high)
+    low = Estimate.unknown(viscous.name, "N s/m", viscous.method, reason, low=viscous.low)
+    return replace(_nothing(reason), coulomb=high, viscous=low)
 
 
 def _fitted(
