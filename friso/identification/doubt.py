@@ -80,7 +80,8 @@ class FitCase(RecordCase):
     @property
     def has_cause(self) -> bool:
         """Whether a cause of what is left unexplained is named already: it may imitate others."""
-        return bool(self.quality.spoilt or self.quality.without)
+        explaining = any(finding.explains for finding in self.quality.findings)
+        return explaining or self.quality.spoilt or bool(self.quality.without)
 
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
         """The case after a finding: its consequences for the fit, and the finding among those of the quality."""
@@ -122,7 +123,8 @@ class RaisedDoubt:
     Consequences: intervals reach to what the inverse model `without` the effect says, and to `reaches`, ends by
     quantity of the inverse model; the `fit` and the `inverse` model with intervals that allow for the effect;
     `answers`, estimates in place of others of the same key; keys that it `refuses`, with the reason; and whether it
-    `spoils` the record, so that it passes for friction at low speed. `doubt` is the name of the file that raised it.
+    `spoils` the record, so that it passes for friction at low speed. One that `explains` what a fit leaves keeps others
+    that would explain it too from being named. `doubt` is the name of the file that raised it.
     """
 
     words: str = ""
@@ -135,6 +137,7 @@ class RaisedDoubt:
     answers: Mapping[str, Estimate] = field(default_factory=dict)
     refuses: Mapping[str, str] = field(default_factory=dict)
     spoils: bool = False
+    explains: bool = False
     doubt: str = ""
 
 

@@ -124,6 +124,21 @@ class DoubtSettings(Settings):
     mass_share_of_a_coupling: float = setting(
         0.003, "", "Share of the mass by which a coupling moves it to be told; less is within good sensors' errors."
     )
+    share_of_a_tried_load: float = setting(
+        0.02, "", "Share of the motor's force by which friction is changed for its effect on the record."
+    )
+    share_of_a_load: float = setting(
+        0.02, "", "Share of the motor's force from which on friction grows with it; of sound logs it was below 0.009."
+    )
+    power_left_by_a_load: float = setting(
+        0.7,
+        "",
+        "Share of the residual's power that such friction leaves at most: of drawn logs with a tenth of it 0.02 to "
+        "0.26, of sound ones 0.92 and more.",
+    )
+    reach_of_a_load: float = setting(
+        2.0, "", "Intervals reach so many times as far as such friction moves the fit: that is one linear step."
+    )
     bandwidths_of_a_delayed_force: float = setting(
         10.0, "", "Cut-off of the force in bandwidths of the motion, above which its derivative is noise."
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
 from friso.identification.inverse_model import InverseModel
-from friso.identification.output_error.effects import explained_by, explained_by_forces, reaching_over
+from friso.identification.output_error.effects import Explained, explained_by, explained_by_forces, reaching_over
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.settings import DoubtSettings
 
@@ -85,14 +85,13 @@ def _bends(share: np.ndarray, counted: np.ndarray) -> list[np.ndarray]:
     return [shape - np.average(shape, weights=counted) for shape in shapes]
 
 
-def _drift(explained: tuple[np.ndarray, np.ndarray] | None, bends: Sequence[np.ndarray]) -> RecordDrift | None:
+def _drift(explained: Explained | None, bends: Sequence[np.ndarray]) -> RecordDrift | None:
     """Return the changes along the record from the sizes of their bends."""
     if explained is None:
         return None
-    moved, levels = explained
-    friction, constant = (part @ np.stack(bends) for part in np.split(levels, 2))
+    friction, constant = (part @ np.stack(bends) for part in np.split(explained.sizes, 2))
     reaches = (float(np.abs(line).max()) for line in (friction, constant))
-    return RecordDrift(moved, float(np.ptp(friction)), float(np.ptp(constant)), *reaches)
+    return RecordDrift(explained.moved, float(np.ptp(friction)), float(np.ptp(constant)), *reaches)
 
 
 def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:

@@ -25,21 +25,14 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     Where the position is that of the load, the force that moves a mass M before the coupling is greater by M / w^2
     times that derivative.
     """
-    fit, settings, step = case.fit, DoubtSettings.current(), case.log.sample_time
-    names = [fit.problem.parameters[number].name for number in fit.free]
-    if case.quality.failed or case.quality.rejected or is_free(case.flat) or MASS not in names:
+    fit, settings, force = case.fit, DoubtSettings.current(), coupling_force(case)
+    if force is None or case.quality.failed or case.quality.rejected or is_free(case.flat):
         return
-    cutoff = settings.bandwidths_of_a_coupling * case.inverse.bandwidth
-    acceleration = motion(case.log["position"][case.log.longest], step, cutoff).acceleration
-    force = np.gradient(np.gradient(acceleration, step), step)
-    size = float(np.std(force))
-    if not size > 0:
-        return
-    unit = settings.mass_share_of_a_tried_coupling * fit.value(MASS) * float(np.std(acceleration)) / size
-    explained = explained_by_forces(fit, [force], [unit])
+    explained = explained_by_forces(fit, [force], [settings.mass_share_of_a_tried_coupling])
     if explained is None:
         return
-    moved, (load,) = explained
+    moved, (load,) = explained.moved, explained.sizes
+    names = [fit.problem.parameters[number].name for number in fit.free]
     share = -float(np.expm1(moved[names.index(MASS)]))
     further = reaching_over(fit, settings.reach_of_a_coupling * np.abs(moved))
     if share * load <= 0 or abs(share) < settings.mass_share_of_a_coupling:
@@ -47,6 +40,21 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         return
     words = "" if case.has_cause else _sentence(share)  # an averaged motion, and others, make such a force too
     yield RaisedDoubt(words, share, fit=further, refuses=dict.fromkeys(BRISTLES, IMITATED))
+
+
+def coupling_force(case: FitCase) -> np.ndarray | None:
+    """Return the force of a coupling [N], shape (n,), with the standard deviation of the inertia.
+
+    None where no mass is fitted, or the stage does not move.
+    """
+    fit, step = case.fit, case.log.sample_time
+    if MASS not in [fit.problem.parameters[number].name for number in fit.free]:
+        return None
+    cutoff = DoubtSettings.current().bandwidths_of_a_coupling * case.inverse.bandwidth
+    acceleration = motion(case.log["position"][case.log.longest], step, cutoff).acceleration
+    force = np.gradient(np.gradient(acceleration, step), step)
+    size = float(np.std(force))
+    return force * (fit.value(MASS) * float(np.std(acceleration)) / size) if size > 0 else None
 
 
 def _sentence(share: float) -> str:
@@ -67,5 +75,5 @@ DOUBT = Doubt(
     "a force that goes with the second derivative of the acceleration",
     "intervals widen; bristles are refused",
     "a frequency response",
-    after=("friction-by-direction",),
+    after=("load-friction",),
 )

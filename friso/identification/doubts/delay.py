@@ -19,14 +19,13 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     on as damping, by their stiffness times the delay, and inertia as viscous friction.
     """
     fit, settings, step = case.fit, DoubtSettings.current(), case.log.sample_time
-    cutoff = settings.bandwidths_of_a_delayed_force * case.inverse.bandwidth
-    rate = np.gradient(low_pass(case.log["force"][case.log.longest], step, cutoff), step)
-    if case.quality.failed or case.quality.rejected or fit.problem.closed or not rate.any():
+    force = delay_force(case)
+    if case.quality.failed or case.quality.rejected or fit.problem.closed or not force.any():
         return
-    explained = explained_by_forces(fit, [rate], [settings.samples_of_a_tried_delay * step])
+    explained = explained_by_forces(fit, [force], [settings.samples_of_a_tried_delay * step])
     if explained is None:
         return
-    moved, late = explained[0], -float(explained[1][0])
+    moved, late = explained.moved, -float(explained.sizes[0])
     words = ""
     if abs(late) >= settings.samples_of_a_delay * step and not case.has_cause:
         words = (
@@ -35,6 +34,13 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
             "for it"
         )
     yield RaisedDoubt(words, late, "s", fit=reaching_over(fit, settings.reach_of_a_delay * np.abs(moved)))
+
+
+def delay_force(case: FitCase) -> np.ndarray:
+    """Return the derivative of the log's force [N/s], shape (n,), which a delay multiplies, without its noise."""
+    cutoff = DoubtSettings.current().bandwidths_of_a_delayed_force * case.inverse.bandwidth
+    force = low_pass(case.log["force"][case.log.longest], case.log.sample_time, cutoff)
+    return np.gradient(force, case.log.sample_time)
 
 
 DOUBT = Doubt(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -14,14 +14,24 @@ from friso.identification.spread import correlation_length
 from friso.intervals import COVERAGE
 
 
-def explained_by_forces(
-    fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]
-) -> tuple[np.ndarray, np.ndarray] | None:
+@dataclass(frozen=True)
+class Explained:
+    """What effects that the model leaves out explain of the residual of a fit.
+
+    `moved` is how far they move the fitted numbers, shape (free,), `sizes` are theirs, and `left` is the share of the
+    residual's power that is left with them.
+    """
+
+    moved: np.ndarray
+    sizes: np.ndarray
+    left: float
+
+
+def explained_by_forces(fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]) -> Explained | None:
     """Fit further forces to what a fit leaves, with its own numbers free to follow.
 
     Each force [N], shape (n,), is one of size 1; it is tried at the size `unit`, small enough for its effect to be in
-    proportion. Returns how far the fitted numbers move, shape (free,), and the sizes of the forces; None where they
-    clearly explain nothing.
+    proportion. Returns None where the forces clearly explain nothing.
     """
     rest, slopes = fit.linearised()
     effects = [effect_of(unit * force, fit, rest) / unit for force, unit in zip(forces, units, strict=True)]
@@ -30,12 +40,11 @@ def explained_by_forces(
 
 def explained_by(
     slopes: np.ndarray, rest: np.ndarray, effects: Sequence[np.ndarray], counted: np.ndarray
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Fit a residual, shape (n,), by fitted numbers and further effects, and return how far the former move.
+) -> Explained | None:
+    """Fit a residual, shape (n,), by fitted numbers and further effects.
 
     Derivatives have the shape (n, numbers), effects and weights `counted` the shape (n,). A number that changes
-    nothing, or of which nothing finite is known, does not move. Returns the moves and the sizes of the effects; None
-    where the effects clearly explain nothing.
+    nothing, or of which nothing finite is known, does not move. Returns None where the effects clearly explain nothing.
     """
     settings = OutputErrorSettings.current()
     every = np.column_stack([slopes, *effects])
@@ -52,7 +61,7 @@ def explained_by(
     if rest @ rest <= left @ left * (1 + chance / independent):
         return None
     moved, sizes = np.split(solution, [slopes.shape[1]])
-    return moved, sizes
+    return Explained(moved, sizes, float(left @ left) / float(rest @ rest))
 
 
 def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:

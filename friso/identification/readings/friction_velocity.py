@@ -189,7 +189,8 @@ def _nothing(reason: str) -> Direction:
     """Return a direction of which nothing is known, for a reason."""
     units = {"coulomb": "N", "viscous": "N s/m", "static": "N", "stribeck_velocity": "m/s", "stribeck_exponent": ""}
     unknown = (Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in units.items())
-    return Direction(*unknown, np.empty((0, 0)))
+    coulomb, viscous, static, velocity, exponent = unknown
+    return Direction(coulomb, viscous, static, velocity, exponent, np.empty((0, 0)))
 
 
 def _direction(
