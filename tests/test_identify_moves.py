@@ -18,7 +18,7 @@ from scipy.signal import lsim
 import friso
 from friso.identification import moves as moves_analysis
 from friso.identification.doubt import FitCase
-from friso.identification.doubts import coupling, delay, friction_by_direction
+from friso.identification.doubts import coupling, delay, friction_by_direction, load_friction
 from friso.identification.errors import errors_of
 from friso.identification.inverse_model import inverse_model
 from friso.identification.logs.log import Log
@@ -363,6 +363,26 @@ def test_an_interval_of_the_mass_holds_the_truth_where_a_coupling_moves_the_fit(
 def test_no_coupling_is_seen_where_there_is_none() -> None:
     log = on_a_coupling(1e4, False)
     assert not [*coupling.find(fit_case(log, *rigid(log)))]
+
+
+@pytest.mark.parametrize("share", [0.05, 0.1, 0.2])
+def test_friction_that_grows_with_the_force_of_the_motor_is_named(share: float, wording: Wording) -> None:
+    """A mass seems heavier driven than braked; intervals of mass and friction reach over it."""
+    plain = on_a_coupling(1e4, False)
+    fitted, bandwidth = rigid(plain)
+    assert not [*load_friction.find(fit_case(plain, fitted, bandwidth))]
+    way = np.tanh(np.gradient(plain["position"], plain.sample_time) / 1e-3)
+    against = np.sign(plain["force"]) * way * share
+    log = replace(plain, signals={**plain.signals, "force": plain["force"] / (1 - against)})
+    fitted, bandwidth = rigid(log)
+    (doubt,) = load_friction.find(fit_case(log, fitted, bandwidth))
+    assert doubt.size == pytest.approx(share, rel=0.3)
+    wording(doubt.words)
+    assert doubt.fit is not None
+    off = np.log(fitted.value(MASS) / sum(TWO_MASSES))
+    assert abs(off) < COVERAGE * np.sqrt(doubt.fit.covariance[0, 0])
+    case = fit_case(log, fitted, bandwidth)
+    assert not [*load_friction.find(replace(case, quality=replace(WELL, spoilt=True)))]
 
 
 @pytest.mark.parametrize("late", [1, 3, -2])

@@ -127,8 +127,11 @@ class DoubtSettings(Settings):
     share_of_a_tried_load: float = setting(
         0.02, "", "Share of the motor's force by which friction is changed for its effect on the record."
     )
-    share_of_a_load: float = setting(
-        0.02, "", "Share of the motor's force from which on friction grows with it; of sound logs it was below 0.009."
+    shares_of_a_load: tuple[float, ...] = setting(
+        (0.02, 0.5),
+        "",
+        "Shares of the motor's force that friction in proportion to it may have: it was below 0.009 on sound logs, "
+        "and from a half on a transmission locks itself.",
     )
     power_left_by_a_load: float = setting(
         0.7,

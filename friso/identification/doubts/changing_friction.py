@@ -56,17 +56,28 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | None:
     """Return what changes during a record, of the smooth `velocity` [m/s], shape (n,); None where nothing clearly does.
 
-    Constant force and friction may follow a line each over either half of the record. They are fitted together with
-    the parameters, about the fit.
+    The changes are fitted together with the parameters, about the fit.
     """
-    problem, settings = fit.problem, DoubtSettings.current()
-    if "friction.coulomb" not in [parameter.name for parameter in problem.parameters]:
+    if "friction.coulomb" not in [parameter.name for parameter in fit.problem.parameters]:
         return None
+    forces, units, bends = changing_forces(fit, velocity)
+    return _drift(explained_by_forces(fit, forces, units), bends)
+
+
+def changing_forces(
+    fit: OutputErrorFit, velocity: np.ndarray
+) -> tuple[list[np.ndarray], list[float], list[np.ndarray]]:
+    """Return forces of friction and of a constant force that change along a record of a velocity [m/s], shape (n,).
+
+    Either may follow a line over each half of the record. Also returns the sizes [N] at which they are tried, and the
+    bends of these lines.
+    """
+    settings = DoubtSettings.current()
     way = np.clip(velocity / (settings.speed_share_of_creeping * np.abs(velocity).max()), -1.0, 1.0)
     unit = settings.friction_share_of_a_tried_force * fit.value("friction.coulomb")
-    bends = _bends(np.linspace(0.0, 1.0, len(velocity)), problem.counted)
+    bends = _bends(np.linspace(0.0, 1.0, len(velocity)), fit.problem.counted)
     forces = [base * bend for base in (-way, np.ones(len(way))) for bend in bends]
-    return _drift(explained_by_forces(fit, forces, [unit] * len(forces)), bends)
+    return forces, [unit] * len(forces), bends
 
 
 def changes_beside(inverse: InverseModel) -> RecordDrift | None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
+from friso.identification.doubts.changing_friction import changing_forces
 from friso.identification.doubts.coupling import coupling_force
 from friso.identification.doubts.delay import delay_force
 from friso.identification.output_error.effects import explained_by_forces, reaching_over
@@ -21,10 +22,12 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     Such friction makes a mass seem heavier while the motor drives it than while the motor brakes it. The model has one
     mass and one Coulomb friction for both: of 3 kg and 5 N with a tenth of the force they came out at 3.13 to 3.36 kg
     and 5.44 to 5.60 N, without a doubt. It is named where it explains much of what the fit leaves, and more than a
-    coupling or a delay would.
+    coupling, a delay, or friction that changes with time would.
     """
     fit, settings, step = case.fit, DoubtSettings.current(), case.log.sample_time
-    if case.quality.failed or case.quality.rejected or is_free(case.flat):
+    names = [parameter.name for parameter in fit.problem.parameters]
+    quality = case.quality
+    if quality.failed or quality.rejected or case.has_cause or is_free(case.flat) or "friction.coulomb" not in names:
         return
     top = settings.speed_share_of_creeping * np.abs(case.velocity).max()
     against = -np.abs(case.log["force"][case.log.longest]) * np.clip(case.velocity / top, -1.0, 1.0)
@@ -32,10 +35,12 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     if explained is None or explained.left > settings.power_left_by_a_load:
         return
     share, coupled = float(explained.sizes[0]), coupling_force(case)
-    rivals = [(delay_force(case), settings.samples_of_a_tried_delay * step)]
-    rivals += [(coupled, settings.mass_share_of_a_tried_coupling)] if coupled is not None else []
-    others = [explained_by_forces(fit, [force], [unit]) for force, unit in rivals if force.any()]
-    if share < settings.share_of_a_load or any(other.left < explained.left for other in others if other):
+    rivals = [([delay_force(case)], [settings.samples_of_a_tried_delay * step])]
+    rivals += [([coupled], [settings.mass_share_of_a_tried_coupling])] if coupled is not None else []
+    rivals.append(changing_forces(fit, case.velocity)[:2])
+    others = [explained_by_forces(fit, *rival) for rival in rivals]
+    least, most = settings.shares_of_a_load
+    if not least <= share <= most or any(other.left < explained.left for other in others if other):
         return
     words = (
         f"Friction grows with the force of the motor, by {percent(share)} of it, as that of worm gears, belts and "
