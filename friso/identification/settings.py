@@ -178,13 +178,20 @@ class DoubtSettings(Settings):
 class IdentificationSettings(Settings):
     """The inverse model, spreads of fits, and the stage file that is written."""
 
+    # Estimates of several experiments.
     chance_of_agreement: float = setting(
         0.01, "", "A scatter less likely than this is a disagreement; 1 in 100 keeps false ones rare."
     )
+
+    # What a file holds, shown before it is identified.
     bins_of_a_small_plot: int = setting(24, "", "Parts of a channel whose means make its small plot.")
+
+    # Residuals over place and speed.
     bins_of_a_residual: int = setting(
         40, "", "Places and speeds in which the mean residual is taken: fewer hide cogging, more hold noise."
     )
+
+    # The inverse model: filters, decimation, and what of a motion counts.
     smoothing_bandwidths: float = setting(
         5.0, "", "Cut-off of the position in bandwidths of the motion (Gautier, Janot, Vandanjon 2013)."
     )
@@ -227,6 +234,8 @@ class IdentificationSettings(Settings):
         0.1, "s", "Rests of this length are left out: friction at rest is what the controller makes it."
     )
     rows_of_an_inverse_model: int = setting(20, "", "Rows at least: fewer leave four numbers without an interval.")
+
+    # How uncertain a fit is whose errors are alike.
     row_share_of_likeness: float = setting(
         0.1, "", "Share of the rows over which errors are looked at for likeness: farther ones are few."
     )
@@ -240,6 +249,8 @@ class IdentificationSettings(Settings):
     eigenvalue_of_likeness: float = setting(
         1e-6, "", "Share of the largest eigenvalue below which columns count as one: differences are no more precise."
     )
+
+    # The stage file that is written.
     bend_of_made_up_bristles: float = setting(
         5e-6, "m", "Bristles of a stage made up around a log bend by this, as those of many bearings (our choice)."
     )
@@ -247,6 +258,8 @@ class IdentificationSettings(Settings):
         1e-3, "m/s", "Stribeck velocity of a stage made up around a log (our choice)."
     )
     digits_of_an_uncertainty: int = setting(2, "", "Significant digits of an uncertainty, and so of its value.")
+
+    # Which estimates the keys of a stage file can take.
     share_of_a_least_value: float = setting(
         1e-3, "", "Share of the upper end at which a range begins that would hold 0: smaller makes no difference."
     )
@@ -256,6 +269,9 @@ class IdentificationSettings(Settings):
 class ExperimentSettings(Settings):
     """What analyses of kinds of experiment look for in their logs."""
 
+    # Excitations and moves, told apart by what repeats.
+
+    # Moves.
     harmonics_of_an_excitation: float = setting(
         7.0, "", "From so many harmonics a log is an excitation; moves have 1 to 7, a multisine of 8 equal lines more."
     )
@@ -265,6 +281,8 @@ class ExperimentSettings(Settings):
     samples_of_moves: int = setting(
         40_000, "", "Samples that are used: more moves of one kind take longer and show little more (our choice)."
     )
+
+    # Small motion before sliding.
     low_pass_of_a_check: float = setting(
         0.7, "", "Low-pass of the second fit that checks the first, over that of the first: nearer 1 it repeats it."
     )
@@ -281,6 +299,8 @@ class ExperimentSettings(Settings):
     stiffness_ratio_of_a_joint: float = setting(
         3.0, "", "Up to this ratio to the joint's stiffness it may well be the joint that is seen."
     )
+
+    # Slow sliding.
     low_pass_below_a_mode: float = setting(
         1 / 3, "", "Highest low-pass over the frequency of the structure's mode, which nothing here describes."
     )
@@ -304,6 +324,8 @@ class ExperimentSettings(Settings):
     stribeck_velocities_gone: float = setting(
         1.5, "", "Stribeck velocities that the motion has to go: at 1.5 a tenth of the fall is left."
     )
+
+    # Position steps with the cart fixed.
     low_pass_of_steps: float = setting(25.0, "Hz", "Low-pass of the force of position steps (thesis, Sec. 4.2.2).")
     drift_of_a_settled_force: float = setting(
         0.02, "", "Share of a step by which the force may drift in a settled window beyond the deflection's part."
@@ -314,6 +336,8 @@ class ExperimentSettings(Settings):
     travel_of_a_fixed_cart: float = setting(
         0.02, "", "Share of the position's steps by which a cart that counts as fixed may follow."
     )
+
+    # Slow motion that sticks and slips.
     low_pass_of_stick_slip: float = setting(
         100.0, "Hz", "Low-pass of deflection and velocity: slips are slower than this."
     )

@@ -11,6 +11,7 @@ from friso.settings import Settings, setting
 class LawSettings(Settings):
     """How friction laws are fitted and compared."""
 
+    # Which laws a record supports.
     parts_left_out: int = setting(
         5, "", "Parts at least into which the records are cut in time: fewer differences decide nothing."
     )
@@ -23,6 +24,8 @@ class LawSettings(Settings):
     error_of_a_prediction: float = setting(
         0.3, "", "Share of the friction's deviation up to which a prediction is one."
     )
+
+    # A log as a body dragged along what was measured.
     samples_of_a_dragged_record: int = setting(400, "", "Samples of a record at least.")
     most_samples_of_a_record: int = setting(
         8000, "", "Samples of a record at most: what follows is left out, which would take longer."
@@ -32,6 +35,8 @@ class LawSettings(Settings):
     )
     samples_of_a_dragged_period: int = setting(20, "", "Samples per period of the force's band that are enough.")
     tolerance_of_dragging: float = setting(1e-5, "", "Relative tolerance of the runs: looser ones blur derivatives.")
+
+    # Fits of a law.
     step_of_a_logarithm: float = setting(
         1e-4, "", "Change of a logarithm for derivatives: smaller ones drown in the runs' tolerance."
     )

@@ -11,6 +11,7 @@ from friso.settings import Settings, setting
 class OutputErrorSettings(Settings):
     """How the whole model is fitted to a log, and what of the fit is believed."""
 
+    # Starts of a fit, and how far each is refined.
     starts_of_a_fit: int = setting(
         1024, "", "Starts that are simulated: a quarter misses optima of stick-slip records, more takes longer."
     )
@@ -51,6 +52,8 @@ class OutputErrorSettings(Settings):
         1e-3, "", "Share of the largest singular value below which fitted numbers cannot be told apart."
     )
     seed_of_starts: int = setting(7, "", "Seed of the starts, so that results repeat.")
+
+    # What is believed of bearings: ranges of the parameters.
     highest_friction_ratio: float = setting(
         4.0, "", "Largest ratio of static to Coulomb friction believed of a bearing; the thesis's rig has 3."
     )
@@ -74,6 +77,8 @@ class OutputErrorSettings(Settings):
     highest_stribeck_velocity: float = setting(
         0.02, "m/s", "Speed up to which the Stribeck effect of a bearing may act."
     )
+
+    # Simulation of a stage on a log: what counts, and how it is held to the log.
     derivative_step: float = setting(
         1e-4, "", "Step of a fitted number for derivatives: smaller drowns in the tolerance, larger passes break-aways."
     )
@@ -100,6 +105,8 @@ class OutputErrorSettings(Settings):
     sample_time_tolerance: float = setting(
         1e-3, "", "Share by which sample times of log and drive may differ to count as one."
     )
+
+    # Profiles: how far a parameter can be moved, all others following.
     points_of_a_profile: int = setting(
         7, "", "Values over its range at which a parameter is held; fewer make intervals coarser, no narrower."
     )
@@ -111,12 +118,16 @@ class OutputErrorSettings(Settings):
     cost_share_of_a_profile: float = setting(
         0.1, "", "Share of what ends an interval by which a fit may still fall; larger ends too early on a ridge."
     )
+
+    # Levenberg-Marquardt steps.
     first_damping: float = setting(1e-2, "", "Damping of the first step, as a share of the curvature.")
     highest_damping: float = setting(1e3, "", "Damping at which a fit that gets no better is left.")
     cost_share_of_refinement: float = setting(
         1e-4, "", "Share by which the squares of a fit fall at last, unless more is asked."
     )
     range_share_inside: float = setting(1e-9, "", "Share of a range by which a number is kept inside it.")
+
+    # Repetitions of a fit on simulated logs.
     repetitions_of_a_fit: int = setting(
         4, "", "Simulated logs that the fit is repeated on: Student's t of 4 is 1.4 times that of a known spread."
     )
@@ -124,6 +135,8 @@ class OutputErrorSettings(Settings):
         8, "", "Iterations from the truth on: what has not settled by then is far off."
     )
     seed_of_repetitions: int = setting(11, "", "Seed of the noise of simulated logs, so that results repeat.")
+
+    # From fitted numbers to keys of the stage file.
     static_error_of_following: float = setting(
         0.05,
         "",
@@ -134,6 +147,8 @@ class OutputErrorSettings(Settings):
         "",
         "Half an interval of the logarithm beyond which a record bounds nothing: linear steps fail by a factor of 2.",
     )
+
+    # What a motion covers: steady speeds, and starts in which bristles bend.
     friction_share_of_inertia: float = setting(
         0.5, "", "Share of Coulomb friction that inertia stays below in a steady motion."
     )
@@ -150,11 +165,17 @@ class OutputErrorSettings(Settings):
         5, "", "Samples in which bristles are seen bending at the start of a motion, at least."
     )
     starts_with_a_bend: int = setting(3, "", "Such starts of a motion at least: one may be chance.")
+
+    # Machines drawn from what a record leaves open.
     machines_drawn: int = setting(16, "", "Machines drawn from what a record leaves open: two fillings of the lanes.")
     seed_of_draws: int = setting(5, "", "Seed of these draws, so that results repeat.")
+
+    # What a log does not say of the motion between its samples.
     probability_of_an_effect: float = setting(
         0.999, "", "Probability with which a worse explanation has to be wrong to be left out."
     )
+
+    # Which parameters a record shows.
     noise_ratio_of_a_closed_fit: float = setting(
         1.2, "", "A fit within this ratio of the noise is where it belongs, and is judged by its noise alone."
     )

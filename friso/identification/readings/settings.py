@@ -11,6 +11,7 @@ from friso.settings import Settings, setting
 class ReadingSettings(Settings):
     """What is read off logs: passes, slips, ramps, friction over speed and place."""
 
+    # The body on the bearing, from what the drive commands and the sensor sees.
     points_per_sample: int = setting(
         8, "", "Points per sample for a mode of the structure: one of a tenth of the sampling rate is off by 0.05 %."
     )
@@ -39,6 +40,8 @@ class ReadingSettings(Settings):
     contact_ratio_of_bending: float = setting(
         3.0, "", "Times what the contact that holds the joint gives that the deflection reaches then."
     )
+
+    # Means, noise and digits of signals.
     blocks_of_a_mean: int = setting(
         8, "", "Blocks of a stretch for its mean: enough for an interval, each long enough to forget the last."
     )
@@ -58,6 +61,8 @@ class ReadingSettings(Settings):
     )
     spectrum_share_of_noise: float = setting(0.25, "", "Share of the spectrum, at its top, that is taken for noise.")
     lines_of_a_spectrum: int = setting(1000, "", "Lines of the spectrum: more resolve more and scatter more.")
+
+    # How a log goes that nobody has named.
     range_share_of_a_turn: float = setting(
         0.1, "", "A signal turns where it goes back by this share of its range: less is noise."
     )
@@ -86,6 +91,8 @@ class ReadingSettings(Settings):
     samples_of_a_blur: int = setting(
         20, "", "Samples over which a position is averaged, for its way not to be that of its noise."
     )
+
+    # Friction over the place on the rail.
     points_of_a_friction_map: int = setting(400, "", "Places of a map over the whole travel.")
     correlation_of_passes: float = setting(
         0.5, "", "Correlation of the maps of two passes from which they repeat each other."
@@ -97,6 +104,8 @@ class ReadingSettings(Settings):
         5.0, "", "Correlation lengths that a pass holds for its correlation length to be shown."
     )
     harmonics_of_a_pass: int = setting(3, "", "Harmonics reported of each pass.")
+
+    # Friction over speed.
     span_of_speeds: float = setting(
         1.5, "", "Ratio of speeds from which Coulomb and viscous friction can be told apart."
     )
@@ -106,7 +115,11 @@ class ReadingSettings(Settings):
         3, "", "Distinct speeds from which it shows whether friction is a straight line over them."
     )
     rounding_of_a_force: float = setting(1e-9, "", "Share of the greatest force better than which no mean is known.")
+
+    # Loads of a joint between slips.
     fewest_loads: int = setting(3, "", "Loads between slips at least: fewer leave no error of the stiffness.")
+
+    # Stretches of constant velocity.
     low_pass_of_passes: float = setting(25.0, "Hz", "Low-pass of the velocity by which constant stretches are found.")
     time_of_a_pass: float = setting(
         0.1, "s", "Shortest stretch of constant velocity: the filter takes as long to settle."
@@ -141,11 +154,15 @@ class ReadingSettings(Settings):
     acceleration_of_a_constant_speed: float = setting(
         0.02, "", "Share of the reference's largest acceleration below which its velocity is constant."
     )
+
+    # The greatest friction before a body breaks away.
     deviations_of_a_kernel: int = setting(4, "", "Deviations of the Gaussian beyond which it is cut off.")
     widths_tried: int = setting(12, "", "Widths of the Gaussian among which one is chosen.")
     ramp_share_of_a_width: float = setting(
         0.1, "", "Longest deviation of the Gaussian as a share of the ramp's second half."
     )
+
+    # Ramps of the force from rest.
     low_pass_of_ramps: float = setting(100.0, "Hz", "Low-pass of force and velocity of force ramps.")
     periods_of_a_ramp: float = setting(
         2.0, "", "Periods of the low-pass that the second half of a ramp lasts for its break-away to be read."
@@ -161,6 +178,8 @@ class ReadingSettings(Settings):
     force_share_of_a_start: float = setting(
         0.5, "", "Share of its break-away force from below which a ramp rises: else bristles are bent already."
     )
+
+    # Break-away at the rate of a ramp.
     least_bristle_rate: float = setting(
         100.0,
         "N/s",
@@ -173,6 +192,8 @@ class ReadingSettings(Settings):
     share_extrapolated: float = setting(
         0.15, "", "Share of static friction over which it may be extrapolated, or widened by a bound."
     )
+
+    # Slips.
     speed_share_of_a_slip: float = setting(0.1, "", "Share of the highest speed from which the body slips.")
     deviations_of_a_slip: float = setting(8.0, "", "Deviations of noise by which the speed of a slip stands out.")
     time_before_a_slip: float = setting(
@@ -185,6 +206,8 @@ class ReadingSettings(Settings):
     time_share_of_sliding: float = setting(
         0.6, "", "Share of the time above the threshold from which a body slides, and does not stick and slip."
     )
+
+    # Stribeck curves through forces at some speeds.
     chance_of_a_curve: float = setting(
         0.01, "", "Chance below which a curve is shown, or an exponent is another than stated."
     )

@@ -11,23 +11,30 @@ from friso.settings import Settings, setting
 class ResponseSettings(Settings):
     """How frequency responses are estimated and explained."""
 
+    # Which lines of a response the models are fitted to.
     frequency_above_friction: float = setting(
         1 / 7, "", "Share of the highest frequency below which friction may bend a response: looked at again."
     )
     frequency_of_one_body: float = setting(
         0.4, "", "Share of the antiresonance's frequency up to which both masses move as one (to 1.2)."
     )
+
+    # Responses to arbitrary excitation.
     order_of_local_polynomials: int = setting(2, "", "Order of the local polynomials of response and transient.")
     lines_on_a_side: int = setting(8, "", "Lines on each side in a local fit: 17 complex equations for 6 unknowns.")
     amplitude_of_a_weak_line: float = setting(
         1e-4, "", "Amplitude over the largest below which a line is not excited (-80 dB)."
     )
+
+    # What the drive and modes above the band add.
     periods_of_a_delay: float = setting(
         0.4, "", "Largest delay over the highest frequency's period: a drive is late by 0.38 at four samples each."
     )
     periods_of_a_sample: float = setting(
         0.25, "", "Share of that period that an unknown sample time usually has at most."
     )
+
+    # Feedback.
     past_of_the_input: int = setting(
         60, "", "Past samples of the input from which it is foretold: it remembers more than the output."
     )
@@ -43,16 +50,22 @@ class ResponseSettings(Settings):
     difference_of_played_periods: float = setting(
         1e-6, "", "Difference between periods of an input below which it was played from a table."
     )
+
+    # Where friction bends a response.
     lines_of_a_window: int = setting(
         9, "", "Neighbouring lines judged together: scatter averages out over them, a departure does not."
     )
     chance_of_a_departure: float = setting(0.01, "", "Chance below which a window of lines is off the model.")
+
+    # Fits to responses.
     tolerance_of_a_fit: float = setting(
         1e-6, "", "Change of squares or parameters that ends a fit: far below what noise does to them."
     )
     factor_of_a_loose_interval: float = setting(
         1e3, "", "Factor to either side from which a linear interval says nothing of a positive quantity."
     )
+
+    # Straight lines in a response.
     scatter_of_a_straight_line: float = setting(
         0.02, "", "Scatter beyond its noise that a line may have: drives, guides and cables are never quite straight."
     )
@@ -62,6 +75,8 @@ class ResponseSettings(Settings):
     lines_of_a_band: int = setting(4, "", "Frequency lines of a band at least.")
     octaves_of_a_band: float = setting(0.4, "", "Width of a band at least.")
     edges_tried: int = setting(300, "", "Frequencies tried as ends of a band at most.")
+
+    # Modes.
     modes_at_most: int = setting(4, "", "Modes at most: more than a bench shows in a band.")
     error_of_a_response: float = setting(
         0.01, "", "Error below which no model is trusted; keeps a few strong lines from ruling the fit."
@@ -72,6 +87,8 @@ class ResponseSettings(Settings):
     widths_of_cancelling: float = setting(
         1.0, "", "Distance of resonance and antiresonance, in half-widths, up to which they nearly cancel."
     )
+
+    # One mass or two.
     squares_left_by_two: float = setting(
         0.5, "", "Share of the squares of one mass that two may leave: unevenness explains some, but not half."
     )
@@ -80,6 +97,8 @@ class ResponseSettings(Settings):
     width_of_a_start: float = setting(
         0.1, "", "Half-width of the mode on the spring from which a fit starts, over its frequency."
     )
+
+    # The period of an input.
     amplitude_switched_off: float = setting(
         0.01, "", "Share of the input's range below which a trailing stretch is switched off."
     )
@@ -92,6 +111,8 @@ class ResponseSettings(Settings):
     growth_of_a_slip: float = setting(
         2.0, "", "Times as much that has changed after two periods: a slip changes four times as much."
     )
+
+    # Averages over periods and realisations.
     lines_sharing_variance: int = setting(
         5, "", "Neighbouring lines that share their variance where few realisations leave it uncertain."
     )
@@ -100,6 +121,8 @@ class ResponseSettings(Settings):
     )
     tolerance_of_equal_periods: float = setting(1e-6, "", "Share up to which periods are equal.")
     freedom_of_a_variance: int = setting(10, "", "Degrees of freedom per line from which a variance stands on its own.")
+
+    # Rational models.
     criterion_of_a_mode: float = setting(
         10.0, "", "Fall of the information criterion for another mode (Kass, Raftery 1995: very strong evidence)."
     )
@@ -110,6 +133,8 @@ class ResponseSettings(Settings):
     dampings_tried: tuple[float, ...] = setting(
         (0.003, 0.01, 0.03, 0.1, 0.3), "", "Damping ratios at which a further mode is tried."
     )
+
+    # Records of one realisation.
     amplitude_of_an_excited_line: float = setting(
         0.01, "", "Amplitude over the strongest line's below which a line is not excited (-40 dB)."
     )
@@ -126,9 +151,15 @@ class ResponseSettings(Settings):
     distance_of_a_transient: float = setting(
         1.5, "", "A leading period that lies so much further off than others is a transient."
     )
+
+    # Lines of a response that are used.
     coherence_of_a_line: float = setting(0.5, "", "Coherence from which on, where it is known, a line is used.")
     lines_of_a_scatter: int = setting(15, "", "Lines from which the scatter between neighbours is taken.")
+
+    # Simulated friction.
     periods_simulated: int = setting(10, "", "Periods simulated; friction forgets the start within one or two.")
+
+    # Two masses.
     resonance_ratios: tuple[float, ...] = setting(
         (1.05, 1.2, 1.5, 2.0, 3.0), "", "Resonance over antiresonance from which the fit starts."
     )
