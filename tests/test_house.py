@@ -42,6 +42,7 @@ RECIPES = {
     "kind of experiment": "identification/experiments",
     "question": "questions",
     "log format": "identification/logs",
+    "doubt about a log": "identification/doubts",
     "parameter file": "drives/formats",
 }
 """What CONTRIBUTING.md tells how to add, and the folder that takes its one file."""

@@ -212,7 +212,10 @@ def identify(
 
 
 def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Changes) -> Stage:
-    """The stage of a file that lacks tables which a stage `made` up around a log has. Raises InputError."""
+    """Return the stage of a file that lacks tables which a stage `made` up around a log has.
+
+    Raises InputError.
+    """
     try:
         return changed(completed(tables, made), changes_of(changes))
     except InputError as error:
@@ -220,14 +223,16 @@ def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Cha
 
 
 def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]:
-    """The keys of tables that a stage file lacks, of a stage `made` up around a log, but for those that are set."""
+    """List the keys of tables that a stage file lacks, of a stage `made` up around a log, but
+    for those that are set.
+    """
     keys_set = changes_of(changes)
     keys = [f"{name}.{key}" for name in lacking for key in made.as_written()[name]]
     return [key for key in keys if key not in keys_set]
 
 
 def _taken_from_logs(made_up: Sequence[str]) -> list[str]:
-    """A sentence on the tables of keys that were made up around a log."""
+    """Say which tables of keys were made up around a log."""
     if not made_up:
         return []
     listed = ", ".join(dict.fromkeys(f"[{key.partition('.')[0]}]" for key in made_up))
@@ -235,7 +240,10 @@ def _taken_from_logs(made_up: Sequence[str]) -> list[str]:
 
 
 def _settings(bandwidth: FrequencyLike | None, band: FrequencyBand | None, period: TimeLike | None) -> AnalysisSettings:
-    """What the user chose for the analyses. Raises InputError."""
+    """Return what the user chose for the analyses.
+
+    Raises InputError.
+    """
     values = []
     for name, value, quantity in (("bandwidth", bandwidth, _HERTZ), ("period", period, _SECONDS)):
         text = None if value is None else text_of(value, quantity.unit)
@@ -251,7 +259,10 @@ def _settings(bandwidth: FrequencyLike | None, band: FrequencyBand | None, perio
 
 
 def _logs_to_predict(inputs: Sequence[LogFile]) -> list[Log]:
-    """The logs to be predicted. Raises InputError."""
+    """Read the logs to be predicted.
+
+    Raises InputError.
+    """
     logs = [item.source for item in inputs if isinstance(item.source, Log)]
     if len(logs) < len(inputs):
         raise InputError("predict", "a measured frequency response", "a log over time", "predict=other.mat")
