@@ -1,83 +1,86 @@
-"""What modules compute, as a digest: their syntax, without what a reader alone sees.
+"""Size of the code: `python -m benchmarks.code [PACKAGE ...]`, by default friso, friso_thesis and two anchors.
 
-Comments, docstrings, sentences, annotations, imports and the names that a module gives to its own values do not count,
-so that a change of words leaves the digest as it is; a number, a condition or another function called does not.
+A line of code has a token of its own: docstrings, comments and blank lines are none. Prose are docstrings and comments.
+The anchors, python-control and xarray, are counted as installed, with the same rules.
 """
 
 from __future__ import annotations
 
+import argparse
 import ast
-import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+import io
+import tokenize
+from collections import Counter
+from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
+from typing import NamedTuple
 
-import friso
+ANCHORS = ("control", "xarray")
+"""Packages of the field and of its neighbourhood that are known for good code."""
 
-PACKAGE = Path(friso.__file__).parent
-DIGITS = 12
-"""Digits of a digest on file."""
-
-READ_ALONE = ast.Import | ast.ImportFrom
-ANNOTATED = ("annotation", "returns", "type_comment", "type_params", "kind", "ctx")
+NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
 
 
-def code_digest(places: Sequence[str]) -> str:
-    """A digest of what the modules in some folders and files compute, paths from the package friso; empty without
-    any."""
-    if not places:
-        return ""
-    code = hashlib.sha256()
-    for file in sorted({file for place in places for file in _files(PACKAGE / place)}):
-        code.update(computed(file.read_text(encoding="utf-8")).encode())
-    return code.hexdigest()[:DIGITS]
+class LineCount(NamedTuple):
+    """Lines of modules: all of them, those with code, and those with prose."""
+
+    lines: int
+    code: int
+    prose: int
 
 
-def computed(source: str) -> str:
-    """The syntax of a module, its own names as numbers in the order in which they occur."""
-    tree = ast.parse(source)
-    own = {name for node in ast.walk(tree) for name in _bound(node)}
-    numbers: dict[str, str] = {}
-
-    def shown(value: object) -> str:
-        if isinstance(value, ast.AST):
-            return _node(value)
-        if isinstance(value, list):
-            return f"[{' '.join(shown(part) for part in value if not _prose(part))}]"
-        if isinstance(value, str) and value in own:
-            return numbers.setdefault(value, f"_{len(numbers)}")
-        return repr(value)
-
-    def _node(node: ast.AST) -> str:
-        if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            return "text" if " " in node.value.strip() else repr(node.value)
-        if isinstance(node, ast.JoinedStr):
-            return f"(text {' '.join(shown(part) for part in node.values if isinstance(part, ast.FormattedValue))})"
-        fields = [value for name, value in ast.iter_fields(node) if name not in ANNOTATED]
-        return f"({type(node).__name__} {' '.join(shown(value) for value in fields if value not in (None, []))})"
-
-    return shown(tree.body)
+def count(source: str) -> LineCount:
+    """Count the lines of a module."""
+    prose = {line for first, last in _docstrings(ast.parse(source)) for line in range(first, last + 1)}
+    code: set[int] = set()
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT and not token.line[: token.start[1]].strip():
+            prose.add(token.start[0])
+        elif token.type not in NO_CODE:
+            code.update(range(token.start[0], token.end[0] + 1))
+    return LineCount(len(source.splitlines()), len(code - prose), len(prose))
 
 
-def _bound(node: ast.AST) -> Iterator[str]:
-    """Names that a node of the syntax gives."""
-    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-        yield node.id
-    elif isinstance(node, ast.arg):
-        yield node.arg
-    elif isinstance(node, ast.FunctionDef | ast.ClassDef):
-        yield node.name
+def _docstrings(tree: ast.Module) -> Iterator[tuple[int, int]]:
+    """First and last line of each text that stands as a statement, as docstrings do."""
+    for node in ast.walk(tree):
+        for statement in getattr(node, "body", []) if isinstance(getattr(node, "body", None), list) else []:
+            value = statement.value if isinstance(statement, ast.Expr) else None
+            if isinstance(value, ast.Constant) and isinstance(value.value, str):
+                yield statement.lineno, statement.end_lineno or statement.lineno
 
 
-def _prose(part: object) -> bool:
-    """Whether a statement says something to readers alone: an import, a docstring, a declaration of a type."""
-    if isinstance(part, ast.AnnAssign) and part.value is None:
-        return True
-    docstring = isinstance(part, ast.Expr) and isinstance(part.value, ast.Constant)
-    return docstring or isinstance(part, READ_ALONE)
+def of_package(package: str) -> dict[str, LineCount]:
+    """Count the modules of an installed package, by its rooms; tests that it holds are left out."""
+    spec = find_spec(package)
+    if spec is None or spec.origin is None:
+        raise SystemExit(f"{package} is not installed")
+    root, rooms = Path(spec.origin).parent, Counter[tuple[str, int]]()
+    for path in sorted(root.rglob("*.py")):
+        parts = path.relative_to(root).parts
+        if not {"tests", "tests.py"} & {*parts}:
+            for column, number in enumerate(count(path.read_text(encoding="utf-8"))):
+                rooms[parts[0] if len(parts) > 1 else ".", column] += number
+    return {room: LineCount(*(rooms[room, column] for column in range(3))) for room in {room for room, _ in rooms}}
 
 
-def _files(place: Path) -> Iterable[Path]:
-    """Raises FileNotFoundError for a place that does not exist."""
-    if not place.exists():
-        raise FileNotFoundError(place)
-    return place.rglob("*.py") if place.is_dir() else [place]
+def main() -> None:
+    """Print a table of the packages, and of the rooms of the first one."""
+    parser = argparse.ArgumentParser(prog="code", description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("packages", nargs="*", metavar="PACKAGE", default=["friso", "friso_thesis", *ANCHORS])
+    packages = parser.parse_args().packages
+    counted = {package: of_package(package) for package in packages}
+    rows = [(name, LineCount(*map(sum, zip(*rooms.values(), strict=True)))) for name, rooms in counted.items()]
+    rows += sorted(((f"  {packages[0]}/{room}", lines) for room, lines in counted[packages[0]].items()), key=_by_code)
+    print(f"{'':32}{'lines':>8}{'code':>8}{'prose':>8}")
+    for name, lines in rows:
+        print(f"{name:32}{lines.lines:8}{lines.code:8}{lines.prose / max(lines.lines, 1):8.1%}")
+
+
+def _by_code(row: tuple[str, LineCount]) -> int:
+    return -row[1].code
+
+
+if __name__ == "__main__":
+    main()

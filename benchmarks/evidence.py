@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.canonical import differ, reference_numbers
-from benchmarks.code import code_digest
+from benchmarks.code_digest import code_digest
 from benchmarks.ode23s import thesis_solver
 from benchmarks.report import print_table
 from friso import evidence

@@ -7,8 +7,8 @@ import pytest
 
 from benchmarks import evidence as command
 from benchmarks.canonical import differ, reference_numbers
-from benchmarks.code import DIGITS, code_digest
-from benchmarks.code import computed as syntax
+from benchmarks.code_digest import DIGITS, code_digest
+from benchmarks.code_digest import computed as syntax
 from friso.evidence import equations, findings_on_file, value
 
 ROOT = Path(__file__).parent.parent

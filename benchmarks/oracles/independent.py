@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.code import code_digest
+from benchmarks.code_digest import code_digest
 from benchmarks.oracles.edges import FINE, QUOTAS, ROUNDS, Quota, Record, kept, of_quota
 from benchmarks.oracles.oracle import Finding, Oracle
 from benchmarks.oracles.plain_runs import BRISTLE, Plain

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
 
-from benchmarks.code import code_digest
+from benchmarks.code_digest import code_digest
 from benchmarks.oracles.oracle import Finding, Oracle
 from benchmarks.truth.kept import CHECKED
 from benchmarks.truth.tally import markdown

@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from benchmarks.code import code_digest
+from benchmarks.code_digest import code_digest
 
 CHECKED = ("stage", "equations", "engine", "hunting")
 """Folders of friso on which the answers of a check rest."""
