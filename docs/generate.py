@@ -16,7 +16,9 @@ from typer.core import TyperGroup
 
 import friso
 from friso.cli.app import command_line
-from friso.cli.command import COMMANDS, QUESTIONS
+from friso.cli.command import COMMANDS
+from friso.identification.doubt import DOUBTS
+from friso.interface.question import TOPICS
 from friso.settings import settings_classes
 
 WIDTH = 100
@@ -31,6 +33,7 @@ def write_reference(folder: Path) -> None:
         "specification": schema_page("specification"),
         "commands": commands_page(),
         "settings": settings_page(),
+        "doubts": doubts_page(),
     }
     for name, text in pages.items():
         path = folder / f"{name}.md"
@@ -46,6 +49,14 @@ def settings_page() -> str:
         lines += [f"## {settings.__name__} (`{room}`)", "", "| setting | value | unit | why |", "|---|---|---|---|"]
         lines += [f"| `{row.name}` | {row.value} | {row.unit} | {row.reason} |" for row in settings.rows()]
         lines.append("")
+    return "\n".join(lines)
+
+
+def doubts_page() -> str:
+    """Every doubt about logs: the effect, what is looked at, what follows, and what would decide it."""
+    lines = ["| effect | looked at | consequence | decided by |", "|---|---|---|---|"]
+    for name, doubt in DOUBTS.items():
+        lines.append(f"| {DOUBTS.one_line(name)} | {doubt.looks_at} | {doubt.consequence} | {doubt.decided_by} |")
     return "\n".join(lines)
 
 
@@ -110,10 +121,10 @@ def commands_page() -> str:
     group = typer.main.get_command(command_line())
     assert isinstance(group, TyperGroup)
     lines = []
-    for question in QUESTIONS:
-        lines.append(f"## {question}\n")
+    for topic in TOPICS:
+        lines.append(f"## {topic}\n")
         for name in group.commands:
-            if COMMANDS[name].question == question:
+            if COMMANDS[name].topic == topic:
                 lines += [f"### friso {name}\n", "```text", _help(group, name), "```\n"]
     return "\n".join(lines)
 

@@ -4,7 +4,6 @@ import friso.platform.early  # noqa: F401 (notes a signal that comes while the r
 
 # isort: split
 import importlib
-from collections.abc import Callable, Mapping
 from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     from friso.frequency.describing.response import plant_response
     from friso.frequency.members import Members, member
     from friso.frequency.tuning import Tuning, tuning
+    from friso.interface.starting import example, init, schema
     from friso.questions.bode.question import bode
     from friso.questions.boundary.question import boundary
     from friso.questions.check.question import check
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from friso.questions.export.question import export
     from friso.questions.flexure.question import flexure
     from friso.questions.identify.question import identify
-    from friso.questions.init.starting import example, init, schema
     from friso.questions.logs.question import logs
     from friso.questions.map.question import sweep
     from friso.questions.rig.question import rig
@@ -41,22 +40,7 @@ if TYPE_CHECKING:
     from friso.studies.store import read_store
 
 _PLACES = {
-    "friso.questions.bode.question": ("bode",),
-    "friso.questions.boundary.question": ("boundary",),
-    "friso.questions.check.question": ("check",),
-    "friso.questions.compare.question": ("compare",),
-    "friso.questions.convert.question": ("convert",),
-    "friso.questions.design.question": ("design",),
-    "friso.questions.doctor.question": ("doctor",),
-    "friso.questions.export.question": ("export",),
-    "friso.questions.flexure.question": ("flexure",),
-    "friso.questions.identify.question": ("identify",),
-    "friso.questions.logs.question": ("logs",),
-    "friso.questions.rig.question": ("rig",),
-    "friso.questions.simulate.question": ("simulate",),
-    "friso.questions.init.starting": ("example", "init", "schema"),
-    "friso.questions.map.question": ("sweep",),
-    "friso.questions.tune.question": ("tune",),
+    "friso.interface.starting": ("example", "init", "schema"),
     "friso.remedies.sensitivities": ("Sensitivities", "sensitivity"),
     "friso.errors": ("InputError", "LogError", "SpecError", "StageError", "StoreError"),
     "friso.frequency.analysis": ("linear",),
@@ -70,7 +54,7 @@ _PLACES = {
     "friso.studies.samples": ("Samples",),
     "friso.studies.store": ("read_store",),
 }
-"""Where everything public stands."""
+"""Where everything public stands that is no function of a question."""
 
 _LAZY = {name: module for module, names in _PLACES.items() for name in names}
 
@@ -120,8 +104,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is used for the first time: numbers with units and arrays take half a second. What friso does not
-    have itself is looked for among the functions of installed packages."""
+    """Import what is used for the first time: numbers with units and arrays take half a second. The functions of
+    questions, of friso and of installed packages, are found where these are declared."""
     if name in _LAZY:
         return getattr(importlib.import_module(_LAZY[name]), name)
     nearest = ""
@@ -129,24 +113,19 @@ def __getattr__(name: str) -> Any:
         from difflib import get_close_matches
 
         from friso.errors import InputError
-        from friso.platform.installed import FUNCTIONS, load_declared
+        from friso.interface.question import function_of
 
-        if name in _installed():
-            try:
-                return load_declared(FUNCTIONS, name, _installed()[name], name, Callable)
-            except InputError as error:
-                raise AttributeError(str(error)) from error
-        nearest = "".join(f"; did you mean {near!r}?" for near in get_close_matches(name, __dir__(), 1))
+        try:
+            return function_of(name)
+        except InputError as error:
+            raise AttributeError(str(error)) from error
+        except KeyError:
+            nearest = "".join(f"; did you mean {near!r}?" for near in get_close_matches(name, __dir__(), 1))
     raise AttributeError(f"module 'friso' has no attribute {name!r}{nearest}")
 
 
 def __dir__() -> list[str]:
     """What is public, for completion, with the functions of installed packages."""
-    return [*__all__, *_installed()]
+    from friso.interface.question import QUESTIONS
 
-
-def _installed() -> Mapping[str, str]:
-    """The modules of functions that installed packages name, by name."""
-    from friso.platform.installed import FUNCTIONS, installed_modules
-
-    return installed_modules(FUNCTIONS, frozenset(_LAZY))
+    return [*__all__, *(name.replace("-", "_") for name in QUESTIONS.others)]

@@ -18,8 +18,8 @@ Item = TypeVar("Item")
 
 
 class Registry(Generic[Item]):
-    """What modules declare under the name `attribute`, by the name of the module with dashes: `break_away.py` declares
-    "break-away".
+    """What modules declare under the name `attribute`, by the name of the module, with dashes unless that is declined:
+    `break_away.py` declares "break-away".
 
     The modules are those of a `package`, and, where there is a `group` of entry points, those that installed packages
     name in it; what the latter declare has to be of a `kind`. The names are read without importing any module, and so
@@ -27,27 +27,33 @@ class Registry(Generic[Item]):
     asked for. `added` takes what is declared elsewhere, as (declared, one line), by name.
     """
 
-    def __init__(self, package: str, attribute: str, group: str = "", kind: type = object) -> None:
+    def __init__(self, package: str, attribute: str, group: str = "", kind: type = object, dashes: bool = True) -> None:
         self.package, self.attribute, self.group, self.kind = package, attribute, group, kind
+        self.dash = "-" if dashes else "_"
         self.added: dict[str, tuple[Item, str]] = {}
 
     @cached_property
     def _own(self) -> dict[str, str]:
         """The modules of the package, by name."""
         modules = iter_modules(import_module(self.package).__path__)
-        return {module.name.replace("_", "-"): f"{self.package}.{module.name}" for module in modules}
+        return {module.name.replace("_", self.dash): f"{self.package}.{module.name}" for module in modules}
 
     @property
-    def _installed(self) -> Mapping[str, str]:
+    def installed(self) -> Mapping[str, str]:
         """The modules that installed packages name, by name."""
         return installed_modules(self.group, frozenset(self._own)) if self.group else {}
 
+    @property
+    def others(self) -> list[str]:
+        """The names that friso does not have itself."""
+        return sorted({*self.installed, *self.added})
+
     def __iter__(self) -> Iterator[str]:
         """The names, in alphabetical order."""
-        return iter(sorted({*self._own, *self._installed, *self.added}))
+        return iter(sorted({*self._own, *self.installed, *self.added}))
 
     def __contains__(self, name: object) -> bool:
-        return name in self.added or name in self._own or name in self._installed
+        return name in self.added or name in self._own or name in self.installed
 
     def __getitem__(self, name: str) -> Item:
         """What is declared under a name. Raises KeyError for an unknown one, InputError where another package's module
@@ -56,9 +62,9 @@ class Registry(Generic[Item]):
             return self.added[name][0]
         if name in self._own:
             return getattr(import_module(self._own[name]), self.attribute)
-        if name not in self._installed:
+        if name not in self.installed:
             raise KeyError(name)
-        return load_declared(self.group, name, self._installed[name], self.attribute, self.kind)
+        return load_declared(self.group, name, self.installed[name], self.attribute, self.kind)
 
     def items(self) -> Iterator[tuple[str, Item]]:
         """The names with what is declared; what another package's module does not declare is told, and left out."""
@@ -72,7 +78,7 @@ class Registry(Generic[Item]):
         """What is declared under a name, in one line without a full stop. Raises KeyError for an unknown name."""
         if name in self.added:
             return self.added[name][1]
-        module = self._own.get(name) or self._installed[name]
+        module = self._own.get(name) or self.installed[name]
         try:
             loader: Any = getattr(find_spec(module), "loader", None)
             docstring = ast.get_docstring(ast.parse(loader.get_source(module)))

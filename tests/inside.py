@@ -3,12 +3,16 @@
 import io
 import subprocess
 import sys
+from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from friso.cli import main
+from friso.cli.derived import ask_by_values
+from friso.interface.question import QUESTIONS
 
 
 def friso_inside(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
@@ -21,3 +25,15 @@ def friso_inside(folder: Path, *arguments: object) -> subprocess.CompletedProces
         with pytest.raises(SystemExit) as left:
             main()
     return subprocess.CompletedProcess(command, int(left.value.code or 0), out.getvalue(), err.getvalue())
+
+
+def command_of(name: str) -> Callable[..., None]:
+    """The command of a question as a function: what it is asked about, then its options as keywords."""
+    question = QUESTIONS[name]
+
+    def command(*about: Any, **options: Any) -> None:
+        ask_by_values(
+            question, dict.fromkeys(question.takes) | dict(zip(question.takes, about, strict=False)) | options
+        )
+
+    return command

@@ -19,13 +19,12 @@ from friso.equations.settings import settings_named
 from friso.errors import InputError
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases
-from friso.questions.compare.figures import LINES
-from friso.questions.compare.words import PROSE, _disturbance_rejection
+from friso.questions.compare.figures import COLOURS
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
-from friso.studies.compare.disturbance_rejection import ADRC
+from friso.studies.compare.disturbance_rejection import ADRC, rejection
 from friso.studies.compare.machines import draw_machines
-from friso.studies.compare.options import NAMES, Option, linear_flat, options
+from friso.studies.compare.options import OPTIONS, Option, linear_flat, options
 
 MASS, RATIO = 1.7, 5.0
 STATIC, COULOMB, STRIBECK, SIGMA_0, SIGMA_1, SIGMA_2 = 3.0, 1.0, 1.6e-3, 1e5, 1e5**0.5, 0.5
@@ -106,7 +105,7 @@ def test_it_is_written_read_and_made_faster() -> None:
 def test_as_an_option_it_is_as_fast_as_what_it_replaces(present: Stage) -> None:
     """For the mass that the present one believes in, behind the same limit."""
     machines = draw_machines(present, Correlations(), 20, 1)
-    tried = options(machines, 1e-6, with_adrc=True)
+    tried = options(machines, 1e-6, {"adrc"})
     with_observer: Option = tried.options[-1]
     assert with_observer.letter == "n"
     flat = machines.flat(with_observer.stage, with_observer.changes)
@@ -117,12 +116,16 @@ def test_as_an_option_it_is_as_fast_as_what_it_replaces(present: Stage) -> None:
     assert crossings[1] == pytest.approx(
         crossing_ratio(RATIO) * with_observer.stage.flat()["controller.bandwidth"], rel=0.02
     )
-    assert f"{RATIO:g} times" in _disturbance_rejection(with_observer.stage.flat())
+    numbers = rejection(with_observer.stage.flat())
+    assert numbers is not None
+    assert numbers.observer_ratio == RATIO
     assert not settings_named((ADRC,), (ADRC,))
 
 
-def test_every_option_has_its_line_and_its_words() -> None:
-    assert NAMES.keys() == LINES.keys() == PROSE.keys()
+def test_every_option_has_a_line_and_a_letter_of_its_own() -> None:
+    assert "".join(kind.letter for kind in OPTIONS.values()) == "abcdefghijklmn"
+    assert len({kind.line for kind in OPTIONS.values()}) == len(OPTIONS)
+    assert {kind.line[0] for kind in OPTIONS.values()} <= {*COLOURS}
 
 
 def crossing(machine: Stage) -> float:

@@ -52,7 +52,7 @@ from friso.engine.cache import CodeRequest
 from friso.engine.overtaken import Overtaken, ended_by, go_on, going_first, is_first
 from friso.errors import InputError, LogError
 from friso.identification.logs.mapping import sidecar
-from friso.questions.init.schema import stage_schema
+from friso.interface.schema import stage_schema
 from friso.shown.drawing.drawable import drawable
 from friso.shown.drawing.figure import Axis, Cloud, Figure, Panel, Series
 from friso.studies.execute import local_crew
@@ -616,7 +616,7 @@ def test_few_texts_of_machines_are_kept() -> None:
     assert sum(text() is not None for text in kept) * 4e6 <= 64e6
 
 
-@pytest.mark.parametrize("name", [name for name in friso.questions.init.starting.example_names() if "/" not in name])
+@pytest.mark.parametrize("name", [name for name in friso.interface.starting.example_names() if "/" not in name])
 def test_every_example_is_shown(name: str) -> None:
     path = Path(friso.example(name))
     part = machine_on_page(Machine(path.read_text(encoding="utf-8"), path.name))

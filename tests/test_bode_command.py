@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from inside import friso_inside
+from inside import command_of, friso_inside
 from pages import Page
 from refusals import Refused
 from snapshots import Snapshots
 
 import friso
-from friso.cli.commands.bode import bode as command
 from friso.frequency.bode import Bode, Unstable, bode
 from friso.interface.output_folder import MARKER
 from friso.questions.bode.document import bode_document
@@ -31,6 +30,8 @@ from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.drawable import drawable
 from friso.shown.drawing.figure import Axis, Band, Figure, Panel, Series
 from friso.stage import Stage
+
+command = command_of("bode")
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, EMPS = EXAMPLES / "thesis_rig.toml", EXAMPLES / "emps_axis.toml"
@@ -514,11 +515,11 @@ def test_frequencies_that_are_refused(text: str, shown: str, expected: str, refu
 )
 def test_overrides_that_are_refused(overrides: list[str], frequencies: str | None, refused: Refused) -> None:
     with refused():
-        command(RIG, overrides=overrides, frequencies=frequencies)
+        command(RIG, set=overrides, frequencies=frequencies)
 
 
 def test_half_the_sampling_frequency_itself_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    command(RIG, overrides=['drive.sample_time="1 ms"'], frequencies="1 Hz..500 Hz", as_json=True)
+    command(RIG, set=['drive.sample_time="1 ms"'], frequencies="1 Hz..500 Hz", as_json=True)
     assert capsys.readouterr().out.startswith("{")
 
 

@@ -35,7 +35,7 @@ from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.common import record
 from friso.progress import silent
 from friso.questions.compare.words import sentences as comparison_sentences
-from friso.questions.rig.page import sentences
+from friso.questions.rig.words import sentences
 from friso.stage import Stage
 from friso.studies.compare import study
 from friso.studies.compare.study import compare

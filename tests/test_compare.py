@@ -25,9 +25,9 @@ from friso.frequency.members import limit_cases, member
 from friso.hunting.criteria import end_of_traces, outcomes, settling_of_traces
 from friso.interface.output_folder import MARKER
 from friso.questions.compare.document import compare_document
-from friso.questions.compare.figures import figures
+from friso.questions.compare.figures import compare_figures
 from friso.questions.compare.page import page
-from friso.questions.compare.words import _setting, conclusion, paired_rows, sentences, table_rows
+from friso.questions.compare.words import conclusion, paired_rows, sentences, table_rows
 from friso.shares import share
 from friso.shown.drawing.matplotlib_renderer import image
 from friso.stage import Stage, load
@@ -36,7 +36,7 @@ from friso.stage.lists import element_keys
 from friso.studies.compare import measures, study
 from friso.studies.compare.machines import ELEMENTS, SPREADS, TOGETHER_BY, Machines, draw_machines
 from friso.studies.compare.measures import linear_loops
-from friso.studies.compare.options import DEADBAND, MODEL_ERROR, CompareOptions, Option, linear_flat, options
+from friso.studies.compare.options import DEADBAND, MODEL_ERROR, OPTIONS, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import difference, median, quantile_interval
 from friso.studies.compare.study import Comparison, OptionResult, compare
 
@@ -376,7 +376,7 @@ def test_options_share_their_machines(built: Stage, comparison: Comparison) -> N
     that changes nothing."""
     work = study._Work(comparison.machines, study.own_motion(built), study._places(built), 1e-6, study.silent, 1)
     base = comparison.results[0]
-    again = work.runs(replace(base.option, letter="f"), 0)
+    again = work.runs(replace(base.option, kind=OPTIONS["feedforward"]), 0)
     assert np.array_equal(again.in_position, base.measures.in_position)
     assert np.array_equal(again.force, base.measures.force)
     assert not np.array_equal(comparison.results[5].measures.force, base.measures.force)
@@ -386,8 +386,8 @@ def test_hardly_any_friction_never_swings(built: Stage) -> None:
     ideal = {"friction.static": "1 mN +/- 1e-6 %", "friction.coulomb": "1 mN +/- 1e-6 %"}
     machines = draw_machines(built.replace(ideal), Correlations(), 20, 1)
     work = study._Work(machines, study.own_motion(built), study._places(built), 1e-6, study.silent, 1)
-    for letter, variant in (("a", "locked"), ("c", "free")):
-        runs = work.runs(Option(letter, machines.stage.variants()[variant]), 0)
+    for name, variant in (("as-is", "locked"), ("isolator", "free")):
+        runs = work.runs(Option(OPTIONS[name], machines.stage.variants()[variant]), 0)
         assert runs.done.all()
         assert not runs.swings.any()
         assert np.isfinite(runs.settling).all()
@@ -480,7 +480,7 @@ def test_standstill_is_compared_on_a_floor_only(made_up: Comparison, wording: Wo
         assert (expected["standstill_compared"], ratio is not None) == (compared, compared)
         assert any("no [floor]" in note for note in expected["notes"]) is not compared
         assert ("no [floor]" in text) is not compared
-        wording(figures(item)[0].caption)
+        wording(compare_figures(item)[0].caption)
 
 
 def test_machines_that_rest_where_they_begin_are_drawn(made_up: Comparison) -> None:
@@ -488,9 +488,9 @@ def test_machines_that_rest_where_they_begin_are_drawn(made_up: Comparison) -> N
     still = [
         replace(result, measures=replace(result.measures, in_position=np.zeros(COUNT))) for result in made_up.results
     ]
-    drawn = figures(replace(made_up, results=tuple(still)))[0]
+    drawn = compare_figures(replace(made_up, results=tuple(still)))[0]
     assert image(drawn, "png")  # warnings are errors here
-    assert [figure.panels[-1].y.log for figure in (drawn, *figures(made_up))] == [False, True]
+    assert [figure.panels[-1].y.log for figure in (drawn, *compare_figures(made_up))] == [False, True]
 
 
 def test_the_cable_is_said_to_be_left_out(built: Stage) -> None:
@@ -578,10 +578,10 @@ def test_a_setting_against_friction_is_one_that_the_stage_can_have(name: str) ->
     chosen = stage.with_numbers(numbers)
     assert {key: chosen.flat()[key] for key in numbers} == pytest.approx(numbers)
     assert structure(chosen.flat()) != structure(stage.flat())
-    assert _setting(setting, chosen.flat())
+    assert OPTIONS[name].says == setting.says
 
 
 def test_settings_that_are_asked_for_are_tried() -> None:
-    assert [setting.letter for setting in settings_named(("all",))] == list("hijklm")
+    assert [OPTIONS[name].letter for name in SETTINGS] == list("hijklm")
     with pytest.raises(InputError, match="--also leak"):
         settings_named(("leek",))

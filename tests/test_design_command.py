@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import typer
+from inside import command_of
 from pages import Page
 from patched import patched
 from refusals import Refused, Wording
@@ -23,7 +24,6 @@ from snapshots import Snapshots
 
 import friso
 from friso.cli.app import main
-from friso.cli.commands.design import design as command
 from friso.design_method import choice, controller, edges, front, hunting_map, method, population, verification
 from friso.design_method.edges import Corners
 from friso.design_method.geometry import Geometry, Sheet
@@ -44,6 +44,8 @@ from friso.shown import files
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.figure import Figure
 from friso.stage import Stage
+
+command = command_of("design")
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, SPEC = EXAMPLES / "thesis_rig.toml", EXAMPLES / "specs" / "thesis.toml"
@@ -518,11 +520,11 @@ def test_overrides_are_of_the_stage(
     refused: Refused,
     wording: Wording,
 ) -> None:
-    command(RIG, spec, overrides=['name="Another"', 'drive.delay="1 ms"'], out=folder)
+    command(RIG, spec, set=['name="Another"', 'drive.delay="1 ms"'], out=folder)
     assert finished[-1] == "Another"
     wording("\n".join(f"friso: {message}" for message in caplog.messages))
     with refused():
-        command(RIG, spec, overrides=['controller.crosover="8 Hz"'], out=folder)
+        command(RIG, spec, set=['controller.crosover="8 Hz"'], out=folder)
 
 
 @pytest.mark.parametrize(

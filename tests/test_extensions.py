@@ -3,6 +3,7 @@ all the way through friso."""
 
 from __future__ import annotations
 
+import importlib
 import json
 import sys
 from collections.abc import Sequence
@@ -12,9 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import friso
+from friso.app.questions import QUESTIONS as QUESTIONS_OF_PAGES
+from friso.app.questions import PageRequest, job_of
+from friso.app.uploads import Uploads
+from friso.app.work import Work
 from friso.cli.app import main
-from friso.cli.command import COMMANDS, HUNTS, Command
-from friso.cli.output import print_document
 from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.kinds import KINDS, in_order
@@ -22,7 +26,7 @@ from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import FORMATS, LogFormat
 from friso.identification.logs.log import Log
 from friso.identification.logs.read import file_format, read_table
-from friso.interface.output_folder import OutputFolder
+from friso.interface.question import HUNTS, QUESTIONS
 from friso.progress import Progress
 from friso.questions.identify.kind_view import VIEWS, KindView
 from friso.questions.rig.outcome_view import OUTCOME_VIEWS
@@ -30,6 +34,7 @@ from friso.shown.drawing.figure import Axis, Figure, Panel, Series
 from friso.shown.pages import Report
 from friso.stage import Stage
 from friso.stage.foreign import foreign
+from friso.studies.metric import METRICS, MapFinding, Metric, Word
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.studies.rig.outcome import Outcome, RigLog
 
@@ -74,6 +79,25 @@ def push(stage: Stage, seed: int, progress: Progress) -> Outcome:
     return Outcome("push", stage, seed, (RigLog("pushed", "hold", 1e-3, logged, logged, stage, seed),), None)
 
 
+LOADED = Metric(
+    "Load of the actuator",
+    lambda run: np.where(run.measures.largest_force > run.flat["friction.static"], "heavy", "light"),
+    words=(Word("heavy", "orange", "the actuator overcomes static friction"), Word("light", "#eef0ff")),
+    findings=(MapFinding("The actuator works hard", ("heavy",)),),
+)
+"""A metric of words, computed from runs."""
+
+ATTRACTORS = Metric(
+    "Motions that attract",
+    lambda stage: stage.attracted.attracts.astype(float),
+    source="sketch",
+    unit="1",
+    counts=True,
+    findings=(MapFinding("Something attracts"),),
+)
+"""A metric of numbers, computed from a sketch of what attracts a stage."""
+
+
 def read_pairs(path: Path) -> ChannelTable:
     """Position in m and force in N, a millisecond apart, alternating in a file of doubles behind its mark."""
     position, force = np.frombuffer(path.read_bytes()[4:]).reshape(-1, 2).T
@@ -90,6 +114,8 @@ def extended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(KINDS.added, "hold", (KIND, "Forces that the stage bears without moving"))
     monkeypatch.setitem(RIG_EXPERIMENTS.added, "push", (push, "Push without moving"))
     monkeypatch.setitem(FORMATS.added, "pairs", (FORMAT, "Pairs of doubles"))
+    monkeypatch.setitem(METRICS.added, "loaded", (LOADED, "How hard the actuator works"))
+    monkeypatch.setitem(METRICS.added, "attracting", (ATTRACTORS, "How much attracts the stage"))
 
 
 @pytest.fixture
@@ -155,6 +181,26 @@ def test_an_experiment_of_the_rig_of_its_own_is_run_and_shown(
     assert "push Push without moving" in " ".join(capsys.readouterr().out.split())
 
 
+def test_a_metric_of_its_own_is_swept_drawn_and_told(
+    extended: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stage, crossovers = ROOT / "examples" / "thesis_rig.toml", "controller.crossover=4 Hz, 8 Hz"
+    answer = friso.sweep(stage, x=crossovers, metric="attracting")
+    assert answer.data["attracting"].attrs == {"units": "1"}
+    assert np.array_equal(answer.data["attracting"] > 0, friso.sweep(stage, x=crossovers).data["sketch"] == "hunts")
+    assert answer.sentences()[0].startswith("Something attracts in ")
+    assert [figure.title for figure in answer.figures()] == ["Motions that attract"]
+    store = tmp_path / "map.zarr"
+    assert run(stage, "--x", crossovers, "--metric", "loaded", "--out", store, command="map") == 0
+    assert "The actuator works hard in " in " ".join(capsys.readouterr().out.split())
+    page = store.with_suffix(".html").read_text(encoding="utf-8")
+    assert all(text in page for text in ("Load of the actuator", "the actuator overcomes static friction"))
+    assert run(store, "--json", "--out", tmp_path / "again", command="map") == 0
+    assert json.loads(capsys.readouterr().out)["conclusion"].startswith("The actuator works hard")
+    assert run(stage, "--x", crossovers, "--metric", "load", "--out", tmp_path / "no.zarr", command="map") == 2
+    assert "--metric loaded" in capsys.readouterr().err
+
+
 def test_a_page_of_its_own_needs_no_template() -> None:
     figure = figures(Hold(Estimate.unknown("a", "N", "", "", 1.0), np.arange(3.0), np.ones(3)), (), "held")[0]
     values = {"sentences": ["It <holds>."], "columns": ["Force"], "rows": [("Held", ["2 N"])], "computed": ", by hand"}
@@ -163,28 +209,112 @@ def test_a_page_of_its_own_needs_no_template() -> None:
     assert all(text in page for text in ("It &lt;holds&gt;.", "<td>2 N</td>", "Forces held", ", by hand."))
 
 
-def hold(out: Path) -> None:
-    """Hold still.
+QUESTION = {
+    "__init__": """
+from friso.interface.question import HUNTS, Question
+QUESTION = Question(__name__, 25, HUNTS, "hold rig.toml --force-limit '3 N'", details=True)
+""",
+    "question": """
+from __future__ import annotations
+from friso.interface.answer import Answer, question
+from friso.interface.inputs import Changes, ForceLike, StageLike, quantity_of, read_stage
+from friso.progress import Progress, silent
+from friso.quantities import Quantity, positive
+from friso.stage import Stage
 
-    Example: friso hold out
-    """
-    files = OutputFolder("hold", out, False).write({"hold.html": Report("hold", "A stage").html()})
-    print_document({"conclusion": "held"}, files)
+class HoldAnswer(Answer):
+    '''Whether it holds: `result` is the force [N].'''
+    stage: Stage
+    @property
+    def subject(self) -> HoldAnswer:
+        return self
+
+@question
+def hold(
+    stage: StageLike, *, force_limit: ForceLike = "2 N", set: Changes = None, progress: Progress = silent
+) -> HoldAnswer:
+    '''Does it hold still.
+
+    Parameters
+    ----------
+    force_limit : str or float
+        The force that it has to bear, "2 N" or a number [N].
+    '''
+    chosen = read_stage(stage, set)
+    return HoldAnswer(quantity_of(force_limit, "force_limit", Quantity("N", positive, "2 N")), stage=chosen)
+""",
+    "words": """
+def sentences(answer):
+    return [f"It holds {answer.result:g} N."]
+""",
+    "document": """
+def hold_document(answer):
+    return {"conclusion": answer.sentences()[0], "force_n": answer.result}
+""",
+    "page": """
+from friso.shown.pages import Report
+def hold_files(answer):
+    return {"hold.html": Report.of_stage("hold", answer.stage, (), sentences=answer.sentences()).html()}
+""",
+}
+"""The folder of a question, by module."""
 
 
-def test_a_command_of_its_own_is_listed_and_runs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+@pytest.fixture
+def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A question of its own, "hold"."""
+    folder = tmp_path / "own" / "hold"
+    folder.mkdir(parents=True)
+    for name, text in QUESTION.items():
+        (folder / f"{name}.py").write_text(text)
+    monkeypatch.syspath_prepend(folder.parent)
+    monkeypatch.setitem(QUESTIONS.added, "hold", (importlib.import_module("hold").QUESTION, ""))
+
+
+def test_a_question_of_its_own_is_listed_and_answers(
+    asked: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setitem(COMMANDS.added, "hold", (Command(hold, 25, HUNTS), ""))
     assert run(command="--help") == 0
     lines = capsys.readouterr().out.partition(HUNTS)[2].splitlines()
     names = [line.split()[0] for line in lines if line[:2] == "  " and line[2:3].isalpha()]
     assert names.index("check") < names.index("hold") < names.index("simulate")
-    assert run(tmp_path / "out", command="hold") == 0
-    page = tmp_path / "out" / "hold.html"
-    expected = {"conclusion": "held", "files": [str(page)], "plug_ins": foreign()}
+    assert run("--help", command="hold") == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert '--force-limit FORCE The force that it has to bear, "2 N" or a number [N]. [default: 2 N]' in shown
+    assert "--set KEY=VALUE Override a key" in shown
+    stage, out = ROOT / "examples" / "thesis_rig.toml", tmp_path / "out"
+    assert run(stage, "--force-limit", "3 N", "--json", "--out", out, command="hold") == 0
+    expected = {"conclusion": "It holds 3 N.", "force_n": 3.0, "files": [str(out / "hold.html")], "plug_ins": foreign()}
     assert json.loads(capsys.readouterr().out) == expected
-    assert "friso hold" in page.read_text(encoding="utf-8")
+    assert "It holds 3 N." in (out / "hold.html").read_text(encoding="utf-8")
+    assert run(stage, "--force-limit", "3 mm", command="hold") == 2
+    assert "--force-limit" in capsys.readouterr().err
+
+
+def test_a_question_of_its_own_is_a_function_of_friso(asked: None, tmp_path: Path) -> None:
+    answer = friso.hold(friso.example("thesis_rig"), force_limit=4.0)
+    assert str(answer) == "It holds 4 N."
+    assert answer.data["force"].attrs["units"] == "N"
+    assert "hold" in dir(friso)
+    assert "set : dict, optional" in (friso.hold.__doc__ or "")
+    assert answer.report(tmp_path / "hold.html") == [tmp_path / "hold.html"]
+
+
+def test_a_question_of_its_own_is_a_picture_of_the_app(asked: None) -> None:
+    rig = ROOT / "examples" / "thesis_rig.toml"
+    machine = {"name": "rig.toml", "text": rig.read_text(encoding="utf-8"), "changes": {}}
+    request, work = PageRequest.of({"machine": machine}, Uploads()), Work(lambda frame: None)
+    (described,) = QUESTIONS_OF_PAGES["machine"](request, work)
+    assert {"id": "hold", "label": "Hold"} in described["others"]
+    job, files = job_of("hold"), job_of("hold.zip")
+    assert job is not None
+    assert files is not None
+    (part,) = job(request, work)
+    assert part["sentences"] == ["It holds 2 N."]
+    assert part["command"] == "friso hold rig.toml"
+    (archive,) = files(request, work)
+    assert archive["name"] == "rig_hold.zip"
+    assert job_of("held") is None
 
 
 def test_what_is_registered_is_in_the_help(extended: None, capsys: pytest.CaptureFixture[str]) -> None:

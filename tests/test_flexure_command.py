@@ -14,12 +14,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import typer
+from inside import command_of
 from pages import Page
 from refusals import Refused, Wording
 from snapshots import Snapshots
 
 import friso
-from friso.cli.commands.flexure import flexure as command
 from friso.errors import InputError
 from friso.interface.output_folder import MARKER
 from friso.leaf_springs.beams import BeamFailure
@@ -38,6 +38,8 @@ from friso.questions.flexure.words import assumptions, findings, sentences, warn
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.figure import Figure
 from friso.stage import Stage
+
+command = command_of("flexure")
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 FIGURES = ("flexure_force", "flexure_support", "flexure_modes")
@@ -447,7 +449,7 @@ def test_strokes_that_are_refused(path: Path, stroke: str, shown: str, expected:
 
 def test_a_stroke_of_the_stage_file_is_refused_alike(path: Path, refused: Refused) -> None:
     with refused("joint.stroke"):
-        command(path, overrides=['joint.stroke="36 mm"'])
+        command(path, set=['joint.stroke="36 mm"'])
 
 
 def test_a_locked_joint_without_a_stroke_needs_one(
@@ -471,7 +473,7 @@ def test_a_locked_joint_without_a_stroke_needs_one(
 )
 def test_overrides_that_are_refused(path: Path, overrides: list[str], refused: Refused) -> None:
     with refused():
-        command(path, overrides=overrides)
+        command(path, set=overrides)
 
 
 def test_an_unknown_material_names_the_nearest(tmp_path: Path, refused: Refused) -> None:

@@ -40,8 +40,9 @@ RECIPES = {
     "controller": "equations/controllers",
     "friction law": "equations/friction",
     "kind of experiment": "identification/experiments",
-    "command and its page": "cli/commands",
+    "question": "questions",
     "log format": "identification/logs",
+    "doubt about a log": "identification/doubts",
     "parameter file": "drives/formats",
 }
 """What CONTRIBUTING.md tells how to add, and the folder that takes its one file."""
@@ -170,7 +171,8 @@ def test_there_is_a_recipe(kind: str) -> None:
     sections = GUIDE.read_text(encoding="utf-8").split("\n#")
     recipes = [section for section in sections if kind in section.partition("\n")[0].lower()]
     assert any(f"friso/{RECIPES[kind]}/" in recipe for recipe in recipes)
-    assert [*(PACKAGE / RECIPES[kind]).glob("[a-z]*.py")] != []
+    folder = PACKAGE / RECIPES[kind]
+    assert [*folder.glob("[a-z]*.py"), *folder.glob("[a-z]*/question.py")] != []
 
 
 def test_the_drawing_of_the_house_is_of_what_there_is() -> None:

@@ -18,7 +18,6 @@ import pandas as pd
 import pytest
 from machines import Machine, drawn, moves
 from pages import Page
-from patched import patched
 from snapshots import Snapshots
 from systems import posix
 
@@ -28,16 +27,19 @@ from friso.errors import InputError
 from friso.identification import method
 from friso.identification.kind import Prior
 from friso.identification.logs.log import Log
-from friso.identification.output_error import fit as fitting
-from friso.identification.output_error import profile as profiles
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.stage.correlations import correlations_file, read_correlations
 
 pytestmark = pytest.mark.xdist_group("identify-moves")
 
-SMALL: dict[Any, dict[str, Any]] = {
-    profiles: {"POINTS": 3, "ROUNDS": 1},
-    fitting: {"STARTS": 64, "TRIED": 4, "KEPT": 2, "NEARBY": 15},
-}
+SMALL = OutputErrorSettings(
+    points_of_a_profile=3,
+    iterations_of_a_profile=1,
+    starts_of_a_fit=64,
+    starts_refined_first=4,
+    starts_refined_further=2,
+    starts_near_a_fit=15,
+)
 """Sizes with which a log is identified in seconds."""
 
 COUNT = 2000
@@ -49,7 +51,7 @@ Said = tuple[int, str, str]
 
 @pytest.fixture(scope="module", autouse=True)
 def small() -> Iterator[None]:
-    with patched(SMALL):
+    with SMALL.in_use():
         yield
 
 

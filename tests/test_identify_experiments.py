@@ -31,8 +31,9 @@ from friso.identification.readings.common import block_mean, correlated_mean, lo
 from friso.identification.readings.course import Course
 from friso.identification.readings.friction_position import friction_position
 from friso.identification.readings.friction_velocity import friction_velocity
-from friso.identification.readings.ramps import FEW_RAMPS, force_ramps
+from friso.identification.readings.ramps import force_ramps
 from friso.identification.readings.rate_effect import break_away, share_below, static_friction
+from friso.identification.readings.settings import ReadingSettings
 from friso.identification.response.fitting import ResponseFit
 from friso.identification.sources import recognised
 
@@ -484,7 +485,7 @@ def test_an_integrator_that_winds_up_makes_no_ramps_from_none(rig: friso.Stage, 
     rng = np.random.default_rng(8)
     position, force = (np.asarray(run[name])[round(15 / DT) :] for name in ("position", "force"))
     log = record("hunting", DT, position=measured(position, 1e-7, rng), force=measured(force, 0.05, rng))
-    assert len(force_ramps(log).forces) > FEW_RAMPS
+    assert len(force_ramps(log).forces) > ReadingSettings.current().fewest_ramps
     assert Course(log).ramps == 0
     assert recognised(log, Path("log.csv"))[0] == "moves"
 

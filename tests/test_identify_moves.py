@@ -11,29 +11,27 @@ import numpy as np
 import pytest
 from emps import emps_log
 from machines import drawn, moves
-from patched import patched
 from refusals import Refused, Wording
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import lsim
 
 import friso
-from friso.identification import moves as method
+from friso.identification import moves as moves_analysis
+from friso.identification.doubt import FitCase
+from friso.identification.doubts import coupling, delay, friction_by_direction, load_friction
 from friso.identification.errors import errors_of
 from friso.identification.inverse_model import inverse_model
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, identify_moves, simulated_log
 from friso.identification.output_error import fit as fitting
 from friso.identification.output_error import identifiable
-from friso.identification.output_error import profile as profiles
-from friso.identification.output_error.compliance import with_compliance
-from friso.identification.output_error.delay import with_delay
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
 from friso.identification.output_error.holding import with_force_settled, with_smoothness_settled
-from friso.identification.output_error.identifiable import BRISTLES, IdentifiableFit, believed, bounds_as_much
-from friso.identification.output_error.one_way import either_way
-from friso.identification.output_error.parameters import EXPONENT, HIGHEST_RATIO, MASS, RATIO, SHORTEST, fit_parameters
+from friso.identification.output_error.identifiable import IdentifiableFit, believed, bounds_as_much
+from friso.identification.output_error.parameters import BRISTLES, EXPONENT, MASS, RATIO, fit_parameters
 from friso.identification.output_error.problem import loop_problem, tracking
 from friso.identification.output_error.refine import bounds_of, costs
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.quality import Quality
 from friso.identification.readings.common import record
@@ -44,16 +42,20 @@ from friso.progress import silent
 pytestmark = pytest.mark.xdist_group("identify-moves")
 
 ROOT = Path(__file__).parents[1]
-SMALL: dict[Any, dict[str, Any]] = {
-    profiles: {"POINTS": 3, "ROUNDS": 1},
-    fitting: {"STARTS": 256, "TRIED": 10, "KEPT": 3, "NEARBY": 31},
-}
+SMALL = OutputErrorSettings(
+    points_of_a_profile=3,
+    iterations_of_a_profile=1,
+    starts_of_a_fit=256,
+    starts_refined_first=10,
+    starts_refined_further=3,
+    starts_near_a_fit=31,
+)
 """Sizes with which a fit takes seconds: coarser profiles are no narrower, and fewer starts do for quiet logs."""
 
 
 @pytest.fixture(scope="module", autouse=True)
 def small() -> Iterator[None]:
-    with patched(SMALL):
+    with SMALL.in_use():
         yield
 
 
@@ -254,7 +256,7 @@ def test_without_noise_the_fit_ends_at_the_truth() -> None:
     log = replace(log, signals={role: values[:2000] for role, values in log.signals.items()}, time=log.time[:2000])
     log = replace(log, segments=(slice(0, 2000),))
     flat = {**machine.flat, "friction.viscous_asymmetry": 0.0}
-    inputs = method._problems(log, log.segments[0], flat, method.inverse_model(log), True)[1]
+    inputs = moves_analysis._problems(log, log.segments[0], flat, inverse_model(log), True)[1]
     assert inputs is not None
     exact = replace(inputs, target=loop_problem(flat, log, log.segments[0], ()).record(np.zeros(0)).force)
     names = [item.name for item in inputs.parameters]
@@ -325,6 +327,17 @@ def rigid(log: Log) -> tuple[OutputErrorFit, float]:
     return polished(problem, free, first_values(parameters)), inverse.bandwidth
 
 
+WELL = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
+"""The quality of a fit that lacks nothing."""
+
+
+def fit_case(log: Log, fitted: OutputErrorFit, bandwidth: float) -> FitCase:
+    """A fit to a log whose motion is of a bandwidth [Hz]."""
+    velocity = np.gradient(log["position"], log.sample_time)[log.longest]
+    inverse = inverse_model(log, bandwidth)
+    return FitCase(log, inverse, flat=fitted.problem.flat, fit=fitted, quality=WELL, velocity=velocity)
+
+
 @pytest.mark.parametrize("behind", [False, True], ids=["position of the motor", "position of the load"])
 @pytest.mark.parametrize("rate", [25.0, 40.0])
 def test_an_interval_of_the_mass_holds_the_truth_where_a_coupling_moves_the_fit(
@@ -336,24 +349,40 @@ def test_an_interval_of_the_mass_holds_the_truth_where_a_coupling_moves_the_fit(
     off = np.log(fitted.value(MASS) / sum(TWO_MASSES))
     assert (off < 0) == behind
     assert abs(off) > COVERAGE * np.sqrt(fitted.covariance[0, 0])
-    wider, share = with_compliance(fitted, log["position"], log.sample_time, bandwidth)
-    assert COVERAGE * np.sqrt(wider.covariance[0, 0]) > 1.5 * abs(off)
-    assert share == pytest.approx(off, rel=0.3)
-    plain = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
-    seen = log["position"], log.sample_time, bandwidth
-    unspoilt, spoiled = (
-        method._with_compliance(fitted, replace(plain, spoilt=spoilt), *seen)[1] for spoilt in (False, True)
-    )
-    wording(" ".join(unspoilt.doubts))
-    assert unspoilt.compliant
-    assert spoiled.compliant
-    assert not spoiled.doubts  # a cause that has been named makes such a force too
+    case = fit_case(log, fitted, bandwidth)
+    (unspoilt,) = coupling.find(case)
+    (spoiled,) = coupling.find(replace(case, quality=replace(WELL, spoilt=True)))
+    assert unspoilt.fit is not None
+    assert COVERAGE * np.sqrt(unspoilt.fit.covariance[0, 0]) > 1.5 * abs(off)
+    assert unspoilt.size == pytest.approx(off, rel=0.3)
+    wording(unspoilt.words)
+    assert {*unspoilt.refuses} == {*spoiled.refuses} == {*BRISTLES}
+    assert not spoiled.words  # a cause that has been named makes such a force too
 
 
 def test_no_coupling_is_seen_where_there_is_none() -> None:
     log = on_a_coupling(1e4, False)
+    assert not [*coupling.find(fit_case(log, *rigid(log)))]
+
+
+@pytest.mark.parametrize("share", [0.05, 0.1, 0.2])
+def test_friction_that_grows_with_the_force_of_the_motor_is_named(share: float, wording: Wording) -> None:
+    """A mass seems heavier driven than braked; intervals of mass and friction reach over it."""
+    plain = on_a_coupling(1e4, False)
+    fitted, bandwidth = rigid(plain)
+    assert not [*load_friction.find(fit_case(plain, fitted, bandwidth))]
+    way = np.tanh(np.gradient(plain["position"], plain.sample_time) / 1e-3)
+    against = np.sign(plain["force"]) * way * share
+    log = replace(plain, signals={**plain.signals, "force": plain["force"] / (1 - against)})
     fitted, bandwidth = rigid(log)
-    assert with_compliance(fitted, log["position"], log.sample_time, bandwidth) == (fitted, 0.0)
+    (doubt,) = load_friction.find(fit_case(log, fitted, bandwidth))
+    assert doubt.size == pytest.approx(share, rel=0.3)
+    wording(doubt.words)
+    assert doubt.fit is not None
+    off = np.log(fitted.value(MASS) / sum(TWO_MASSES))
+    assert abs(off) < COVERAGE * np.sqrt(doubt.fit.covariance[0, 0])
+    case = fit_case(log, fitted, bandwidth)
+    assert not [*load_friction.find(replace(case, quality=replace(WELL, spoilt=True)))]
 
 
 @pytest.mark.parametrize("late", [1, 3, -2])
@@ -362,21 +391,21 @@ def test_an_interval_of_friction_holds_the_truth_where_a_delay_moves_the_fit(lat
     plain = on_a_coupling(1e4, False)
     log = replace(plain, signals={**plain.signals, "force": np.roll(plain["force"], -late)})
     fitted, bandwidth = rigid(log)
-    wider, time = with_delay(fitted, log["force"], log.sample_time, bandwidth)
-    assert time == pytest.approx(late * log.sample_time, rel=0.2)
+    case = fit_case(log, fitted, bandwidth)
+    (finding,) = delay.find(case)
+    assert finding.fit is not None
+    assert finding.size == pytest.approx(late * log.sample_time, rel=0.2)
     names = [fitted.problem.parameters[number].name for number in fitted.free]
     off = [np.log(fitted.value(name) / true) for name, true in zip(names[1:3], FRICTION, strict=True)]
-    assert (COVERAGE * np.sqrt(np.diag(wider.covariance))[1:3] > np.abs(off)).all()
-    well = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
-    (doubt,) = method._with_delay(fitted, well, log, bandwidth)[1].doubts
-    wording(doubt)
-    assert not method._with_delay(fitted, replace(well, spoilt=True), log, bandwidth)[1].doubts
+    assert (COVERAGE * np.sqrt(np.diag(finding.fit.covariance))[1:3] > np.abs(off)).all()
+    wording(finding.words)
+    (spoiled,) = delay.find(replace(case, quality=replace(WELL, spoilt=True)))
+    assert not spoiled.words
 
 
 def test_no_delay_is_seen_where_there_is_none() -> None:
     log = on_a_coupling(1e4, False)
-    fitted, bandwidth = rigid(log)
-    assert with_delay(fitted, log["force"], log.sample_time, bandwidth) == (fitted, 0.0)
+    assert not [*delay.find(fit_case(log, *rigid(log)))]
 
 
 def test_the_fit_tells_whether_the_force_of_a_log_is_held() -> None:
@@ -419,16 +448,19 @@ def test_static_friction_of_one_direction_is_named_and_intervals_reach_to_what_e
     more = 0.3 * machine.flat["friction.coulomb"] * np.exp(-((speed / machine.flat["friction.stribeck_velocity"]) ** 2))
     log = replace(log, signals={**log.signals, "force": log["force"] + more * (speed > 0)})
     both = followed(log, machine.flat)
-    apart = either_way(both, speed[:2500], False)
+    case = replace(fit_case(log, both, 20.0), velocity=speed[: len(both.problem.counted)])
+    (apart,) = friction_by_direction.find(replace(case, quality=replace(WELL, noise=0.0)))
     wider = apart.fit
+    assert wider is not None
     names = [parameter.name for parameter in both.problem.parameters]
     place = names.index("friction.stribeck_velocity")
     assert wider.inner == pytest.approx(both.inner)
     assert np.all(np.diag(wider.covariance) >= np.diag(both.covariance) * (1 - 1e-9))
     off = abs(both.inner[place] - np.log(machine.flat["friction.stribeck_velocity"]))
     assert off < COVERAGE * np.sqrt(wider.covariance[place, place])
-    assert apart.less is not None
-    assert apart.less < both.left
+    assert apart.words
+    assert apart.spoils
+    assert apart.size < both.left
 
 
 # --- the record of the EMPS benchmark ------------------------------------------------------------------------------
@@ -483,8 +515,10 @@ def test_emps_shows_mass_and_sliding_friction_alone(identified: IdentifiedMoves,
     wording(by_name["friction.static"].reason)
     coulomb, static = by_name["friction.coulomb"], by_name["friction.static"]
     assert coulomb.low - 1e-9 < static.low < coulomb.value  # Coulomb friction may be less than its value as well
-    assert HIGHEST_RATIO * coulomb.value < static.high < 1.02 * HIGHEST_RATIO * coulomb.high
-    lengths = [by_name["friction.coulomb"].value / by_name[BRISTLES[0]].high, SHORTEST]
+    settings = OutputErrorSettings.current()
+    highest = settings.highest_friction_ratio
+    assert highest * coulomb.value < static.high < 1.02 * highest * coulomb.high
+    lengths = [by_name["friction.coulomb"].value / by_name[BRISTLES[0]].high, settings.shortest_bristle_bend]
     assert lengths[0] < 2 * lengths[1]  # all that is believed of bristles, and not what the fit makes of them
     mass = by_name["masses.cart"]
     assert mass.determined

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, cast
 
@@ -14,30 +14,29 @@ from refusals import Wording
 from scipy.signal import lfilter
 from variants import VARIANTS
 
-from friso.identification.alternatives import alternatives, perhaps_fed_forward
-from friso.identification.causes import causes, fragment
 from friso.identification.combine import combined
-from friso.identification.doubts import little_friction
-from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import directions, inverse_model
-from friso.identification.logs.log import Log
-from friso.identification.model_error import (
-    all_with_model_error,
-    of_inverse_model,
-    with_causes,
-    with_halves,
-    with_model_error,
-    with_possible_values,
-    without_bristles,
+from friso.identification.doubt import DOUBTS, Doubt, KeyCase, RaisedDoubt, RecordCase, ValueCase, causes, judged_keys
+from friso.identification.doubts import (
+    differing_halves,
+    gaps,
+    little_friction,
+    missing_feedforward,
+    perhaps_feedforward,
 )
+from friso.identification.doubts.changing_friction import changes_beside, inverse_reaching
+from friso.identification.estimate import Estimate
+from friso.identification.inverse_model import InverseModel, directions, inverse_model
+from friso.identification.logs.log import Log
+from friso.identification.model_error import allowed_for, of_inverse_model, with_model_error
 from friso.identification.output_error import fit as fitting
-from friso.identification.output_error.changes import changes_beside, explained_by, inverse_reaching
+from friso.identification.output_error.effects import explained_by
 from friso.identification.output_error.fit import OutputErrorFit, first_values
-from friso.identification.output_error.parameters import FitParameter, fit_parameters
+from friso.identification.output_error.parameters import BRISTLES, FitParameter, fit_parameters
 from friso.identification.output_error.problem import Problem, Simulated, tracking
 from friso.identification.output_error.refine import refine_fit
 from friso.identification.output_error.repeated import as_far_off_as_repeated
-from friso.identification.quality import Quality, halves, whole_error
+from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.quality import Quality, whole_error
 from friso.identification.readings.common import noise_of, record
 from friso.identification.spread import groups_of, spread_of
 from friso.identification.stage_file import (
@@ -143,6 +142,35 @@ def test_a_motion_that_is_repeated_says_nothing_new_of_what_the_model_lacks() ->
 
 # --- quality ----------------------------------------------------------------------------------------------------------
 
+GOOD = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
+"""The quality of a fit that lacks nothing."""
+
+
+def key_case(estimates: Sequence[Estimate], flat: dict[str, Any], **seen: Any) -> KeyCase:
+    """Estimates of a log, with what is said of it."""
+    size = sum(estimate.determined for estimate in estimates)
+    rest: Any = {"log": axis(), "inverse": None, "fit": None, "quality": GOOD, "velocity": np.ones(1)}
+    rest |= {"flat": flat, "correlation": np.eye(size)}
+    return KeyCase(**rest | {"estimates": tuple(estimates)} | seen)
+
+
+def allowed(
+    estimates: Sequence[Estimate],
+    inverse: InverseModel,
+    flat: dict[str, Any],
+    quality: Quality,
+    correlation: np.ndarray | None = None,
+    refused: dict[str, str] | None = None,
+) -> KeyCase:
+    """Estimates with intervals that allow for what a model lacks."""
+    together = {} if correlation is None else {"correlation": correlation}
+    return allowed_for(key_case(estimates, flat, inverse=inverse, quality=quality, refused=refused or {}, **together))
+
+
+def of_little_friction(log: Log) -> str:
+    """What is said of the Coulomb friction of a log."""
+    return "".join(finding.words for finding in little_friction.find(ValueCase(log, inverse_model(log, 5.0))))
+
 
 @pytest.mark.parametrize("noise", [0.01, 0.05, 0.5])
 def test_the_noise_of_a_force_is_found_beside_its_motion(noise: float) -> None:
@@ -188,13 +216,13 @@ def test_halves_that_differ_are_named() -> None:
     other = axis(coulomb=2 * COULOMB)
     count = len(log.time) // 2
     force = np.concatenate([log["force"][:count], other["force"][count:]])
-    assert not halves(inverse_model(log, 5.0))
-    differing = tuple(halves(inverse_model(replace(log, signals={**log.signals, "force": force}), 5.0)))
-    (apart,) = (one for one in differing if one.name == "coulomb")
+    assert not differing_halves.halves(inverse_model(log, 5.0))
+    inverse = inverse_model(replace(log, signals={**log.signals, "force": force}), 5.0)
+    (apart,) = (one for one in differing_halves.halves(inverse) if one.name == "coulomb")
     assert (apart.first, apart.second) == pytest.approx((COULOMB, 2 * COULOMB), rel=0.1)
     sure = Estimate.normal("friction.coulomb", "N", 1.5 * COULOMB, 0.01, "output error")
-    quality = Quality(0.05, 5.0, 0.05, 0.1, 0.1, halves=differing)
-    (fair,) = with_halves([sure], {"masses.cart": MASS}, quality)
+    findings = tuple(differing_halves.find(ValueCase(log, inverse, lacks=True)))
+    (fair,) = allowed([sure], inverse, {"masses.cart": MASS}, replace(GOOD, findings=findings)).estimates
     assert fair.holds(COULOMB)
     assert fair.holds(2 * COULOMB)
     assert fair.value == sure.value
@@ -222,29 +250,32 @@ def test_a_number_of_which_nothing_is_known_does_not_move_and_hides_nothing(odd:
     noise = 0.01 * np.random.default_rng(1).standard_normal(500)
     explained = explained_by(np.column_stack([wave, odd * counted]), noise - 2 * wave - 3 * line, [line], counted)
     assert explained is not None
-    assert np.concatenate(explained) == pytest.approx([2.0, 0.0, 3.0], abs=0.01)
+    assert [*explained.moved, *explained.sizes] == pytest.approx([2.0, 0.0, 3.0], abs=0.01)
 
 
 def test_slow_friction_of_a_fit_that_lacks_something_is_less_certain() -> None:
     log = axis()
     inverse, flat = inverse_model(log, 5.0), made_up(log, inverse_model(log, 5.0)).flat()
     stribeck = Estimate.normal("friction.stribeck_velocity", "m/s", 2e-3, 1e-4, "output error")
-    good = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
-    assert all_with_model_error([stribeck], inverse, flat, good) == (stribeck,)
-    (wide,) = all_with_model_error([stribeck], inverse, flat, replace(good, left=1.0))
+    assert allowed([stribeck], inverse, flat, GOOD).estimates == (stribeck,)
+    (wide,) = allowed([stribeck], inverse, flat, replace(GOOD, left=1.0)).estimates
     assert wide.half_width == pytest.approx(2 * stribeck.half_width)
 
 
-@pytest.mark.parametrize("wrong", [{"left": 1.0}, {"compliant": True}])
-def test_what_a_model_lacks_may_pass_for_bristles(wrong: dict[str, Any]) -> None:
-    good = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
+@pytest.mark.parametrize("lacking", [True, False], ids=["it lacks something", "a coupling bends"])
+def test_what_a_model_lacks_may_pass_for_bristles(lacking: bool) -> None:
     names = ("friction.bristle_stiffness", "friction.stribeck_velocity", "friction.bristle_damping")
     estimates = tuple(Estimate.normal(name, "", 1.0, 0.1, "output error") for name in names)
     correlation = np.array([[1.0, 0.2, 0.3], [0.2, 1.0, 0.4], [0.3, 0.4, 1.0]])
-    assert without_bristles(estimates, correlation, good) == (estimates, correlation)
-    answers, left = without_bristles(estimates, correlation, replace(good, **wrong))
-    assert [one.determined for one in answers] == [False, True, False]
-    assert left.tolist() == [[1.0]]
+    inverse, flat = inverse_model(axis(), 5.0), {"masses.cart": MASS}
+    fine = allowed(estimates, inverse, flat, GOOD, correlation)
+    assert fine.estimates == estimates
+    assert fine.correlation.tolist() == correlation.tolist()
+    refused = {} if lacking else dict.fromkeys(BRISTLES, "a coupling would pass for it")
+    wrong = replace(GOOD, left=1.0) if lacking else GOOD
+    case = allowed(estimates, inverse, flat, wrong, correlation, refused)
+    assert [one.determined for one in case.estimates] == [False, True, False]
+    assert case.correlation.tolist() == [[1.0]]
 
 
 def test_intervals_hold_only_values_that_keys_may_have() -> None:
@@ -253,30 +284,32 @@ def test_intervals_hold_only_values_that_keys_may_have() -> None:
     viscous = Estimate("friction.viscous", "N*s/m", 2.0, -1.0, 5.0, "")
     mass = Estimate("masses.stage", "kg", 2.0, 1.0, 3.0, "")
     asymmetry = Estimate("friction.viscous_asymmetry", "", -0.5, -1.2, 0.2, "")
-    assert with_possible_values([asymmetry], np.eye(1), flat)[0] == (asymmetry,)
+    assert judged_keys(key_case([asymmetry], flat)).estimates == (asymmetry,)
     correlation = np.array([[1.0, 0.2, 0.3], [0.2, 1.0, 0.4], [0.3, 0.4, 1.0]])
-    (bounded, cut, same), left = with_possible_values([stiffness, viscous, mass], correlation, flat)
+    case = judged_keys(key_case([stiffness, viscous, mass], flat, correlation=correlation))
+    bounded, cut, same = case.estimates
     assert (bounded.determined, bounded.low, bounded.high) == (False, 0.0, 3e5)
     assert (cut.value, cut.low, cut.high) == (2.0, 0.0, 5.0)
     assert same == mass
-    assert left.tolist() == [[1.0, 0.4], [0.4, 1.0]]
+    assert case.correlation.tolist() == [[1.0, 0.4], [0.4, 1.0]]
 
 
 def test_what_comes_out_negative_is_not_told_and_never_as_next_to_nothing(wording: Wording) -> None:
     """A log of -7.8 N of Coulomb friction had "next to nothing", and a range from 0 down to -7.777 N."""
     negative = Estimate("friction.coulomb", "N", -7.8, -7.823, -7.777, "")
-    (answer,), left = with_possible_values([negative], np.eye(1), VARIANTS["rigid"].flat())
+    case = judged_keys(key_case([negative], VARIANTS["rigid"].flat()))
+    (answer,) = case.estimates
     assert (answer.determined, answer.low, answer.high) == (False, 0.0, np.inf)
-    assert left.size == 0
+    assert case.correlation.size == 0
     for coulomb, noise in ((-7.8, 0.05), (0.0, 1e-3), (-0.3, 20.0)):
-        wording(little_friction(inverse_model(axis(noise, coulomb=coulomb), 5.0), "N"))
+        wording(of_little_friction(axis(noise, coulomb=coulomb)))
     time = np.arange(4000) * DT
     falling = record("falling", DT, position=time + 0.1 * np.sin(5 * time), force=-7.8 - 2.5 * np.sin(5 * time))
-    wording(little_friction(inverse_model(falling, 5.0), "N"))
+    wording(of_little_friction(falling))
     force = falling["force"] - inverse_model(falling, 5.0).value("coulomb")
     balanced = record("balanced", DT, position=falling["position"], force=force)
-    assert "next to nothing: the log moves in one direction only" in little_friction(inverse_model(balanced, 5.0), "N")
-    assert not little_friction(inverse_model(axis(), 5.0), "N")
+    assert "next to nothing: the log moves in one direction only" in of_little_friction(balanced)
+    assert not of_little_friction(axis())
 
 
 def test_model_error_reaches_the_other_model_where_noise_does_not_explain_the_rest() -> None:
@@ -327,15 +360,19 @@ def test_the_inverse_model_steps_in_with_its_values() -> None:
 # --- causes -----------------------------------------------------------------------------------------------------------
 
 
+def causes_of(log: Log) -> list[RaisedDoubt]:
+    return causes(RecordCase(log, inverse_model(log, 5.0)))
+
+
 def sentences(log: Log) -> str:
-    return " ".join(cause.sentence for cause in causes(log, inverse_model(log, 5.0), 0.0))
+    return " ".join(cause.words for cause in causes_of(log))
 
 
 def test_a_delay_is_found(wording: Wording) -> None:
     log = axis()
     late = replace(log, signals={**log.signals, "force": np.roll(log["force"], 16)})
-    (cause,) = causes(late, inverse_model(late, 5.0), 0.0)
-    wording(cause.sentence)
+    (cause,) = causes_of(late)
+    wording(cause.words)
     assert cause.without is not None
     assert cause.without.value("mass") == pytest.approx(MASS, rel=0.01)
 
@@ -344,15 +381,16 @@ def test_an_interval_spans_what_the_log_says_with_and_without_a_delay() -> None:
     log = axis()
     late = replace(log, signals={**log.signals, "force": np.roll(log["force"], 16)})
     inverse, flat = inverse_model(late, 5.0), {"masses.cart": MASS}
-    (cause,) = causes(late, inverse, 0.0)
+    (cause,) = causes_of(late)
     off = Estimate.normal("masses.cart", "kg", inverse.value("mass"), 0.01, "output error")
     quality = Quality(0.05, 1.0, 0.05, inverse.error, inverse.error)
-    (blind,) = all_with_model_error([off], inverse, flat, quality)
+    (blind,) = allowed([off], inverse, flat, quality).estimates
     assert cause.without is not None
     spoilt = replace(quality, without=(cause.without,), spoilt=True)
     slow = Estimate.normal("friction.static", "N", 9.0, 0.1, "output error")
-    (fair, static), correlation = with_causes([blind, slow], np.eye(2), inverse, flat, spoilt)
-    assert correlation.shape == (1, 1)
+    case = allowed([off, slow], inverse, flat, spoilt)
+    fair, static = case.estimates
+    assert case.correlation.shape == (1, 1)
     assert not static.determined
     assert not blind.holds(MASS)
     assert fair.holds(MASS)
@@ -364,9 +402,9 @@ def test_an_averaged_force_is_found_and_the_mass_behind_it(wording: Wording) -> 
     late = np.convolve(log["force"], np.full(65, 1 / 65), "full")[: len(log.time)]
     filtered = replace(log, signals={**log.signals, "force": late})
     inverse = inverse_model(filtered, 5.0)
-    cause = causes(filtered, inverse, 0.0)[0]
+    cause = causes_of(filtered)[0]
     assert cause.without is not None
-    wording(cause.sentence)
+    wording(cause.words)
     assert abs(inverse.value("mass") - MASS) > 0.1
     assert cause.without.value("mass") == pytest.approx(MASS, rel=0.02)
 
@@ -375,8 +413,8 @@ def test_a_force_along_the_way_is_found(wording: Wording) -> None:
     log = axis()
     force = log["force"] + 8 * np.sin(2 * np.pi * log["position"] / 0.15)
     uneven = replace(log, signals={**log.signals, "force": force})
-    (cause,) = causes(uneven, inverse_model(uneven, 5.0), 0.0)
-    wording(cause.sentence)
+    (cause,) = causes_of(uneven)
+    wording(cause.words)
     assert cause.without is not None
     assert cause.without.value("coulomb") == pytest.approx(COULOMB, rel=0.1)
 
@@ -387,16 +425,16 @@ def test_a_feed_forward_that_is_not_logged_is_found(wording: Wording, monkeypatc
     force = log["force"] - 4.0 * np.gradient(np.gradient(ahead, DT), DT)
     lacking = replace(log, signals={**log.signals, "reference": ahead, "force": force})
     inverse = inverse_model(lacking, 5.0)
-    cause = causes(lacking, inverse, 0.0)[0]
-    wording(cause.sentence)
+    cause, case = causes_of(lacking)[0], RecordCase(lacking, inverse)
+    wording(cause.words)
     assert cause.without is not None
     assert inverse.value("mass") < 0.5 * MASS
     assert cause.without.value("mass") == pytest.approx(MASS, rel=0.05)
-    assert perhaps_fed_forward(lacking, inverse, 0.0) == ""  # it is certain
-    monkeypatch.setattr("friso.identification.alternatives._lacks_when_fast", lambda *_: False)
-    perhaps = perhaps_fed_forward(lacking, inverse, 0.0)
-    assert "this log does not tell" in perhaps
-    assert float(perhaps.split()[-2]) == pytest.approx(MASS, rel=0.05)
+    assert not [*perhaps_feedforward.find(case)]  # it is certain
+    monkeypatch.setattr(missing_feedforward, "lacks_when_fast", lambda *_: False)
+    (perhaps,) = perhaps_feedforward.find(case)
+    assert "this log does not tell" in perhaps.words
+    assert perhaps.size == pytest.approx(MASS, rel=0.05)
 
 
 def test_what_friction_does_to_a_servo_that_follows_well_is_no_missing_feedforward() -> None:
@@ -410,14 +448,14 @@ def test_what_friction_does_to_a_servo_that_follows_well_is_no_missing_feedforwa
     inverse = inverse_model(followed, 5.0)
     assert np.abs(error).max() < 0.02 * np.ptp(log["position"])
     assert inverse.value("mass") == pytest.approx(MASS, rel=0.01)
-    assert not alternatives(followed, inverse, 0.0)
+    assert not [cause for cause in causes_of(followed) if cause.without]
 
 
 def test_a_force_that_is_cut_off_spoils_the_record(wording: Wording) -> None:
     log = axis()
     cut = replace(log, signals={**log.signals, "force": np.clip(log["force"], -15, 15)})
-    cause = causes(cut, inverse_model(cut, 5.0), 0.0)[-1]
-    wording(cause.sentence)
+    cause = causes_of(cut)[-1]
+    wording(cause.words)
     assert cause.spoils
 
 
@@ -426,10 +464,9 @@ def test_much_that_nothing_explains_makes_intervals_wider() -> None:
     inverse, flat = inverse_model(log, 5.0), {"masses.cart": MASS}
     one = Estimate.normal("masses.cart", "kg", MASS, 0.1, "output error")
     plain = Quality(0.05, 1.0, 0.05, inverse.error, inverse.error)
-    (same,), _ = with_causes([one], np.eye(1), inverse, flat, plain)
-    (wide,), _ = with_causes([one], np.eye(1), inverse, flat, replace(plain, spoilt=True, unsettled=True))
-    assert same == one
-    assert wide.half_width == pytest.approx(2 * one.half_width)
+    (same,) = allowed([one], inverse, flat, plain).estimates
+    (wide,) = allowed([one], inverse, flat, replace(plain, spoilt=True, unsettled=True)).estimates
+    assert wide.half_width == pytest.approx(2 * same.half_width)
 
 
 def test_in_one_direction_no_interval_is_narrower_than_the_inverse_models() -> None:
@@ -442,7 +479,7 @@ def test_in_one_direction_no_interval_is_narrower_than_the_inverse_models() -> N
     whole = Estimate.normal("friction.viscous", "N*s/m", VISCOUS, viscous.half_width / 100, "output error")
     quality = Quality(0.05, 0.05, 0.01, inverse.error, inverse.error)
     fair, narrow = (
-        all_with_model_error([whole], one, {"masses.cart": MASS}, replace(quality, left=0.01 * quality.left))[0]
+        allowed([whole], one, {"masses.cart": MASS}, replace(quality, left=0.01 * quality.left)).estimates[0]
         for one in (one_way, inverse)
     )
     assert narrow.half_width < 0.5 * viscous.half_width
@@ -451,8 +488,11 @@ def test_in_one_direction_no_interval_is_narrower_than_the_inverse_models() -> N
 
 def test_a_record_in_pieces_says_how_little_is_fitted(wording: Wording) -> None:
     log = axis()
-    assert fragment(log) == ""
-    wording(fragment(replace(log, segments=tuple(slice(a, a + 400) for a in range(0, 7600, 401)))))
+    inverse = inverse_model(log, 5.0)
+    assert not [*gaps.find(RecordCase(log, inverse))]
+    pieces = replace(log, segments=tuple(slice(a, a + 400) for a in range(0, 7600, 401)))
+    (finding,) = gaps.find(RecordCase(pieces, inverse))
+    wording(finding.words)
 
 
 @pytest.mark.parametrize("what", ["a jump", "coarse digits"])
@@ -461,7 +501,7 @@ def test_a_broken_record_says_what_is_broken(what: str, wording: Wording) -> Non
     position = np.where(log.time > 3, log["position"] - 0.05, log["position"])
     position = position if what == "a jump" else np.round(log["position"], 3)
     broken = replace(log, signals={**log.signals, "position": position})
-    wording(causes(broken, inverse_model(broken, 5.0), 0.0)[0].sentence)
+    wording(causes_of(broken)[0].words)
 
 
 def test_gravity_is_found(wording: Wording) -> None:
@@ -480,7 +520,38 @@ def test_noise_has_no_cause() -> None:
     log = axis()
     noise = 300 * np.random.default_rng(1).standard_normal(len(log.time))
     other = replace(log, signals={**log.signals, "force": noise + 0.2 * log["force"]})
-    assert causes(other, inverse_model(other, 5.0), 0.0) == []
+    assert causes_of(other) == []
+
+
+# --- the registry -----------------------------------------------------------------------------------------------------
+
+
+def test_every_doubt_says_what_it_looks_at_and_what_would_decide_it() -> None:
+    for name, doubt in DOUBTS.items():
+        assert DOUBTS.one_line(name)
+        assert all((doubt.looks_at, doubt.consequence, doubt.decided_by)), name
+        assert all(DOUBTS[other].moment == doubt.moment for other in doubt.after), name
+
+
+def test_a_doubt_that_is_added_is_asked_in_its_order_and_has_its_consequences() -> None:
+    """One file is all that a further effect takes: here one that refuses the mass, and one that is asked before it."""
+    asked = []
+
+    def find(name: str, refuses: dict[str, str]) -> Callable[[KeyCase], Iterator[RaisedDoubt]]:
+        def raised(case: KeyCase) -> Iterator[RaisedDoubt]:
+            asked.append(name)
+            yield RaisedDoubt(refuses=refuses)
+
+        return raised
+
+    mass = Estimate.normal("masses.stage", "kg", 6.0, 0.1, "output error")
+    with pytest.MonkeyPatch.context() as patch:
+        for name, refuses, after in (("a-load", {"masses.stage": "a load"}, ("z-play",)), ("z-play", {}, ())):
+            made_up_doubt = Doubt("key", find(name, refuses), "play", "refused", "a dial gauge", after)
+            patch.setitem(DOUBTS.added, name, (made_up_doubt, "made up"))
+        case = judged_keys(key_case([mass], VARIANTS["rigid"].flat(), acceleration=np.ones(3)))
+    assert asked == ["z-play", "a-load"]
+    assert case.estimates[0].reason == "a load"
 
 
 # --- rests ------------------------------------------------------------------------------------------------------------
@@ -544,10 +615,11 @@ def test_starts_are_tried_all_over_a_long_record() -> None:
     log = axis(seconds=20.0)
     flat = made_up(log, inverse_model(log, 5.0)).flat()
     problem = tracking(flat, log, log.segments[0], _parameters(flat), 5.0)
-    parts = fitting._parts(problem, fitting.STARTS)
+    settings = OutputErrorSettings.current()
+    parts = fitting._parts(problem, settings.starts_of_a_fit)
     assert parts[0].start == 0
     assert parts[-1].stop == len(log.time)
-    assert sum(part.stop - part.start for part in parts) <= fitting.SCREENED / fitting.STARTS
+    assert sum(part.stop - part.start for part in parts) <= settings.samples_of_all_starts / settings.starts_of_a_fit
     later = problem.part(parts[-1])
     assert later.start[0] == later.inputs.reference[0] == problem.inputs.reference[parts[-1].start]
     assert len(later.target) == len(later.counted) == parts[-1].stop - parts[-1].start

@@ -22,7 +22,8 @@ from friso.identification.logs.assemble import read_log
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.mapping import Mapping, load_mapping, mapping_text, sidecar
 from friso.identification.method import axis_of_all
-from friso.identification.output_error.parameters import LONGEST, SHORTEST, bends
+from friso.identification.output_error.parameters import bends
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.stage_file import made_up
 
 TURNING = Mapping(axis="rotary")
@@ -115,8 +116,9 @@ def test_a_stage_around_a_rotary_log_is_one_of_a_rotary_axis() -> None:
     linear, turned = (made_up(one, inverse_model(one, 5.0)) for one in (log, replace(log, axis=ROTARY)))
     assert turned.axis_kind == ROTARY
     assert {key: value for key, value in turned.flat().items() if key != "axis.kind"} == linear.flat()
-    assert bends(linear.flat()) == (SHORTEST, LONGEST)
-    assert bends(turned.flat())[1] > LONGEST
+    settings = OutputErrorSettings.current()
+    assert bends(linear.flat()) == (settings.shortest_bristle_bend, settings.longest_bristle_bend)
+    assert bends(turned.flat())[1] > settings.longest_bristle_bend
 
 
 def test_logs_and_stage_are_of_one_kind_of_axis(refused: Refused) -> None:

@@ -9,15 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from friso.identification.doubts import quality_of
+from friso.identification.doubt import KeyCase
+from friso.identification.doubts import lost_inertia, slow_motion
+from friso.identification.doubts.break_away_friction import friction_beyond
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model
-from friso.identification.output_error.break_aways import exceeded_at_break_away
-from friso.identification.output_error.drawn import DRAWS, drawn_from
-from friso.identification.output_error.parameters import EXPONENT, MASS, RATIO, FitParameter
+from friso.identification.output_error.drawn import drawn_from
+from friso.identification.output_error.parameters import MASS, RATIO, FitParameter
+from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import record
 from friso.identification.readings.ramps import Ramps
-from friso.identification.slow_records import with_unexplained_inertia, without_sliding
 from friso.identification.stage_file import made_up
 from friso.questions.identify.kinds.moves import FALLING, _inverse_text
 
@@ -28,13 +30,21 @@ UNKNOWN = Estimate.unknown("friction.stribeck_velocity", "m/s", "drawn", "not co
 STRIBECK = Estimate.normal("friction.stribeck_velocity", "m/s", 1e-3, 1e-5, "drawn")
 
 
+def case_of(estimates: tuple[Estimate, ...], **seen: Any) -> KeyCase:
+    """Estimates of a log of nothing, with what is said of it."""
+    log: Any = record("made up", 1e-3, position=np.zeros(100), force=np.zeros(100))
+    rest: Any = {"log": log, "inverse": None, "fit": None, "quality": Quality(0.1, 0.1, 0.1, 0.1, 0.1)}
+    rest |= {"flat": FLAT, "velocity": np.zeros(1), "correlation": np.eye(sum(one.determined for one in estimates))}
+    return KeyCase(**rest | {"estimates": estimates} | seen)
+
+
 def shown(estimates: tuple[Estimate, ...], top: float) -> set[str]:
     """What is left of estimates of a motion of this highest speed [m/s]."""
-    size = sum(estimate.determined for estimate in estimates)
-    kept, correlation = without_sliding(estimates, np.eye(size), FLAT, top, "N")
-    names = {estimate.name for estimate in kept if estimate.determined}
-    assert len(correlation) == len(names)
-    return names
+    case = case_of(estimates, velocity=np.array([0.0, -top]))
+    for finding in slow_motion.find(case):
+        case = case.with_answers(finding)
+    assert len(case.correlation) == len(case.determined)
+    return set(case.determined)
 
 
 @pytest.mark.parametrize(
@@ -50,8 +60,10 @@ def test_friction_at_slow_speeds_alone_is_no_coulomb_friction(stribeck: Estimate
 @pytest.mark.parametrize(("share", "off"), [(0.01, MASSES.half_width), (0.9, 0.81 * 3.0), (1.1, None)])
 def test_what_is_left_passes_for_inertia(share: float, off: float | None) -> None:
     """Little of it does nothing, much of it makes the mass uncertain, and beyond the inertia there is no mass."""
-    acceleration = np.array([0.5, -0.5])
-    (mass,), _ = with_unexplained_inertia((MASSES,), np.eye(1), acceleration, share * 3.0 * 0.5, "N")
+    case = case_of((MASSES,), acceleration=np.array([0.5, -0.5]), unexplained=share * 3.0 * 0.5)
+    for finding in lost_inertia.find(case):
+        case = case.with_answers(finding)
+    (mass,) = case.estimates
     assert mass.determined == (off is not None)
     assert off is None or mass.half_width == pytest.approx(off)
 
@@ -66,7 +78,7 @@ def test_machines_are_drawn_from_intervals_and_from_what_is_left() -> None:
     ]
     inner = np.array([np.log(3.0), np.log(8.0), 1.0, 5.0])
     rows = drawn_from((MASSES, COULOMB, static), np.eye(2), parameters, inner)
-    assert rows.shape == (DRAWS, 4)
+    assert rows.shape == (OutputErrorSettings.current().machines_drawn, 4)
     assert np.ptp(rows[:, 0]) > 0
     assert MASSES.low <= np.exp(rows[:, 0]).min() <= np.exp(rows[:, 0]).max() <= MASSES.high
     assert rows[:, 2].min() < 1.5
@@ -118,12 +130,13 @@ def test_static_friction_below_that_of_break_aways_is_not_believed() -> None:
         unsure = np.full(count, 0.1)
         return Ramps(*rest, directions, forces, np.ones(count), unsure, np.zeros(count), np.full(count, 0.05), 0.0, ())
 
-    assert exceeded_at_break_away([static, bias], curve, ramps(13.9), "N").keys() == {RATIO, STRIBECK.name, EXPONENT}
-    assert not exceeded_at_break_away([static, bias], curve, ramps(11.9), "N")
-    assert not exceeded_at_break_away([static, bias], curve, ramps(13.9, 2), "N")
-    assert not exceeded_at_break_away([bias], curve, ramps(13.9), "N")
-    assert not exceeded_at_break_away([static, bias], curve, ramps(11.5, more=3, backward=5), "N")
-    assert not exceeded_at_break_away([static, bias], {**curve, "friction.viscous": 60.0}, ramps(13.9), "N")
+    both, steeper = {static.name: static, bias.name: bias}, {**curve, "friction.viscous": 60.0}
+    assert friction_beyond(both, curve, ramps(13.9)) == pytest.approx(13.9, rel=0.05)
+    assert friction_beyond(both, curve, ramps(11.9)) is None
+    assert friction_beyond(both, curve, ramps(13.9, 2)) is None
+    assert friction_beyond({bias.name: bias}, curve, ramps(13.9)) is None
+    assert friction_beyond(both, curve, ramps(11.5, more=3, backward=5)) is None
+    assert friction_beyond(both, steeper, ramps(13.9)) is None
 
 
 def test_falling_friction_is_told_where_no_other_sign_is_possible() -> None:

@@ -19,17 +19,14 @@ from typer.core import TyperGroup
 import friso
 from friso.axis import unit_of_key
 from friso.cli.app import command_line
-from friso.cli.command import QUESTIONS
 from friso.interface.answer import Answer
+from friso.interface.question import TOPICS
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 STICK_SLIP, LEAVES = EXAMPLES / "lugre_stick_slip.toml", EXAMPLES / "thesis_leaves.toml"
 
 OF_THE_SHELL = {"--out", "--overwrite", "--json", "--details", "--help"}
 """Options that say where an answer goes: `report` and `to_dict` of the answer in Python."""
-
-OTHERWISE = {("map", "--check"): "friso.questions.map.question.whole"}
-"""Options that are not keywords, and what does the same."""
 
 FUNCTIONS = {"map": "sweep"}
 """Commands whose function has another name."""
@@ -51,8 +48,7 @@ def function_of(command: str) -> Any:
 def test_a_command_has_a_function_and_its_options_are_keywords(command: str) -> None:
     keywords = {name.strip("_") for name in inspect.signature(function_of(command)).parameters}
     options = {option for parameter in commands()[command].params for option in parameter.opts if option[:2] == "--"}
-    expected = OF_THE_SHELL | {option for name, option in OTHERWISE if name == command}
-    missing = {option for option in options - expected if option[2:].replace("-", "_") not in keywords}
+    missing = {option for option in options - OF_THE_SHELL if option[2:].replace("-", "_") not in keywords}
     assert missing == set()
 
 
@@ -93,7 +89,7 @@ def test_the_help_imports_no_stage_and_lists_every_command_once() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
     listed = [line.split()[0] for line in done.stdout.splitlines() if line[:2] == "  " and line[2:3].isalpha()]
     assert set(commands()) <= set(listed)
-    assert [question for question in QUESTIONS if question not in done.stdout] == []
+    assert [question for question in TOPICS if question not in done.stdout] == []
     assert "..." not in done.stdout.partition("Does it hunt?")[2]
 
 

@@ -28,6 +28,7 @@ from friso.identification.logs import format as reading
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.preamble import preamble
 from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
+from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.sniff import split_line
 from friso.identification.logs.units import is_unit, spelled, split_heading
 from friso.platform.system import LIMITS_MEMORY
@@ -678,15 +679,13 @@ def zeros_as_mat(path: Path, count: int) -> None:
 
 
 @pytest.mark.skipif(not LIMITS_MEMORY, reason="this system does not hold a process to an amount of memory")
-def test_a_file_that_swells_is_an_error_of_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
-) -> None:
-    monkeypatch.setattr(confined, "MEMORY", 400 << 20)
-    zeros_as_mat(tmp_path / "small.mat", 1000)
-    assert channel(read_table(tmp_path / "small.mat"), "x").values.shape == (1000,)
-    zeros_as_mat(tmp_path / "large.mat", 50_000_000)
-    with refused("log"):
-        read_table(tmp_path / "large.mat")
+def test_a_file_that_swells_is_an_error_of_its_own(tmp_path: Path, refused: Refused) -> None:
+    with LogSettings(memory_of_reading=400 << 20).in_use():
+        zeros_as_mat(tmp_path / "small.mat", 1000)
+        assert channel(read_table(tmp_path / "small.mat"), "x").values.shape == (1000,)
+        zeros_as_mat(tmp_path / "large.mat", 50_000_000)
+        with refused("log"):
+            read_table(tmp_path / "large.mat")
 
 
 def endless_mat(path: Path) -> None:
@@ -700,12 +699,9 @@ def endless_mat(path: Path) -> None:
         file.create_dataset("x", data=[below.ref], dtype=h5py.ref_dtype)
 
 
-def test_a_file_that_never_ends_is_an_error_of_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
-) -> None:
-    monkeypatch.setattr(confined, "SECONDS", 3.0)
+def test_a_file_that_never_ends_is_an_error_of_its_own(tmp_path: Path, refused: Refused) -> None:
     endless_mat(tmp_path / "a.mat")
-    with refused("log"):
+    with refused("log"), LogSettings(time_of_reading=3.0).in_use():
         read_table(tmp_path / "a.mat")
 
 
@@ -721,12 +717,12 @@ def test_a_file_is_given_the_time_that_a_busy_machine_takes(tmp_path: Path, monk
     slow = tmp_path / "slow.py"
     slow.write_text(SLOW.format(program=confined.binary.__file__))
     monkeypatch.setattr(confined.binary, "__file__", str(slow))
-    monkeypatch.setattr(confined, "SECONDS", 2.0)
     zeros_as_mat(tmp_path / "a.mat", 1000)
-    assert channel(read_table(tmp_path / "a.mat"), "x").values.shape == (1000,)
-    monkeypatch.setattr(confined, "PATIENCE", 0.5)
+    with LogSettings(time_of_reading=2.0).in_use():
+        assert channel(read_table(tmp_path / "a.mat"), "x").values.shape == (1000,)
     zeros_as_mat(tmp_path / "b.mat", 1000)
-    with pytest.raises(LogError, match="the machine is busy"):
+    impatient = LogSettings(time_of_reading=2.0, patience_with_a_busy_machine=0.5)
+    with impatient.in_use(), pytest.raises(LogError, match="the machine is busy"):
         read_table(tmp_path / "b.mat")
 
 

@@ -22,8 +22,8 @@ from systems import posix
 import friso as friso_api
 from friso.errors import InputError, StoreError
 from friso.questions.map.study import refuse_overwriting, stored_study
-from friso.studies.cells import USUAL
 from friso.studies.metadata import annotate_metadata
+from friso.studies.metric import with_usual
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 SMALL = ("--x", "controller.crossover=4 Hz..12 Hz:5", "--y", "joint.stroke=0 m..1 mm:4")
@@ -348,7 +348,7 @@ def test_what_a_store_holds_is_drawn_and_what_it_lacks_is_named(
         assert "('" not in done.stderr
     more = tmp_path / "b.zarr"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("friso.questions.map.study.USUAL", (*USUAL, "verdict"))
+        patch.setattr("friso.questions.map.study.with_usual", lambda metric: (*with_usual(metric), "verdict"))
         small = ("--x", "controller.crossover=4 Hz, 5 Hz", "--out", more, "--verify", "0")
         assert friso_inside(tmp_path, "map", RIG, *small).returncode == 0
     done = friso_inside(tmp_path, "map", RIG, *small, "--metric", "peaks")

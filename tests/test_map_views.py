@@ -29,7 +29,7 @@ from friso.questions.map.data import MOST, NONE
 from friso.questions.map.figures import SLICES, map_figure, map_panel
 from friso.questions.map.findings import headline, statement, verification
 from friso.questions.map.page import map_files, map_html, marked_figure
-from friso.questions.map.words import CATEGORIES, FAILED, INFERRED, INVALID, NOT_RUN, QUIET, quantity
+from friso.questions.map.words import FAILED, INVALID, NOT_RUN, QUIET, categories_of, quantity
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.colours import painted, ramp, scale
 from friso.shown.drawing.drawable import cell_edges, colour_key, drawable
@@ -144,7 +144,13 @@ def test_runs_that_were_not_made_are_not_counted(snapshots: Snapshots):
 def test_cells_without_number_are_told_apart_and_never_zero():
     field = only_map(map_figure(troubled(), "peaks"))
     column = [row[0] for row in categories_shown(field)]
-    assert column == [INVALID, FAILED, NOT_RUN, INFERRED["swings"], INFERRED["rests"]]
+    assert column == [
+        INVALID,
+        FAILED,
+        NOT_RUN,
+        categories_of("outcome", inferred=True)["swings"],
+        categories_of("outcome", inferred=True)["rests"],
+    ]
     assert np.isnan(field.z[:, 0]).all()
     assert np.array_equal(field.z[:, 1:], troubled().peaks.values[1:].T)
     assert all(category is None for row in categories_shown(field) for category in row[1:])
@@ -153,7 +159,7 @@ def test_cells_without_number_are_told_apart_and_never_zero():
         *ramp(11)[::-1],
         *(
             category.colour
-            for category in {*field.categories, *CATEGORIES["outcome"].values()}
+            for category in {*field.categories, *categories_of("outcome").values()}
             if category.label != "rests"
         ),
     ]

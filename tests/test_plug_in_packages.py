@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from friso import example
 from friso.errors import InputError
 from friso.stage import ControllerSection, register_controller
 
@@ -70,6 +71,28 @@ def installed(tmp_path: Path) -> Path:
     package(tmp_path, "other", controllers="own_controller", friction="air_film")
     (tmp_path / "stage.toml").write_text(STAGE)
     return tmp_path
+
+
+METRIC = '''
+"""Largest force over static friction"""
+
+from friso.studies.metric import Metric
+
+METRIC = Metric(
+    "Use of the force", lambda run: run.measures.largest_force / run.flat["friction.static"], unit="1"
+)
+'''
+
+
+def test_a_metric_of_a_package_is_mapped(tmp_path: Path) -> None:
+    (tmp_path / "force_use.py").write_text(METRIC)
+    package(tmp_path, "other", metrics={"force_use": "force_use", "peaks": "force_use"})
+    shutil.copy(example("thesis_rig"), tmp_path / "rig.toml")
+    small = ("rig.toml", "--x", "controller.crossover=4 Hz, 8 Hz", "--out", "a.zarr", "--json")
+    done = friso_command(tmp_path, "map", *small, "--metric", "force_use")
+    assert done.returncode == 0, done.stderr
+    assert "friso.metrics: peaks is left out" in " ".join(done.stderr.split())
+    assert "Use of the force" in (tmp_path / "a.html").read_text(encoding="utf-8")
 
 
 def test_help_names_them(installed: Path) -> None:
@@ -187,45 +210,44 @@ def python(folder: Path, code: str) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-COMMANDS = {
-    name: f"from friso.cli.command import Command\ndef run(stage: {kind}) -> None: ...\nCOMMAND = Command({declared})"
-    for name, kind, declared in (
-        ("unread", "Nowhere", "run, 1"),
-        ("early", "str", "run, 'early'"),
-        ("lost", "str", "run, 1, 'Why?'"),
-        ("number", "str", "3, 1"),
-    )
-}
-"""Modules whose command friso cannot show or run."""
+QUESTION = "from friso.interface.question import WHY, Question\nQUESTION = Question(__name__, {declared})"
+FUNCTION = """from friso.interface.answer import question
+@question
+def unread(stage: Nowhere) -> None:
+    'Read nothing.'
+"""
 
 
 @pytest.mark.parametrize(
     ("name", "module", "why"),
     [
-        ("check", "friso_resting.command", "friso has it"),
-        ("reproduce", "friso_resting.command", "several packages give it"),
+        ("check", "friso_resting.resting", "friso has it"),
+        ("reproduce", "friso_resting.resting", "several packages give it"),
         ("missing", "missing", "cannot be imported: No module named"),
-        ("empty", "empty", "whose COMMAND is missing"),
-        ("wrong", "wrong", "whose COMMAND is int"),
+        ("empty", "empty", "whose QUESTION is missing"),
+        ("wrong", "wrong", "whose QUESTION is int"),
         ("leaves", "leaves", "cannot be imported"),
         ("broken", "broken", "cannot be imported: invalid syntax"),
-        ("unread", "unread", "name 'Nowhere' is not defined"),
         ("early", "early", "place 'early' is not a number"),
-        ("lost", "lost", "question 'Why?' is none of"),
-        ("number", "number", "3 is not a callable object"),
+        ("lost", "lost", "topic 'Why?' is none of"),
+        ("alone", "alone", "a module that can be read"),
+        ("bare", "bare", "the function bare and its docstring"),
     ],
 )
-def test_a_command_that_is_of_no_use_is_one_sentence_and_hinders_no_other(
+def test_a_question_that_is_of_no_use_is_one_sentence_and_hinders_no_other(
     name: str, module: str, why: str, tmp_path: Path
 ) -> None:
-    texts = {"empty": "", "wrong": "COMMAND = 1", "leaves": "raise SystemExit(0)", "broken": "def", **COMMANDS}
+    texts = {"empty": "", "wrong": "QUESTION = 1", "leaves": "raise SystemExit(0)", "broken": "def"}
+    declared = {"early": "'early', WHY, ''", "lost": "1, 'Why?', ''", "alone": "1, WHY, ''"}
+    texts |= {file: QUESTION.format(declared=text) for file, text in declared.items()}
     for file, text in texts.items():
         (tmp_path / f"{file}.py").write_text(text)
-    package(tmp_path, "other", commands={name: module}, functions={name: module}, rig_experiments={name: module})
+    write_question(tmp_path / "bare", "1, WHY, ''", "def bare(): ...")
+    package(tmp_path, "other", questions={name: module}, rig_experiments={name: module})
     listed = friso_command(tmp_path, "--help")
     assert listed.returncode == 0
     assert "  check " in listed.stdout
-    assert f"friso: friso.commands: {name} is left out: {module}" in left_out(listed)
+    assert f"friso: friso.questions: {name} is left out: {module}" in left_out(listed)
     assert why in left_out(listed)
     done = friso_command(tmp_path, "init", "stage.toml")
     assert (done.returncode, done.stderr) == (0, "")
@@ -236,18 +258,43 @@ def test_a_command_that_is_of_no_use_is_one_sentence_and_hinders_no_other(
     if name not in ("check", "reproduce"):
         asked = friso_command(tmp_path, name)
         assert (asked.returncode, asked.stdout) == (2, "")
-        assert why in asked.stderr
         assert "Traceback" not in asked.stderr
+        assert f"friso.questions: {name}" in asked.stderr
+
+
+def write_question(folder: Path, declared: str, module: str) -> None:
+    """The package of a question: what it declares, and the module of its function."""
+    folder.mkdir()
+    (folder / "__init__.py").write_text(QUESTION.format(declared=declared))
+    (folder / "question.py").write_text(module)
+
+
+def test_a_question_whose_options_cannot_be_read_is_told_when_it_is_asked(tmp_path: Path) -> None:
+    write_question(tmp_path / "unread", "1, WHY, 'unread rig.toml'", FUNCTION)
+    package(tmp_path, "other", questions={"unread": "unread"})
+    assert "unread" in friso_command(tmp_path, "--help").stdout
+    asked = friso_command(tmp_path, "unread", "rig.toml")
+    assert (asked.returncode, asked.stdout) == (2, "")
+    assert "unread.question, which cannot be imported: name 'Nowhere' is not defined" in asked.stderr
 
 
 def test_a_function_that_is_of_no_use_is_refused_and_leaves_the_others(tmp_path: Path) -> None:
-    package(tmp_path, "other", functions={"check": "taken", "missing": "missing", "stage": "taken"})
+    package(tmp_path, "other", questions={"check": "taken", "missing": "missing", "stage": "taken"})
     code = "import friso\nprint(friso.check.__module__, friso.stage.__name__)\nfriso.missing"
     done = python(tmp_path, code)
     assert done.stdout == "friso.questions.check.question friso.stage\n"
-    assert "friso.functions: check is left out: taken; expected: a name that is not taken: friso has it" in done.stderr
-    assert "AttributeError: friso.functions: missing" in done.stderr
+    assert "friso.questions: check is left out: taken; expected: a name that is not taken: friso has it" in done.stderr
+    assert "AttributeError: friso.questions: missing" in done.stderr
     assert "which cannot be imported: No module named 'missing'" in done.stderr
+
+
+def test_a_package_for_the_version_before_is_told_what_to_rename(tmp_path: Path) -> None:
+    package(tmp_path, "other", commands={"old": "old.command"}, functions={"old": "old.answer"})
+    done = friso_command(tmp_path, "--help")
+    assert done.returncode == 0
+    for group, module in (("friso.commands", "old.command"), ("friso.functions", "old.answer")):
+        assert f"{group} is of friso 0.2: old ({module}) is left out" in done.stderr
+    assert "friso.questions" in done.stderr
 
 
 def test_a_registered_name_is_refused_in_python() -> None:

@@ -12,7 +12,8 @@ from friso import load
 from friso.engine.arrays import Status
 from friso.progress import silent
 from friso.questions.rig.document import rig_document
-from friso.questions.rig.page import figures, sentences
+from friso.questions.rig.figures import rig_figures
+from friso.questions.rig.words import sentences
 from friso.studies.rig.experiments import hunting
 from friso.studies.rig.moves_on_rails import (
     RailRuns,
@@ -142,5 +143,5 @@ def test_free_joint_does_not_hunt() -> None:
     assert outcome.result.cases["locked"].peaks[0].any()
     assert [log.kind for log in outcome.logs] == ["moves"] * 6
     assert all(sentences(outcome))
-    assert figures(outcome)
+    assert rig_figures(outcome)
     assert rig_document(outcome)["results"]

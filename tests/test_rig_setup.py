@@ -11,7 +11,7 @@ from friso.identification.logs.mapping import Mapping, load_mapping, mapping_tex
 from friso.identification.sources import read_all
 from friso.progress import silent
 from friso.questions.rig.log_files import write_csv
-from friso.questions.rig.page import sentences
+from friso.questions.rig.words import sentences
 from friso.stage import Stage
 from friso.studies.rig.experiments import constant_speed, presliding, stiction
 from friso.studies.rig.experiments.stiffness import steps

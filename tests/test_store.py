@@ -32,10 +32,10 @@ from friso.errors import InputError, StoreError
 from friso.stage import Stage
 from friso.studies import ledger, refine
 from friso.studies import store as storing
-from friso.studies.cells import WORDS
 from friso.studies.execute import local_crew
 from friso.studies.kept_cells import KeptCells
 from friso.studies.metadata import annotate_metadata, checked_metadata, digest
+from friso.studies.metric import is_text
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.sealed_store import SealedStore
@@ -259,7 +259,7 @@ def test_answers_are_those_of_their_study_and_no_larger(
     def ask(cells: np.ndarray) -> dict[str, np.ndarray]:
         asked.append(cells)
         names = refine.asked_for(study).metrics
-        return {name: np.full(len(cells), "rests" if name in WORDS else 1.0) for name in names}
+        return {name: np.full(len(cells), "rests" if is_text(name) else 1.0) for name in names}
 
     def keeping(digest: str = "a study") -> int:
         """How often it was asked by then."""

@@ -19,7 +19,7 @@ from friso.hunting.basin import ends_in
 from friso.hunting.measures import Measures, measure_runs, measuring_options
 from friso.hunting.verdict import judge
 from friso.stage import Stage
-from friso.studies.cells import USUAL
+from friso.studies.metric import usual_metrics
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.study import study_of
@@ -43,7 +43,7 @@ def judged(stage: Stage, measures: Measures) -> str:
 def test_a_run_that_is_drawn_has_the_extremes_of_the_run_alone(rig: Stage) -> None:
     """A cell that no stage may have is not drawn."""
     axes = {"joint.locked": [True, False], "joint.stroke": (np.array([-1e-3, 1e-3]), "m")}
-    study = Request(rig, axes, None, {}, False).study(USUAL)
+    study = Request(rig, axes, None, {}, False).study(usual_metrics())
     drawn = traces(study)
     skipped = traces(study, np.array([False, True, False, False]))
     assert np.isnan(skipped.deviations).all(axis=1).tolist() == [True, True, True, False]
@@ -63,7 +63,7 @@ def test_cells_equal_runs_alone(rig: Stage) -> None:
     runs = sweep(
         rig,
         {"joint.locked": [True, False], "controller.crossover": (np.array([4.0, 8.0, 20.0]), "Hz")},
-        metrics=[*USUAL, "verdict"],
+        metrics=[*usual_metrics(), "verdict"],
         rtol=1e-6,
     )
     assert runs.peaks.dims == ("joint.locked", "controller.crossover")

@@ -37,7 +37,7 @@ from friso.hunting.criteria import settling_of_runs
 from friso.hunting.measures import measured_run
 from friso.questions.check.isolator_words import isolator_sentence
 from friso.questions.tune.document import tune_document
-from friso.questions.tune.figures import _sensitivity, drawn_stages, figures
+from friso.questions.tune.figures import _sensitivity, drawn_stages, tune_figures
 from friso.questions.tune.gain_words import gain_lines
 from friso.questions.tune.page import tune_files
 from friso.questions.tune.question import TuneAnswer
@@ -585,7 +585,7 @@ def test_the_answer_as_files(tuning: Advice, undrawn: None) -> None:
 
 
 def test_its_figures_can_be_drawn(tuning: Advice) -> None:
-    for figure in figures(tuning):
+    for figure in tune_figures(tuning):
         assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
 
 
@@ -855,7 +855,7 @@ def test_what_decides_is_drawn_and_named(tuning: Advice) -> None:
     ]
     advice = replace(tuning, outcomes=tuple(outcomes), goal=replace(tuning.goal, margin=0.6))
     labels = ["as it is", works.remedy.name, "isolator", "isolator and gains"]
-    (figure,) = figures(advice)
+    (figure,) = tune_figures(advice)
     response, settling, loops, window = figure.panels
     for panel in (response, settling, loops):
         assert [series.label for series in panel.series][:4] == labels

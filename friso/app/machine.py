@@ -11,8 +11,8 @@ from typing import Any
 
 from friso.app.names import plain_name
 from friso.errors import InputError
+from friso.interface.schema import stage_schema
 from friso.quantities import Number, Quantity
-from friso.questions.init.schema import stage_schema
 from friso.stage import Stage, loads, numeric_keys
 
 REACH = 10.0

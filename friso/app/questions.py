@@ -6,6 +6,7 @@ import base64
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from friso.app.uploads import Uploads
 from friso.axis import speaking_of
 from friso.errors import InputError
 from friso.identification.logs.mapping import MAPPABLE
+from friso.interface.question import QUESTIONS as DECLARED
 from friso.quantities import exactly
 from friso.questions.map.places import SHOWN, with_places
 from friso.shown.cases import case_labels
@@ -101,7 +103,23 @@ def words_of(answer: Answer) -> AnswerPart:
 def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The keys of the machine."""
     asked.chosen()
-    yield {"kind": "answer", **machines.machine_on_page(asked.machine)}
+    others = [{"id": name, "label": name.replace("-", " ").capitalize()} for name in others_of_stages()]
+    yield {"kind": "answer", "others": others, **machines.machine_on_page(asked.machine)}
+
+
+def others_of_stages() -> list[str]:
+    """The questions of installed packages that are asked about a stage alone; a page shows each as a picture."""
+    return [name for name, declared in DECLARED.items() if name in DECLARED.others and declared.takes == ("stage",)]
+
+
+def other(name: str, asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
+    """What an installed package answers about the machine shown."""
+    asked.chosen()
+    yield parts_of(_other(name, asked, work), **_lines(name, asked))
+
+
+def _other(name: str, asked: PageRequest, work: Work) -> Answer:
+    return KEPT.answer(DECLARED[name].function, asked.machine, work)
 
 
 def run(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -416,9 +434,19 @@ COMMANDS: Mapping[str, Callable[[PageRequest, Work], Answer]] = {
 """The commands whose files are handed out: all that the command writes, and its document, in one archive."""
 
 
+def job_of(name: str) -> Callable[[PageRequest, Work], Iterator[AnswerPart]] | None:
+    """What answers a page that asks under a name, with ".zip" for the files of a command; None for an unknown name."""
+    command = name.removesuffix(".zip")
+    if command in others_of_stages():
+        return partial(report if name != command else other, command)
+    if name != command:
+        return partial(report, command) if command in COMMANDS else None
+    return QUESTIONS.get(name)
+
+
 def report(command: str, asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The files of the answer of a command."""
-    answer = COMMANDS[command](asked, work)
+    answer = COMMANDS[command](asked, work) if command in COMMANDS else _other(command, asked, work)
     work.progress(0, 0, "drawing the figures")
     of_logs = command in ("logs", "identify")  # a stage file that is identified is among what is written
     stem = "logs" if of_logs else asked.machine.name.removesuffix(".toml")

@@ -21,8 +21,8 @@ from friso.app.gate import LOOPBACK, Access
 from friso.app.server import application
 from friso.app.work import Workshop
 from friso.errors import InputError
+from friso.interface.starting import example
 from friso.platform.early import SIGNALS
-from friso.questions.init.starting import example
 from friso.stage.files import load, text_of
 
 PORT = 8741

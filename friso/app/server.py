@@ -18,7 +18,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from friso.app.gate import Access, Gate
-from friso.app.questions import COMMANDS, PICTURES, QUESTIONS, QUICK, PageRequest, report
+from friso.app.questions import PICTURES, QUICK, PageRequest, job_of
 from friso.app.uploads import Uploads
 from friso.app.work import Workshop
 from friso.errors import InputError
@@ -40,8 +40,7 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
 
     async def ask(request: Request) -> Response:
         name = request.path_params["question"]
-        command = name.removesuffix(".zip")
-        job = partial(report, command) if name != command and command in COMMANDS else QUESTIONS.get(name)
+        job = job_of(name)
         if job is None:
             return _refused(f"there is no question {name[:40]!r}", 404)
         try:

@@ -17,10 +17,11 @@ import typer
 from typer.core import TyperGroup
 
 from friso.cli.arguments import number_refused, parted_path, refuse_empty, with_checked_paths
-from friso.cli.command import COMMANDS, QUESTIONS
+from friso.cli.command import COMMANDS, help_class, listed
 from friso.cli.common import INTERRUPTED, say
 from friso.cli.terminal import SPELLED, escaping
 from friso.errors import InputError, shortened
+from friso.interface.question import TOPICS
 from friso.platform import interrupts
 from friso.platform.installed import installed_modules
 from friso.platform.system import LIBRARIES, cause_of, path_of
@@ -61,16 +62,17 @@ class ByQuestion(TyperGroup):
     """The list of commands, by the question that they answer."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        for question in QUESTIONS:
+        for topic in TOPICS:
             commands = [(name, COMMANDS[name]) for name in self.list_commands(ctx) if name in COMMANDS]
-            if rows := [(name, command.summary) for name, command in commands if command.question == question]:
-                formatter.write(f"\n{question}\n")
+            if rows := [(name, command.summary) for name, command in commands if command.topic == topic]:
+                formatter.write(f"\n{topic}\n")
                 with formatter.indentation():
                     formatter.write_dl(rows)
 
 
-def command_line(*names: str) -> typer.Typer:
-    """The commands of these names, by default all that there are, in the order of their places."""
+def command_line(*names: str, for_list: bool = False) -> typer.Typer:
+    """The commands of these names, by default all that there are, in the order of their places; those `for_list` have
+    no options, for which their functions would have to be imported."""
     app = typer.Typer(
         cls=ByQuestion,
         rich_markup_mode=None,
@@ -78,9 +80,10 @@ def command_line(*names: str) -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback()(friso)
-    commands = ((name, COMMANDS[name]) for name in names) if names else COMMANDS.items()
+    commands = ((name, COMMANDS[name]) for name in names) if names else COMMANDS.usable()
     for name, command in sorted(commands, key=lambda item: item[1].place):
-        app.command(name, cls=command.help_class)(with_checked_paths(command.function))
+        function = listed(command) if for_list else with_checked_paths(command.function)
+        app.command(name, cls=help_class(command.choices))(function)
     return app
 
 
@@ -138,7 +141,9 @@ def _run() -> int:
             print(TOUR)
             return 0
         refuse_empty(sys.argv[1:])
-        app = command_line(*(name for name in sys.argv[1:2] if name in COMMANDS))  # others take longer to put together
+        typed = os.environ.get("_TYPER_COMPLETE_ARGS") or os.environ.get("COMP_WORDS")  # what a shell completes
+        first = [name for name in (typed.split() if typed else sys.argv)[1:2] if name in COMMANDS]
+        app = command_line(*first, for_list=not first)  # options of all commands take seconds to put together
         if {"-h", "--help"} & {*sys.argv[1:2]}:
             app.info.epilog = _plug_ins()
         return copy_context().run(app, standalone_mode=False) or 0

@@ -4,10 +4,11 @@ first, small tables, what to do next, and details if they are wanted."""
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -17,51 +18,51 @@ from friso.cli.common import print_table, print_wrapped, say
 from friso.cli.output import print_document, print_written
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
+from friso.platform.interrupts import answers_interrupts
 from friso.platform.system import cause_of, path_of
 
 if TYPE_CHECKING:
     from friso.interface.answer import Answer
+    from friso.interface.question import Question
 
 DRAWING = "drawing the page"
 """What is being done once an answer is there."""
 
-Details = Annotated[bool, typer.Option("--details", help="Also print what the answer rests on.")]
+
+@dataclass(frozen=True)
+class Shown:
+    """Where a command's answer goes: a folder for its files, what may be replaced there, and what is printed."""
+
+    out: Path | None = None
+    overwrite: bool = False
+    as_json: bool = False
+    details: bool = False
 
 
-def ask(
-    command: str,
-    question: Callable[..., Answer],
-    *about: Any,
-    out: Path | None = None,
-    overwrite: bool = False,
-    as_json: bool = False,
-    details: bool = False,
-    what: str = "",
-    writes: Iterable[str] = (),
-    **options: Any,
-) -> None:
-    """Ask a question `about` files, with the options of its command, write its files into `out`, and show the answer.
+def ask(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown, **kept: Any) -> None:
+    """Ask a question `about` files, with the options of its command, write its files, and show the answer.
 
-    `what` stands beside the progress bar; files of the names `writes` may not be in the way. Raises InputError,
-    typer.Exit with the status of a failure.
+    `kept` are further keywords of the function. Raises InputError, typer.Exit with the status of a failure.
     """
+    if question.answers_interrupted:
+        answers_interrupts()
     target, beside = None, nullcontext()
-    if out is not None:
+    if shown.out is not None:
         from friso.interface.output_folder import OutputFolder
         from friso.shown.drawing.images import drawing_beside
 
-        target = OutputFolder(command, out, overwrite, [*_paths(about)])
-        target.check(writes)
+        target = OutputFolder(question.name, shown.out, shown.overwrite, [*_paths([*about, *options.values()])])
+        target.check(question.files)
         beside = drawing_beside()
     files, unwritten = [], ""
-    with ProgressBar(what) as progress, beside:
-        with named_as_options(options):
-            answer = question(*about, **options, progress=progress)
+    with ProgressBar(question.during) as progress, beside:
+        with named_as_options(question.parameters):
+            answer = question.function(*about, **options, **kept, progress=progress)
         speak_of(answer.axis_kind)
         if target is not None:
             progress(0, 0, DRAWING)
             files, unwritten = tried(lambda: target.write(answer.files(), progress))
-    show(answer, files, as_json, details, unwritten)
+    show(answer, files, shown.as_json, shown.details, unwritten)
 
 
 def tried(write: Callable[[], list[Path]], nothing: str = "no file was written") -> tuple[list[Path], str]:

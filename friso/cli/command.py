@@ -1,26 +1,19 @@
-"""What the module of a command declares: the command, its place in `friso --help`, and a list below its help."""
+"""The commands of friso: one for each question, and a few that ask none (`friso/cli/commands/`)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from inspect import signature
 from typing import Any
 
 from typer.core import TyperArgument, TyperCommand
 
+from friso.errors import InputError
+from friso.interface.question import QUESTIONS, TOPICS, Choices, Question
+from friso.platform.installed import leave_out
 from friso.registry import Registry
-
-HUNTS, WHERE, WHY, STOPS, MACHINE, HELP = (
-    "Does it hunt?",
-    "Where does it hunt?",
-    "Why does it hunt?",
-    "What stops it?",
-    "What is my machine?",
-    "Help",
-)
-QUESTIONS = (HUNTS, WHERE, WHY, STOPS, MACHINE, HELP)
-"""The questions by which `friso --help` lists the commands."""
 
 
 class _Command(TyperCommand):
@@ -34,50 +27,113 @@ class _Command(TyperCommand):
 
 
 @dataclass(frozen=True)
-class Choices:
-    """A list below the help of a command, read only when the help is asked for: (name, what it is in one line)."""
-
-    title: str
-    rows: Callable[[], Iterable[tuple[str, str]]]
-
-
-@dataclass(frozen=True)
 class Command:
-    """A command of friso: the function that typer calls, whose docstring is the help; its `place` in the list of
-    commands, which goes by increasing numbers, under the `question` that it answers. Raises ValueError for a question
-    that is not one of QUESTIONS, TypeError or NameError for a function whose options typer could not read."""
+    """A command that asks no question: the function that typer calls, whose docstring is the help; its `place` below
+    its `topic` in `friso --help`.
+
+    Raises ValueError for a topic that is not one of TOPICS, TypeError or NameError for a function whose options typer
+    could not read.
+    """
 
     function: Callable[..., None]
     place: float
-    question: str = HELP
+    topic: str
     choices: Choices | None = None
 
     def __post_init__(self) -> None:
         signature(self.function, eval_str=True)
-        if self.question not in QUESTIONS:
-            raise ValueError(f"question {self.question!r} is none of {', '.join(QUESTIONS)}")
-        if not isinstance(self.place, int | float):
-            raise TypeError(f"place {self.place!r} is not a number")
+        if self.topic not in TOPICS:
+            raise ValueError(f"topic {self.topic!r} is none of {', '.join(TOPICS)}")
 
     @property
     def summary(self) -> str:
         """The command in one line."""
         return (self.function.__doc__ or "").partition("\n")[0].strip().rstrip(".")
 
+
+@dataclass(frozen=True)
+class QuestionCommand:
+    """The command of a question; its options are read from the question's function when they are needed."""
+
+    question: Question
+
     @property
-    def help_class(self) -> type[TyperCommand]:
-        """The class of typer that shows the help, with the choices below."""
-        choices = self.choices
-        if choices is None:
-            return _Command
+    def place(self) -> float:
+        return self.question.place
 
-        class ListingCommand(_Command):
-            def format_epilog(self, ctx: Any, formatter: Any) -> None:
-                with formatter.section(choices.title):
-                    formatter.write_dl([*choices.rows()])
+    @property
+    def topic(self) -> str:
+        return self.question.topic
 
-        return ListingCommand
+    @property
+    def choices(self) -> Choices | None:
+        return self.question.choices
+
+    @property
+    def summary(self) -> str:
+        return self.question.summary
+
+    @cached_property
+    def function(self) -> Callable[..., None]:
+        """The function that typer calls."""
+        from friso.cli.derived import command_function
+
+        return command_function(self.question)
 
 
-COMMANDS = Registry[Command]("friso.cli.commands", "COMMAND", "friso.commands", Command)
-"""Every module of `friso/cli/commands/` declares one, and every module that an installed package names."""
+AnyCommand = Command | QuestionCommand
+
+WITHOUT_QUESTION = Registry[Command]("friso.cli.commands", "COMMAND")
+"""Every module of `friso/cli/commands/` declares a command that asks no question."""
+
+
+class _Commands(Mapping[str, AnyCommand]):
+    """All commands by name, in alphabetical order."""
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(sorted({*WITHOUT_QUESTION, *QUESTIONS}))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def __contains__(self, name: object) -> bool:
+        return name in WITHOUT_QUESTION or name in QUESTIONS
+
+    def __getitem__(self, name: str) -> AnyCommand:
+        return WITHOUT_QUESTION[name] if name in WITHOUT_QUESTION else QuestionCommand(QUESTIONS[name])
+
+    def usable(self) -> Iterator[tuple[str, AnyCommand]]:
+        """The commands by name; what another package's module does not declare is told, and left out."""
+        for name in self:
+            try:
+                command = self[name]
+                command.summary  # noqa: B018 (raises where there is none)
+                yield name, command
+            except InputError as error:
+                leave_out(error)
+
+
+COMMANDS = _Commands()
+
+
+def help_class(choices: Choices | None) -> type[TyperCommand]:
+    """The class of typer that shows the help of a command, with its choices below."""
+    if choices is None:
+        return _Command
+
+    class ListingCommand(_Command):
+        def format_epilog(self, ctx: Any, formatter: Any) -> None:
+            with formatter.section(choices.title):
+                formatter.write_dl([*choices.rows()])
+
+    return ListingCommand
+
+
+def listed(command: AnyCommand) -> Callable[[], None]:
+    """A stand-in for a command in the list of all, which needs its summary alone."""
+
+    def stand_in() -> None:
+        raise RuntimeError("a command of the list is not called")
+
+    stand_in.__doc__ = command.summary
+    return stand_in

@@ -1,4 +1,4 @@
-"""What the commands share: their options, and how sentences and tables are printed."""
+"""How sentences and tables are printed, and the option that commands without a question share."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -16,13 +15,9 @@ from friso.escapes import one_line
 
 INTERRUPTED = 130
 
-StageFile = Annotated[Path, typer.Argument(metavar="STAGE.toml", help="The stage file.")]
 Overrides = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='Override a key: masses.stage="0.6 kg".')
 ]
-RTOL_HELP = "Relative tolerance of the solver, 1e-12 to 1e-2."
-Tolerance = Annotated[str, typer.Option("--rtol", metavar="NUMBER", help=RTOL_HELP)]
-AsJson = Annotated[bool, typer.Option("--json", help="One JSON document on standard output, nothing else.")]
 
 
 def say(message: str) -> None:

@@ -11,12 +11,6 @@ import typer
 
 from friso.escapes import one_line
 
-OutFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the files written.")]
-DefaultFolder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files written.")]
-Overwrite = Annotated[
-    bool,
-    typer.Option("--overwrite", help="Write even if the folder holds other files; replace files of the same name."),
-]
 Replace = Annotated[bool, typer.Option("--overwrite", help="Replace the file if it exists.")]
 
 

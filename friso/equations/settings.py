@@ -41,10 +41,9 @@ stiffness."""
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting: the `letter` and `name` of its option, what it does (`says`, names of its keys in braces standing for
-    their values), whether it needs an integral, its `sizes`, and the ranges in which it is tuned (None: it is not)."""
+    """A setting: its `name` in words, what it does (`says`, names of its keys in braces standing for their values),
+    whether it needs an integral, its `sizes`, and the ranges in which it is tuned (None: it is not)."""
 
-    letter: str
     name: str
     says: str
     integral: bool
@@ -118,16 +117,14 @@ def _dither(flat: FlatMachine, within: float) -> dict[str, float]:
 
 SETTINGS: Mapping[str, Setting] = {
     "limit": Setting(
-        "h",
         "integral limit",
         "the force that an integral holds stays below {integral_limit}",
         True,
         lambda flat, _: {"integral_limit": 1.2 * float(breakaway(flat))},
         _limits,
     ),
-    "leak": Setting("i", "leak of the integral", "the integral leaks below {integral_leak}", True, _leak, _leaks),
+    "leak": Setting("leak of the integral", "the integral leaks below {integral_leak}", True, _leak, _leaks),
     "hysteresis": Setting(
-        "j",
         "deadband with hysteresis",
         "the integrator pauses from an error of {integral_deadband} on, until it is {integral_deadband_exit}",
         True,
@@ -138,7 +135,6 @@ SETTINGS: Mapping[str, Setting] = {
         },
     ),
     "standstill": Setting(
-        "k",
         "gains at standstill",
         "all gains times {standstill_factor} while the error is below {standstill_window}",
         False,
@@ -146,7 +142,6 @@ SETTINGS: Mapping[str, Setting] = {
         _standstill,
     ),
     "push": Setting(
-        "l",
         "push",
         "a force of {stiction_push} towards the reference while that rests and the error is above "
         "{stiction_push_window}",
@@ -154,7 +149,7 @@ SETTINGS: Mapping[str, Setting] = {
         lambda flat, within: {"stiction_push": 0.8 * float(sliding(flat)), "stiction_push_window": within},
     ),
     "dither": Setting(
-        "m", "dither", "a sinusoidal force of {dither_amplitude} at {dither_frequency}", False, _dither, _dithers
+        "dither", "a sinusoidal force of {dither_amplitude} at {dither_frequency}", False, _dither, _dithers
     ),
 }
 """Sizes are our choice: an integral that can just break the machine loose; a leak at a tenth of the integral's corner;

@@ -10,20 +10,18 @@ from scipy.stats import chi2
 
 from friso.identification.estimate import Estimate
 from friso.identification.readings.common import Mean, by_t, t_value
+from friso.identification.settings import IdentificationSettings
 from friso.intervals import COVERAGE
-
-CHANCE = 0.01
-"""Probability below which a scatter as large as that of estimates which agree is taken for a disagreement."""
 
 Correlated = tuple[Sequence[Estimate], np.ndarray]
 """What one experiment shows, each with an interval, and its correlation matrix, shape (estimates, estimates)."""
 
 
 def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
-    """One estimate per key from all those found, weighted by their intervals; and a sentence where they disagree.
+    """Combine all estimates into one per key, and say in sentences where they disagree.
 
-    Where some disagree, the interval allows for that. What one experiment shows counts, whatever another cannot show;
-    where none does, what all of them leave possible is left.
+    Estimates are weighted by their intervals; where some disagree, the interval allows for that. What one experiment
+    shows counts, whatever another cannot show; where none does, what all of them leave possible is left.
     """
     answers, sentences = [], []
     for key in dict.fromkeys(estimate.name for estimate in estimates):
@@ -50,7 +48,8 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
 
 
 def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) -> tuple[tuple[str, ...], np.ndarray]:
-    """The keys of the groups and their correlations once combined, shape (keys, keys).
+    """Return the keys of groups of estimates and their correlations once combined, shape (keys,
+    keys).
 
     `estimates` are those of all experiments. A combined value is a mean of single ones with weights a_i, and the
     experiments are independent: its covariance is the sum of A_i C_i A_i, with C_i the covariance within one.
@@ -72,16 +71,18 @@ def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) ->
 
 
 def determined(estimates: Sequence[Estimate]) -> list[Estimate]:
-    """Those that are shown, with an interval, by which they can be weighted."""
+    """List the estimates that are shown: those have an interval, by which they can be weighted."""
     return [estimate for estimate in estimates if estimate.determined]
 
 
 def _weight(estimate: Estimate) -> float:
+    """The weight of an estimate: one over its variance."""
     return (COVERAGE / estimate.half_width) ** 2
 
 
 def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
-    """The weighted mean where a chi-square test allows that all are of one value, and whether it does.
+    """Return the weighted mean of estimates of one key, and whether a chi-square test allows
+    that all are of one value.
 
     Its interval is wider by the Birge ratio (Birge 1932, doi:10.1103/PhysRev.40.207), by Student's t of three and more,
     where they scatter more than their own intervals say; what is systematic in these does not average out. Where the
@@ -96,7 +97,7 @@ def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
     shared = float(np.average([estimate.systematic for estimate in estimates], weights=weights))
     squares = float(np.sum(weights * (values - mean) ** 2))
     method = ", ".join(dict.fromkeys(estimate.method for estimate in estimates))
-    if chi2.sf(squares, freedom) > CHANCE:
+    if chi2.sf(squares, freedom) > IdentificationSettings.current().chance_of_agreement:
         errors = np.array([(estimate.half_width - estimate.systematic) / COVERAGE for estimate in estimates])
         error = float(np.linalg.norm(weights * errors)) / float(weights.sum())
         ratio = (squares / freedom) ** 0.5
@@ -110,9 +111,12 @@ def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
 
 
 def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
-    """The mean of values, shape (n,), that scatter by more than their variances: a variance from one to the next is
-    added with which they scatter as they do (Paule, Mandel 1982, doi:10.6028/jres.087.022). The degrees of freedom are
-    those of as many values as count equally: one that is hardly known says little about the scatter."""
+    """Return the mean of values, shape (n,), that scatter by more than their variances.
+
+    A variance from one to the next is added with which they scatter as they do (Paule, Mandel 1982,
+    doi:10.6028/jres.087.022). The degrees of freedom are those of as many values as count equally: one that is hardly
+    known says little about the scatter.
+    """
 
     def excess(added: float) -> float:
         weights = 1 / (variances + added)
@@ -124,7 +128,11 @@ def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
 
 
 def _intersection(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
-    """What several that do not show it leave possible: what they have in common, or the hull where that is nothing."""
+    """Return the range that estimates without a value leave in common, and whether they have
+    one.
+
+    Where they have none, their hull is left.
+    """
     bounding = [
         estimate for estimate in estimates if np.isfinite(estimate.low) or np.isfinite(estimate.high)
     ] or estimates[:1]
@@ -143,17 +151,19 @@ def _intersection(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bo
 
 
 def _text(estimate: Estimate) -> str:
+    """An estimate in words, with its method."""
     return f"{_value(estimate)} by {estimate.method}"
 
 
 def _texts(estimates: Sequence[Estimate]) -> str:
-    """The values by method."""
+    """Several estimates in words, the values by method."""
     methods = dict.fromkeys(estimate.method for estimate in estimates)
     values_of = ([_value(estimate) for estimate in estimates if estimate.method == method] for method in methods)
     return "; ".join(f"{', '.join(values)} by {method}" for method, values in zip(methods, values_of, strict=True))
 
 
 def _value(estimate: Estimate) -> str:
+    """The value with its interval in words, or the range that is left."""
     if estimate.determined:
         return f"{estimate.value:.4g} ({estimate.low:.4g} to {estimate.high:.4g})"
     return f"{estimate.low:.4g} to {estimate.high:.4g} is the possible range"

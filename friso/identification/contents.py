@@ -19,16 +19,17 @@ from friso.identification.logs.read import file_format, is_frequency_response, r
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
 from friso.identification.logs.signals import Notes, Reading, instants, with_user_units
 from friso.identification.logs.time_base import usual_step
+from friso.identification.settings import IdentificationSettings
 from friso.identification.sources import log_with_signals, unnamed
-
-BINS = 24
-"""Parts of a channel whose means make its small plot."""
 
 
 @dataclass(frozen=True)
 class ChannelContent:
-    """A channel as it stands in the file: its `values` of shape (n,) in its `unit` ("" for none), its instants [s],
-    shape (n,), or None, and its `role` ("" for none) with the reason for it."""
+    """A channel as it stands in a file.
+
+    Its `values`, shape (n,), are in its `unit` ("" for none), at the instants `time` [s], shape (n,), or None. Its
+    `role` ("" for none) has a reason.
+    """
 
     name: str
     unit: str
@@ -56,8 +57,11 @@ class ChannelContent:
         return 1 / usual_step(steps) if steps.size else None
 
     def course(self) -> np.ndarray:
-        """The means over parts of the channel one after the other, at most so many, NaN where there is no number."""
-        parts = np.array_split(self.values, min(BINS, max(self.values.size, 1)))
+        """Return means over parts of the channel in turn, for a small plot; NaN where there is no
+        number.
+        """
+        settings = IdentificationSettings.current()
+        parts = np.array_split(self.values, min(settings.bins_of_a_small_plot, max(self.values.size, 1)))
         finite = [part[np.isfinite(part)] for part in parts]
         # divided first: the sum of huge values is infinite
         return np.array([(part / part.size).sum() if part.size else np.nan for part in finite])
@@ -65,9 +69,12 @@ class ChannelContent:
 
 @dataclass(frozen=True)
 class LogContent:
-    """What a file holds: the title of its format, its channels or its frequency response, the kind of experiment with
-    the reason ("" where it is open), lines that tell of the reading, warnings, the `gaps` that have to be closed
-    before it can be identified, and the `options` with which it was read."""
+    """What a file holds, for a look at it before anything is identified.
+
+    It has the title of its format, its channels or its frequency response, and the kind of experiment with the reason
+    ("" where it is open). `read` are lines that tell of the reading, `gaps` what has to be told before the file can be
+    identified, and `options` those with which it was read.
+    """
 
     path: Path
     title: str
@@ -87,8 +94,10 @@ class LogContent:
 
 
 def log_content(path: Path, options: Mapping, folder: Path | None = None) -> LogContent:
-    """What a file holds, mapped as the options say or as kept beside it or in `folder`. Raises LogError for what cannot
-    be read."""
+    """Read what a file holds, mapped as the options say or as kept beside it or in `folder`.
+
+    Raises LogError for what cannot be read.
+    """
     name = file_format(path)
     title = FORMATS[name].title
     if is_frequency_response(path):
@@ -112,14 +121,17 @@ def log_content(path: Path, options: Mapping, folder: Path | None = None) -> Log
 
 
 def _recognised(path: Path, mapping: Mapping) -> tuple[Source, str, str]:
-    """The log as it would be identified, its kind, and why. Raises LogError, GapsError for what is open."""
+    """Return the log as it would be identified, its kind, and why.
+
+    Raises LogError, GapsError for what is open.
+    """
     if mapping.experiment is not None:
         return log_with_signals(path, mapping, mapping.experiment), mapping.experiment, "as specified"
     return unnamed(path, mapping)
 
 
 def _content(channel: Channel, proposal: Proposal, reading: Reading) -> ChannelContent:
-    """A channel with its instants and its role."""
+    """Describe a channel with its instants and its role."""
     role, reason = "", ""
     for choice in proposal.chosen.values():
         if choice.channel is channel:
@@ -134,7 +146,9 @@ def _content(channel: Channel, proposal: Proposal, reading: Reading) -> ChannelC
 
 
 def _time(channel: Channel, proposal: Proposal, reading: Reading) -> np.ndarray | None:
-    """The instants of a channel [s]; None where the file and the mapping do not tell them."""
+    """Return the instants of a channel [s]; None where neither the file nor the mapping tells
+    them.
+    """
     clock = proposal.chosen.get("time")
     try:
         return instants(AssignedRole("", channel, "", False), clock, reading, Notes())

@@ -6,20 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.identification.inverse_model import SMOOTH, FilteredMotion, motion
+from friso.identification.inverse_model import FilteredMotion, motion
 from friso.identification.logs.log import Log
 from friso.identification.output_error.problem import Simulated
+from friso.identification.settings import IdentificationSettings
 from friso.identification.spread import correlation_length
-
-BINS = 40
-"""Places along the rail, and speeds, in which the mean of the residual is taken."""
 
 
 @dataclass(frozen=True)
 class SimulationErrors:
-    """Norms of measured minus simulated over norms of the measured signal, of position, velocity, acceleration and
-    force; velocity and acceleration of both by the same filter and differences. Of a stage that was held to the log's
-    position only the force has one: what the model does not explain."""
+    """How far a simulated record is from the measured one, relative to that.
+
+    Each is the norm of measured minus simulated over the norm of the measured signal: position, velocity, acceleration
+    and force, velocity and acceleration of both by the same filter and differences. Of a stage that was held to the
+    log's position only the force has one: what the model does not explain.
+    """
 
     position: float
     velocity: float
@@ -29,8 +30,12 @@ class SimulationErrors:
 
 @dataclass(frozen=True)
 class Residual:
-    """What is left of the force [N]: root mean square and mean, the time [s] over which it stays correlated, and the
-    shares of its power that its mean over places along the rail, and over speeds, explains."""
+    """What a fit leaves of the force [N], and what it looks like.
+
+    `rms` and `mean` are in newtons, `correlation_time` [s] is the time over which it stays correlated, and
+    `by_position` and `by_velocity` are the shares of its power that its means over places along the rail, and over
+    speeds, explain.
+    """
 
     rms: float
     mean: float
@@ -45,9 +50,12 @@ class Residual:
 
 
 def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> SimulationErrors:
-    """The errors of a simulated record of some samples of a log; `bandwidth` [Hz] is that of the motion."""
-    measured = motion(log["position"][part], log.sample_time, SMOOTH * bandwidth)
-    modelled = motion(simulated.position, log.sample_time, SMOOTH * bandwidth)
+    """Compare a simulated record with some samples of a log; `bandwidth` [Hz] is that of the
+    motion.
+    """
+    settings = IdentificationSettings.current()
+    measured = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * bandwidth)
+    modelled = motion(simulated.position, log.sample_time, settings.smoothing_bandwidths * bandwidth)
     disturbance = log["disturbance"][part] if "disturbance" in log else 0.0
     return SimulationErrors(
         _relative(log["position"][part], simulated.position),
@@ -58,13 +66,17 @@ def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> 
 
 
 def unexplained(log: Log, part: slice, held: Simulated) -> SimulationErrors:
-    """The error of a stage that was held to the log's position, by the force that it took."""
+    """Return the error of a stage that was held to the log's position: the force that holding it
+    took.
+    """
     share = float(np.linalg.norm(held.force) / np.linalg.norm(log["force"][part]))
     return SimulationErrors(np.nan, np.nan, np.nan, share)
 
 
 def residual_of(residual: np.ndarray, moved: FilteredMotion, sample_time: float) -> Residual:
-    """What is left of the force, shape (n,) [N], over a motion."""
+    """Describe what is left of the force [N], shape (n,), over a motion sampled every
+    `sample_time` [s].
+    """
     alike = correlation_length(residual)
     return Residual(
         float(np.sqrt(np.mean(residual**2))),
@@ -76,15 +88,20 @@ def residual_of(residual: np.ndarray, moved: FilteredMotion, sample_time: float)
 
 
 def _relative(measured: np.ndarray, simulated: np.ndarray) -> float:
+    """The norm of a difference over the norm of what was measured."""
     return float(np.linalg.norm(measured - simulated) / np.linalg.norm(measured))
 
 
 def _explained(residual: np.ndarray, along: np.ndarray) -> float:
-    """The share of the residual's power in its means over the bins of another signal, corrected for their number."""
-    edges = np.linspace(along.min(), along.max(), BINS + 1)
-    bins = np.clip(np.digitize(along, edges) - 1, 0, BINS - 1)
-    count = np.bincount(bins, minlength=BINS)
-    means = np.bincount(bins, residual, minlength=BINS) / np.maximum(count, 1)
+    """The share of a residual's power in its means over the bins of another signal.
+
+    Chance alone explains something, by the number of bins: that is taken off.
+    """
+    settings = IdentificationSettings.current()
+    edges = np.linspace(along.min(), along.max(), settings.bins_of_a_residual + 1)
+    bins = np.clip(np.digitize(along, edges) - 1, 0, settings.bins_of_a_residual - 1)
+    count = np.bincount(bins, minlength=settings.bins_of_a_residual)
+    means = np.bincount(bins, residual, minlength=settings.bins_of_a_residual) / np.maximum(count, 1)
     power = float(np.mean(residual**2))
     independent = len(residual) / correlation_length(residual)
     share = float(np.sum(count * means**2)) / len(residual) / power if power else 0.0

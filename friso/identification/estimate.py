@@ -14,12 +14,14 @@ NO_INTERVAL = "how far off it may be is not known"
 
 @dataclass(frozen=True)
 class Estimate:
-    """A quantity found from data, all numbers in the SI `unit`.
+    """A quantity found from data, with its 95 % interval, or with the reason why there is no
+    value.
 
-    `name` is a key of the stage file ("friction.coulomb") where it is one, else what it is ("resonance 1 frequency").
-    `low` to `high`, finite and apart, is the 95 % interval of the `value`. Where the data cannot show the quantity,
-    `value` is NaN, `reason` says why, and `low`, `high` are what is left possible (infinite where nothing is known).
-    `systematic` is the part of the interval's half-width that repeating the experiment does not make smaller.
+    `name` is a key of the stage file ("friction.coulomb") where it is one, else what it is ("resonance 1 frequency");
+    all numbers are in the SI `unit`. `low` to `high`, finite and apart, is the interval of the `value`. Where the data
+    cannot show the quantity, `value` is NaN, `reason` says why, and `low`, `high` are what is left possible (infinite
+    where nothing is known). `systematic` is the part of the interval's half-width that repeating the experiment does
+    not make smaller.
     """
 
     name: str
@@ -32,7 +34,7 @@ class Estimate:
     systematic: float = 0.0
 
     def __post_init__(self) -> None:
-        """A value without an interval around it is no estimate: it is not determined then."""
+        """Turn a value without an interval around it into one that is not determined."""
         if self.reason or (np.isfinite([self.value, self.low, self.high]).all() and self.low < self.high):
             return
         for name, end in (("value", np.nan), ("low", -np.inf), ("high", np.inf), ("reason", NO_INTERVAL)):
@@ -40,7 +42,7 @@ class Estimate:
 
     @classmethod
     def normal(cls, name: str, unit: str, value: float, deviation: float, method: str) -> Estimate:
-        """With the interval of a normal distribution of this standard deviation."""
+        """Make an estimate with the interval of a normal distribution of this standard deviation."""
         half = COVERAGE * deviation
         return cls(name, unit, float(value), float(value - half), float(value + half), method)
 
@@ -48,7 +50,9 @@ class Estimate:
     def unknown(
         cls, name: str, unit: str, method: str, reason: str, low: float = -np.inf, high: float = np.inf
     ) -> Estimate:
-        """Not determined by the data, for this reason; at most bounded."""
+        """Make an estimate that the data do not determine, with the reason and the bounds that are
+        left.
+        """
         return cls(name, unit, np.nan, float(low), float(high), method, reason)
 
     @property
@@ -58,8 +62,9 @@ class Estimate:
 
     @property
     def half_width(self) -> float:
+        """Half of the interval."""
         return (self.high - self.low) / 2
 
     def holds(self, truth: float) -> bool:
-        """Whether the interval holds a value."""
+        """Tell whether the interval holds a value."""
         return bool(self.low <= truth <= self.high)

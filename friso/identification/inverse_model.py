@@ -23,37 +23,8 @@ from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.readings.common import cart, noise_of, turns_of
+from friso.identification.settings import IdentificationSettings
 from friso.identification.spread import groups_of, spread_of
-
-SMOOTH, DECIMATE = 5.0, 2.0
-"""Cut-off frequencies, in units of the motion's bandwidth, of the filter of the position and of the decimation, which
-passes the share `PASS` of half the new sampling frequency."""
-
-PASS = 0.8
-ORDER, DECIMATION_ORDER, RIPPLE = 4, 8, 0.05
-"""Order of the Butterworth filter; order and ripple [dB] of the Chebyshev filter before decimation."""
-
-COARSE = 0.15
-"""Cut-off frequency times sample time from which on derivatives are those of a quintic spline: central differences lose
-some of the acceleration (1 % of it at this sampling), which would make the mass too large."""
-
-EDGE = 49
-"""Samples left out at the start, where the filters swing in."""
-
-ENERGY, ABOVE_NOISE, PIECES = 0.95, 4.0, 8
-"""Share of the power of the acceleration within the bandwidth of the motion, by how much the spectrum of the position
-stands above its noise where it counts, and into how many pieces a record is cut for it (Welch's method)."""
-
-ONE_WAY, STILL = 0.02, 20.0
-"""Share of the way that a log goes in one direction at least, for the two directions to be distinguished; and standard
-deviations of the position's noise within which nothing has moved."""
-
-SLIDING, REST = 0.01, 0.1
-"""Share of the highest speed below which a stage rests, and time [s] from which on a rest is left out of the fit: the
-sign of the velocity is noise then, and friction is what the controller makes it."""
-
-LEAST = 20
-"""Rows that a fit needs at least."""
 
 METHOD = "least squares on the inverse model"
 
@@ -62,10 +33,12 @@ NO_COLUMNS: Mapping[str, np.ndarray] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class InverseModel:
-    """The fit: `estimates` and the plain `solution` by name (of the mass: "mass"; per direction "... forward" and
-    "... backward"), the `columns`, shape (rows, columns), and their `covariance`, times [s] and forces [N] of the rows,
-    measured and fitted, of shape (rows,), and the relative `error`, norm of the residual over that of the force.
-    `bandwidth` [Hz] is the motion's."""
+    """A fit of force = M a + F_v v + F_c sign(v) + offset to a log, with what it rests on.
+
+    It has `estimates`, and the plain `solution` by name (of the mass: "mass"; per direction "... forward" and "...
+    backward"). The `columns`, shape (rows, columns), have the `covariance` of their coefficients; `time` [s] and forces
+    [N], `measured` and `fitted`, have the shape (rows,). `bandwidth` [Hz] is the motion's.
+    """
 
     estimates: tuple[Estimate, ...]
     solution: Mapping[str, float]
@@ -78,16 +51,23 @@ class InverseModel:
 
     @property
     def error(self) -> float:
+        """The norm of what is left of the force, over the norm of the force."""
         return float(np.linalg.norm(self.measured - self.fitted) / np.linalg.norm(self.measured))
 
     def value(self, name: str) -> float:
-        """What least squares made of the column called so, whether the log shows it or not."""
+        """Return what least squares made of a column by name, whether the log shows it or not."""
         return self.solution[name]
+
+    def estimate(self, name: str) -> Estimate:
+        """Return the estimate of one of the quantities that every inverse model has."""
+        return next(estimate for estimate in self.estimates if estimate.name == name)
 
 
 @dataclass(frozen=True)
 class FilteredMotion:
-    """Position [m], velocity [m/s] and acceleration [m/s^2] without the noise beyond the cut-off frequency, (n,)."""
+    """Position [m], velocity [m/s] and acceleration [m/s^2] without noise beyond a cut-off
+    frequency, shape (n,).
+    """
 
     position: np.ndarray
     velocity: np.ndarray
@@ -95,12 +75,18 @@ class FilteredMotion:
 
 
 def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredMotion:
-    """The motion of a measured position, shape (n,) [m], smoothed forward and back at the cut-off frequency [Hz]."""
+    """Smooth a measured position [m], shape (n,), forward and back at a cut-off frequency [Hz],
+    and differentiate it.
+
+    Where the cut-off is near the sampling frequency derivatives are those of a spline: differences would lose a part of
+    the acceleration.
+    """
+    settings = IdentificationSettings.current()
     smooth, filtered = position, cutoff < 0.5 / sample_time
     if filtered:
-        sections = butter(ORDER, 2 * cutoff * sample_time, output="sos")
-        smooth = sosfiltfilt(sections, position, padlen=min(3 * ORDER, len(position) - 1))
-    if cutoff * sample_time < COARSE:
+        sections = butter(settings.order_of_smoothing, 2 * cutoff * sample_time, output="sos")
+        smooth = sosfiltfilt(sections, position, padlen=min(3 * settings.order_of_smoothing, len(position) - 1))
+    if cutoff * sample_time < settings.sampling_of_splines:
         velocity = np.gradient(smooth, sample_time)
         return FilteredMotion(smooth, velocity, np.gradient(velocity, sample_time))
     time = np.arange(len(smooth)) * sample_time
@@ -112,28 +98,39 @@ def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredM
 
 
 def bandwidth_of(log: Log) -> float:
-    """The bandwidth [Hz] of the motion of a log, none of it across gaps: that below which its acceleration has 95 % of
-    its power, as far as the position stands out of its noise. Raises InputError where it does nowhere."""
+    """Read the bandwidth [Hz] of the motion off a log, none of it across gaps.
+
+    It is the frequency below which the acceleration has 95 % of its power, as far as the position stands out of its
+    noise. Raises InputError where it does nowhere.
+    """
+    settings = IdentificationSettings.current()
     lengths = [part.stop - part.start for part in log.segments]
-    pieces = min(max(lengths), max(256, sum(lengths) // PIECES))
+    pieces = min(max(lengths), max(256, sum(lengths) // settings.pieces_of_a_spectrum))
     whole = [log["position"][part] for part, length in zip(log.segments, lengths, strict=True) if length >= pieces]
     spectra = [welch(part, 1 / log.sample_time, nperseg=pieces, detrend="linear") for part in whole]
     frequency = spectra[0][0]
     power = np.average([spectrum for _, spectrum in spectra], axis=0, weights=[part.size for part in whole])
     noise = np.median(power[3 * len(power) // 4 :])
-    below = np.flatnonzero(power < ABOVE_NOISE * noise)
+    below = np.flatnonzero(power < settings.power_above_noise * noise)
     passband = slice(0, below[0] if below.size else len(power))
     share = np.cumsum((power - noise)[passband] * frequency[passband] ** 4)
     if not share.size or not share[-1] > 0:
         raise InputError("position", "nothing but noise", "a motion that stands out of it", "a larger or faster move")
-    return float(frequency[passband][np.searchsorted(share, ENERGY * share[-1])])
+    return float(frequency[passband][np.searchsorted(share, settings.power_share_of_the_motion * share[-1])])
 
 
 def directions(position: np.ndarray) -> tuple[bool, bool]:
-    """Whether a motion, shape (n,) [m], goes forward, and whether it goes back; its noise does neither."""
-    steps = np.diff(position[[0, *turns_of(position, STILL * noise_of(position)), len(position) - 1]])
+    """Tell whether a motion [m], shape (n,), goes forward, and whether it goes back; its noise
+    does neither.
+    """
+    settings = IdentificationSettings.current()
+    steps = np.diff(
+        position[
+            [0, *turns_of(position, settings.deviations_of_standing_still * noise_of(position)), len(position) - 1]
+        ]
+    )
     travelled = np.array([steps[steps > 0].sum(), -steps[steps < 0].sum()])
-    forward, back = travelled > ONE_WAY * travelled.sum()
+    forward, back = travelled > settings.way_share_of_a_direction * travelled.sum()
     return bool(forward), bool(back)
 
 
@@ -145,14 +142,18 @@ def inverse_model(
     averaged: int = 1,
     extra: Mapping[str, np.ndarray] = NO_COLUMNS,
 ) -> InverseModel:
-    """Mass, viscous and Coulomb friction and offset of a log with position and force.
+    """Fit mass, viscous and Coulomb friction and offset to a log with position and force.
 
     With `by_direction`, both frictions have a value for each direction, and there is no offset, which could not be
     distinguished from a difference of the Coulomb frictions. `bandwidth` [Hz] is that of the motion, read off the log
     by default. Of a stage on a joint, `cart_share` is the share of the mass that moves with the measured cart, as does
-    friction. `averaged`: samples over which the log's force is averaged, as then are the columns. `extra` columns by
-    name, shape (n,), are fitted besides, and what they explain is taken out of the measured force. Raises InputError
-    for a log too short."""
+    friction.
+
+    `averaged` is the number of samples over which the log's force is averaged, as then are the columns. `extra` columns
+    by name, shape (n,), are fitted besides, and what they explain is taken out of the measured force. Raises InputError
+    for a log too short.
+    """
+    settings = IdentificationSettings.current()
     band = bandwidth or bandwidth_of(log)
     longest = max(part.stop - part.start for part in log.segments) * log.sample_time
     if band * longest < 1:
@@ -163,11 +164,12 @@ def inverse_model(
     time, columns, force, position = (np.concatenate([part[i] for part in parts]) for i in range(4))
     velocity = columns[:, 1] + columns[:, 3] if by_direction else columns[:, 1]
     speed = np.abs(velocity)
-    slides = ~_rests(speed <= SLIDING * speed.max(initial=0.0), time)
+    slides = ~_rests(speed <= settings.speed_share_of_sliding * speed.max(initial=0.0), time)
     time, columns, force, position, velocity = (rows[slides] for rows in (time, columns, force, position, velocity))
-    if len(force) < LEAST:
+    if len(force) < settings.rows_of_an_inverse_model:
         actual = f"{len(log.time)} samples, {len(force)} of them in motion after decimation to {5 * band:.3g} Hz"
-        expected = f"at least {LEAST} in motion after decimation: a longer log, or the experiment that it is"
+        least = f"at least {settings.rows_of_an_inverse_model} in motion after decimation"
+        expected = f"{least}: a longer log, or the experiment that it is"
         raise InputError("position", actual, expected, "--as break-away, for force that rises from rest")
     both = all(directions(log["position"]))
     if not both and not by_direction:
@@ -192,8 +194,17 @@ def inverse_model(
     )
 
 
+def least_squares(columns: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Fit a force [N], shape (rows,), by columns, shape (rows, columns).
+
+    Returns the solution, shape (columns,), and what it leaves [N], shape (rows,).
+    """
+    solution = np.linalg.lstsq(columns, force, rcond=None)[0]
+    return solution, force - columns @ solution
+
+
 def _other_sign(log: Log) -> str:
-    """The scale with which the force of a log was read, with the other sign."""
+    """Return the scale with which the force of a log was read, with the other sign."""
     scales = [re.search(r"; ([+-]?)(\d\S* \S+/[^,/]+)", line) for line in log.read if line.startswith("force:")]
     scale = next((match for match in scales if match), None)
     if scale is None:
@@ -202,14 +213,20 @@ def _other_sign(log: Log) -> str:
 
 
 def unit_of(unit: str, log: Log) -> str:
-    """The unit of a quantity of mechanics where the force of a log stands in the newton's place: with a force in volts
-    a mass is in V*s^2/m instead of kg."""
+    """Return the unit of a quantity of mechanics where the force of a log stands in the newton's
+    place.
+
+    With a force in volts a mass is in V*s^2/m instead of kg.
+    """
     if log.unit("force") == ROLES["force"]:
         return unit
     return re.sub(r"\bN\b", log.unit("force"), unit.replace("kg", "N*s^2/m"))
 
 
 def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
+    """Make an estimate from a coefficient and its variance, which is infinite where directions
+    are missing.
+    """
     if np.isfinite(variance):
         return Estimate.normal(name, unit, value, float(np.sqrt(variance)), METHOD)
     return Estimate.unknown(
@@ -218,11 +235,12 @@ def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
 
 
 def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Which rows belong to a stretch of slow ones that lasts, shape (rows,)."""
+    """Tell which rows belong to a stretch of slow ones that lasts, shape (rows,)."""
+    settings = IdentificationSettings.current()
     ends = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(int)))
     rests = np.zeros(len(slow), bool)
     for first, behind in zip(ends[::2], ends[1::2], strict=True):
-        rests[first:behind] = time[behind - 1] - time[first] >= REST
+        rests[first:behind] = time[behind - 1] - time[first] >= settings.time_of_a_left_out_rest
     return rests
 
 
@@ -241,14 +259,17 @@ _NAMES = {
 def _rows(
     log: Log, part: slice, band: float, by_direction: bool, cart_share: float, averaged: int, extra: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Times, columns of the inverse model with the extra ones, forces and positions of a segment, decimated."""
-    if part.stop - part.start < 2 * EDGE:
+    """Return times, columns with the extra ones, forces and positions of a segment, filtered and
+    decimated.
+    """
+    settings = IdentificationSettings.current()
+    if part.stop - part.start < 2 * settings.samples_of_an_edge:
         return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]) + extra.shape[1])), np.zeros(0), np.zeros(0)
-    moved = motion(log["position"][part], log.sample_time, SMOOTH * band)
+    moved = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * band)
     v, a = moved.velocity, moved.acceleration
     carried_position = cart(log) if cart_share else None
     if carried_position is not None:
-        carried = motion(carried_position[part], log.sample_time, SMOOTH * band)
+        carried = motion(carried_position[part], log.sample_time, settings.smoothing_bandwidths * band)
         v, a = carried.velocity, cart_share * carried.acceleration + (1 - cart_share) * a
     sign = np.sign(v)
     if by_direction:
@@ -259,18 +280,25 @@ def _rows(
     if averaged > 1:
         columns = uniform_filter1d(columns, averaged, axis=0)
     columns = np.hstack([columns, extra])
-    step = max(1, round(PASS / (2 * DECIMATE * band * log.sample_time)))
-    arrays = [array[EDGE:] for array in (log.time[part], columns, log["force"][part], moved.position)]
+    step = max(1, round(settings.decimation_pass / (2 * settings.decimation_bandwidths * band * log.sample_time)))
+    arrays = [
+        array[settings.samples_of_an_edge :] for array in (log.time[part], columns, log["force"][part], moved.position)
+    ]
     time, position = (array[_first(len(array), step) :: step] for array in (arrays[0], arrays[3]))
     return time, _decimated(arrays[1], step), _decimated(arrays[2], step), position
 
 
 def _decimated(columns: np.ndarray, step: int) -> np.ndarray:
-    """Every so many-th row, after a filter forward and back that keeps what is beyond half the new frequency out."""
+    """Keep every `step`th row, after a filter forward and back that keeps out what is too fast
+    for that.
+    """
+    settings = IdentificationSettings.current()
     if step == 1:
         return columns
-    sections = cheby1(DECIMATION_ORDER, RIPPLE, PASS / step, output="sos")
-    low = sosfiltfilt(sections, columns, axis=0, padlen=3 * DECIMATION_ORDER)
+    sections = cheby1(
+        settings.order_of_decimation, settings.ripple_of_decimation, settings.decimation_pass / step, output="sos"
+    )
+    low = sosfiltfilt(sections, columns, axis=0, padlen=3 * settings.order_of_decimation)
     return low[_first(len(columns), step) :: step]
 
 

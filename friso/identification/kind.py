@@ -30,8 +30,11 @@ OF_ANY_FORM = ("kind", "force_limit", "anti_windup")
 
 @dataclass(frozen=True)
 class AnalysisSettings:
-    """What the user chose: bandwidth of the moves [Hz] for the inverse model, band [Hz] and period [s] of frequency
-    responses; None where friso is to find them. `progress` is told how far an analysis is."""
+    """What the user chose for an analysis; None where friso is to find it.
+
+    `bandwidth` [Hz] is that of moves for the inverse model, `band` [Hz] and `period` [s] are those of frequency
+    responses. `progress` is told how far an analysis is.
+    """
 
     bandwidth: float | None = None
     band: tuple[float, float] | None = None
@@ -44,9 +47,12 @@ NOTHING_CHOSEN = AnalysisSettings()
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of the machine before an experiment is analysed: the stage (None where there is none), whether it
-    is the user's, so that its controller is the machine's, the estimates of experiments analysed before, by key, and
-    the keys of that stage that were `made_up` around a log, since its file lacks their tables."""
+    """What is known of the machine before an experiment is analysed.
+
+    `stage` is None where there is none; `from_user` says whether it is the user's, so that its controller is the
+    machine's. `estimates` are those of experiments analysed before, by key, and `made_up` the keys of that stage that
+    were made up around a log, since its file lacks their tables.
+    """
 
     stage: Stage | None = None
     from_user: bool = False
@@ -54,26 +60,41 @@ class Prior:
     made_up: Collection[str] = ()
 
     def flat(self, log: Log) -> dict[str, Any]:
-        """The flat keys of the stage as it was set up for a log; none without a stage. Raises InputError."""
+        """Return the flat keys of the stage as it was set up for a log; {} without a stage.
+
+        Raises InputError.
+        """
         return {} if self.stage is None else as_set_up(self.stage, log)
 
     def user_told(self, key: str, log: Log) -> bool:
-        """Whether the user told a key of the stage as it was set up for a log. Raises InputError."""
+        """Tell whether the user stated a key of the stage as it was set up for a log.
+
+        Raises InputError.
+        """
         return self.from_user and key not in self.made_up and key in self.flat(log)
 
     def believed(self, log: Log) -> dict[str, Any]:
-        """The same, with the values that other experiments show. Raises InputError."""
+        """Return the flat keys of the stage with the values that other experiments show.
+
+        Raises InputError.
+        """
         return {**self.flat(log), **{key: estimate.value for key, estimate in self.estimates.items()}}
 
     def masses(self, log: Log) -> tuple[float, float]:
-        """Mass [kg] of the cart and of the stage as believed, 0 for what is not known. Raises InputError."""
+        """Return the mass [kg] of the cart and of the stage as believed, 0 for what is not known.
+
+        Raises InputError.
+        """
         believed = self.believed(log)
         return float(believed.get("masses.cart", 0.0)), float(believed.get("masses.stage", 0.0))
 
 
 def as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
-    """The flat keys of the stage as it was set up for a log; what the stage does not have is left out (`left_out`),
-    but for a controller of another form, which replaces the stage's. Raises InputError."""
+    """Return the flat keys of the stage as it was set up for a log.
+
+    What the stage does not have is left out (`left_out`), but for a controller of another form, which replaces the
+    stage's. Raises InputError.
+    """
     setup = {key: text for key, text in log.setup.items() if key not in left_out(stage, log)}
     changes: dict[str, Any] = dict(parse_set(f"{key}={text}") for key, text in setup.items())
     try:
@@ -88,21 +109,23 @@ def as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
 
 
 def left_out(stage: Stage, log: Log) -> list[str]:
-    """The keys in the set-up of a log that the stage does not have."""
+    """List the keys in the set-up of a log that the stage does not have."""
     return [key for key in log.setup if key not in stage.flat() and not key.startswith(f"{CONTROLLER}.")]
 
 
 def independent(result: Any, estimates: Sequence[Estimate]) -> Correlated:
-    """Estimates that are independent of one another."""
+    """Return estimates that are independent of one another, with their correlation."""
     certain = determined(estimates)
     return certain, np.eye(len(certain))
 
 
 @dataclass(frozen=True)
 class Predictor(Generic[Result]):
-    """How a result predicts another log, with what is known of the machine: the prediction, or None for a log that
-    it cannot predict. `needs` is what there has to be, in words; `check` raises InputError where logs, to which
-    nothing has been fitted yet, will not be able to."""
+    """How a result predicts another log, with what is known of the machine.
+
+    `predict` returns the prediction, or None for a log that it cannot predict. `needs` says in words what there has to
+    be. `check` raises InputError where logs, to which nothing has been fitted yet, will not be able to.
+    """
 
     needs: str
     predict: Callable[[Result, Log, Prior, AnalysisSettings], Any]
@@ -111,20 +134,25 @@ class Predictor(Generic[Result]):
 
 @dataclass(frozen=True)
 class ExperimentKind(Generic[Result]):
-    """A kind of experiment. Its name, the word of the command line, is that of its module; see `kinds`.
+    """A kind of experiment. Its name, the word of the command line, is that of its module; see
+    `kinds`.
 
     `analyse` gives the result of a group of logs, whose class is the kind's own affair; `estimates` what this says
     about keys of the stage file, and `correlated` how these hang together. `after` names the kinds whose results it
-    uses. `roles` are the channels that a log needs; of several separated by | the first one that is mapped, or the
-    last. `si`: they have to be in SI units, but for the `foreign` ones (a force in volts); where the kind is
-    `per_unit`, its analysis is the same whatever the unit of the force, and then one per volt. `partial`: whether a log
-    shows too little for a result of its own, such as one event; logs like that count as one log with gaps. `together`:
-    all its logs are realisations of one experiment; `responses`: it takes frequency responses as somebody measured
-    them, too. `claims` says why a log without a stated kind may be of this one, or None, `claims_together` the same of
-    several logs, whatever each seems to be alone; `around` makes up a stage around a log where
-    none is given. `notes` are what the engineer should know of all its results, the stage being given or not; `doubts`
-    what speaks against believing a result, in sentences, and `failed` whether its analysis failed, whatever of it still
-    holds. Functions raise InputError for logs that cannot be used."""
+    uses.
+
+    `roles` are the channels that a log needs; of several separated by | the first one that is mapped, or the last.
+    `si`: they have to be in SI units, but for the `foreign` ones (a force in volts); where the kind is `per_unit`, its
+    analysis is the same whatever the unit of the force, and then one per volt. `partial`: whether a log shows too
+    little for a result of its own, such as one event; logs like that count as one log with gaps. `together`: all its
+    logs are realisations of one experiment; `responses`: it takes frequency responses as somebody measured them, too.
+
+    `claims` says why a log without a stated kind may be of this one, or None, `claims_together` does so for several
+    logs, whatever each seems to be alone; `around` makes up a stage around a log where none is given. `notes` are what
+    the engineer should know of all its results, the stage being given or not; `doubts` what speaks against believing a
+    result, in sentences, and `failed` whether its analysis failed, whatever of it still holds. Functions raise
+    InputError for logs that cannot be used.
+    """
 
     analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]
     estimates: Callable[[Result, Stage | None], tuple[Estimate, ...]]
@@ -146,12 +174,12 @@ class ExperimentKind(Generic[Result]):
     failed: Callable[[Result], bool] = lambda result: False
 
     def needed(self, mapped: Mapping[str, Any]) -> tuple[str, ...]:
-        """The roles that a log needs, where these are mapped."""
+        """Return the roles that a log needs, where these are mapped."""
         choices = [channels.split("|") for channels in self.roles]
         return tuple(next((role for role in roles if role in mapped), roles[-1]) for roles in choices)
 
     def groups(self, sources: Sequence[Source]) -> list[tuple[Source, ...]]:
-        """The logs of this kind, by experiment."""
+        """Group the logs of this kind by experiment."""
         times = tuple(source for source in sources if isinstance(source, Log))
         responses = [(source,) for source in sources if not isinstance(source, Log)] if self.responses else []
         if self.together:

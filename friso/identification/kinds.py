@@ -14,9 +14,14 @@ KINDS: Registry[ExperimentKind[Any]] = Registry("friso.identification.experiment
 """Every module of `friso/identification/experiments/` declares one."""
 
 
-def in_order() -> list[str]:
-    """The names of all kinds, those first whose results others use; by name where none uses the other's."""
-    sorter = TopologicalSorter({name: [kind for kind in KINDS[name].after if kind in KINDS] for name in KINDS})
+def in_order(registry: Registry[Any] = KINDS) -> list[str]:
+    """Return the names of a registry, those first after which others come; by name where neither needs the other.
+
+    What the registry holds names in `after` what has to come before it.
+    """
+    sorter = TopologicalSorter(
+        {name: [other for other in registry[name].after if other in registry] for name in registry}
+    )
     sorter.prepare()
     names: list[str] = []
     while sorter.is_active():

@@ -11,6 +11,7 @@ import numpy as np
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError
 from friso.identification.combine import combined, correlations
+from friso.identification.doubt import words_of
 from friso.identification.estimate import Estimate
 from friso.identification.kind import NOTHING_CHOSEN, AnalysisSettings, Prior, Source, left_out
 from friso.identification.kinds import KINDS, in_order
@@ -19,13 +20,15 @@ from friso.identification.logs.log import Log
 from friso.identification.stage_file import identified_stage, origins
 from friso.identification.stage_keys import Fitting, fitting
 from friso.progress import Progress, share_of, silent
-from friso.stage import Stage, plausible
+from friso.stage import Stage
 from friso.stage.correlations import Correlations
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment of a kind with its logs, its result, and the estimates of keys of the stage file."""
+    """An experiment of a kind with its logs, its result, and its estimates of keys of the stage
+    file.
+    """
 
     kind: str
     logs: tuple[Source, ...]
@@ -35,12 +38,15 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Identification:
-    """The stage with its uncertain keys (None: neither a stage was given, nor a log around which one could be made up,
-    or nothing was identified), the correlations of these, the experiments behind it, the `estimates` that went into it
-    (one per key), and what the engineer should know (`warnings`).
+    """What logs of several experiments show of a machine.
+
+    `stage` has uncertain keys; it is None where neither a stage was given nor a log around which one could be made up,
+    or where nothing was identified. `correlations` are those of its keys, `estimates` what went into it (one per key),
+    and `warnings` what the engineer should know.
 
     `doubts` are sentences that speak against believing it, and `failed` is whether an analysis failed, whatever of it
-    still holds. `origins` says of each key of the stage where it comes from; `laws`, if asked, which laws fit."""
+    still holds. `origins` says of each key of the stage where it comes from; `laws`, if asked, which laws fit.
+    """
 
     stage: Stage | None
     correlations: Correlations
@@ -55,7 +61,9 @@ class Identification:
 
 @dataclass(frozen=True)
 class Prediction:
-    """Another log as an experiment of this kind predicts it; the `result` is the kind's own affair."""
+    """Another log as an experiment of this kind predicts it; the `result` is the kind's own
+    affair.
+    """
 
     log: Log
     kind: str
@@ -69,11 +77,11 @@ def identify(
     progress: Progress = silent,
     made_up: Collection[str] = (),
 ) -> Identification:
-    """The stage behind logs, each with its kind of experiment, and what is known of it beforehand, `base`, of which
-    some keys may be `made_up` around a log.
+    """Identify the stage behind logs, each with its kind of experiment.
 
-    With a base whose controller is the machine's, moves with a reference are simulated in closed loop. Raises
-    InputError for logs that cannot be used.
+    `base` is what is known of the stage beforehand, of which some keys may be `made_up` around a log. With a base whose
+    controller is the machine's, moves with a reference are simulated in closed loop. Raises InputError for logs that
+    cannot be used.
     """
     if base is not None and base.conditions is not None:
         expected = "none: what a log shows of friction holds for the conditions under which it was recorded"
@@ -99,7 +107,7 @@ def identify(
     warnings += [*_notes(experiments, base), *_set_up([log for log, _ in logs], stage)]
     fits = fitting(stage, estimates)
     fitted = identified_stage(stage, fits.estimates, [log.name for log, _ in logs])
-    doubts += _unusual(fitted, estimates)
+    doubts += words_of("stage", (fitted, estimates))
     return Identification(
         fitted,
         _correlations(experiments, estimates, fits, fitted),
@@ -115,35 +123,29 @@ def identify(
 def with_laws(
     identification: Identification, logs: Sequence[Source], base: Stage, progress: Progress = silent
 ) -> Identification:
-    """The same with the friction laws that its logs support, begun from `base` where its law allows that. Raises
-    InputError as `compare_laws`."""
+    """Return an identification with the friction laws that its logs support.
+
+    Fits begin from `base` where its law allows that. Raises InputError as `compare_laws`.
+    """
     estimates = {estimate.name: estimate for estimate in identification.estimates if estimate.determined}
     times = [log for log in logs if isinstance(log, Log)]
     stage = identification.stage or base
     laws = compare_laws(times, stage, Prior(base, True, estimates), progress)
-    return replace(identification, laws=laws, doubts=(*identification.doubts, *_of_another_law(laws, stage)))
-
-
-def _of_another_law(laws: LawComparison, stage: Stage) -> tuple[str, ...]:
-    """That the record supports other laws than that of the stage, if it does."""
-    model, supported = stage.flat()["friction.model"], [law.law for law in laws.supported]
-    if not supported or model in supported or model not in (law.law for law in laws.predictions):
-        return ()
-    return (
-        f"The record does not support {model}, the law of the stage: what is told of bristles is what {model} comes "
-        "nearest with",
-    )
+    return replace(identification, laws=laws, doubts=(*identification.doubts, *words_of("laws", (laws, stage))))
 
 
 def nothing_learnt(estimates: Sequence[Estimate], failed: bool) -> bool:
-    """Whether there are estimates none of which is determined, nor bounds anything unless the analysis `failed`."""
+    """Tell whether no estimate is determined, nor bounds anything unless the analysis `failed`."""
     ends = [end for estimate in estimates for end in (estimate.low, estimate.high)]
     none_determined = not any(estimate.determined for estimate in estimates)
     return none_determined and (failed or (bool(estimates) and not np.isfinite(ends).any()))
 
 
 def axis_of_all(sources: Sequence[Source], base: Stage | None) -> AxisKind:
-    """The kind of axis of logs and of what is known of the machine. Raises InputError where they differ."""
+    """Return the kind of axis of logs and of what is known of the machine.
+
+    Raises InputError where they differ.
+    """
     kinds = {source.name: source.axis for source in sources if isinstance(source, Log)}
     if base is not None:
         kinds = {base.name: base.axis_kind, **kinds}
@@ -159,8 +161,11 @@ def axis_of_all(sources: Sequence[Source], base: Stage | None) -> AxisKind:
 
 
 def check_predictions(logs: Sequence[tuple[Source, str]], others: Sequence[Log], base: Stage | None) -> None:
-    """Raises InputError for another log that none of the logs, each with its kind, will be able to predict: before
-    anything is fitted to these."""
+    """Check before any fit that the logs, each with its kind, will be able to predict the
+    others.
+
+    Raises InputError for a log that none of them will.
+    """
     prior = Prior(base, base is not None)
     predictors = {kind: predictor for _, kind in logs if (predictor := KINDS[kind].predictor) is not None}
     for other in others:
@@ -179,9 +184,13 @@ def check_predictions(logs: Sequence[tuple[Source, str]], others: Sequence[Log],
 def predict(
     identification: Identification, log: Log, settings: AnalysisSettings, base: Stage | None = None
 ) -> Prediction:
-    """Another log of the same machine, predicted by the first experiment that can, kinds that rest on others first: the
-    stage as its log alone shows it, not as combined, so that the errors are those of one record on another. The
-    controller is that of `base`, or of the log's own set-up. Raises InputError where none can."""
+    """Predict another log of the machine by the first experiment that can, kinds that rest on
+    others first.
+
+    The prediction is by the stage as that experiment alone shows it, not as combined, so that the errors are those of
+    one record on another. The controller is that of `base`, or of the log's own set-up. Raises InputError where none
+    can.
+    """
     prior = Prior(base, base is not None)
     predictors = {name: predictor for name in reversed(in_order()) if (predictor := KINDS[name].predictor)}
     for kind, predictor in predictors.items():
@@ -199,15 +208,8 @@ def _unpredictable(log: Log) -> InputError:
     return InputError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
 
 
-def _unusual(stage: Stage, estimates: Sequence[Estimate]) -> tuple[str, ...]:
-    """A sentence on each identified value that no positioning stage has."""
-    keys = [estimate.name for estimate in estimates if estimate.determined]
-    sentences = [sentence for sentence in plausible.implausible_values(stage) if sentence.partition(" ")[0] in keys]
-    return tuple(f"{sentence}: a wrong unit or --scale of a channel?" for sentence in sentences)
-
-
 def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:
-    """A sentence for each log whose set-up has keys that the stage does not have."""
+    """Say for each log which keys of its set-up the stage does not have."""
     several = {log.name: left_out(stage, log) for log in logs if isinstance(log, Log)}
     return [
         f"{name}: [setup] has {', '.join(keys)}, which the stage does not have: left out"
@@ -217,7 +219,7 @@ def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:
 
 
 def _groups(logs: Sequence[tuple[Source, str]]) -> list[tuple[str, tuple[Source, ...]]]:
-    """The logs by experiment, in the order of analysis."""
+    """Return the logs by experiment, in the order of analysis."""
     return [
         (name, group)
         for name in in_order()
@@ -226,7 +228,7 @@ def _groups(logs: Sequence[tuple[Source, str]]) -> list[tuple[str, tuple[Source,
 
 
 def around(logs: Sequence[tuple[Source, str]]) -> Stage | None:
-    """A stage around the first log that shows enough of a machine; None without one."""
+    """Make up a stage around the first log that shows enough of a machine; None without one."""
     for log, kind in logs:
         make = KINDS[kind].around
         if make is not None and isinstance(log, Log) and (stage := make(log)) is not None:
@@ -235,11 +237,12 @@ def around(logs: Sequence[tuple[Source, str]]) -> Stage | None:
 
 
 def _every_estimate(experiments: Sequence[Experiment]) -> list[Estimate]:
+    """List the estimates of all experiments."""
     return [estimate for experiment in experiments for estimate in experiment.estimates]
 
 
 def _notes(experiments: Sequence[Experiment], base: Stage | None) -> list[str]:
-    """What to know of the results, kind by kind."""
+    """List what the engineer should know of the results, kind by kind."""
     results: dict[str, list[Any]] = {}
     for experiment in experiments:
         results.setdefault(experiment.kind, []).append(experiment.result)
@@ -249,7 +252,9 @@ def _notes(experiments: Sequence[Experiment], base: Stage | None) -> list[str]:
 def _correlations(
     experiments: Sequence[Experiment], estimates: Sequence[Estimate], fits: Fitting, stage: Stage
 ) -> Correlations:
-    """Those of the keys that the stage file has as they were estimated, and of what moves along with one of these."""
+    """Return the correlations of keys that the stage file has as they were estimated, and of
+    those that move along.
+    """
     keys, matrix = correlations(
         _every_estimate(experiments),
         [KINDS[experiment.kind].correlated(experiment.result, experiment.estimates) for experiment in experiments],

@@ -4,46 +4,31 @@ of the same machine, simulated with what they show."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
 from friso.errors import InputError
-from friso.identification.doubts import quality_of
+from friso.identification.doubt import FitCase, KeyCase, judged_fit, judged_keys, raised
 from friso.identification.errors import Residual, SimulationErrors, errors_of, residual_of, unexplained
 from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion, unit_of
+from friso.identification.inverse_model import InverseModel, directions, inverse_model, motion, unit_of
 from friso.identification.logs.log import Log
-from friso.identification.model_error import (
-    all_with_model_error,
-    not_described,
-    of_inverse_model,
-    with_causes,
-    with_halves,
-    with_possible_values,
-    without_bristles,
-)
-from friso.identification.output_error.break_aways import exceeded_at_break_away
-from friso.identification.output_error.changes import changes_beside, drift_of_friction, inverse_reaching, reaching
-from friso.identification.output_error.compliance import WORTH_TELLING, with_compliance
+from friso.identification.model_error import allowed_for
 from friso.identification.output_error.coverage import Coverage, coverage
-from friso.identification.output_error.delay import LATE, with_delay
 from friso.identification.output_error.drawn import drawn_from
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.identifiable import fit_identifiable
-from friso.identification.output_error.one_way import either_way
+from friso.identification.output_error.identifiable import IdentifiableFit, fit_identifiable
 from friso.identification.output_error.parameters import MASS, fit_parameters, is_free, keys_of
 from friso.identification.output_error.problem import Problem, Simulated, loop_problem, tracking
 from friso.identification.output_error.profile import Profile
 from friso.identification.output_error.repeated import as_far_off_as_repeated, late_by_a_sample
 from friso.identification.output_error.to_keys import estimates_of
-from friso.identification.quality import Quality
+from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import noise_of
-from friso.identification.readings.ramps import force_ramps
-from friso.identification.slow_records import with_unexplained_inertia, without_sliding
+from friso.identification.settings import IdentificationSettings
 from friso.progress import Progress, between, silent
-from friso.quantities import percent
 from friso.stage.controllers import CONTROLLER
 
 FITTED, REPEATED = 0.8, 0.92
@@ -53,12 +38,15 @@ either direction alone."""
 
 @dataclass(frozen=True)
 class IdentifiedMoves:
-    """What was found: both fits of the inverse model, the output-error `fit`, the profiles of all parameters by name,
-    the estimates by key of the stage file with the `correlation` of the shown ones, what the motion covers, the
-    simulated record of the fit and its errors, and `part`, the samples of the log used.
+    """What an analysis of moves found.
+
+    It has both fits of the inverse model, the output-error `fit`, the profiles of all parameters by name, the estimates
+    by key of the stage file with the `correlation` of the shown ones, what the motion covers, the simulated record of
+    the fit and its errors, and `part`, the samples of the log used.
 
     `loop` is the machine's own closed loop, which was simulated; without it (None) the stage followed the log, and the
-    simulated force is what it took to hold it there, which the model does not explain."""
+    simulated force is what it took to hold it there, which the model does not explain.
+    """
 
     log: Log
     part: slice
@@ -94,19 +82,21 @@ class IdentifiedMoves:
 def identify_moves(
     log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth: float | None = None, progress: Progress = silent
 ) -> IdentifiedMoves:
-    """Mass, friction and what else the moves of a log show of a stage given as flat keys.
+    """Identify mass, friction and what else the moves of a log show of a stage given as flat
+    keys.
 
     With `own_loop` the stage's controller is the machine's, and the closed loop is simulated on the log's reference;
     else the model follows the log's position. `bandwidth` [Hz] is the motion's, read off the force by default. Where
     the force is not in newtons, which no loop of a machine allows, estimates are per unit of it. Raises InputError for
     a log without position or force.
     """
+    settings = IdentificationSettings.current()
     check_roles(log, ("position", "force", *(("reference",) if own_loop else ())), () if own_loop else ("force",))
     part = log.longest
     share = _cart_share(log, flat)
     inverse, by_direction = (inverse_model(log, bandwidth, split, share) for split in (False, True))
     follows, loop = _problems(log, part, flat, inverse, own_loop)
-    moved = motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth)
+    moved = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * inverse.bandwidth)
     starts = {parameter.name: parameter.start for parameter in follows.parameters}
     mass, coulomb = starts[MASS], starts.get("friction.coulomb", np.inf)
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
@@ -116,37 +106,16 @@ def identify_moves(
     quality = quality_of(log, inverse, fit, noise, share)
     if not fit.problem.closed:
         fit = as_far_off_as_repeated(fit, log, part, inverse.bandwidth, noise, between(progress, FITTED, REPEATED))
-    if not fit.explains(noise):
-        fit = fit if fit.problem.closed else late_by_a_sample(fit)
-        way = between(progress, REPEATED, 1, "moves: forward and backward motion alone")
-        fit, quality = _with_directions(fit, quality, moved.velocity, log.unit("force"), way)
-    if not (quality.failed or quality.rejected or is_free(flat)):
-        fit, quality = _with_compliance(fit, quality, log["position"][part], log.sample_time, inverse.bandwidth)
-    fit, quality = _with_delay(fit, quality, log, inverse.bandwidth)
-    fit, inverse, quality = _with_changes(fit, inverse, quality, moved.velocity, log.unit("force"))
-    answer = replace(answer, fit=fit)
-    estimates, correlation = estimates_of(answer, covered)
-    if not (is_free(flat) or (fit.problem.closed and fit.explains(noise))):
-        ramps = force_ramps(log.per_unit_of_force(), fit.value(MASS))
-        refuted = exceeded_at_break_away(estimates, fit.stage, ramps, log.unit("force"))
-        estimates, correlation = estimates_of(replace(answer, refuted=refuted), covered)
-    if quality.failed:
-        estimates, correlation = not_described(estimates)
-    elif quality.rejected:
-        estimates, correlation = of_inverse_model(inverse, flat, estimates)
-    else:
-        estimates = all_with_model_error(estimates, inverse, flat, quality)
-    estimates, correlation = without_bristles(estimates, correlation, quality)
-    estimates, correlation = with_causes(estimates, correlation, inverse, flat, quality)
-    estimates = with_halves(estimates, flat, quality)
-    estimates, correlation = with_possible_values(estimates, correlation, flat)
-    top = float(np.abs(moved.velocity).max())
-    estimates, correlation = without_sliding(estimates, correlation, flat, top, log.unit("force"))
-    if quality.rejected:
-        acceleration, left = inverse.columns[:, 0], float(np.std(inverse.measured - inverse.fitted))
-    else:
-        acceleration, left = moved.acceleration[answer.fit.problem.counted > 0], quality.left * quality.lacking
-    estimates, correlation = with_unexplained_inertia(estimates, correlation, acceleration, left, log.unit("force"))
+        fit = fit if fit.explains(noise) else late_by_a_sample(fit)
+    doubted = judged_fit(
+        FitCase(
+            log, inverse, share, flat=flat, fit=fit, quality=quality, velocity=moved.velocity,
+            progress=between(progress, REPEATED, 1),
+        )
+    )  # fmt: skip
+    inverse, quality, answer = doubted.inverse, doubted.quality, replace(answer, fit=doubted.fit)
+    case = _with_estimates(doubted, answer, covered, moved.acceleration)
+    fit, estimates, correlation = case.fit, case.estimates, case.correlation
     simulated = (loop or fit.problem).record(fit.inner)
     return IdentifiedMoves(
         log, part, inverse, by_direction, fit, answer.profiles, estimates, correlation, covered, simulated,
@@ -155,83 +124,31 @@ def identify_moves(
     )  # fmt: skip
 
 
-def _with_directions(
-    fit: OutputErrorFit, quality: Quality, velocity: np.ndarray, unit: str, progress: Progress
-) -> tuple[OutputErrorFit, Quality]:
-    """A fit with intervals that allow for friction that differs by direction, and the quality that says so where the
-    model, of one friction for both, cannot describe it; `velocity` [m/s] is smooth, `unit` that of the force."""
-    apart = either_way(fit, velocity, quality.lacks_something, progress)
-    if apart.less is None:
-        return apart.fit, quality
-    doubt = (
-        f"Friction differs between forward and backward motion by more than its level: either alone leaves "
-        f"{apart.less:.2g} {unit} unexplained, both together {fit.left:.2g} {unit}"
-    )
-    return apart.fit, replace(quality, doubts=(*quality.doubts, doubt), spoilt=True)
-
-
-def _with_compliance(
-    fit: OutputErrorFit, quality: Quality, position: np.ndarray, sample_time: float, bandwidth: float
-) -> tuple[OutputErrorFit, Quality]:
-    """A fit with intervals that allow for a coupling between force and position, and the quality that says so, unless
-    another cause is named already: an averaged motion, and others, make such a force too."""
-    fit, share = with_compliance(fit, position, sample_time, bandwidth)
-    if abs(share) < WORTH_TELLING:
-        return fit, quality
-    quality = replace(quality, compliant=True)
-    if quality.spoilt or quality.without:
-        return fit, quality
-    where, way = (
-        ("a part of the load moved on a coupling behind the measured position", "smaller")
-        if share > 0
-        else ("the position were measured behind a coupling", "larger")
-    )
-    doubt = (
-        f"The force goes with the motion as if {where}: the mass may be {percent(abs(share))} {way}, for which the "
-        "intervals allow; a frequency response would show the coupling"
-    )
-    return fit, replace(quality, doubts=(*quality.doubts, doubt))
-
-
-def _with_delay(fit: OutputErrorFit, quality: Quality, log: Log, bandwidth: float) -> tuple[OutputErrorFit, Quality]:
-    """A fit with intervals that allow for a delay between force and motion, and the quality that says so, unless a
-    cause in time, or another, is named already."""
-    if quality.failed or quality.rejected:
-        return fit, quality
-    fit, late = with_delay(fit, log["force"][log.longest], log.sample_time, bandwidth)
-    if abs(late) < LATE * log.sample_time or quality.spoilt or quality.without:
-        return fit, quality
-    doubt = (
-        f"The motion seems to come {abs(late) * 1e3:.2g} ms {'after' if late > 0 else 'before'} the force: a delay "
-        "of the drive or between the channels, which passes for damping and viscous friction; the intervals allow for "
-        "it"
-    )
-    return fit, replace(quality, doubts=(*quality.doubts, doubt))
-
-
-def _with_changes(
-    fit: OutputErrorFit, inverse: InverseModel, quality: Quality, velocity: np.ndarray, unit: str
-) -> tuple[OutputErrorFit, InverseModel, Quality]:
-    """The model that estimates are taken from with intervals that allow for what changes during the record, and the
-    quality that says so; `velocity` [m/s] is smooth, `unit` that of the force."""
-    if quality.failed:
-        return fit, inverse, quality
-    changes = changes_beside(inverse) if quality.rejected else drift_of_friction(fit, velocity)
-    if changes is None:
-        return fit, inverse, quality
+def _with_estimates(doubted: FitCase, answer: IdentifiableFit, covered: Coverage, acceleration: np.ndarray) -> KeyCase:
+    """The case with estimates by key, and what doubts make of them; `acceleration` [m/s^2], shape (n,), is smooth."""
+    fit, inverse, quality = doubted.fit, doubted.inverse, doubted.quality
     if quality.rejected:
-        inverse = inverse_reaching(inverse, changes)
+        acceleration, left = inverse.columns[:, 0], float(np.std(inverse.measured - inverse.fitted))
     else:
-        fit = reaching(fit, changes)
-    sentences = changes.sentences(inverse.value("coulomb"), unit)
-    return fit, inverse, replace(quality, doubts=(*quality.doubts, *sentences))
+        acceleration, left = acceleration[fit.problem.counted > 0], quality.left * quality.lacking
+
+    def case(answer: IdentifiableFit) -> KeyCase:
+        estimates, correlation = estimates_of(answer, covered)
+        shown = {"estimates": estimates, "correlation": correlation, "acceleration": acceleration, "unexplained": left}
+        return KeyCase(**{one.name: getattr(doubted, one.name) for one in fields(doubted)}, **shown)
+
+    refuted = {name: why for finding in raised("curve", case(answer)) for name, why in finding.refuses.items()}
+    return judged_keys(allowed_for(case(replace(answer, refuted=refuted))))
 
 
 @dataclass(frozen=True)
 class SimulatedLog:
-    """Another log of the same axis, simulated: the samples used, the record, and its errors; and how far the farthest
-    of the machines drawn from the estimates goes from that record, `apart`, as a share of the position: infinitely far
-    where one does not keep to finite numbers."""
+    """Another log of the same axis, simulated.
+
+    It has the samples used, the record and its errors; `apart` is how far the farthest of the machines drawn from the
+    estimates goes from that record, as a share of the position: infinitely far where one does not keep to finite
+    numbers.
+    """
 
     part: slice
     simulated: Simulated
@@ -240,9 +157,9 @@ class SimulatedLog:
 
 
 def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | None = None) -> SimulatedLog:
-    """Another log of the same axis simulated with the estimates; `set_up` are the flat keys of the stage as it was
-    set up for that log, whose controller and changed keys count.
+    """Simulate another log of the same axis with the estimates.
 
+    `set_up` are the flat keys of the stage as it was set up for that log, whose controller and changed keys count.
     Raises InputError where the machine's own loop is not known.
     """
     if moves.loop is None:
@@ -255,16 +172,13 @@ def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | 
     others = [np.linalg.norm(record.position - simulated.position, axis=1) for _, record in problem.simulated(drawn)]
     away = np.nan_to_num(np.concatenate(others), nan=np.inf)
     errors = errors_of(log, part, simulated, moves.inverse.bandwidth)
-    return SimulatedLog(
-        part,
-        simulated,
-        errors,
-        float(away.max()) / float(np.linalg.norm(log["position"][part])),
-    )
+    return SimulatedLog(part, simulated, errors, float(away.max()) / float(np.linalg.norm(log["position"][part])))
 
 
 def _same_kind(problem: Problem, log: Log, part: slice, set_up: Mapping[str, Any] | None, changed: set[str]) -> Problem:
-    """The same stage and parameters on another log, with the controller and the `changed` keys of its set-up."""
+    """Set up the stage and its parameters on another log, with the controller and the `changed`
+    keys of its set-up.
+    """
     check_roles(log, ("position", "force", "reference"))
     flat = dict(problem.flat)
     if set_up is not None:
@@ -274,7 +188,10 @@ def _same_kind(problem: Problem, log: Log, part: slice, set_up: Mapping[str, Any
 
 
 def check_roles(log: Log, roles: Sequence[str], foreign: Sequence[str] = ()) -> None:
-    """Raises InputError for a role that a log does not have, or in another unit than SI, but for the `foreign`."""
+    """Check that a log has its roles in SI units, but for the `foreign` ones.
+
+    Raises InputError for a role that is missing, or in another unit.
+    """
     for role in roles:
         if role not in log:
             actual = f"a log with {', '.join(log.signals) or 'no signals'}"
@@ -287,8 +204,15 @@ def check_roles(log: Log, roles: Sequence[str], foreign: Sequence[str] = ()) -> 
 def _problems(
     log: Log, part: slice, flat: Mapping[str, Any], inverse: InverseModel, own_loop: bool
 ) -> tuple[Problem, Problem | None]:
-    """The stage following the log's position, and in its own loop, with all the parameters in its equations."""
-    speed = float(np.abs(motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth).velocity).max())
+    """Set up the stage following the log's position, and in its own loop, with all the
+    parameters of its equations.
+    """
+    settings = IdentificationSettings.current()
+    speed = float(
+        np.abs(
+            motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * inverse.bandwidth).velocity
+        ).max()
+    )
     levels = _levels(log, flat, inverse)
     position = log["position"][part]
     every = fit_parameters(flat, levels, speed, float(np.ptp(position)), all(directions(position)))
@@ -299,17 +223,20 @@ def _problems(
 
 
 def _cart_share(log: Log, flat: Mapping[str, Any]) -> float:
-    """The share of the mass that moves with the cart, where that is measured apart from a stage on a free joint."""
+    """Return the share of the mass that moves with the cart, where that is measured apart from a
+    stage on a free joint.
+    """
     if not is_free(flat) or not ("cart_position" in log or "relative_position" in log):
         return 0.0
     return flat["masses.cart"] / (flat["masses.cart"] + flat["masses.stage"])
 
 
 def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[str, float]:
-    """Where the fit starts: at the inverse model's values, as far as it shows them and is one of this stage.
+    """Return where the fit starts: at the inverse model's values, as far as it shows them and is
+    one of this stage.
 
-    It knows one body. What it does not tell from 0 starts within its interval; all of a stage on a free joint whose
-    cart is not measured starts at the stage given.
+    The inverse model knows one body. What it does not tell from 0 starts within its interval; all of a stage on a free
+    joint whose cart is not measured starts at the stage given.
     """
     if is_free(flat) and not _cart_share(log, flat):
         mass = flat["masses.cart"] + flat["masses.stage"]

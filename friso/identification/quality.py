@@ -1,60 +1,58 @@
-"""The quality of a fit of moves: what it leaves unexplained against the noise of the record, and whether inverse model,
-whole model and the halves of the record agree."""
+"""The quality of a fit of moves: what it leaves unexplained against the noise of the record, and what may be wrong."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from friso.identification.doubt import RaisedDoubt, RecordCase, ValueCase, causes, raised
 from friso.identification.inverse_model import InverseModel
-from friso.identification.spread import spread_of
-from friso.intervals import COVERAGE
+from friso.identification.logs.log import Log
+from friso.identification.output_error.fit import OutputErrorFit
+from friso.identification.settings import DoubtSettings
+from friso.quantities import percent, plain_factor
 
-NOISY = 10.0
-"""A fit that leaves so many times the noise of the record lacks something, and says so."""
+UNKNOWN = (
+    "a delay, a filter, a constant force, one that drifts or varies with position, a missing feedforward and a mode in "
+    "the band were considered, and none explains it: check --scale, including its sign, and which channel is which"
+)
+"""What to do where no cause is found."""
 
-APART = 3.29
-"""Standard deviations by which the halves of a record differ by chance once in a thousand times."""
-
-
-@dataclass(frozen=True)
-class Halves:
-    """A quantity of the inverse model, `name`, that differs between both halves of a record: its values there, and the
-    interval that holds those of either."""
-
-    name: str
-    first: float
-    second: float
-    low: float
-    high: float
+WITHOUT_FRICTION = ". The stage file says that there is no friction: with a table [friction], friction is identified"
+"""What to do where the structure that was told leaves friction out."""
 
 
 @dataclass(frozen=True)
 class Quality:
-    """`noise` [N] of the record's force; `left` [N], RMS of what the fit leaves of it where it counts, and what `noise`
-    alone would leave there; relative errors of the force by the inverse model, and on its samples by the steady
-    friction and mass of the whole model; sentences that say what is wrong (`doubts`); whether the whole model was
-    `rejected`, and whether nothing holds (`failed`); the quantities whose `halves` differ; the inverse models `without`
-    a cause, of a log rid of what may be wrong with it; whether the record is `spoilt`, so that what is wrong with it
-    passes for slow friction, whether much is left that is `unsettled`: for which no cause was found, and whether a
-    `compliant` coupling seems to be between force and position."""
+    """How well a fit of moves describes its record, with what speaks against believing it.
+
+    `noise` [N] is that of the record's force; `left` [N] the RMS that the fit leaves of it where it counts, and
+    `noise_left` what the noise alone would leave there. `inverse_error` and `whole_error` are relative errors of the
+    force: by the inverse model, and by steady friction and mass of the whole model on the samples of the inverse model.
+    `findings` are the doubts raised. The whole model may be `rejected`, or nothing holds at all (`failed`). The inverse
+    models `without` a cause are of a log rid of what may be wrong with it. A record is `spoilt` where what is wrong
+    with it passes for friction at low speed, and `unsettled` where much is left for which no cause was found.
+    """
 
     noise: float
     left: float
     noise_left: float
     inverse_error: float
     whole_error: float
-    doubts: tuple[str, ...] = ()
+    findings: tuple[RaisedDoubt, ...] = ()
     rejected: bool = False
     failed: bool = False
-    halves: tuple[Halves, ...] = ()
     without: tuple[InverseModel, ...] = ()
     spoilt: bool = False
     unsettled: bool = False
-    compliant: bool = False
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Sentences that speak against believing the fit."""
+        return tuple(finding.words for finding in self.findings if finding.words)
 
     @property
     def ratio(self) -> float:
@@ -63,12 +61,75 @@ class Quality:
 
     @property
     def lacks_something(self) -> bool:
-        return self.ratio > NOISY
+        """Whether the fit leaves clearly more than noise."""
+        return self.ratio > DoubtSettings.current().noise_ratio_of_a_lacking_model
 
     @property
     def lacking(self) -> float:
         """Share of what is left, RMS, that is not noise: 0 of a model that lacks nothing."""
         return float(np.sqrt(max(0.0, 1 - 1 / self.ratio**2))) if self.ratio > 1 else 0.0
+
+
+def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: float, cart_share: float) -> Quality:
+    """Judge a fit of moves, and name in sentences what is wrong with it.
+
+    The whole model may describe a record that is `beyond` the inverse one, which does not know of sticking. A cause is
+    no doubt then if the whole model is clearly better than the inverse model without it.
+    """
+    settings, case = DoubtSettings.current(), RecordCase(log, inverse, cart_share)
+    flat, left, passed = fit.stage, fit.left, noise * fit.problem.passes
+    findings = list(raised("record", case))
+    plain = Quality(noise, left, passed, inverse.error, whole_error(flat, inverse), tuple(findings))
+    if fit.problem.closed and fit.explains(noise):
+        return plain
+    force = float(np.sqrt(np.mean(log["force"][log.longest][fit.problem.counted > 0] ** 2)))
+    beyond = inverse.error > settings.error_of_a_poor_model and left < settings.error_of_an_unsettled_record * force
+    poor = inverse.error > settings.error_of_a_poor_model and not beyond
+    reasons = causes(case) if plain.lacks_something or poor else []
+    if beyond:
+        share = settings.error_share_of_a_clearly_better_model * force
+        reasons = [cause for cause in reasons if cause.without is None or share * cause.without.error < left]
+    worse = max(settings.error_ratio_of_a_contradiction * inverse.error, settings.error_of_a_fine_model)
+    rejected = not (beyond or poor) and plain.whole_error > worse and plain.lacks_something
+    words = _verdict(plain, reasons, case.unit, poor, rejected, flat["friction.model"] == "none")
+    findings += [RaisedDoubt(words, plain.ratio, doubt="model")] if words else []
+    findings += raised("value", ValueCase(log, inverse, cart_share, plain.lacks_something, poor))
+    without = tuple(cause.without for cause in reasons if cause.without)
+    best = min([inverse.error, *(model.error for model in without)])
+    unsettled = plain.lacks_something and min(left / force, best) > settings.error_of_an_unsettled_record
+    return replace(
+        plain,
+        findings=tuple(findings),
+        rejected=rejected,
+        failed=poor and plain.whole_error > settings.error_of_a_poor_model,
+        without=without,
+        spoilt=unsettled or any(cause.spoils for cause in reasons),
+        unsettled=unsettled,
+    )
+
+
+def _verdict(
+    plain: Quality, reasons: list[RaisedDoubt], unit: str, poor: bool, rejected: bool, frictionless: bool
+) -> str:
+    """What the fit leaves unexplained and why, in a sentence; "" where it lacks nothing."""
+    why = "".join(f"; {cause.words}" for cause in reasons)
+    if poor:
+        return (
+            f"A mass with friction leaves {percent(plain.inverse_error, 3)} of the force unexplained: "
+            f"{why.removeprefix('; ') or UNKNOWN}"
+        )
+    if rejected:
+        return (
+            f"The whole model contradicts the record: on the moves it leaves {percent(plain.whole_error, 3)} of the "
+            f"force, a plain mass with friction {percent(plain.inverse_error, 3)}. What follows is from the latter "
+            f"alone{why}{WITHOUT_FRICTION if frictionless else ''}"
+        )
+    if plain.lacks_something:
+        return (
+            f"The fit leaves {plain.left:.3g} {unit} unexplained, {plain_factor(plain.ratio)} times what the noise of "
+            f"the record would leave: the model lacks something, for which the intervals allow{why}"
+        )
+    return ""
 
 
 def steady_friction(flat: Mapping[str, Any], velocity: np.ndarray) -> np.ndarray:
@@ -95,22 +156,3 @@ def _by_direction(flat: Mapping[str, Any], speed: np.ndarray, sign: np.ndarray) 
     forward, backward = (steady_force(flat, speed, forwards) for forwards in (True, False))
     constant = flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
     return forward * (1 + sign) / 2 - backward * (1 - sign) / 2 - constant
-
-
-def halves(inverse: InverseModel) -> list[Halves]:
-    """Mass, viscous and Coulomb friction, where they differ by more than their spreads."""
-    names = ("mass", "viscous", "coulomb")
-    parts = np.array_split(np.arange(len(inverse.measured)), 2)
-    fits = []
-    for part in parts:
-        columns, force = inverse.columns[part], inverse.measured[part]
-        solution = np.linalg.lstsq(columns, force, rcond=None)[0]
-        fits.append((solution, np.sqrt(np.diag(spread_of(columns, force - columns @ solution)))))
-    values, off = (np.array(rows) for rows in zip(*fits, strict=True))
-    apart = np.abs(values[0] - values[1]) > APART * np.hypot(*off)
-    low, high = (values - COVERAGE * off).min(axis=0), (values + COVERAGE * off).max(axis=0)
-    return [
-        Halves(name, *(float(number) for number in (*values[:, i], low[i], high[i])))
-        for i, name in enumerate(names)
-        if apart[i] and np.isfinite(off[:, i]).all()
-    ]

@@ -24,8 +24,11 @@ MOVED = ("position", "force")
 
 @dataclass(frozen=True)
 class LogFile:
-    """A file with what it holds, its kind of experiment and why it counts as one, how it was mapped, where that is kept
-    (None: not yet, or nothing had to be said about it), and what of it was kept from an `earlier` time."""
+    """A file with what it holds, its kind of experiment and why it counts as one.
+
+    `mapping` says how it was read, `mapping_file` where that is kept (None: not yet, or nothing had to be said about
+    it), and `earlier` what of it was kept from an earlier time.
+    """
 
     path: Path
     source: Source
@@ -43,18 +46,22 @@ class LogFile:
 
 
 class OpenQuestions(GapsError):
-    """What several logs do not tell; `mappings` are what was said of them, by file, kept beside or not."""
+    """What several logs do not tell; `mappings` are what was said of them, by file, kept beside
+    or not.
+    """
 
     def __init__(self, gaps: Sequence[LogError], mappings: dict[Path, Mapping]) -> None:
+        """Keep the gaps of all files with their mappings."""
         super().__init__(gaps)
         self.mappings = mappings
 
 
 def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogFile]:
-    """The files, mapped as the options say, or as kept from an earlier time beside them or in `folder`. Raises
-    OpenQuestions for all that they do not tell, InputError for what cannot be read.
+    """Read the files, mapped as the options say, or as kept from an earlier time beside them or
+    in `folder`.
 
-    Of several files, each takes what the options say about channels that it has.
+    Of several files, each takes what the options say about channels that it has. Raises OpenQuestions for all that they
+    do not tell, InputError for what cannot be read.
     """
     if options.experiment is not None:
         KINDS.checked(options.experiment, "--as", "--as {}")
@@ -76,7 +83,7 @@ def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogF
 
 
 def _recognised_together(files: list[LogFile]) -> list[LogFile]:
-    """The files, those without a stated kind as of the kind that claims all of these together, if one does."""
+    """Give files without a stated kind the kind that claims all of these together, if one does."""
     kindless = [number for number, file in enumerate(files) if file.mapping.experiment is None]
     courses = [Course(source) for number in kindless if isinstance(source := files[number].source, Log)]
     for name in KINDS if len(courses) > 1 else ():
@@ -91,8 +98,11 @@ def _recognised_together(files: list[LogFile]) -> list[LogFile]:
 
 
 def per_unit_of_force(file: LogFile, beside: AxisKind | None) -> LogFile:
-    """A file whose force is not in newtons, of a kind that is analysed per unit of it: as a log on an axis with forces
-    in that unit. Raises InputError beside a stage, of such an axis, whose numbers are in newtons."""
+    """Turn a file whose force is not in newtons into a log on an axis with forces in that unit.
+
+    That is for kinds that are analysed per unit of force. Raises InputError beside a stage, of such an axis, whose
+    numbers are in newtons.
+    """
     unit = file.source.units.get("force") if isinstance(file.source, Log) else None
     if unit is None or not KINDS[file.kind].per_unit or not isinstance(file.source, Log):
         return file
@@ -106,7 +116,10 @@ def per_unit_of_force(file: LogFile, beside: AxisKind | None) -> LogFile:
 
 
 def _applicable(options: Mapping, path: Path, paths: Sequence[Path]) -> Mapping:
-    """Of the options what this file can use; what no file can use stays, to be answered where it is read."""
+    """Return what of the options this file can use.
+
+    What no file can use stays, to be answered where it is read.
+    """
     if len(paths) < 2 or is_frequency_response(path):
         return options
     names = {*options.roles.values(), *options.units}
@@ -120,7 +133,7 @@ def _applicable(options: Mapping, path: Path, paths: Sequence[Path]) -> Mapping:
 
 
 def _has(path: Path, name: str) -> bool:
-    """Whether a file has a channel of this name."""
+    """Tell whether a file has a channel of this name."""
     if is_frequency_response(path):
         return False
     try:
@@ -131,6 +144,7 @@ def _has(path: Path, name: str) -> bool:
 
 
 def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
+    """Read a file, mapped by options over what was kept of it."""
     if is_frequency_response(path):
         kind = next(name for name in KINDS if KINDS[name].responses)
         return LogFile(path, read_frequency_response(path), kind, "the file holds a frequency response")
@@ -148,8 +162,10 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
 
 
 def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
-    """A log without a stated kind, its kind of experiment, and why. Raises GapsError for all that is open,
-    the units included that most kinds need."""
+    """Return a log without a stated kind, its kind of experiment, and why.
+
+    Raises GapsError for all that is open, the units included that most kinds need.
+    """
     gaps: list[LogError] = []
     kind = reason = ""
     try:
@@ -172,7 +188,11 @@ def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
 
 
 def _without_clock(path: Path, mapping: Mapping) -> Log | None:
-    """A log whose instants are not told, sample by sample: how it goes can be seen without. None where it cannot."""
+    """Return a log whose instants are not told, sample by sample, by which its course can be
+    seen.
+
+    None where it cannot.
+    """
     try:
         return read_log(path, replace(mapping, sample_time=1.0), strict=False, needed=MOVED)
     except LogError:
@@ -180,19 +200,23 @@ def _without_clock(path: Path, mapping: Mapping) -> Log | None:
 
 
 def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
-    """Where the mapping of a log is kept for the next time: beside it, or in `folder`; None for nothing to keep."""
+    """Return where the mapping of a log is kept for the next time: beside it, or in `folder`;
+    None for nothing to keep.
+    """
     return None if mapping == Mapping() else place_for(path, folder)
 
 
 def log_with_signals(path: Path, mapping: Mapping, kind: str) -> Log:
-    """The log with the signals that the kind of experiment needs."""
+    """Read the log with the signals that the kind of experiment needs."""
     chosen = KINDS[kind]
     return read_log(path, mapping, chosen.si, chosen.needed(mapping.roles), chosen.foreign)
 
 
 def recognised(log: Log, path: Path) -> tuple[str, str]:
-    """The only kind of experiment that a log without a stated kind may be of, and why. Raises InputError
-    where none claims it, or several do."""
+    """Return the only kind of experiment that a log without a stated kind may be of, and why.
+
+    Raises InputError where none claims it, or several do.
+    """
     course = Course(log)
     claims_of = {name: claims for name in KINDS if (claims := KINDS[name].claims) is not None}
     reasons = {name: reason for name, claims in claims_of.items() if (reason := claims(course)) is not None}

@@ -7,31 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import t as student
 
+from friso.identification.settings import IdentificationSettings
 from friso.intervals import COVERAGE
-
-LONGEST = 0.1
-"""Share of the rows over which errors are looked at for likeness at most."""
-
-BLOCKS, PLACES = 10, 20
-"""Blocks of time, and bins of place and of speed, in which errors may be alike."""
-
-FEWEST = 3.0
-"""Degrees of freedom at least of the scatter between groups, of which some are always much alike: our choice."""
 
 CONFIDENCE = 0.975
 """Of Student's t at each end of a 95 % interval."""
 
-COLLINEAR = 1e-6
-"""Share of the largest eigenvalue below which columns of a Jacobian count as one: differences are no more precise."""
-
 
 def correlation_length(residual: np.ndarray) -> int:
-    """Rows after which residuals, shape (n,), are no longer correlated: the integrated autocorrelation up to its first
-    zero, to both sides; 1 of white noise."""
+    """Count the rows after which residuals, shape (n,), are no longer correlated; 1 of white
+    noise.
+
+    It is the integrated autocorrelation up to its first zero, to both sides.
+    """
     centred = residual - residual.mean()
     count = len(centred)
     spectrum = np.abs(np.fft.rfft(centred, 2 * count)) ** 2
-    correlation = np.fft.irfft(spectrum)[: max(2, int(LONGEST * count))]
+    correlation = np.fft.irfft(spectrum)[: max(2, int(IdentificationSettings.current().row_share_of_likeness * count))]
     if correlation[0] <= 0:
         return 1
     correlation = correlation / correlation[0]
@@ -41,31 +33,37 @@ def correlation_length(residual: np.ndarray) -> int:
 
 
 def groups_of(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Groups in which a motion may make errors alike, of shape (n,) as its position [m], velocity [m/s] and
-    acceleration [m/s^2]: blocks of time, places, and speeds, speeding up and slowing down apart.
+    """Return groups in which a motion may make errors alike, each of shape (n,).
 
-    What a model lacks returns with place and speed: a motion that is repeated repeats it, and says nothing new."""
+    They are blocks of time, places, and speeds, speeding up and slowing down apart, of a position [m], velocity [m/s]
+    and acceleration [m/s^2]. What a model lacks returns with place and speed: a motion that is repeated repeats it, and
+    says nothing new.
+    """
+    settings = IdentificationSettings.current()
     return (
-        np.arange(len(position)) * BLOCKS // len(position),
-        _binned(position, PLACES),
-        2 * _binned(velocity, PLACES) + (velocity * acceleration > 0),
+        np.arange(len(position)) * settings.blocks_of_time // len(position),
+        _binned(position, settings.bins_of_place_and_speed),
+        2 * _binned(velocity, settings.bins_of_place_and_speed) + (velocity * acceleration > 0),
     )
 
 
 def _binned(values: np.ndarray, count: int) -> np.ndarray:
-    """The numbers of the bins, of equal width, that hold the values, shape (n,)."""
+    """Return the numbers of the bins, of equal width, that hold the values, shape (n,)."""
     edges = np.linspace(values.min(), values.max(), count + 1)[1:-1]
     return np.digitize(values, edges)
 
 
 def spread_of(jacobian: np.ndarray, residual: np.ndarray, groups: Sequence[np.ndarray] = ()) -> np.ndarray:
-    """Covariance of the parameters of a fit, shape (p, p), from its Jacobian, shape (n, p), and residual, shape (n,).
+    """Return the covariance of the parameters of a fit, shape (p, p), from its Jacobian and
+    residual.
 
-    Neither equal nor independent errors are assumed: Newey, West 1987, doi:10.2307/1913610, with the window as long as
-    the residuals, or their products with a column, stay correlated. Errors may besides be alike within each of some
-    `groups` (Cameron, Miller 2015, doi:10.3368/jhr.50.2.317), numbers of shape (n,): a parameter has the largest of the
-    deviations that these give, as large as Student's t of so many groups asks for. Directions in which the fit does not
-    depend on the parameters have an infinite variance.
+    The Jacobian has the shape (n, p), and the residual (n,). Neither equal nor independent errors are assumed: Newey,
+    West 1987, doi:10.2307/1913610, with the window as long as the residuals, or their products with a column, stay
+    correlated.
+
+    Errors may besides be alike within each of some `groups` (Cameron, Miller 2015, doi:10.3368/jhr.50.2.317), numbers
+    of shape (n,): a parameter has the largest of the deviations that these give, as large as Student's t of so many
+    groups asks for. Directions in which the fit does not depend on the parameters have an infinite variance.
     """
     count, size = jacobian.shape
     scale = np.linalg.norm(jacobian, axis=0)
@@ -87,10 +85,12 @@ def spread_of(jacobian: np.ndarray, residual: np.ndarray, groups: Sequence[np.nd
 
 
 def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """The covariance of the sum of scores, shape (n, p), of which neighbouring ones are alike."""
+    """Return the covariance of the sum of scores, shape (n, p), of which neighbouring ones are
+    alike.
+    """
     count = len(scores)
     window = max(correlation_length(series) for series in (residual, *scores.T))
-    window = min(max(window, 1), max(2, int(LONGEST * count)))
+    window = min(max(window, 1), max(2, int(IdentificationSettings.current().row_share_of_likeness * count)))
     middle = scores.T @ scores
     for lag in range(1, window):
         shifted = scores[lag:].T @ scores[:-lag]
@@ -99,21 +99,28 @@ def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
 
 
 def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
-    """The covariance of the sum of scores, shape (n, p), of which those of a group are alike, for normal intervals of
-    `COVERAGE` deviations; the degrees of freedom are those of as many groups as are equally large."""
+    """Return the covariance of the sum of scores, shape (n, p), of which those of a group are
+    alike.
+
+    It is one for normal intervals of `COVERAGE` deviations; the degrees of freedom are those of as many groups as are
+    equally large.
+    """
     names, members = np.unique(group, return_inverse=True)
     sums = np.stack([np.bincount(members, column, len(names)) for column in scores.T], axis=1)
     power = np.bincount(members, (scores**2).sum(axis=1), len(names))
     equal = power.sum() ** 2 / (power @ power) if power.any() else 1.0
-    freedom = max(equal - 1, FEWEST)
+    freedom = max(equal - 1, IdentificationSettings.current().least_freedom_of_groups)
     wider = float(student.ppf(CONFIDENCE, freedom)) / COVERAGE
     return wider**2 * (1 + 1 / freedom) * (sums.T @ sums)
 
 
 def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The inverse of columns of length 1 times themselves, and which of these cannot be distinguished from others."""
+    """Invert columns of length 1 times themselves, and tell which of these cannot be
+    distinguished from others.
+    """
+    settings = IdentificationSettings.current()
     sizes, directions = np.linalg.eigh(square)
-    collinear = sizes < COLLINEAR * sizes[-1]
+    collinear = sizes < settings.eigenvalue_of_likeness * sizes[-1]
     resolved = directions[:, ~collinear]
-    alike = (np.abs(directions[:, collinear]) > np.sqrt(COLLINEAR)).any(axis=1)
+    alike = (np.abs(directions[:, collinear]) > np.sqrt(settings.eigenvalue_of_likeness)).any(axis=1)
     return resolved / sizes[~collinear] @ resolved.T, alike

@@ -11,16 +11,10 @@ import numpy as np
 from friso.axis import LINEAR
 from friso.equations.controllers.van_dijk import controller_table
 from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import SMOOTH, InverseModel, motion
+from friso.identification.inverse_model import InverseModel, motion
 from friso.identification.logs.log import Log
+from friso.identification.settings import IdentificationSettings
 from friso.stage import Stage
-
-BENDING, STRIBECK_VELOCITY = 5e-6, 1e-3
-"""Length [m] (or angle [rad]) by which bristles bend and Stribeck velocity [m/s] of a stage made up around a log: our
-choice."""
-
-DIGITS = 2
-"""Significant digits of an uncertainty, and so of its value."""
 
 NOT_IDENTIFIED = "not identified: all that is possible"
 
@@ -30,11 +24,18 @@ OUR_CHOICE = "controller, motion, bristles and Stribeck velocity are our choice"
 
 
 def made_up(log: Log, inverse: InverseModel) -> Stage:
-    """A stage around a log without any: one rigid mass, LuGre friction without Stribeck effect, a controller of our
-    choice, and a move as fast as the log's fastest."""
+    """Make up a stage around a log without any.
+
+    It has one rigid mass, LuGre friction without Stribeck effect, a controller of our choice, and a move as fast as the
+    log's fastest.
+    """
+    settings = IdentificationSettings.current()
     mass, coulomb = (max(inverse.value(name), 1e-6) for name in ("mass", "coulomb"))
-    viscous, stiffness = max(inverse.value("viscous"), 0.0), coulomb / BENDING
-    parts = [motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth) for part in log.segments]
+    viscous, stiffness = max(inverse.value("viscous"), 0.0), coulomb / settings.bend_of_made_up_bristles
+    parts = [
+        motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * inverse.bandwidth)
+        for part in log.segments
+    ]
     axis = log.axis
     top = max(float(np.abs(part.velocity).max()) for part in parts)
     brisk = max(float(np.abs(part.acceleration).max()) for part in parts)
@@ -46,7 +47,7 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
             "model": "lugre",
             "static": f"{coulomb:.6g} {axis.force}",
             "coulomb": f"{coulomb:.6g} {axis.force}",
-            "stribeck_velocity": f"{STRIBECK_VELOCITY:g} {axis.length}/s",
+            "stribeck_velocity": f"{settings.made_up_stribeck_velocity:g} {axis.length}/s",
             "stribeck_exponent": 2,
             "bristle_stiffness": f"{stiffness:.6g} {axis.unit('N/m')}",
             "bristle_damping": f"{math.sqrt(stiffness * mass):.6g} {axis.unit('N*s/m')}",
@@ -67,7 +68,8 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
 
 
 def identified_stage(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str]) -> Stage:
-    """The stage with the estimates of its keys, as values with 95 % intervals or as ranges.
+    """Return the stage with the estimates of its keys, as values with 95 % intervals or as
+    ranges.
 
     Their units are those of the stage's kind of axis. A stiffness that follows from a [flexure] stays as it follows.
     Raises InputError where they do not fit together, which those of `fitting` do.
@@ -87,7 +89,9 @@ TOLD_BY_LOGS = ("masses", "friction", "motion")
 
 
 def completed(tables: Mapping[str, Any], around: Stage) -> dict[str, Any]:
-    """The tables of a stage file, with those `TOLD_BY_LOGS` that it lacks of a stage made up around a log."""
+    """Return the tables of a stage file, completed by those that a stage made up around a log
+    can stand in for.
+    """
     made = around.as_written()
     return {**{name: made[name] for name in TOLD_BY_LOGS}, **tables}
 
@@ -95,8 +99,11 @@ def completed(tables: Mapping[str, Any], around: Stage) -> dict[str, Any]:
 def origins(
     stage: Stage, estimates: Iterable[Estimate], follows: Mapping[str, str], chosen: Collection[str] | None
 ) -> dict[str, str]:
-    """Where each key of an identified stage comes from: the estimates that it took, keys that follow another one, and
-    the stage file, or our choice of the `chosen` keys (None: all)."""
+    """Say where each key of an identified stage comes from.
+
+    It comes from estimates, follows another key, stands in the stage file, or is our choice of the `chosen` keys (None:
+    all).
+    """
     sources: dict[str, str] = {}
     for estimate in estimates:
         sources[estimate.name] = f"identified: {estimate.method}" if estimate.determined else NOT_IDENTIFIED
@@ -108,7 +115,9 @@ def origins(
 
 
 def with_origins(text: str, origins: Mapping[str, str]) -> str:
-    """The text of a stage file with a comment behind each key that says where it comes from."""
+    """Return the text of a stage file with a comment behind each key that says where it comes
+    from.
+    """
     lines, table = [], ""
     for line in text.splitlines():
         key = f"{table}.{line.partition(' = ')[0]}"
@@ -119,7 +128,9 @@ def with_origins(text: str, origins: Mapping[str, str]) -> str:
 
 
 def estimate_text(estimate: Estimate) -> str:
-    """The text of an estimate in a stage file: "20.4 N +/- 0.1 N", or "1 N .. 2.5 N" for what is not shown."""
+    """Write an estimate as in a stage file: "20.4 N +/- 0.1 N", or "1 N .. 2.5 N" for what is
+    not shown.
+    """
     unit = f" {estimate.unit}" if estimate.unit else ""
     if not estimate.determined:
         return f"{estimate.low:.3g}{unit} .. {estimate.high:.3g}{unit}"
@@ -129,7 +140,9 @@ def estimate_text(estimate: Estimate) -> str:
 
 
 def round_uncertainty(half: float) -> tuple[str, int]:
-    """An uncertainty rounded up to two digits, as text, and the decimal places of its value."""
-    digits = DIGITS - 1 - math.floor(math.log10(half))
+    """Round an uncertainty up to two digits, as text, and return the decimal places of its
+    value.
+    """
+    digits = IdentificationSettings.current().digits_of_an_uncertainty - 1 - math.floor(math.log10(half))
     up = math.ceil(round(half * 10**digits, 6)) / 10**digits
     return (f"{up:.{digits}f}" if digits > 0 else f"{up:.0f}"), digits

@@ -9,16 +9,13 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
-from friso.identification.output_error.parameters import HIGHEST_RATIO
+from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.settings import IdentificationSettings
 from friso.identification.stage_file import estimate_text, identified_stage
 from friso.intervals import uncertain_value
 from friso.quantities import Number, Quantity
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
-
-LEAST = 1e-3
-"""Share of a range's upper end at which one begins that would hold 0 or less, where a key does not allow that: smaller
-values make no difference beside it, and a range over orders of magnitude needs an end."""
 
 STATIC, COULOMB = "friction.static", "friction.coulomb"
 
@@ -28,8 +25,11 @@ ADDED = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
 
 @dataclass(frozen=True)
 class Fitting:
-    """Estimates that can all stand in the stage file, keys that move along with another (full correlation), and a
-    sentence for each that cannot stand there as it was estimated."""
+    """Estimates that can all stand in the stage file.
+
+    `follows` holds keys that move along with another (full correlation), and `notes` a sentence for each estimate that
+    cannot stand there as it was made.
+    """
 
     estimates: tuple[Estimate, ...]
     follows: Mapping[str, str]
@@ -37,7 +37,9 @@ class Fitting:
 
 
 def fitting(stage: Stage, estimates: Sequence[Estimate]) -> Fitting:
-    """What of the estimates, one per key, the stage file can take: in the units of its kind of axis."""
+    """Choose what of the estimates, one per key, the stage file can take, in the units of its
+    kind of axis.
+    """
     flat, notes = stage.flat(), []
     estimates = [replace(estimate, unit=stage.axis_kind.unit(estimate.unit)) for estimate in estimates]
     fields = numeric_keys({**flat, "bias.cart": 0.0})
@@ -59,7 +61,7 @@ def fitting(stage: Stage, estimates: Sequence[Estimate]) -> Fitting:
 
 
 def shared_masses(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
-    """The whole mass, shared among the masses as in the stage."""
+    """Share the whole mass among the masses as in the stage."""
     masses = {f"masses.{name}": value for name, value in stage.masses if value is not None}
     method, sizes = f"{total.method}, shared as in the stage file", ("value", "low", "high", "systematic")
     shares = {key: value / sum(masses.values()) for key, value in masses.items()}
@@ -70,10 +72,11 @@ def shared_masses(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
 
 
 def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) -> Estimate:
-    """An estimate of which one bound is known, with the other one from what was known beforehand.
+    """Complete an estimate of which one bound is known by the other one from what was known
+    beforehand.
 
-    Static friction known as "at least" reaches up to `HIGHEST_RATIO` times Coulomb friction, the most that is believed
-    of a bearing, unless the stage knows.
+    Static friction known as "at least" reaches up to the highest ratio to Coulomb friction that is believed of a
+    bearing, unless the stage knows.
     """
     before = stage.uncertain().get(estimate.name)
     if before is not None and not estimate.determined and before.high >= estimate.low and before.low <= estimate.high:
@@ -83,13 +86,15 @@ def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) ->
     flat = stage.flat()
     coulomb = next((candidate for candidate in estimates if candidate.name == COULOMB and candidate.determined), None)
     value, high = (coulomb.value, coulomb.high) if coulomb else (flat[COULOMB], flat[COULOMB])
-    top = HIGHEST_RATIO * value
+    top = OutputErrorSettings.current().highest_friction_ratio * value
     # a bound that is Coulomb friction itself adds nothing: static friction then moves along with that
     return replace(estimate, high=top) if max(flat[STATIC], high) < estimate.low < top else estimate
 
 
 def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | None, str]:
-    """The estimate as far as the key allows it, or None; and why it is not as it was, if it is not."""
+    """Return the estimate as far as the key allows it, or None; and why it is not as it was, if
+    it is not.
+    """
     if not np.isfinite([estimate.low, estimate.high]).all():
         ends = [f"{word} {end:.4g} {estimate.unit}".rstrip() for word, end in _ends(estimate)]
         knowledge = f"known only to be {' and '.join(ends)}" if ends else "unknown"
@@ -101,7 +106,7 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
         return None, f"{ends} is all that is known, the stage file keeps its value: it has to be {field.bound.text}"
     if _allowed(estimate, field):
         return estimate, ""
-    low = LEAST * estimate.high
+    low = IdentificationSettings.current().share_of_a_least_value * estimate.high
     cut = replace(estimate, value=np.nan, low=low, reason=estimate.reason or f"it has to be {field.bound.text}")
     limits = f"{estimate_text(estimate)} was found, but it has to be {field.bound.text}"
     if estimate.low < low and _allowed(cut, field):
@@ -115,7 +120,7 @@ def _ends(estimate: Estimate) -> list[tuple[str, float]]:
 
 
 def _allowed(estimate: Estimate, field: Quantity | Number) -> bool:
-    """Whether the key takes the text of the estimate."""
+    """Tell whether the key takes the text of the estimate."""
     try:
         uncertain_value(estimate_text(estimate), field)
     except InputError:
@@ -126,8 +131,11 @@ def _allowed(estimate: Estimate, field: Quantity | Number) -> bool:
 def _static_above(
     stage: Stage, fields: Mapping[str, Quantity | Number], estimates: dict[str, Estimate], notes: list[str]
 ) -> dict[str, str]:
-    """Keep static friction no smaller than Coulomb friction: the less certain of both gives way, in `estimates`; which
-    moves along with the other, in the ratio that the stage had."""
+    """Keep static friction no smaller than Coulomb friction: the less certain of both gives way,
+    in `estimates`.
+
+    It moves along with the other, in the ratio that the stage had.
+    """
     flat = stage.flat()
     if STATIC not in flat or not estimates.keys() & {STATIC, COULOMB}:
         return {}
@@ -156,7 +164,10 @@ def _static_above(
 
 
 def _together(stage: Stage, estimates: dict[str, Estimate], notes: list[str]) -> tuple[Estimate, ...]:
-    """Those with which the stage is one; a key that breaks a rule of the stage file is taken out of `estimates`."""
+    """Return the estimates with which the stage is one.
+
+    A key that breaks a rule of the stage file is taken out of `estimates`.
+    """
     units = [[key for key in (COULOMB, STATIC) if key in estimates]]
     units += [[key] for key in estimates if key not in (COULOMB, STATIC)]
     fine: list[Estimate] = []

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import copy_context
 from dataclasses import dataclass
 from functools import wraps
 from html import escape
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Concatenate, ParamSpec, TypeVar
 
 from friso.axis import LINEAR, AxisKind, speaking_of
 from friso.errors import InputError
 from friso.escapes import escaped
+from friso.interface.shared_options import described
 from friso.stage.arguments import check_arguments
 
 if TYPE_CHECKING:
@@ -29,7 +31,9 @@ Returned = TypeVar("Returned")
 
 
 def question(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
-    """A public function: its arguments are checked, and the kind of axis that it speaks of stays its own."""
+    """Make a function of friso of a question's function: its arguments are checked, shared parameters are described in
+    its docstring, and the kind of axis that it speaks of stays its own."""
+    function.__doc__ = described(function)
     answer = check_arguments(function)
 
     @wraps(function)
@@ -75,10 +79,13 @@ def _in_its_units(method: Callable[Concatenate[Answer, Arguments], Returned]) ->
     return shown
 
 
-class Answer(ABC):
+class Answer:
     """What friso answers to a question.
 
-    The answer in words stands first (`sentences`), then small `tables`, then `details`. `result` is what the analysis
+    The answer in words stands first (`sentences`), then small `tables`, then `details`. Functions in the
+    folder of its question make these: `words.sentences`, `words.tables`, `words.details`, `words.blocks`,
+    `words.next_steps`, and, of the question NAME, `figures.NAME_figures`, `document.NAME_document`, `page.NAME_files`.
+    Each takes the `subject`; an answer that shows something else overrides the method. `result` is what the analysis
     returned: whatever else is asked of the answer is asked of the result, so that ``cases["given"]`` is a case of
     `friso.check` and ``runs.outcome`` a variable of `friso.sweep`.
 
@@ -92,18 +99,41 @@ class Answer(ABC):
         The numbers with their units.
     """
 
-    command: ClassVar[str]
-    """The command that gives this answer."""
     result: Any
     axis_kind: AxisKind = LINEAR
 
     status: ClassVar[int] = 1
     """The exit status of the command where the answer is a failure."""
 
+    def __init__(self, result: Any, **parts: Any) -> None:
+        """Keep the result, and other `parts` as attributes; the axis is that of the stage unless it is one of these."""
+        stage = parts.get("stage") or getattr(result, "stage", None)
+        self.result, self.axis_kind = result, LINEAR if stage is None else stage.axis_kind
+        vars(self).update(parts)
+
     def __init_subclass__(cls) -> None:
         """Whatever an answer shows is in the units of its axis, whoever asks."""
+        cls.package = cls.__module__.rpartition(".")[0]
         for name in _SHOWN & vars(cls).keys():
             setattr(cls, name, _in_its_units(getattr(cls, name)))
+
+    package: ClassVar[str]
+    """The folder of the question, whose modules show its answers."""
+
+    @property
+    def command(self) -> str:
+        """The command that gives this answer."""
+        return self._name.replace("_", "-")
+
+    @property
+    def _name(self) -> str:
+        """The name of the question in Python, with which its functions begin."""
+        return self.package.rpartition(".")[2]
+
+    @property
+    def subject(self) -> Any:
+        """What the functions that show the answer take: the result, or the answer itself where it is more than that."""
+        return self.result
 
     @property
     def failure(self) -> str:
@@ -115,37 +145,43 @@ class Answer(ABC):
         """Whether Ctrl-C ended what it rests on: it says what was found so far."""
         return False
 
-    @abstractmethod
+    def _shown_by(self, module: str, function: str, otherwise: Any, *more: Any) -> Any:
+        """What a function of the question's folder makes of the answer; `otherwise` where there is none."""
+        name = f"{self.package}.{module}"
+        shown = getattr(import_module(name), function, None) if find_spec(name) else None
+        return otherwise if shown is None else shown(self.subject, *more)
+
     def sentences(self) -> Sequence[str]:
         """The answer in words, the conclusion first."""
+        return self._shown_by("words", "sentences", ())
 
     def blocks(self) -> Sequence[str]:
         """Drawings and files in characters of one width."""
-        return ()
+        return self._shown_by("words", "blocks", ())
 
     def tables(self) -> Sequence[AnswerTable]:
         """The numbers that the answer rests on, as texts."""
-        return ()
+        return self._shown_by("words", "tables", ())
 
     def details(self) -> Sequence[str]:
         """What else there is to say, a paragraph each."""
-        return ()
+        return self._shown_by("words", "details", ())
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Commands that follow from the answer, the `files` of which were written."""
-        return ()
+        return self._shown_by("words", "next_steps", (), files)
 
     def figures(self) -> Sequence[Figure]:
         """The figures, the most telling first."""
-        return ()
+        return self._shown_by("figures", f"{self._name}_figures", ())
 
-    @abstractmethod
     def document(self) -> dict[str, Any]:
         """The JSON document of the command."""
+        return self._shown_by("document", f"{self._name}_document", {})
 
-    @abstractmethod
     def files(self) -> Files:
         """What the command writes, by name."""
+        return self._shown_by("page", f"{self._name}_files", {})
 
     @property
     def data(self) -> xr.Dataset:
@@ -282,6 +318,10 @@ class Answer(ABC):
     def __dir__(self) -> list[str]:
         own = (name for name in super().__dir__() if name.startswith("__") or not name.startswith("_"))
         return sorted({*own, *(name for name in dir(self.result) if not name.startswith("_"))})
+
+
+for _name in _SHOWN:
+    setattr(Answer, _name, _in_its_units(getattr(Answer, _name)))
 
 
 def _html_table(table: AnswerTable) -> str:

@@ -27,6 +27,39 @@ Changes: TypeAlias = Mapping[str, Any] | Iterable[str] | None
 Whole: TypeAlias = int
 """A whole number whose limits `whole_number` checks, however large it is."""
 
+Seed: TypeAlias = int
+"""A seed of random numbers, from 0 to 2147483647."""
+
+LengthLike: TypeAlias = float | str
+TimeLike: TypeAlias = float | str
+ForceLike: TypeAlias = float | str
+FrequencyLike: TypeAlias = float | str
+RatioLike: TypeAlias = float | str
+Tolerance: TypeAlias = float | str
+"""Numbers in SI, or texts with a unit: "1 um"."""
+
+AxisRange: TypeAlias = str
+AxisPoints: TypeAlias = str
+FrequencyBand: TypeAlias = str
+"""Texts with a range: 'controller.crossover="1 Hz..40 Hz"', with ":41" for points behind it, "0.1 Hz..1 kHz"."""
+
+LawName: TypeAlias = str
+KindName: TypeAlias = str
+MetricName: TypeAlias = str
+SettingName: TypeAlias = str
+FormatName: TypeAlias = str
+ExperimentName: TypeAlias = str
+StudyName: TypeAlias = str
+ClaimName: TypeAlias = str
+Address: TypeAlias = str
+"""Names, of which a wrong one is answered with all of them; and the address of a scheduler."""
+
+Links: TypeAlias = Changes
+Roles: TypeAlias = Changes
+ChannelUnits: TypeAlias = Changes
+RoleScales: TypeAlias = Changes
+"""Dictionaries, or texts NAME=VALUE: expressions by key, channels by role, units by channel, scales by role."""
+
 _NAMED = 3
 """Uncertain keys that are named, at most, where there are more."""
 

@@ -19,8 +19,8 @@ from friso.errors import InputError
 
 LOGGER = logging.getLogger("friso")
 
-FUNCTIONS = "friso.functions"
-"""The group of functions that stand beside `friso.check`: each in a module, under the name of the entry point."""
+RENAMED = {"friso.commands": "friso.questions", "friso.functions": "friso.questions"}
+"""Groups of friso 0.2, and the group that takes their place."""
 
 
 @cache
@@ -42,7 +42,13 @@ def _entry_points() -> Mapping[str, list[tuple[str, str]]]:
     from importlib.metadata import entry_points  # costs as much as all of friso's stage file
 
     points = entry_points()
-    groups = (group for group in points.groups if group.startswith("friso."))
+    groups = [group for group in points.groups if group.startswith("friso.")]
+    for group in RENAMED.keys() & {*groups}:
+        names = ", ".join(sorted(f"{point.name} ({point.module})" for point in points.select(group=group)))
+        LOGGER.warning(
+            f"{group} is of friso 0.2: {names} is left out until its package names a {RENAMED[group]} "
+            "(CONTRIBUTING.md, docs/migration.md)"
+        )
     return {group: sorted((point.name, point.module) for point in points.select(group=group)) for group in groups}
 
 

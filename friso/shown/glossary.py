@@ -17,7 +17,7 @@ _HEADING = "word"
 
 
 @dataclass(frozen=True)
-class Explained:
+class GlossaryRow:
     """A row of the glossary: its words, and what they mean."""
 
     words: tuple[str, ...]
@@ -35,7 +35,7 @@ class Explained:
 
 
 @cache
-def entries() -> Mapping[str, Explained]:
+def entries() -> Mapping[str, GlossaryRow]:
     """What the glossary explains, by its words in small letters.
 
     Words that mean this in one context only stand there as "slope (of the return map)": they are left out, since pages
@@ -43,7 +43,7 @@ def entries() -> Mapping[str, Explained]:
     """
     text = (resources.files("friso.shown") / "templates" / "glossary.md").read_text(encoding="utf-8")
     plain = re.sub(r"[*`]", "", text)
-    rows = [Explained(tuple(words.split(", ")), meaning) for words, meaning in _ROW.findall(plain) if "(" not in words]
+    rows = [GlossaryRow(tuple(words.split(", ")), meaning) for words, meaning in _ROW.findall(plain) if "(" not in words]
     return {word.lower(): entry for entry in rows for word in entry.words if word != _HEADING}
 
 
@@ -58,7 +58,7 @@ class Glossary:
     """What one page explains: the entries `used` on it, in the order of their first words."""
 
     def __init__(self) -> None:
-        self.used: dict[str, Explained] = {}
+        self.used: dict[str, GlossaryRow] = {}
 
     def linked(self, text: str) -> Markup:
         """The text, escaped, with links from words that are new on the page."""
@@ -73,5 +73,5 @@ class Glossary:
         return Markup("").join([*parts, escape(text[end:])])
 
     @staticmethod
-    def _link(word: str, entry: Explained) -> Markup:
+    def _link(word: str, entry: GlossaryRow) -> Markup:
         return Markup('<a class="word" href="#{}" title="{}">{}</a>').format(entry.place, entry.meaning, word)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import wraps
 from inspect import signature
 from numbers import Integral, Real
@@ -20,6 +20,35 @@ from friso.stage.stage import Stage
 
 Arguments = ParamSpec("Arguments")
 Returned = TypeVar("Returned")
+
+
+TEXT_KINDS = {
+    "AxisRange": 'KEY="FIRST..LAST"',
+    "AxisPoints": 'KEY="FIRST..LAST:POINTS"',
+    "FrequencyBand": '"FIRST..LAST"',
+    "Changeable": "PART",
+    "LawName": "LAW",
+    "KindName": "KIND",
+    "MetricName": "NAME",
+    "SettingName": "SETTING",
+    "FormatName": "FORMAT",
+    "ExperimentName": "EXPERIMENT",
+    "StudyName": "STUDY",
+    "ClaimName": "CLAIM",
+    "Address": "ADDRESS",
+}
+"""Annotations of texts, and what stands for the text on the command line."""
+
+PAIR_KINDS = {
+    "Links": "KEY=EXPRESSION",
+    "Roles": "ROLE=CHANNEL",
+    "ChannelUnits": "CHANNEL=UNIT",
+    "RoleScales": "ROLE=SCALE",
+}
+"""Annotations of dictionaries, and what stands for a pair on the command line."""
+
+QUANTITY_KINDS = ("LengthLike", "TimeLike", "ForceLike", "FrequencyLike", "RatioLike")
+"""Annotations of numbers with a unit: "1 um" or a number in SI."""
 
 
 def _is_text(value: Any) -> bool:
@@ -64,51 +93,73 @@ def _are_numbers(value: Any) -> bool:
 MOST_INT = 10**18
 """Whole numbers are smaller, whatever they count."""
 
+MOST_SEED = 2**31 - 1
+"""The largest seed that every generator of random numbers takes."""
+
 
 @dataclass(frozen=True)
 class ArgumentKind:
-    """What an annotation stands for: a test, what passes it in words, and an example of that."""
+    """What an annotation stands for: a test, what passes it in words, and an example of that; and on the command line
+    what `metavar` stands for its value ("": the name of the parameter) and of which `command_type` one value is, of
+    which there may be `several`."""
 
     holds: Callable[[Any], bool]
     words: str
     example: str = ""
+    metavar: str = ""
+    command_type: type = str
+    several: bool = False
 
 
-_PATHS = ArgumentKind(lambda value: _is_list(value, _is_path), "a list of paths", '["map.nc"]')
-_TEXTS = ArgumentKind(lambda value: _is_list(value, _is_text), "a list of texts")
+_TEXT = ArgumentKind(_is_text, "a text")
+_PATHS = ArgumentKind(
+    lambda value: _is_list(value, _is_path), "a list of paths", '["map.nc"]', "FILE", Path, several=True
+)
+_TEXTS = ArgumentKind(lambda value: _is_list(value, _is_text), "a list of texts", several=True)
 _FUNCTION = ArgumentKind(callable, "a function")
+_STAGE = ArgumentKind(
+    lambda value: isinstance(value, Stage) or _has_text_keys(value) or _is_path(value),
+    "a stage, the path of a stage file, or its tables as a dictionary",
+    '"rig.toml"',
+    "STAGE.toml",
+    Path,
+)
+_CHANGES = ArgumentKind(
+    lambda value: value is None or _has_text_keys(value) or _is_list(value, _is_text),
+    "a dictionary of keys, or a list of texts KEY=VALUE",
+    '{"masses.stage": "0.6 kg"}',
+    "KEY=VALUE",
+    several=True,
+)
+_WHOLE = ArgumentKind(_is_whole, "a whole number", "6", "N", int)
+_PATH = ArgumentKind(_is_path, "a path", '"report"', "FILE", Path)
+_QUANTITY = ArgumentKind(lambda value: _is_number(value) or _is_text(value), "a number or a text")
 
-_KINDS: dict[str, ArgumentKind] = {
+KINDS: dict[str, ArgumentKind] = {
     "None": ArgumentKind(lambda value: value is None, ""),
-    "str": ArgumentKind(_is_text, "a text"),
-    "int": ArgumentKind(
-        lambda value: _is_whole(value) and abs(int(value)) < MOST_INT,
-        "a whole number",
-        "64",
+    "str": _TEXT,
+    **{name: replace(_TEXT, metavar=metavar) for name, metavar in TEXT_KINDS.items()},
+    "int": replace(_WHOLE, holds=lambda value: _is_whole(value) and abs(int(value)) < MOST_INT, example="64"),
+    "Whole": _WHOLE,
+    "Seed": replace(
+        _WHOLE,
+        holds=lambda value: _is_whole(value) and 0 <= value <= MOST_SEED,
+        words=f"a whole number from 0 to {MOST_SEED}",
+        example="1",
     ),
-    "Whole": ArgumentKind(_is_whole, "a whole number", "6"),
-    "float": ArgumentKind(_is_number, "a number"),
-    "bool": ArgumentKind(lambda value: isinstance(value, bool | np.bool_), "True or False", "True"),
-    "os.PathLike[str]": ArgumentKind(_is_path, "a path", '"report"'),
-    "Path": ArgumentKind(lambda value: isinstance(value, Path), "a path", 'Path("report")'),
-    **dict.fromkeys(
-        ("Stage", "StageLike"),
-        ArgumentKind(
-            lambda value: isinstance(value, Stage) or _has_text_keys(value) or _is_path(value),
-            "a stage, the path of a stage file, or its tables as a dictionary",
-            '"rig.toml"',
-        ),
-    ),
-    "Changes": ArgumentKind(
-        lambda value: value is None or _has_text_keys(value) or _is_list(value, _is_text),
-        "a dictionary of keys, or a list of texts KEY=VALUE",
-        '{"masses.stage": "0.6 kg"}',
-    ),
-    "Spec": ArgumentKind(lambda value: type(value).__name__ == "Spec", "a specification"),
+    "float": ArgumentKind(_is_number, "a number", metavar="NUMBER", command_type=float),
+    **{name: replace(_QUANTITY, metavar=name.removesuffix("Like").upper()) for name in QUANTITY_KINDS},
+    "Tolerance": replace(_QUANTITY, metavar="NUMBER"),
+    "bool": ArgumentKind(lambda value: isinstance(value, bool | np.bool_), "True or False", "True", "", bool),
+    "os.PathLike[str]": _PATH,
+    "Path": replace(_PATH, holds=lambda value: isinstance(value, Path), example='Path("report")'),
+    **dict.fromkeys(("Stage", "StageLike"), _STAGE),
+    "Changes": _CHANGES,
+    **{name: replace(_CHANGES, metavar=metavar) for name, metavar in PAIR_KINDS.items()},
+    "Spec": ArgumentKind(lambda value: type(value).__name__ == "Spec", "a specification", "", "SPEC.toml", Path),
     "Samples": ArgumentKind(lambda value: type(value).__name__ == "Samples", "friso.Samples"),
     "Members": ArgumentKind(lambda value: type(value).__name__ == "Members", "friso.Members"),
     "Margin": ArgumentKind(lambda value: type(value).__name__ == "Margin", "the edge of hunting of a stage"),
-    "Changeable": ArgumentKind(_is_text, "a text"),
     "tuple[float, float]": ArgumentKind(
         lambda value: _is_list(value, lambda end: _is_number(end) or _is_text(end)) and len(value) == 2,
         "both ends of a range",
@@ -116,6 +167,7 @@ _KINDS: dict[str, ArgumentKind] = {
     "Sequence[int | str]": ArgumentKind(
         lambda value: _is_list(value, lambda item: _is_path(item) or _is_whole(item)),
         "the numbers of a cell",
+        several=True,
     ),
     "Sequence[int]": ArgumentKind(lambda value: _is_list(value, _is_whole), "whole numbers"),
     "Iterable[str | os.PathLike[str]]": _PATHS,
@@ -128,8 +180,12 @@ _KINDS: dict[str, ArgumentKind] = {
         lambda value: _is_path(value) or _is_list(value, _is_path),
         "the path of a file, or a list of paths",
         '"log.csv"',
+        "LOG",
+        Path,
+        several=True,
     ),
     "Iterable[str]": _TEXTS,
+    **{f"Iterable[{name}]": replace(_TEXTS, metavar=metavar) for name, metavar in TEXT_KINDS.items()},
     "Sequence[str]": _TEXTS,
     "Sequence[float]": ArgumentKind(_are_numbers, "numbers"),
     "np.ndarray": ArgumentKind(_are_numbers, "numbers"),
@@ -142,8 +198,8 @@ _KINDS: dict[str, ArgumentKind] = {
 _PATH_KINDS = {"os.PathLike[str]", "Path", "Stage", "StageLike", "LogFiles", "Iterable[str | os.PathLike[str]]"}
 
 
-def _alternatives(annotation: str) -> list[str]:
-    """The parts of an annotation at its outer bars: "int | None" has two, "Iterable[str | None]" one."""
+def alternatives(annotation: str) -> list[str]:
+    """Split an annotation at its outer bars: "int | None" has two parts, "Iterable[str | None]" one."""
     parts, depth = [""], 0
     for sign in annotation:
         depth += (sign == "[") - (sign == "]")
@@ -160,7 +216,7 @@ def check_arguments(function: Callable[Arguments, Returned]) -> Callable[Argumen
     KeyError for an annotation that is no kind of argument."""
     parameters = signature(function)
     kinds = {
-        name: {part: _KINDS[part] for part in _alternatives(str(parameter.annotation))}
+        name: {part: KINDS[part] for part in alternatives(str(parameter.annotation))}
         for name, parameter in parameters.parameters.items()
         if parameter.kind is not parameter.VAR_KEYWORD
     }
@@ -206,7 +262,7 @@ def _check(name: str, value: Any, kinds: Mapping[str, ArgumentKind], sets: bool)
     if kinds and not any(kind.holds(value) for kind in kinds.values()):
         words = " or ".join(dict.fromkeys(kind.words for kind in kinds.values() if kind.words))
         key = "set" if sets and isinstance(value, Mapping) else name
-        named = [_KINDS["Changes"]] if key == "set" else kinds.values()
+        named = [KINDS["Changes"]] if key == "set" else kinds.values()
         example = next((kind.example for kind in named if kind.example), "")
         raise InputError(name, quoted(value), words, f"{key}={example}" if example else "")
     if _PATH_KINDS & {*kinds}:

@@ -3,103 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from friso.axis import AxisKind
 from friso.engine.arrays import Status
-from friso.engine.batch import Runs, run_chunks
+from friso.engine.batch import run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import Structure, decisive_keys, structure
 from friso.hunting import Motions, StageAttractors, find_attractors, judge_runs, sketch_attractors
-from friso.hunting.criteria import (
-    BAND,
-    DISTINCT_CRITERION,
-    FAILED,
-    OUTCOME_CRITERION,
-    PEAK_CRITERION,
-    VERDICT_CRITERION,
-)
-from friso.hunting.measures import BANDS, Measures, measure_runs, measuring_options
+from friso.hunting.criteria import FAILED
+from friso.hunting.measures import measure_runs, measuring_options
 from friso.stage import Stage, violations
 from friso.studies.links import linked
+from friso.studies.metric import (
+    STATUS,
+    Metric,
+    MetricBasis,
+    RunEvidence,
+    StageEvidence,
+    in_order,
+    is_text,
+    metrics,
+    usual_metrics,
+    worded,
+)
 from friso.studies.scalings import scaled
 
 Columns = dict[str, np.ndarray]
 """Names to arrays of shape (cells,)."""
 
-RUN_UNITS = {
-    "peaks": "1",
-    "distinct_peaks": "1",
-    "peak_to_peak": "m",
-    "period": "s",
-    "settling_time": "s",
-    "settling_time_10um": "s",
-    "largest_force": "N",
-    "steps": "1",
-    "rejected": "1",
-}
-"""The numeric measures of a cell's run and their units."""
-
-CYCLE_UNITS = {"multiplier": "1", "amplitude": "m", "cycle_period": "s"}
-"""Those of what attracts its stage, which are computed if asked for: of the largest swing where several are found; NaN
-where nothing attracts, the multiplier also where no orbit could be closed."""
-
-UNITS = RUN_UNITS | CYCLE_UNITS
-"""All numeric measures and their units."""
-
-CYCLE, SWING, NOTHING, UNKNOWN = "cycle", "swing", "nothing", "unknown"
-"""What attracts a stage: a cycle that was closed as an orbit; a swing that simulations do not leave, of which no orbit
-could be closed; nothing; or it is not certain, because simulations failed or had not settled when they were stopped, or
-because something may attract beyond them."""
-
-SKETCH = "sketch"
-"""The verdict on a stage by a sketch of what attracts it (see `friso.hunting.sketch_attractors`)."""
-
-WORDS = {"outcome": "<U9", "verdict": "<U9", SKETCH: "<U9", "attractor": "<U9", "status": "<U160"}
-"""The measures that are words, and how they are stored; a status longer than that is cut."""
-
-ALWAYS = ("outcome", "status")
-"""The words of every cell; the verdict and what attracts are found if asked for."""
-
-USUAL = (*RUN_UNITS, *ALWAYS)
-"""What is known of every cell."""
-
-BY_ATTRACTORS = (*CYCLE_UNITS, "attractor", "verdict")
-"""What needs a survey of what attracts, and is computed if asked for."""
-
-VERDICTS = ("verdict", SKETCH)
-"""The measures that are verdicts on the stage."""
-
-METRICS = (*RUN_UNITS, *CYCLE_UNITS, *WORDS)
-"""Everything that may be known of a cell."""
-
-OF_ATTRACTORS = (
-    "what attracts the stage, by a survey of simulations from many starts: of several swings that attract the largest "
-    "that was found"
-)
-
-CRITERIA = {
-    "outcome": OUTCOME_CRITERION,
-    "verdict": VERDICT_CRITERION,
-    SKETCH: f"sketch of the {VERDICT_CRITERION}: what attracts from a narrow range of distances may be missed",
-    **dict.fromkeys(("attractor", *CYCLE_UNITS), OF_ATTRACTORS),
-    "peaks": PEAK_CRITERION,
-    "distinct_peaks": DISTINCT_CRITERION,
-}
-"""By which criterion (`friso.hunting.criteria`) a measure says what hunts."""
-
 INFERRED = "inferred"
 """How the status of a cell begins that was not run, but lies among cells that agree."""
 
 
-def attributes_of(metric: str, kind: AxisKind) -> dict[str, Any]:
-    """The attributes of the variable of a metric, of stages with that kind of axis."""
-    attributes: dict[str, Any] = {"units": kind.unit(UNITS[metric])} if metric in UNITS else {}
-    bands = {"settling_time": BANDS[0], "settling_time_10um": BANDS[1], "outcome": BAND}
-    attributes |= {kind.suffix("band_m"): bands[metric]} if metric in bands else {}
-    return attributes | ({"criterion": kind.text(CRITERIA[metric])} if metric in CRITERIA else {})
+SURVEYS: Mapping[MetricBasis, Callable[..., StageAttractors]] = {"sketch": sketch_attractors, "survey": find_attractors}
+"""How what attracts a stage is looked for, by the source of a metric."""
 
 
 def run_cells(
@@ -107,35 +47,34 @@ def run_cells(
     links: Mapping[str, str],
     columns: Mapping[str, np.ndarray],
     rtol: float,
-    metrics: Sequence[str] = USUAL,
+    names: Sequence[str] = (),
     threads: int | None = 1,
     cancel: np.ndarray | None = None,
 ) -> Columns:
     """Run one stage per entry of the columns: axis names to SI values, words or booleans, each of shape (cells,).
 
-    The result holds `USUAL`, and of `BY_ATTRACTORS` and `SKETCH` what is among the metrics, each of shape (cells,). A
-    cell that no stage may have has the outcome (and the verdicts) "invalid" and the reason in its status; one that a
-    run did not complete for has "failed". Setting cancel[0] from another thread ends the work early: cells not run by
-    then keep the outcome "".
+    The result holds the usual metrics of a run, and those named (`friso.studies.metric`), each of shape (cells,). A
+    cell that no stage may have has the word "invalid" and the reason in its status; one that a run did not complete for
+    has the outcome "failed". Setting cancel[0] from another thread ends the work early: cells not run by then keep the
+    outcome "".
     """
-    more = (name for name in (*BY_ATTRACTORS, SKETCH) if name in metrics)
-    table = _Table(len(next(iter(columns.values()))), (*USUAL, *more))
+    table = _Table(len(next(iter(columns.values()))), in_order((*usual_metrics(), *names)))
     parts = list(by_words(stage, links, columns))
     for flat, cells in parts:
         table.invalidate(cells, flat)
     for flat, cells, shape in by_equations(parts, table.valid):
         for runs in run_chunks(kernel(shape), flat, len(cells), measuring_options(rtol, threads, cancel)):
-            table.write(cells[runs.numbers], measure_runs(runs.part(flat), runs), runs)
-    if SKETCH in metrics:
-        for flat, cells, attracted in cell_attractors(parts, table.ran, sketch_attractors, threads, cancel):
-            words = judge_runs(flat, table.motions(cells), attracted, rtol, threads, cancel)
-            table.columns[SKETCH][cells] = words
-    if any(name in metrics for name in BY_ATTRACTORS):
-        for flat, cells, attracted in cell_attractors(parts, table.ran, find_attractors, threads, cancel):
-            table.write_attractors(cells, attracted)
-            if "verdict" in metrics:
-                words = judge_runs(flat, table.motions(cells), attracted, rtol, threads, cancel)
-                table.columns["verdict"][cells] = words
+            part = runs.part(flat)
+            table.write_runs(cells[runs.numbers], RunEvidence(part, runs, measure_runs(part, runs)))
+    for source, find in SURVEYS.items():
+        if not table.of(source):
+            continue
+        for flat, cells, attracted in cell_attractors(parts, table.ran, find, threads, cancel):
+            motions = table.motions(cells)
+            verdicts = partial(judge_runs, flat, motions, attracted, rtol, threads, cancel)
+            evidence = StageEvidence(flat, attracted, motions, verdicts)
+            for name, metric in table.of(source).items():
+                table.columns[name][cells] = metric.compute(evidence)
     return table.columns
 
 
@@ -178,7 +117,7 @@ def _once(
 
 def allowed_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Which cells a stage may have, shape (cells,)."""
-    table = _Table(len(next(iter(columns.values()))), ALWAYS)
+    table = _Table(len(next(iter(columns.values()))), ("outcome", STATUS))
     for flat, cells in by_words(stage, links, columns):
         table.invalidate(cells, flat)
     return table.valid
@@ -235,30 +174,30 @@ def _by_structure(flat: Mapping[str, Any], valid: np.ndarray, count: int) -> Ite
         yield shape, np.sort(np.concatenate(members))
 
 
-_SAME = ("peaks", "distinct_peaks", "peak_to_peak", "period", "outcome", "largest_force", "steps", "rejected")
-"""Measures that `Measures` has under the same name."""
-
 _STATUS = np.array([status.text for status in Status], dtype=object)
 
 
 class _Table:
-    """The growing measures, one entry per cell; and when each run has settled within 10 um for good, wherever it is
-    then, `settled` [s], shape (count,)."""
+    """The growing variables of a study, one entry per cell; and when each run has settled within 10 um for good,
+    wherever it is then, `settled` [s], shape (count,)."""
 
     def __init__(self, count: int, names: Iterable[str]) -> None:
-        self.count, self.settled = count, np.full(count, np.nan)
-        self.columns: Columns = {
-            name: np.full(count, "", dtype=object) if name in WORDS else np.full(count, np.nan) for name in names
-        }
+        self.count, self.settled, every = count, np.full(count, np.nan), metrics()
+        self.columns = {name: unfilled(name, count) for name in names}
+        self.metrics = {name: every[name] for name in self.columns if name in every}
+
+    def of(self, source: MetricBasis) -> dict[str, Metric]:
+        """Return the metrics that are computed from this source."""
+        return {name: metric for name, metric in self.metrics.items() if metric.source == source}
 
     def invalidate(self, cells: np.ndarray, flat: Mapping[str, Any]) -> None:
         """Mark the cells that no stage may have, each with the first reason found."""
         for broken, why in violations(flat):
             which = cells[np.broadcast_to(broken, cells.shape) & self.valid[cells]]
-            for name in ("outcome", *VERDICTS):
+            for name in worded():
                 if name in self.columns:
                     self.columns[name][which] = "invalid"
-            self.columns["status"][which] = f"invalid: {why}"
+            self.columns[STATUS][which] = f"invalid: {why}"
 
     @property
     def valid(self) -> np.ndarray:
@@ -273,31 +212,18 @@ class _Table:
     def motions(self, cells: np.ndarray) -> Motions:
         """How the motions of the cells went."""
         peaks, swing = (self.columns[name][cells] for name in ("peaks", "peak_to_peak"))
-        away = self.columns["status"][cells] == Status.DIVERGED.text
+        away = self.columns[STATUS][cells] == Status.DIVERGED.text
         return Motions(self.columns["outcome"][cells] != FAILED, away, peaks, swing, self.settled[cells])
 
-    def write(self, which: np.ndarray, measures: Measures, runs: Runs) -> None:
-        """Write the measures of the cells that were run."""
-        ran = runs.results.statuses != Status.NOT_RUN
-        inner, outer = measures.settling_time
-        written = {
-            "settling_time": inner,
-            "settling_time_10um": outer,
-            "status": _STATUS[measures.status],
-        } | {name: getattr(measures, name) for name in _SAME}
-        for name, column in written.items():
-            self.columns[name][which[ran]] = column[ran]
-        self.settled[which[ran]] = measures.in_the_end[1][ran]
+    def write_runs(self, cells: np.ndarray, evidence: RunEvidence) -> None:
+        """Write the status and the metrics of those of the cells that were run before the work was cancelled."""
+        measures, ran = evidence.measures, evidence.runs.results.statuses != Status.NOT_RUN
+        columns = {name: metric.compute(evidence) for name, metric in self.of("run").items()}
+        for name, column in (columns | {STATUS: _STATUS[measures.status]}).items():
+            self.columns[name][cells[ran]] = column[ran]
+        self.settled[cells[ran]] = measures.in_the_end[1][ran]
 
-    def write_attractors(self, cells: np.ndarray, attracted: StageAttractors) -> None:
-        """Write those measures of what attracts the cells' stages that the table has: of the largest swing of each, as
-        far as that is certain."""
-        kind = np.where(attracted.attracts, np.where(attracted.closed, CYCLE, SWING), NOTHING)
-        columns = {"attractor": np.where(attracted.certain, kind, UNKNOWN).astype(object)}
-        swing = attracted.multiplier, attracted.amplitude, attracted.period
-        columns |= {
-            name: np.where(attracted.certain, column, np.nan) for name, column in zip(CYCLE_UNITS, swing, strict=True)
-        }
-        for name, column in columns.items():
-            if name in self.columns:
-                self.columns[name][cells] = column
+
+def unfilled(variable: str, shape: int | tuple[int, ...]) -> np.ndarray:
+    """Return an array for a variable of a study before any cell was run: of empty texts, or of NaN."""
+    return np.full(shape, "", dtype=object) if is_text(variable) else np.full(shape, np.nan)

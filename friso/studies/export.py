@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.escapes import table_cell
-from friso.studies.cells import WORDS
+from friso.studies.metric import every_variable, is_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,9 +23,9 @@ def export(runs: xr.Dataset, path: Path) -> None:
     Columns of a CSV file are named with their units.
     """
     if path.suffix == ".nc":
-        runs.assign(
-            {name: runs[name].copy(data=_bytes(runs[name].values)) for name in WORDS if name in runs}
-        ).to_netcdf(path, engine="scipy")
+        texts = [name for name in every_variable() if name in runs and is_text(name)]
+        converted = {name: runs[name].copy(data=_bytes(runs[name].values)) for name in texts}
+        runs.assign(converted).to_netcdf(path, engine="scipy")
     elif path.suffix == ".csv":
         _write_csv(runs, path)
     else:

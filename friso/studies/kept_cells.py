@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from friso.platform.system import remove_folder
-from friso.studies.cells import WORDS, Columns
+from friso.studies.cells import Columns
+from friso.studies.metric import form_of
 from friso.studies.refine import Ask, asked_for
 from friso.studies.store_files import keep_arrays, kept_arrays
 from friso.studies.study import Study
@@ -31,7 +32,7 @@ class KeptCells:
             if (kept := self._kept(file, cells)) is not None:
                 return kept
             columns = ask(cells)
-            arrays = {name: columns[name].astype(WORDS.get(name, "f8")) for name in self.metrics}
+            arrays = {name: columns[name].astype(form_of(name)) for name in self.metrics}
             keep_arrays(file, {"cells": cells, **arrays}, self.digest)
             return columns
 
@@ -43,7 +44,7 @@ class KeptCells:
 
     def _kept(self, file: Path, cells: np.ndarray) -> Columns | None:
         """What was kept about just these cells, None if nothing."""
-        forms = {name: np.dtype(WORDS.get(name, "f8")) for name in self.metrics}
+        forms = {name: np.dtype(form_of(name)) for name in self.metrics}
         most = cells.nbytes + cells.size * sum(form.itemsize for form in forms.values()) + 1024 * (2 + len(forms))
         columns = kept_arrays(file, self.digest, most)
         if columns is None or not np.array_equal(columns.pop("cells", ()), cells):

@@ -23,7 +23,7 @@ from typing import Any
 from friso.errors import StoreError
 from friso.escapes import one_line
 from friso.platform.system import cause_of
-from friso.studies.cells import METRICS
+from friso.studies.metric import every_variable
 from friso.studies.store_files import digest_of, put, stored
 
 logger = logging.getLogger("friso")
@@ -213,7 +213,7 @@ def _are_of_a_store(files: Mapping[str, Any], axes: Mapping[str, Any]) -> bool:
         chunks = Counter(file.rpartition("/")[0] for file in axes)
         lengths = {name: arrays[name]["shape"][0] for name in indices}
         return (
-            arrays.keys() <= {*METRICS, *chunks}
+            arrays.keys() <= {*every_variable(), *chunks}
             and all(_is_plain(array) for array in arrays.values())
             and all(
                 array["shape"] == [lengths[dimension] for dimension in files[f"{name}/.zattrs"]["_ARRAY_DIMENSIONS"]]

@@ -19,7 +19,8 @@ import numpy as np
 from friso.errors import InputError
 from friso.hunting.criteria import SWINGS
 from friso.studies.axes import SweptAxis
-from friso.studies.cells import INFERRED, METRICS, UNITS, USUAL, VERDICTS, Columns
+from friso.studies.cells import INFERRED, Columns, unfilled
+from friso.studies.metric import in_order, usual_metrics, worded
 from friso.studies.samples import SAMPLE
 from friso.studies.study import Dimension, Study
 
@@ -68,7 +69,7 @@ def _finer(axis: SweptAxis) -> SweptAxis:
 
 def asked_for(study: Study) -> Study:
     """The study of what is asked about cells: refining it takes what is usually known of them."""
-    return replace(study, metrics=tuple(name for name in METRICS if name in (*USUAL, *study.metrics)))
+    return replace(study, metrics=in_order((*usual_metrics(), *study.metrics)))
 
 
 def refine_cells(study: Study, ask: Ask) -> Columns:
@@ -104,7 +105,7 @@ class _Grid:
         coarse = math.prod(size // FINER + 1 for size in study.shape)
         self.budget = max(int(SHARE * study.cells), min(3 * coarse // 2, study.cells))
         self.columns: Columns = {}
-        self.words = tuple(name for name in ("outcome", *VERDICTS) if name in study.metrics)
+        self.words = tuple(name for name in worded(verdicts=True) if name in study.metrics)
         self.computed = np.zeros(study.shape, bool)
         self.runs = 0
 
@@ -112,10 +113,7 @@ class _Grid:
         """Ask for cells; those that no stage may have cost no run."""
         columns = ask(cells)
         for name in columns:
-            empty = (
-                np.full(self.computed.size, np.nan) if name in UNITS else np.full(self.computed.size, "", dtype=object)
-            )
-            self.columns.setdefault(name, empty)[cells] = columns[name]
+            self.columns.setdefault(name, unfilled(name, self.computed.size))[cells] = columns[name]
         self.computed.flat[cells] = True
         self.runs += int(np.sum(columns["outcome"] != "invalid"))
 

@@ -13,7 +13,7 @@ from friso.errors import InputError
 from friso.stage import Stage
 from friso.studies import links as linking
 from friso.studies.axes import AxisValues, SweptAxis, SweptRange, read_axes
-from friso.studies.cells import ALWAYS, CYCLE_UNITS, METRICS, USUAL
+from friso.studies.metric import every_variable, in_order, usual_metrics
 from friso.studies.samples import SAMPLE, Samples, sample_axes
 from friso.studies.study import Dimension, Study
 
@@ -49,7 +49,7 @@ class Request:
                 axes.append(SweptAxis(axis.name, axis.at(rng.random(TRIED)), axis.unit, axis.scale))
             else:
                 axes.append(replace(axis, values=rng.choice(axis.values, TRIED)))
-        return Study(self.stage, (Dimension(SAMPLE, tuple(axes)),), dict(self.links), USUAL, 1e-6)
+        return Study(self.stage, (Dimension(SAMPLE, tuple(axes)),), dict(self.links), usual_metrics(), 1e-6)
 
     def study(self, metrics: Sequence[str] | None = None, rtol: float = 1e-6) -> Study:
         """The study. Raises InputError."""
@@ -64,7 +64,7 @@ class Request:
             dimensions.append(Dimension(SAMPLE, sample_axes(self.stage, self.samples, free, self.log)))
         names = [axis.name for dimension in dimensions for axis in dimension.axes]
         for name in names:
-            if names.count(name) > 1 or name in (*METRICS, SAMPLE):
+            if names.count(name) > 1 or name in (*every_variable(), SAMPLE):
                 raise InputError(name, "a name that is taken", "each axis once, each under a different name")
         linking.check_links(self.stage, self.links, frozenset(names))
         return Study(self.stage, tuple(dimensions), dict(self.links), _checked_metrics(metrics), rtol)
@@ -88,12 +88,9 @@ def _gridded(axis: SweptAxis | SweptRange) -> SweptAxis:
     return axis.axis()
 
 
-def _checked_metrics(metrics: Sequence[str] | None) -> tuple[str, ...]:
-    """The metrics asked for, with outcome and status, in their usual order; with measures of what attracts comes what
-    that is."""
-    for name in metrics or ():
-        if name not in METRICS:
-            raise InputError("metrics", name, f"some of {', '.join(METRICS)}", '["peaks", "period"]')
-    requested = [*(metrics or USUAL)]
-    requested += ["attractor"] if any(name in CYCLE_UNITS for name in requested) else []
-    return tuple(name for name in METRICS if name in requested or name in ALWAYS)
+def _checked_metrics(names: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the variables asked for, the usual ones by default, in their usual order. Raises InputError."""
+    for name in names or ():
+        if name not in every_variable():
+            raise InputError("metrics", name, f"some of {', '.join(every_variable())}", '["peaks", "period"]')
+    return in_order(names or usual_metrics())

@@ -12,9 +12,9 @@ from zarr.storage import LocalStore, WrapperStore
 
 from friso.errors import StoreError
 from friso.platform.system import cause_of, shell_word
-from friso.studies.cells import METRICS
 from friso.studies.ledger import Ledger
 from friso.studies.metadata import Metadata
+from friso.studies.metric import every_variable
 
 if TYPE_CHECKING:
     from zarr.abc.buffer import Buffer
@@ -29,7 +29,7 @@ class SealedStore(WrapperStore[LocalStore]):
     def __init__(self, store: LocalStore, metadata: Metadata) -> None:
         super().__init__(store)
         self.metadata, self.files = metadata, metadata.all_files
-        self.ledger = Ledger(store.root, metadata.study, METRICS)
+        self.ledger = Ledger(store.root, metadata.study, every_variable())
 
     @classmethod
     def at(cls, path: Path, metadata: Metadata) -> SealedStore:
@@ -47,7 +47,7 @@ class SealedStore(WrapperStore[LocalStore]):
         if key in self.files:
             return prototype.buffer.from_bytes(json.dumps(self.files[key]).encode())
         variable, _, number = key.partition("/")
-        if variable not in METRICS or not re.fullmatch(r"[0-9.]+", number):
+        if variable not in self.ledger.metrics or not re.fullmatch(r"[0-9.]+", number):
             return await super().get(key, prototype, byte_range)
         try:
             digest = self.ledger.digest(number, variable)

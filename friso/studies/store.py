@@ -27,10 +27,10 @@ from friso.errors import StoreError
 from friso.escapes import one_line
 from friso.platform.system import cause_of, once_free, path_of
 from friso.stage.arguments import check_arguments
-from friso.studies.cells import UNITS, WORDS, attributes_of
 from friso.studies.kept_cells import KeptCells
 from friso.studies.ledger import Ledger
 from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
+from friso.studies.metric import attributes_of, every_variable, form_of, is_text
 from friso.studies.store_files import ANSWERS, refuse_foreign
 from friso.studies.store_folder import (
     exchange,
@@ -116,7 +116,7 @@ class Store:
         study, coordinates = self.study, self.study.coordinates()
         # Arrays of a single empty cell, which is not written, are then given their size: none of it is ever computed.
         cells = {
-            name: np.full((1,) * len(study.names), "" if name in WORDS else np.nan, WORDS.get(name, "f8"))
+            name: np.full((1,) * len(study.names), "" if is_text(name) else np.nan, form_of(name))
             for name in study.metrics
         }
         variables = {
@@ -124,9 +124,8 @@ class Store:
         }
         checked = {"filters": [CRC32()]}  # for whoever reads a part of it
         encoding: dict[str, dict[str, Any]] = {name: {"chunks": self.blocks, **checked} for name in study.metrics}
-        for name in UNITS:
-            if name in encoding:
-                encoding[name]["_FillValue"] = np.nan
+        for name in encoding:
+            encoding[name] |= {} if is_text(name) else {"_FillValue": np.nan}
         own: dict[str, dict[str, Any]] = dict.fromkeys(coordinates, checked)
         beside = " ".join(name for name, (dimension, *_) in coordinates.items() if name != dimension)
         attributes = study.attributes() | ({COORDINATES: beside} if beside else {})
@@ -220,7 +219,7 @@ class Store:
         with zarr.config.set({"array.write_empty_chunks": True}):
             group: Any = zarr.open_group(self.path, mode="r+", zarr_format=_FORMAT, use_consolidated=True)
             for name in self.study.metrics:
-                values = columns[name].astype(WORDS.get(name, "f8")).reshape(shape)
+                values = columns[name].astype(form_of(name)).reshape(shape)
                 once_free(partial(group[name].__setitem__, block, values))
         self.ledger.enter(self._number(block))
 
@@ -318,7 +317,7 @@ def holds_all(path: Path, study: Study) -> bool:
 
 def in_memory(runs: xr.Dataset) -> xr.Dataset:
     """The study of an opened store in memory, each text once: as stored, a status takes a hundred times the room."""
-    words = [name for name in WORDS if name in runs]
+    words = [name for name in every_variable() if name in runs and is_text(name)]
     loaded = runs.drop_vars(words).load()
     return loaded.assign({name: (runs[name].dims, _shared(runs[name]), runs[name].attrs) for name in words})
 

@@ -16,8 +16,9 @@ from friso.engine.cache import code_digest, machine
 from friso.engine.tolerance import checked_rtol
 from friso.stage import Stage, loads
 from friso.studies.axes import SweptAxis
-from friso.studies.cells import BY_ATTRACTORS, METRICS, flat_cells
+from friso.studies.cells import flat_cells
 from friso.studies.links import names as linked_names
+from friso.studies.metric import every_variable, metrics
 from friso.studies.samples import SAMPLE
 from friso.studies.scalings import SCALINGS
 from friso.version import VERSION
@@ -62,7 +63,8 @@ class Study:
     @property
     def cycles(self) -> bool:
         """Whether anything is wanted that needs a survey of what attracts."""
-        return any(name in self.metrics for name in BY_ATTRACTORS)
+        every = metrics()
+        return any(name in every and every[name].source == "survey" for name in self.metrics)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -189,10 +191,11 @@ def cells_of(block: CellBlock) -> int:
     return math.prod(part.stop - part.start for part in block)
 
 
-_STUDIES = tuple(
-    f"studies/{name}.py" for name in ("axes", "cells", "links", "refine", "request", "samples", "scalings")
+_STUDIES = ("axes", "cells", "links", "metric", "refine", "request", "samples", "scalings")
+_DECISIVE = (
+    *("quantities.py", "stage", "equations", "engine", "hunting", "studies/metrics"),
+    *(f"studies/{name}.py" for name in _STUDIES),
 )
-_DECISIVE = ("quantities.py", "stage", "equations", "engine", "hunting", *_STUDIES)
 """Parts of the package that decide on the numbers of a cell, or on which cells a refined study runs."""
 
 
@@ -208,9 +211,9 @@ def study_of(runs: xr.Dataset) -> Study:
         axes = tuple(_stored_axis(runs[axis]) for axis in order if runs[axis].dims == (name,))
         dimensions.append(Dimension(str(name), axes))
     stage = loads(runs.attrs["stage"])
-    metrics = tuple(name for name in METRICS if name in runs)
+    names = tuple(name for name in every_variable() if name in runs)
     links, rtol = dict(json.loads(runs.attrs["links"])), checked_rtol(float(runs.attrs["rtol"]))
-    return Study(stage, tuple(dimensions), links, metrics, rtol, bool(runs.attrs["refined"]))
+    return Study(stage, tuple(dimensions), links, names, rtol, bool(runs.attrs["refined"]))
 
 
 def _stored_axis(coordinate: xr.DataArray) -> SweptAxis:

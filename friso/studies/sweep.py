@@ -12,8 +12,9 @@ import numpy as np
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
 from friso.studies.axes import AxisValues
-from friso.studies.cells import WORDS, Columns, attributes_of
+from friso.studies.cells import Columns, unfilled
 from friso.studies.execute import Crew, local_crew, run_scattered
+from friso.studies.metric import attributes_of
 from friso.studies.refine import Ask, asked_for, finer, refine_cells
 from friso.studies.request import Request
 from friso.studies.samples import Samples
@@ -80,7 +81,9 @@ def run_in_memory(
     """Run studies side by side (refined ones one by one), verify a share of each; their results as datasets."""
     tally = Tally(progress, sum(study.cells for study in studies))
     refined = {id(study): _refined(study, crew, tally) for study in studies if study.refined}
-    columns = [refined.get(id(study)) or _room(study) for study in studies]
+    columns = [
+        refined.get(id(study)) or {name: unfilled(name, study.shape) for name in study.metrics} for study in studies
+    ]
     number = {id(study): k for k, study in enumerate(studies)}
     for study, block, columns_of_block in crew.compute(crew.jobs([study for study in studies if not study.refined])):
         for name in study.metrics:
@@ -91,13 +94,6 @@ def run_in_memory(
     for study, runs in zip(studies, results, strict=True):
         runs.attrs |= verify_cells(study, runs, crew, verify)
     return results
-
-
-def _room(study: Study) -> Columns:
-    return {
-        name: np.full(study.shape, "", dtype=object) if name in WORDS else np.full(study.shape, np.nan)
-        for name in study.metrics
-    }
 
 
 def run_in_store(study: Study, path: Path, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:

@@ -11,8 +11,9 @@ import numpy as np
 
 from friso.engine.tolerance import TIGHTEST, checked_rtol
 from friso.errors import InputError
-from friso.studies.cells import ALWAYS, INFERRED, allowed_cells
+from friso.studies.cells import INFERRED, allowed_cells
 from friso.studies.execute import Crew, run_scattered
+from friso.studies.metric import in_order
 from friso.studies.study import Study
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> di
     ):  # there is no tolerance to check it with
         return {}
     count, rtol = max(LEAST, round(share * study.cells)), max(study.rtol / TIGHTER, TIGHTEST)
-    tighter = replace(study, rtol=rtol, metrics=ALWAYS)
+    tighter = replace(study, rtol=rtol, metrics=in_order(()))
 
     def same(kind: str) -> tuple[int, int]:
         picked = random_cells(study, count, lambda cells: _kinds(runs, study, cells) == kind)
@@ -93,7 +94,7 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
 
     def at(rtol: float) -> np.ndarray:
         if rtol not in outcomes:
-            outcomes[rtol] = run_scattered(replace(study, rtol=rtol, metrics=ALWAYS), picked, crew)["outcome"]
+            outcomes[rtol] = run_scattered(replace(study, rtol=rtol, metrics=in_order(())), picked, crew)["outcome"]
         return outcomes[rtol]
 
     shares: dict[float, float] = {}

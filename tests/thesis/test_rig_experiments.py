@@ -10,7 +10,8 @@ from refusals import Refused
 from friso import load
 from friso.progress import silent
 from friso.questions.rig.document import rig_document
-from friso.questions.rig.page import figures, sentences
+from friso.questions.rig.figures import rig_figures
+from friso.questions.rig.words import sentences
 from friso.studies.rig.moves_on_rails import rails, with_joint
 from friso_thesis.studies.rig import in_position, measured_cycles, stroke_crossover
 
@@ -32,7 +33,7 @@ def test_the_stroke_of_a_free_joint_matters() -> None:
     assert outcome.result.share[1, 1] == 0
     assert outcome.result.share[0].max() > 0
     assert all(sentences(outcome))
-    assert figures(outcome)
+    assert rig_figures(outcome)
     assert rig_document(outcome)["results"]
 
 

@@ -50,7 +50,7 @@ export class Pictures {
   }
 
   bar() {
-    const there = this.machine ? this.tabs.filter((tab) => !tab.when || tab.when()) : [];
+    const there = this.machine ? [...this.tabs.filter((tab) => !tab.when || tab.when()), ...this.machine.others] : [];
     if (this.machine && !there.some((tab) => tab.id === this.shown)) this.show("run");
     const buttons = there.map(({ id, label }) =>
       el("button", { type: "button", role: "tab", id: `tab-${id}`, "aria-selected": String(id === this.shown), "aria-controls": "picture", onclick: () => this.show(id) }, label),

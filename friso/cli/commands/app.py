@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from friso.cli.command import HUNTS, Command
+from friso.cli.command import Command
+from friso.interface.question import HUNTS
 
 BeginArgument = Annotated[Path | None, typer.Argument(metavar="STAGE.toml", help="The stage file to start with.")]
 Host = Annotated[

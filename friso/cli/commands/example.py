@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from friso.cli.command import HELP, Choices, Command
+from friso.cli.command import Command
 from friso.cli.output import Replace
+from friso.interface.question import HELP, Choices
 
 
 def example(
@@ -25,7 +26,7 @@ def example(
     Example: friso example thesis_rig
     """
     from friso.interface.output_folder import write_file
-    from friso.questions.init.starting import example as example_path
+    from friso.interface.starting import example as example_path
 
     if name is None:
         for listed, title in listed_examples():
@@ -41,8 +42,8 @@ def listed_examples() -> list[tuple[str, str]]:
     """The examples, each by the name of its stage, or by what it is for."""
     import tomllib
 
-    from friso.questions.init.starting import example as example_path
-    from friso.questions.init.starting import example_names
+    from friso.interface.starting import example as example_path
+    from friso.interface.starting import example_names
 
     paths = {name: example_path(name) for name in example_names()}
     return [

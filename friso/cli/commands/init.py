@@ -8,9 +8,10 @@ from typing import Annotated
 import typer
 
 from friso.cli.asking import named_as_options
-from friso.cli.command import MACHINE, Command
+from friso.cli.command import Command
 from friso.cli.common import Overrides
 from friso.cli.output import Replace
+from friso.interface.question import MACHINE
 from friso.platform.system import shell_word
 
 SourceArgument = Annotated[
@@ -45,7 +46,7 @@ def init(
 
     Example: friso init my_stage.toml
     """
-    from friso.questions.init.starting import init as write_start
+    from friso.interface.starting import init as write_start
 
     options = {"spec": spec_of, "from_": source, "axis": axis, "set": overrides}
     with named_as_options(options):

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from friso.cli.asking import named_as_options
-from friso.cli.command import HELP, Command
+from friso.cli.command import Command
+from friso.interface.question import HELP
 
 
 def schema(
@@ -20,7 +21,7 @@ def schema(
 
     Example: friso schema > stage.schema.json
     """
-    from friso.questions.init.starting import schema as schema_of
+    from friso.interface.starting import schema as schema_of
 
     with named_as_options({"of": of}):
         print(json.dumps(schema_of(of), indent=2, ensure_ascii=False))

@@ -15,8 +15,9 @@ from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, S
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import by_direction
 from friso.identification.readings.course import Course
-from friso.identification.readings.ramps import FEW_RAMPS, Ramps, force_ramps
-from friso.identification.readings.rate_effect import BRISTLE_RATE, static_friction
+from friso.identification.readings.ramps import Ramps, force_ramps
+from friso.identification.readings.rate_effect import static_friction
+from friso.identification.readings.settings import ReadingSettings
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class BreakAway:
     warnings: tuple[str, ...]
 
 
-def static_from_ramps(log: Log, mass: float = 0.0, bristle_rate: float = BRISTLE_RATE) -> BreakAway:
+def static_from_ramps(log: Log, mass: float = 0.0) -> BreakAway:
     """Static friction of the break-away forces of the ramps in a log; see `rate_effect`.
 
     Without the `mass` [kg] that moves, the interval allows for the inertia of the heaviest mass that can have moved so
@@ -42,7 +43,7 @@ def static_from_ramps(log: Log, mass: float = 0.0, bristle_rate: float = BRISTLE
     def static(chosen: np.ndarray) -> Estimate:
         off, high = (float(part[chosen].mean()) if chosen.any() else 0.0 for part in (ramps.unsure, ramps.late))
         force, rate = ramps.forces[chosen], ramps.rates[chosen]
-        estimate = static_friction("friction.static", force, rate, bristle_rate, late=high)
+        estimate = static_friction("friction.static", force, rate, late=high)
         ends = {"low": max(estimate.low - off, 0.0), "high": estimate.high + off}
         estimate = replace(estimate, **ends, systematic=estimate.systematic + off)
         return (
@@ -61,8 +62,13 @@ def static_from_ramps(log: Log, mass: float = 0.0, bristle_rate: float = BRISTLE
 def _claims_together(courses: Sequence[Course]) -> str | None:
     """Enough ramps of the force in all, and some in each log."""
     ramps = [course.ramps for course in courses]
-    enough = all(ramps) and sum(ramps) >= FEW_RAMPS
+    enough = all(ramps) and sum(ramps) >= ReadingSettings.current().fewest_ramps
     return f"the force rises evenly from none {sum(ramps)} times until the position moves off" if enough else None
+
+
+def _partial(log: Log) -> bool:
+    """Tell whether a log holds too few ramps for static friction of its own."""
+    return len(static_from_ramps(log).ramps.times) < ReadingSettings.current().fewest_ramps
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> BreakAway:
@@ -77,7 +83,7 @@ KIND = ExperimentKind[BreakAway](
     after=("frequency", "moves"),
     foreign=("force",),
     per_unit=True,
-    partial=lambda log: len(static_from_ramps(log).ramps.times) < FEW_RAMPS,
+    partial=_partial,
     claims=lambda course: _claims_together([course]),
     claims_together=_claims_together,
 )

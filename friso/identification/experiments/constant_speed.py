@@ -15,8 +15,9 @@ from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import EXPONENT
 from friso.identification.readings.course import Course
 from friso.identification.readings.friction_position import FrictionPosition, friction_position
-from friso.identification.readings.friction_velocity import STRAIGHT, FrictionVelocity, distinct, friction_velocity
+from friso.identification.readings.friction_velocity import FrictionVelocity, distinct, friction_velocity
 from friso.identification.readings.passes import passes
+from friso.identification.readings.settings import ReadingSettings
 from friso.stage import Stage
 
 
@@ -67,16 +68,17 @@ def _correlated(result: FrictionAtSpeeds, estimates: Sequence[Estimate]) -> Corr
 def _partial(log: Log) -> bool:
     """Whether a log holds too few speeds for a curve of friction over speed."""
     steady = [abs(stretch.velocity) for stretch in passes(log) if stretch.steady]
-    return not steady or distinct(np.array(steady)) < STRAIGHT
+    return not steady or distinct(np.array(steady)) < ReadingSettings.current().speeds_of_a_line
 
 
 def _claims_together(courses: Sequence[Course]) -> str | None:
     """Constant speeds, most of the way of each log, and enough of them for a curve of friction over speed. At the
     slowest speeds a body may stick and slip: a log that goes one way is one of theirs all the same."""
+    settings = ReadingSettings.current()
     speeds = [course.speeds for course in courses]
     fitting = all(len(of_one) or course.one_way for of_one, course in zip(speeds, courses, strict=True))
     count = distinct(np.concatenate(speeds)) if fitting and any(map(len, speeds)) else 0
-    return f"most of the way goes at one of {count} constant speeds" if count >= STRAIGHT else None
+    return f"most of the way goes at one of {count} constant speeds" if count >= settings.speeds_of_a_line else None
 
 
 KIND = ExperimentKind[FrictionAtSpeeds](

@@ -8,28 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from friso.identification.combine import Correlated, determined
+from friso.identification.doubt import words_of
 from friso.identification.estimate import Estimate
-from friso.identification.kind import (
-    AnalysisSettings,
-    ExperimentKind,
-    Predictor,
-    Prior,
-    Source,
-    independent,
-)
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Predictor, Prior, Source, independent
 from friso.identification.logs.log import Log
 from friso.identification.readings.course import Course
 from friso.identification.response.analysis import Bench, analyse, predicted
 from friso.identification.response.two_mass import TwoMass
+from friso.identification.settings import ExperimentSettings
 from friso.identification.stage_keys import shared_masses
 from friso.stage import Stage
-
-FEW = 7.0
-"""Harmonics that an excitation has at least, and as many turns in each period: our choice. A multisine of 8 equal lines
-is one; moves have 1 to 7, or narrow peaks that turn less often than that."""
-
-RESTS = 0.1
-"""Share of the time for which the position rests at most under an excitation."""
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Bench:
@@ -42,10 +30,11 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 def _claims(course: Course) -> str | None:
     """A periodic excitation moves a stage whose reference does not move; it hardly rests, holds many frequencies, and
     turns often."""
+    settings = ExperimentSettings.current()
     repetition = None if course.reference_moves else course.repetition
-    if repetition is None or repetition.rests > RESTS:
+    if repetition is None or repetition.rests > settings.rests_of_moves:
         return None
-    if repetition.harmonics < FEW or repetition.turns < repetition.harmonics:
+    if repetition.harmonics < settings.harmonics_of_an_excitation or repetition.turns < repetition.harmonics:
         return None
     return f"{course.repeats}, with about {repetition.harmonics:.0f} harmonics"
 
@@ -99,19 +88,6 @@ def _correlated(result: Bench, estimates: Sequence[Estimate]) -> Correlated:
     return independent(result, estimates)
 
 
-def _doubts(bench: Bench) -> list[str]:
-    """That the motion goes against the force, as it does with a wrong sign of either."""
-    model = bench.two_masses
-    against = model.signs[0] < 0 if model is not None else any(line.sign < 0 for line in bench.lines[:1])
-    if not against:
-        return []
-    force, motion = bench.driven.channels.input, bench.driven.channels.output
-    return [
-        f"The {motion} goes against the {force}, which no mass does: one of them has the wrong sign; the values are "
-        "those with the sign reversed"
-    ]
-
-
 def _predict(result: Bench, log: Log, prior: Prior, settings: AnalysisSettings) -> tuple[float, ...]:
     """The relative errors of the outputs over the band, the driven mass's first."""
     return predicted(result, log, settings.period)
@@ -125,6 +101,6 @@ KIND = ExperimentKind[Bench](
     together=True,
     responses=True,
     claims=_claims,
-    doubts=_doubts,
+    doubts=lambda bench: words_of("response", bench),
     predictor=Predictor("one of the bench beside frequency responses", _predict),
 )

@@ -15,78 +15,81 @@ from friso.identification.logs.log import ROLES, Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog, check_roles, identify_moves, simulated_log
 from friso.identification.output_error.problem import why_continuous
 from friso.identification.readings.course import Course
-from friso.identification.readings.friction_velocity import STRAIGHT, distinct
-from friso.identification.readings.ramps import FEW_RAMPS
+from friso.identification.readings.friction_velocity import distinct
+from friso.identification.readings.settings import ReadingSettings
+from friso.identification.settings import ExperimentSettings
 from friso.identification.stage_file import made_up
 from friso.stage import Stage
-
-FEW = 7.0
-"""Harmonics, and turns in each period, that moves which are repeated stay below: our choice."""
 
 WITHOUT_CONTROLLER = (
     "without the machine's own controller the simulated stage follows the logged position; with it (--stage) the "
     "intervals may be narrower, and more may be identified, as far as that loop explains the record"
 )
 
-MOST = 40_000
-"""Samples of a log that are used: more of the same moves would take longer and show little more (our choice)."""
-
-RESTS = 0.1
-"""Share of the time for which the position rests from which on what repeats is taken for moves."""
-
 
 def _claims(course: Course) -> str | None:
-    """A reference moves; or it is no series of constant speeds or force ramps, and nothing repeats, the position rests
-    in between, or the force turns seldom and holds few frequencies."""
+    """Claim a log whose reference moves, or in which nothing repeats as an excitation does.
+
+    It is no series of constant speeds or force ramps; the position rests in between, or the force turns seldom and
+    holds few frequencies.
+    """
+    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if course.reference_moves:
         return "its reference moves"
-    if distinct(course.speeds) >= STRAIGHT or course.ramps >= FEW_RAMPS:
+    if distinct(course.speeds) >= reading_settings.speeds_of_a_line or course.ramps >= reading_settings.fewest_ramps:
         return None
     repetition = course.repetition
     if repetition is None:
         standing = "reference" in course.log
         return None if standing else f"the {course.signal} does not repeat, and there is no reference that moves"
-    if repetition.rests > RESTS:
+    if repetition.rests > experiment_settings.rests_of_moves:
         return f"{course.repeats}, but the position rests in between"
-    if repetition.harmonics < FEW and repetition.turns < FEW:
+    if (
+        repetition.harmonics < experiment_settings.harmonics_of_an_excitation
+        and repetition.turns < experiment_settings.harmonics_of_an_excitation
+    ):
         return f"{course.repeats}, but rarely reverses and contains few frequencies"
     return None
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> IdentifiedMoves:
-    """With a stage that was given and a reference, in the machine's own loop; from what other experiments show."""
+    """Analyse a log in the machine's own loop, where stage and reference are given, from what
+    other experiments show.
+    """
     (whole,) = logs
     assert isinstance(whole, Log)
     if prior.from_user:
         check_roles(whole, ("force",))
-    log = whole.excerpt(MOST)
+    log = whole.excerpt(ExperimentSettings.current().samples_of_moves)
     flat = prior.flat(log) if _in_newtons(log) else made_up(log, inverse_model(log, settings.bandwidth)).flat()
     start = {**flat, **{key: estimate.value for key, estimate in prior.estimates.items() if key in flat}}
     return identify_moves(log, start, prior.from_user and "reference" in log, settings.bandwidth, settings.progress)
 
 
 def _in_newtons(log: Log) -> bool:
+    """Tell whether the force of a log is in newtons."""
     return log.unit("force") == ROLES["force"]
 
 
 def _around(log: Log) -> Stage | None:
-    """A stage around a log whose force is in newtons."""
-    part = log.excerpt(MOST)
+    """Make up a stage around a log whose force is in newtons."""
+    part = log.excerpt(ExperimentSettings.current().samples_of_moves)
     return made_up(part, inverse_model(part)) if _in_newtons(log) else None
 
 
 def _estimates(result: IdentifiedMoves, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Keys of the stage file, which are in newtons."""
+    """Return estimates of keys of the stage file, which are in newtons."""
     return result.estimates if _in_newtons(result.log) else ()
 
 
 def _correlated(result: IdentifiedMoves, estimates: Sequence[Estimate]) -> Correlated:
-    """Those that are shown, as the fit correlates them."""
+    """Return the estimates that are shown, as the fit correlates them."""
     return (result.correlated, result.correlation) if estimates else ((), np.zeros((0, 0)))
 
 
 def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]:
-    """Where the drive that was given is not the one simulated, and where no controller was."""
+    """Say where the drive that was given is not the one simulated, and where no controller was."""
+    settings = ExperimentSettings.current()
     loops = [result for result in results if result.loop] if stage is not None else []
     reasons = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
     followed = any(result.loop is None for result in results)
@@ -94,23 +97,33 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
     return [
         *(sentence for sentence in dict.fromkeys(reasons) if sentence),
         *([WITHOUT_CONTROLLER] if followed else []),
-        *(f"{log.name}: of a log this long {MOST} samples are used, {_span(log)}, where it moves most" for log in long),
+        *(
+            f"{log.name}: of a log this long {settings.samples_of_moves} samples are used, {_span(log)}, where it "
+            "moves most"
+            for log in long
+        ),
     ]
 
 
 def _span(log: Log) -> str:
+    """The span of a log in words."""
     start, end = (round(float(log.time[k]), 9) + 0.0 for k in (0, -1))  # not -2e-16 s
     return f"{start:.6g} to {end:.6g} s"
 
 
 def _predict(result: IdentifiedMoves, log: Log, prior: Prior, settings: AnalysisSettings) -> SimulatedLog | None:
+    """Simulate another log with a reference; None where the machine's own loop is not known."""
     if "reference" not in log or result.loop is None:
         return None
     return simulated_log(result, log, prior.flat(log) or None)
 
 
 def _check_prediction(logs: Sequence[Source], other: Log, prior: Prior) -> None:
-    """Raises InputError where none of the logs will be simulated in the machine's own loop, or the other cannot be."""
+    """Check that a log will be identified in the machine's own loop, and that the other can be
+    simulated.
+
+    Raises InputError where either is not so.
+    """
     check_roles(other, ("position", "force", "reference"))
     prior.flat(other)
     if not prior.from_user:

@@ -20,7 +20,6 @@ from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, S
 from friso.identification.logs.log import Log
 from friso.identification.readings.at_bearing import (
     DIRECT,
-    EXPLAINED,
     HELD,
     BearingRecord,
     Between,
@@ -33,8 +32,6 @@ from friso.identification.readings.at_bearing import (
     why_unseen,
 )
 from friso.identification.readings.common import (
-    BLOCKS,
-    LINEARITY,
     Mean,
     by_t,
     correlation_of,
@@ -42,21 +39,11 @@ from friso.identification.readings.common import (
     jackknife,
     solve_normal_equations,
 )
+from friso.identification.readings.settings import ReadingSettings
+from friso.identification.settings import ExperimentSettings
 from friso.identification.stage_keys import shared_masses
 from friso.quantities import percent
 from friso.stage import Stage
-
-CHECKED, MOTION = 0.7, 5.0
-"""Low-pass of a second fit by which the first one is checked, and of the motion, both over that of the first."""
-
-FINE, FEWEST = 40, 1000
-"""Samples per period of the low-pass that are enough; and of a record at least."""
-
-BENDING = (1e-6, 5.0)
-"""Of the bending q over the range of the motion: from a straight line to bristles that are at their end long before."""
-
-SPRING = 3.0
-"""Stiffness over that of the joint up to which it may well be the joint that is seen."""
 
 KEYS = MASS, DAMPING, STIFFNESS = "moving mass", "friction.bristle_damping", "friction.bristle_stiffness"
 UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
@@ -68,10 +55,13 @@ VISCOUS = "friction.viscous"
 
 @dataclass(frozen=True)
 class Presliding:
-    """Moving mass [kg], damping [N s/m] and stiffness [N/m] of the bristles, and the `correlation` of the three, shape
-    (3, 3). Over time [s], shape (n,): the position [m] of the body on the bearing, the force [N], low-passed, and that
-    of the model (empty where there is none); the share of the friction's standard deviation that it leaves
-    unexplained."""
+    """Bristles and moving mass from small motion before sliding.
+
+    Moving mass [kg], damping [N s/m] and stiffness [N/m] of the bristles have the `correlation` of shape (3, 3). Over
+    time [s], shape (n,), there are the position [m] of the body on the bearing, the force [N], low-passed, and that of
+    the model (empty where there is none). `unexplained` is the share of the friction's standard deviation that the
+    model leaves.
+    """
 
     mass: Estimate
     damping: Estimate
@@ -85,16 +75,19 @@ class Presliding:
     warnings: tuple[str, ...] = ()
 
     def order(self, key: str) -> int:
-        """The row of a key of the stage file in the `correlation`."""
+        """Return the row of a key of the stage file in the `correlation`."""
         return KEYS.index(key) if key in KEYS else KEYS.index(MASS)
 
 
 @dataclass(frozen=True)
 class _Fit:
-    """Mass, damping and stiffness, shape (3,), their covariance by the jackknife, and by how much what the model leaves
-    unexplained may hide of each, `doubt`; by how much later [s] the force comes than was taken; whether the bristles
-    are at their end, and the share of the friction that is left; over time [s], shape (n,), the position of the body on
-    the bearing, its force and that of the model, low-passed."""
+    """A fit of mass and bristles at one low-pass.
+
+    `values` are mass, damping and stiffness, shape (3,), with their covariance by the jackknife; `doubt` is by how much
+    what the model leaves unexplained may hide of each. `late` [s] is by how much later the force comes than was taken;
+    `ends` says whether the bristles are at their end, and `left` is the share of the friction that is left. Over time
+    [s], shape (n,), there are the position of the body on the bearing, its force and that of the model, low-passed.
+    """
 
     values: np.ndarray
     covariance: np.ndarray
@@ -109,23 +102,29 @@ class _Fit:
 
 
 def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
-    """Bristles from a log of position and force whose motion is small beside their break-away. Of a log with gaps the
-    longest stretch is used.
+    """Estimate bristles from a log of position and force whose motion is small beside their
+    break-away.
 
-    A joint is held, or its deflection is measured. The intervals contain by how much the answer changes with a lower
-    low-pass and with the delay that fits best (which is taken where none is given), the doubt about the viscous
-    friction that is taken off the damping, and what the friction that is left unexplained may hide: it falls with
-    speed, which the model leaves out, and bristles of another law bend otherwise. Where much is left, nothing is shown.
-    Raises InputError for missing channels.
+    Of a log with gaps the longest stretch is used. A joint is held, or its deflection is measured.
+
+    The intervals contain by how much the answer changes with a lower low-pass and with the delay that fits best (which
+    is taken where none is given), the doubt about the viscous friction that is taken off the damping, and what the
+    friction that is left unexplained may hide: it falls with speed, which the model leaves out, and bristles of another
+    law bend otherwise. Where much is left, nothing is shown. Raises InputError for missing channels.
     """
+    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     record = record_of(log, log.longest, between)
-    if why := why_unseen(record, FEWEST):
+    if why := why_unseen(record, experiment_settings.samples_of_presliding):
         return _nothing(why)
     cutoff, looked_for = cutoff_of(record), between.delay is None
-    tried = [(cutoff, looked_for), (CHECKED * cutoff, looked_for), *([] if looked_for else [(cutoff, True)])]
+    tried = [
+        (cutoff, looked_for),
+        (experiment_settings.low_pass_of_a_check * cutoff, looked_for),
+        *([] if looked_for else [(cutoff, True)]),
+    ]
     best, *others = (_converged_fit(_seen(record, top), between, top, late) for top, late in tried)
     changes = np.array([other.values - best.values for other in others])
-    even = best.doubt + LINEARITY * np.abs(best.values)
+    even = best.doubt + reading_settings.linearity_of_sensors * np.abs(best.values)
     even[KEYS.index(DAMPING)] += between.viscous[1]
     systematic = np.abs(changes).sum(axis=0) + even
     why = _no_bristles(best, between, record.bent is None)
@@ -140,29 +139,39 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
 
 
 def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
-    """With the motion that belongs to a low-pass [Hz], and no more samples than that needs."""
-    return record.seen(MOTION * cutoff, max(int(1 / (FINE * cutoff * record.interval)), 1))
+    """Return a record with the motion that belongs to a low-pass [Hz], and no more samples than
+    that needs.
+    """
+    settings = ExperimentSettings.current()
+    return record.seen(
+        settings.low_pass_of_the_motion * cutoff,
+        max(int(1 / (settings.samples_of_a_presliding_period * cutoff * record.interval)), 1),
+    )
 
 
 def _nothing(why: str) -> Presliding:
+    """Return a result that shows nothing, for a reason."""
     mass, damping, stiffness = (Estimate.unknown(key, UNITS[key], METHOD, why) for key in KEYS)
     none = np.empty(0)
     return Presliding(mass, damping, stiffness, np.eye(len(KEYS)), none, none, none, none, np.nan)
 
 
 def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
-    """Why the fit is not one of bristles; empty where it is."""
-    if fit.left > EXPLAINED:
+    """Say why the fit is not one of bristles; "" where it is."""
+    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
+    if fit.left > reading_settings.share_left_unexplained:
         return f"{percent(fit.left)} of the friction is not explained: {SLIDES}"
     if fit.ends:
         return f"the bristles yield: {SLIDES}"
-    if held and 0 < fit.values[KEYS.index(STIFFNESS)] < SPRING * between.joint:
+    if held and 0 < fit.values[KEYS.index(STIFFNESS)] < experiment_settings.stiffness_ratio_of_a_joint * between.joint:
         return "the stiffness is like that of the joint: is it held?"
     return ""
 
 
 def _estimate(key: str, value: float, error: float, systematic: float) -> Estimate:
-    estimate = by_t(key, UNITS[key], Mean(value, error, BLOCKS - 1), METHOD, systematic, systematic)
+    """Make an estimate of one of the three quantities, which has to be positive."""
+    settings = ReadingSettings.current()
+    estimate = by_t(key, UNITS[key], Mean(value, error, settings.blocks_of_a_mean - 1), METHOD, systematic, systematic)
     if estimate.low > 0:
         return estimate
     why = "the motion is too slow to show it" if key != STIFFNESS else "no force holds the bearing: does it stick?"
@@ -170,16 +179,21 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
 
 
 def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late: bool) -> _Fit:
-    """The fit once the mass that is believed to move is the one found and, if it is to be looked for (`late`), the
-    delay is that which fits best."""
+    """Fit again with the mass that the first fit found and, if it is to be looked for (`late`),
+    with the delay that fits best.
+    """
     fit = _fit(record, between, cutoff, between.mass, late)
     delayed = replace(between, delay=(between.delay or 0.0) + fit.late)
     return _fit(record, delayed, cutoff, float(fit.values[0]), late)
 
 
 def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
-    """Least squares of the force at a low-pass; the bending, in which it is not linear, is looked for. `mass` [kg] is
-    believed to move; with `late`, what a little more delay would do is among the columns."""
+    """Fit the force at a low-pass by least squares; the bending, in which it is not linear, is
+    searched for.
+
+    `mass` [kg] is believed to move; with `late`, what a little more delay would do is among the columns.
+    """
+    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     equation = _equation(record, between, cutoff, mass, late)
     target, span = equation.target, float(np.ptp(equation.body))
 
@@ -187,7 +201,9 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
         x = equation.columns(float(np.exp(logarithm)) / span)
         return float(np.sum((target - x @ solve_normal_equations(x.T @ x, x.T @ target)) ** 2))
 
-    best: Any = minimize_scalar(off, bounds=tuple(np.log(BENDING)), method="bounded", options={"xatol": 1e-3})
+    best: Any = minimize_scalar(
+        off, bounds=tuple(np.log(experiment_settings.bending_range)), method="bounded", options={"xatol": 1e-3}
+    )
     bending = float(np.exp(best.x)) / span
     x = equation.columns(bending)
     solution = solve_normal_equations(x.T @ x, x.T @ target)
@@ -195,16 +211,16 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
     columns, friction = np.column_stack([x, bends]), target - x[:, 0] * solution[0]
     covariance = jackknife(columns, target)[:3, :3]
     unexplained = target - x @ solution
-    hidden = np.linalg.norm(unexplained) + LINEARITY * np.linalg.norm(friction)
+    hidden = np.linalg.norm(unexplained) + reading_settings.linearity_of_sensors * np.linalg.norm(friction)
     doubt = hidden / np.array([_apart(columns, number) for number in range(len(KEYS))])
     left = float(unexplained.std() / friction.std())
-    ends, more = bending * span > 0.99 * BENDING[1], float(solution[-1]) if late else 0.0
+    ends, more = bending * span > 0.99 * experiment_settings.bending_range[1], float(solution[-1]) if late else 0.0
     curves = (record.time[equation.low_pass.inside], equation.low_pass(equation.body), target, x @ solution)
     return _Fit(solution[:3], covariance, doubt, more, ends, left, *curves)
 
 
 def _apart(columns: np.ndarray, number: int) -> float:
-    """The size of what one of some columns, shape (m, p), has that the others do not."""
+    """Return the size of what one of some columns, shape (m, p), has that the others do not."""
     sizes = np.linalg.norm(columns, axis=0)
     scaled = columns / np.where(sizes > 0, sizes, 1.0)
     others = np.delete(scaled, number, axis=1)
@@ -214,8 +230,11 @@ def _apart(columns: np.ndarray, number: int) -> float:
 
 @dataclass(frozen=True)
 class _Equation:
-    """The low-pass; the position [m] of the body on the bearing, shape (n,); the force [N] and its columns that do not
-    depend on the bristles, at the low-pass, shape (m,) each."""
+    """The equation of a record of small motion at a low-pass.
+
+    It has the position [m] of the body on the bearing, shape (n,), and at the low-pass the force [N] and its columns
+    that do not depend on the bristles, shape (m,) each.
+    """
 
     low_pass: LowPass
     body: np.ndarray
@@ -224,8 +243,10 @@ class _Equation:
     rest: tuple[np.ndarray, ...]
 
     def columns(self, bending: float) -> np.ndarray:
-        """Inertia, rate and deflection of bristles of a bending q [1/m], how a deflection at the start dies away, and
-        the rest, shape (m, p)."""
+        """Return the columns of bristles of a bending q [1/m] and the rest, shape (m, p).
+
+        They are inertia, rate and deflection of the bristles, how a deflection at the start dies away, and the rest.
+        """
         moves = np.diff(self.body)
         z = deflections(moves, np.full(len(moves), 1 / bending))
         path = np.concatenate(([0.0], np.cumsum(np.abs(moves))))
@@ -234,8 +255,11 @@ class _Equation:
 
 
 def _equation(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Equation:
-    """The equation of a record. A mode of the structure, whose mass m moves on its own spring at a frequency w, adds
-    m/w^2 times the fourth derivative of the position: what of it `between` does not know is among the rest."""
+    """Set up the equation of a record.
+
+    A mode of the structure, whose mass m moves on its own spring at a frequency w, adds m/w^2 times the fourth
+    derivative of the position: what of it `between` does not know is among the rest.
+    """
     time, low_pass = record.time, LowPass(record.time, cutoff)
     body, force, inertia = at_bearing(record, between, mass)
     target = force - between.viscous[0] * rate_of(time, body)
@@ -244,6 +268,7 @@ def _equation(record: BearingRecord, between: Between, cutoff: float, mass: floa
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Presliding:
+    """Analyse a log, with viscous friction off the damping where that is known."""
     (log,) = logs
     assert isinstance(log, Log)
     between = believed_between(prior, log)
@@ -254,7 +279,9 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _at_most(total: Estimate) -> Estimate:
-    """The damping of the bristles where viscous friction is not known: at most the `total` of the two."""
+    """Bound the damping of the bristles where viscous friction is not known: it is at most the
+    `total` of the two.
+    """
     if not total.determined:
         return total
     why = f"its sum with viscous friction, which is not known, is {total.low:.4g} to {total.high:.4g} {total.unit}"
@@ -262,23 +289,18 @@ def _at_most(total: Estimate) -> Estimate:
 
 
 def _estimates(result: Presliding, stage: Stage | None) -> tuple[Estimate, ...]:
-    """The bristles, and the whole mass where there is a stage whose masses share it."""
+    """Return the bristles, and the whole mass where there is a stage whose masses share it."""
     masses = shared_masses(result.mass, stage) if stage is not None and result.mass.determined else ()
     return (result.stiffness, result.damping, *masses)
 
 
 def _correlated(result: Presliding, estimates: Sequence[Estimate]) -> Correlated:
-    """As the fit has it; masses are shares of one."""
+    """Return the estimates that are shown, as the fit correlates them; masses are shares of one."""
     certain = determined(estimates)
     rows = [result.order(estimate.name) for estimate in certain]
     return certain, result.correlation[np.ix_(rows, rows)]
 
 
 KIND = ExperimentKind[Presliding](
-    _analyse,
-    _estimates,
-    _correlated,
-    after=("constant-speed", "frequency", "moves"),
-    foreign=("force",),
-    per_unit=True,
+    _analyse, _estimates, _correlated, after=("constant-speed", "frequency", "moves"), foreign=("force",), per_unit=True
 )

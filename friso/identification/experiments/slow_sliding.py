@@ -21,7 +21,6 @@ from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.logs.log import Log
 from friso.identification.readings.at_bearing import (
-    EXPLAINED,
     HELD,
     BearingRecord,
     Between,
@@ -33,37 +32,10 @@ from friso.identification.readings.at_bearing import (
     record_of,
     why_unseen,
 )
-from friso.identification.readings.common import (
-    BLOCKS,
-    LINEARITY,
-    Mean,
-    by_t,
-    correlation_of,
-    deflections,
-    jackknife,
-    stribeck_curve,
-)
+from friso.identification.readings.common import Mean, by_t, correlation_of, deflections, jackknife, stribeck_curve
+from friso.identification.readings.settings import ReadingSettings
+from friso.identification.settings import ExperimentSettings
 from friso.quantities import percent
-
-BELOW_MODE, CHECKED, MOTION = 1 / 3, 0.7, 8.0
-"""Low-pass of the equation over the frequency of the structure's mode, at most; that of a second fit by which the first
-one is checked, and of the motion, both over that of the first."""
-
-MOST, FEWEST = 60_000, 2000
-"""Samples that are used at most, and that are needed."""
-
-STARTS, BOUNDS = (0.2, 0.5), (0.01, 10.0)
-"""Stribeck velocities from which the fit starts, over the RMS velocity; and bounds of all that is fitted, over that and
-over the mean friction."""
-
-CLOSE = 1e-6
-"""Share of its squares, and of what is fitted, to which the fit comes: far within any interval."""
-
-STEP = 1e-3
-"""Of what is fitted, over its size, for derivatives."""
-
-FASTEST = 1.5
-"""Stribeck velocities which the motion has to go: at this one a tenth of the fall is left."""
 
 NAMES = ("friction.coulomb", "friction.static", "friction.stribeck_velocity")
 UNITS = ("N", "N", "m/s")
@@ -75,8 +47,11 @@ DELAY = "the drive's delay is needed: give it in [drive] of the stage file, --st
 
 @dataclass(frozen=True)
 class MassOnBristles:
-    """Moving mass [kg], stiffness [N/m] and damping [N s/m] of the bristles as other experiments show them, each with
-    the half-width of its interval; the exponent of the Stribeck curve."""
+    """Mass and bristles as other experiments show them.
+
+    Moving mass [kg], stiffness [N/m] and damping [N s/m] of the bristles each have the half-width of their interval;
+    `exponent` is that of the Stribeck curve.
+    """
 
     mass: tuple[float, float]
     stiffness: tuple[float, float]
@@ -86,10 +61,13 @@ class MassOnBristles:
 
 @dataclass(frozen=True)
 class SlowSliding:
-    """Coulomb and static friction [N] and Stribeck velocity [m/s], and the `correlation` of the three, shape (3, 3).
-    Over time [s], shape (n,): the velocity [m/s] of the body on the bearing, its friction [N], low-passed, and that of
-    the model (empty where there is none); and the share of the friction's standard deviation that it leaves
-    unexplained; the exponent of its Stribeck curve."""
+    """Friction that slow sliding shows.
+
+    `estimates` are Coulomb and static friction [N] and Stribeck velocity [m/s], with the `correlation` of shape (3, 3).
+    Over time [s], shape (n,), there are the velocity [m/s] of the body on the bearing, its friction [N], low-passed,
+    and that of the model (empty where there is none). `unexplained` is the share of the friction's standard deviation
+    that the model leaves.
+    """
 
     estimates: tuple[Estimate, ...]
     correlation: np.ndarray
@@ -104,10 +82,13 @@ class SlowSliding:
 
 @dataclass(frozen=True)
 class _Equation:
-    """The low-pass; the moves [m] of the body on the bearing between samples, shape (n - 1,), and its velocity [m/s],
-    shape (n,); the friction [N] at the low-pass without the viscous, and what a later force does to it, per second,
-    shape (m,); what is known of the bristles; the `sizes` of what is fitted: of Coulomb friction, of what static
-    friction is more, of the Stribeck velocity, of the constant force and of that of the bristles at the start."""
+    """The equation of a record of slow sliding at a low-pass.
+
+    It has the moves [m] of the body on the bearing between samples, shape (n - 1,), and its velocity [m/s], shape (n,);
+    at the low-pass, shape (m,), the friction [N] without the viscous part, and what a later force does to it, per
+    second. `sizes` are those of what is fitted: of Coulomb friction, of what static friction is more, of the Stribeck
+    velocity, of the constant force and of that of the bristles at the start.
+    """
 
     low_pass: LowPass
     moves: np.ndarray
@@ -118,8 +99,10 @@ class _Equation:
     sizes: np.ndarray
 
     def model(self, p: np.ndarray) -> np.ndarray:
-        """Friction [N] at the low-pass, shape (m,), of the logarithms of the first three over their `sizes`, and of the
-        other two over theirs."""
+        """Return the friction [N] of the model at the low-pass, shape (m,).
+
+        Of what is fitted, the first three are logarithms over their `sizes`, the other two shares of theirs.
+        """
         coulomb, more, stribeck, constant, start = np.append(np.exp(p[:3]), p[3:]) * self.sizes
         stiffness, damping = self.contact.stiffness[0], self.contact.damping[0]
         speed = np.abs(self.velocity)
@@ -128,34 +111,49 @@ class _Equation:
         return self.low_pass(stiffness * z + damping * (self.velocity - speed * z / ends)) + constant
 
     def residual(self, p: np.ndarray) -> np.ndarray:
+        """Return model less measured friction [N], shape (m,)."""
         return self.model(p) - self.friction
 
     def derivatives(self, p: np.ndarray) -> np.ndarray:
-        """Of the residual, shape (m, 5)."""
+        """Return the derivatives of the residual, shape (m, 5)."""
+        settings = ExperimentSettings.current()
         residuals_here = self.model(p)
-        return np.stack([(self.model(p + step) - residuals_here) / STEP for step in STEP * np.eye(len(p))], axis=1)
+        return np.stack(
+            [
+                (self.model(p + step) - residuals_here) / settings.step_of_sliding
+                for step in settings.step_of_sliding * np.eye(len(p))
+            ],
+            axis=1,
+        )
 
 
 def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristles | None) -> SlowSliding:
-    """Static and Coulomb friction and Stribeck velocity from a log of position and force in which the bearing slides
-    slowly, there and back. Of a log with gaps the longest stretch is used, and of that no more than `MOST` samples.
+    """Estimate friction over speed from a log in which the bearing slides slowly, there and
+    back.
 
-    A joint is held, or its deflection is measured. The intervals contain what a lower low-pass changes, what the
-    intervals of the known mass, bristles and viscous friction do, what the delay does that fits best, and the share of
-    the friction that is left unexplained; contact, mode and exponent are taken as given. Raises InputError for missing
-    channels.
+    It shows static and Coulomb friction and Stribeck velocity. Of a log with gaps the longest stretch is used, and of
+    that no more than the settings say. A joint is held, or its deflection is measured.
+
+    The intervals contain what a lower low-pass changes, what the intervals of the known mass, bristles and viscous
+    friction do, what the delay does that fits best, and the share of the friction that is left unexplained; contact,
+    mode and exponent are taken as given. Raises InputError for missing channels.
     """
-    record = record_of(log, slice(log.longest.start, min(log.longest.stop, log.longest.start + MOST)), between)
-    why = why_unseen(record, FEWEST) or (DELAY if between.delay is None else "")
+    settings = ExperimentSettings.current()
+    record = record_of(
+        log,
+        slice(log.longest.start, min(log.longest.stop, log.longest.start + settings.samples_of_slow_sliding)),
+        between,
+    )
+    why = why_unseen(record, settings.fewest_samples_of_sliding) or (DELAY if between.delay is None else "")
     if why or contact is None:
         return _nothing(why or BRISTLES)
     cutoff = cutoff_of(record)
-    cutoff = min(cutoff, BELOW_MODE * between.mode.frequency) if between.mode else cutoff
+    cutoff = min(cutoff, settings.low_pass_below_a_mode * between.mode.frequency) if between.mode else cutoff
     sizes = _sizes(record, cutoff)
     equation = _equation(record, between, contact, cutoff, sizes)
-    best = _fitted(equation, [np.log([1.0, 0.5, share]) for share in STARTS])
+    best = _fitted(equation, [np.log([1.0, 0.5, share]) for share in settings.stribeck_starts])
     jacobian, residual = equation.derivatives(best), equation.residual(best)
-    lower = _fitted(_equation(record, between, contact, CHECKED * cutoff, sizes), [best])
+    lower = _fitted(_equation(record, between, contact, settings.low_pass_of_a_check * cutoff, sizes), [best])
     shifts = [lower - best, _parameter_change(np.column_stack([jacobian, equation.late]), residual)[:5]]
     for other in _off(between, contact):
         shifts.append(_parameter_change(jacobian, _equation(record, *other, cutoff, sizes).residual(best) - residual))
@@ -170,28 +168,32 @@ def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristl
 
 
 def _off(between: Between, contact: MassOnBristles) -> list[tuple[Between, MassOnBristles]]:
-    """What is known, with each in turn at the end of its interval."""
+    """Return what is known beforehand, with each quantity in turn at the end of its interval."""
     doubted = {key: getattr(contact, key) for key in ("mass", "stiffness", "damping")}
     others = [(between, replace(contact, **{key: (sum(value), value[1])})) for key, value in doubted.items()]
     return [*others, (replace(between, viscous=(sum(between.viscous), between.viscous[1])), contact)]
 
 
 def _parameter_change(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """By how much a residual, shape (m,), moves what is fitted, whose derivatives are of shape (m, p)."""
+    """Return by how much a residual, shape (m,), moves what is fitted, whose derivatives are of
+    shape (m, p).
+    """
     return -np.linalg.lstsq(jacobian, residual, rcond=None)[0]
 
 
 def _nothing(why: str) -> SlowSliding:
+    """Return a result that shows nothing, for a reason."""
     none = np.empty(0)
     return SlowSliding(_unknown(why), np.eye(3), none, none, none, none, np.nan)
 
 
 def _unknown(why: str) -> tuple[Estimate, ...]:
+    """Return the three quantities as not determined, for a reason."""
     return tuple(Estimate.unknown(*key, METHOD, why) for key in zip(NAMES, UNITS, strict=True))
 
 
 def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
-    """Of what is fitted: the mean force [N], and the RMS velocity [m/s]."""
+    """Return the sizes of what is fitted: the mean force [N], and the RMS velocity [m/s]."""
     level, low_pass = float(np.abs(record.force - record.force.mean()).mean()), LowPass(record.time, cutoff)
     return np.array([level, level, float(low_pass(rate_of(record.time, record.body)).std()), level, level])
 
@@ -199,8 +201,9 @@ def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
 def _equation(
     record: BearingRecord, between: Between, contact: MassOnBristles, cutoff: float, sizes: np.ndarray
 ) -> _Equation:
-    """The equation of a record at a low-pass [Hz]."""
-    seen, low_pass = record.seen(MOTION * cutoff), LowPass(record.time, cutoff)
+    """Set up the equation of a record at a low-pass [Hz]."""
+    settings = ExperimentSettings.current()
+    seen, low_pass = record.seen(settings.low_pass_of_sliding * cutoff), LowPass(record.time, cutoff)
     body, force, inertia = at_bearing(seen, between, contact.mass[0])
     velocity = rate_of(record.time, body)
     friction = force - contact.mass[0] * inertia - between.viscous[0] * velocity
@@ -209,8 +212,9 @@ def _equation(
 
 
 def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
-    """What fits best from any start, shape (5,)."""
-    least, most = BOUNDS
+    """Return what fits best from any start, shape (5,)."""
+    settings = ExperimentSettings.current()
+    least, most = settings.sliding_bounds
     low, high = np.array([*np.log([least] * 3), -most, -most]), np.array([*np.log([most] * 3), most, most])
     scale = float(equation.friction.std())
 
@@ -223,7 +227,15 @@ def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
     derived: Any = derivatives
     complete = [np.clip(np.append(start, np.zeros(len(low) - len(start))), low, high) for start in starts]
     fits: Any = [
-        least_squares(off, start, jac=derived, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for start in complete
+        least_squares(
+            off,
+            start,
+            jac=derived,
+            bounds=(low, high),
+            ftol=settings.tolerance_of_sliding,
+            xtol=settings.tolerance_of_sliding,
+        )
+        for start in complete
     ]
     return min(fits, key=lambda fit: fit.cost).x
 
@@ -231,29 +243,37 @@ def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
 def _estimates(
     best: np.ndarray, covariance: np.ndarray, shifts: np.ndarray, left: float
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    """The three quantities and their correlation, by the logarithms that were fitted, their covariance, shape (3, 3),
-    and `shifts` of them, shape (m, 3), and the share of the friction that is `left`."""
+    """Turn fitted logarithms into the three quantities and their correlation.
+
+    The logarithms have a covariance, shape (3, 3), and `shifts` of them, shape (m, 3); a share of the friction is
+    `left`.
+    """
+    settings = ReadingSettings.current()
     coulomb, more, stribeck = np.exp(best[:3])
     values = (coulomb, coulomb + more, stribeck)
     turned = np.array([[coulomb, 0, 0], [coulomb, more, 0], [0, 0, stribeck]])  # derivatives by the logarithms
     covariance, shifts = turned @ covariance @ turned.T, shifts @ turned.T
-    even, estimates = (left + LINEARITY) * np.array(values), []
+    even, estimates = (left + settings.linearity_of_sensors) * np.array(values), []
     for i, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
-        mean = Mean(float(values[i]), float(covariance[i, i] ** 0.5), BLOCKS - 1)
+        mean = Mean(float(values[i]), float(covariance[i, i] ** 0.5), settings.blocks_of_a_mean - 1)
         systematic = float(np.abs(shifts[:, i]).sum() + even[i])
         estimates.append(by_t(name, unit, mean, METHOD, systematic, systematic))
     return tuple(estimates), correlation_of(covariance, shifts, even)
 
 
 def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
-    """The estimates as far as the motion determines them, whose model leaves a share of the friction unexplained."""
+    """Return the estimates as far as the motion determines them.
+
+    Their model leaves a share of the friction unexplained.
+    """
+    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     coulomb, static, stribeck = estimates
     fastest = float(np.abs(velocity).max())
-    if left > EXPLAINED:
+    if left > reading_settings.share_left_unexplained:
         return _unknown(f"{percent(left)} of the friction is not explained by LuGre's bristles")
     if not coulomb.low > 0:
         return _unknown("the force shows no friction: does the bearing slide?")
-    if fastest < FASTEST * stribeck.value:
+    if fastest < experiment_settings.stribeck_velocities_gone * stribeck.value:
         return _unknown(f"no faster than {fastest:.3g} m/s, the motion does not show where friction ceases to fall")
     if not (static.low > coulomb.value and stribeck.low > 0):
         why = "no rise of friction towards rest shows"
@@ -264,28 +284,26 @@ def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> SlowSliding:
+    """Analyse a log with the mass and the bristles that other experiments show."""
     (log,) = logs
     assert isinstance(log, Log)
     return stribeck_from_slow_sliding(log, believed_between(prior, log), _bristles(prior, log))
 
 
 def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
-    """The mass and the bristles that other experiments show; None where they do not."""
+    """Return the mass and the bristles that other experiments show; None where they do not."""
     flat = prior.flat(log)
     masses = [key for key in flat if key.startswith("masses.")]
     bristles = ["friction.bristle_stiffness", "friction.bristle_damping"]
     if not masses or not all(key in prior.estimates for key in (*masses, *bristles)):
         return None
-    mass = (
-        sum(prior.estimates[key].value for key in masses),
-        sum(prior.estimates[key].half_width for key in masses),
-    )
+    mass = (sum(prior.estimates[key].value for key in masses), sum(prior.estimates[key].half_width for key in masses))
     stiffness, damping = ((prior.estimates[key].value, prior.estimates[key].half_width) for key in bristles)
     return MassOnBristles(mass, stiffness, damping, flat.get("friction.stribeck_exponent", 2.0))
 
 
 def _correlated(result: SlowSliding, estimates: Sequence[Estimate]) -> Correlated:
-    """As the fit has it."""
+    """Return the estimates that are shown, as the fit correlates them."""
     certain = determined(estimates)
     rows = [result.estimates.index(estimate) for estimate in certain]
     return certain, result.correlation[np.ix_(rows, rows)]

@@ -16,30 +16,11 @@ import numpy as np
 from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.logs.log import Log
-from friso.identification.readings.common import (
-    BLOCKS,
-    LINEARITY,
-    Mean,
-    block_mean,
-    by_t,
-    cart,
-    channel,
-    deflection,
-    low_pass,
-    runs,
-)
+from friso.identification.readings.common import Mean, block_mean, by_t, cart, channel, deflection, low_pass, runs
 from friso.identification.readings.course import Course
+from friso.identification.readings.settings import ReadingSettings
+from friso.identification.settings import ExperimentSettings
 from friso.stage import Stage
-
-CUTOFF = 25.0
-"""Low-pass of the force [Hz] (Sec. 4.2.2)."""
-
-SETTLED, CREEPING = 0.02, 0.1
-"""Share of a step by which, within a settled window, the force may still drift beyond what goes with the deflection,
-and by which the deflection may, where none drifts less: a slow integrator takes long to pull a spring all the way."""
-
-FIXED = 0.02
-"""Share of the steps of the position by which the cart may follow and still count as fixed."""
 
 STARTS = np.linspace(0.1, 0.7, 7)
 """Shares of a plateau after which it may have settled, tried in turn."""
@@ -51,8 +32,10 @@ METHOD = "differences of force over differences of deflection between settled po
 
 @dataclass(frozen=True)
 class Window:
-    """A settled window: from `start` to `end` [s], mean deflection [m] and force [N], with the standard error of the
-    force at that deflection by block means, the rest of a drift included."""
+    """A settled window from `start` to `end` [s], with mean deflection [m] and force [N].
+
+    `force_error` is the standard error of the force at that deflection by block means, the rest of a drift included.
+    """
 
     start: float
     end: float
@@ -63,9 +46,12 @@ class Window:
 
 @dataclass(frozen=True)
 class StepStiffness:
-    """The stiffness [N/m], of all steps and of those up and down; `hysteresis` [N], by how much more force stands at a
-    deflection reached from below than from above; the settled `windows`; the force [N] low-passed, shape (n,); whether
-    the cart was fixed (None: not measured)."""
+    """The stiffness [N/m] of a joint from position steps with the cart fixed.
+
+    It is that of all steps and of those up and down; `hysteresis` [N] is by how much more force stands at a deflection
+    reached from below than from above. There are the settled `windows`, the force [N] low-passed, shape (n,), and
+    whether the cart was fixed (None: not measured).
+    """
 
     stiffness: Estimate
     up: Estimate
@@ -80,18 +66,21 @@ class StepStiffness:
 
 
 def stiffness_from_steps(log: Log) -> StepStiffness:
-    """Stiffness from steps of the position with the cart fixed, the force low-passed at `CUTOFF` [Hz].
+    """Estimate the stiffness from steps of the position with the cart fixed, the force
+    low-passed.
 
     Windows are the plateaus of the reference, or of the position where there is none. Without two steps between settled
     windows the stiffness is unknown. Raises InputError for a log without position or force in SI units.
     """
+    settings = ExperimentSettings.current()
     position, force = channel(log, "position"), channel(log, "force")
     measured = deflection(log)
     deflected = position if measured is None else measured
     smooth = [
-        np.concatenate([low_pass(x[s], log.sample_time, CUTOFF) for s in log.segments]) for x in (force, deflected)
+        np.concatenate([low_pass(x[s], log.sample_time, settings.low_pass_of_steps) for s in log.segments])
+        for x in (force, deflected)
     ]
-    spans = [s for part in log.segments for s in _plateaus(log, part, CUTOFF)]
+    spans = [s for part in log.segments for s in _plateaus(log, part, settings.low_pass_of_steps)]
     scale, secant = _scale(position, spans), _secant(smooth[1], smooth[0], spans)
     settled = [_settled_window(log, span, smooth[0], smooth[1], scale, secant) for span in spans]
     windows = tuple(w for w in settled if w is not None)
@@ -111,7 +100,9 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
 
 
 def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
-    """Stretches of a segment over which the reference, else the position, keeps its level, long enough to average."""
+    """Find stretches of a segment over which the reference, else the position, keeps its level
+    long enough to average.
+    """
     least = int(np.ceil(4 / (cutoff * log.sample_time)))
     if part.stop - part.start < 2 * least:
         return []
@@ -130,14 +121,20 @@ def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
 
 
 def _scale(position: np.ndarray, spans: list[slice]) -> float:
-    """The size of the larger steps [m]: the median of those that are not small against the largest."""
+    """Return the size of the larger steps [m]: the median of those that are not small against
+    the largest.
+    """
     levels = np.array([np.median(position[s][(s.stop - s.start) // 2 :]) for s in spans])
     sizes = np.abs(np.diff(levels))
     return float(np.median(sizes[sizes >= 0.3 * sizes.max()])) if len(sizes) else 0.0
 
 
 def _secant(position: np.ndarray, force: np.ndarray, spans: list[slice]) -> float:
-    """About how much force [N/m] goes with the deflection, by the later half of each plateau; 0 without two of them."""
+    """Return about how much force [N/m] goes with the deflection, by the later half of each
+    plateau.
+
+    It is 0 without two plateaus.
+    """
     levels = np.array([[np.median(x[s][(s.stop - s.start) // 2 :]) for x in (position, force)] for s in spans])
     if len(levels) < 2 or not np.ptp(levels[:, 0]) > 0:
         return 0.0
@@ -147,17 +144,25 @@ def _secant(position: np.ndarray, force: np.ndarray, spans: list[slice]) -> floa
 def _settled_window(
     log: Log, span: slice, force: np.ndarray, position: np.ndarray, scale: float, secant: float
 ) -> Window | None:
-    """The part of a plateau that has settled: the deflection hardly drifts, and the force drifts by no more than goes
-    with that, but for a share of a step or what noise explains."""
+    """Return the part of a plateau that has settled; None without one.
+
+    The deflection hardly drifts there, and the force drifts by no more than goes with that, but for a share of a step
+    or what noise explains.
+    """
+    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     length = span.stop - span.start
-    margin = min(length // 10, int(1 / (CUTOFF * log.sample_time)))
-    for allowed, share in product((SETTLED, CREEPING), STARTS):
+    margin = min(length // 10, int(1 / (experiment_settings.low_pass_of_steps * log.sample_time)))
+    for allowed, share in product(
+        (experiment_settings.drift_of_a_settled_force, experiment_settings.drift_of_a_settled_place), STARTS
+    ):
         chosen = slice(span.start + int(share * length), span.stop - margin)
-        if chosen.stop - chosen.start < 2 * BLOCKS:
+        if chosen.stop - chosen.start < 2 * reading_settings.blocks_of_a_mean:
             continue
         bent, creep = _drifting(position[chosen])
         beyond, drift = _drifting(force[chosen] - secant * position[chosen])
-        if creep <= allowed * scale and drift <= SETTLED * float(np.subtract(*np.percentile(force, [95, 5]))):
+        if creep <= allowed * scale and drift <= experiment_settings.drift_of_a_settled_force * float(
+            np.subtract(*np.percentile(force, [95, 5]))
+        ):
             time = log.time[[chosen.start, chosen.stop - 1]]
             level = beyond.value + secant * bent.value
             return Window(time[0], time[1], bent.value, level, float(np.hypot(beyond.error, drift / 12**0.5)))
@@ -165,14 +170,16 @@ def _settled_window(
 
 
 def _drifting(values: np.ndarray) -> tuple[Mean, float]:
-    """The mean, and by how much the values drift over the window beyond what their scatter explains (two errors)."""
+    """Return the mean, and by how much values drift over a window beyond what their scatter
+    explains (two errors).
+    """
     mean = block_mean(values)
     shift = values[len(values) // 2 :].mean() - values[: len(values) // 2].mean()
     return mean, float(max(abs(2 * shift) - 4 * mean.error, 0.0))
 
 
 def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str, plateaus: int) -> Estimate:
-    """Least squares of the differences of force on those of deflection through the origin.
+    """Fit the differences of force on those of deflection by a line through the origin.
 
     Neighbouring differences share a window: the variance is the larger of that of independent differences (a force that
     wanders) and of differences of independent windows (noise), and no less than the noise within the windows says.
@@ -189,7 +196,7 @@ def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str,
     shared = float(np.sum(np.diff(np.concatenate(([0.0], x, [0.0]))) ** 2)) / float(x @ x) / 2
     within = float(np.sum((x * noise) ** 2) / (x @ x) ** 2)
     variance = max(max(1.0, shared) * spread / float(x @ x), within)
-    linear = LINEARITY * abs(slope)
+    linear = ReadingSettings.current().linearity_of_sensors * abs(slope)
     estimate = by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method, linear, linear)
     if estimate.low > 0:
         return estimate
@@ -197,7 +204,9 @@ def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str,
 
 
 def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
-    """Force = offset + stiffness * deflection + half the hysteresis * direction of the step before."""
+    """Fit force = offset + stiffness * deflection + half the hysteresis * direction of the step
+    before.
+    """
     name, unit, method = "hysteresis", "N", "force at a deflection reached from below minus from above"
     x, force = np.array([[w.position, w.force] for w in windows]).reshape(-1, 2).T
     if len(x) < 5 or len(set(direction := np.sign(np.diff(x)))) < 2:
@@ -212,7 +221,7 @@ def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
 
 
 def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple[bool | None, tuple[str, ...]]:
-    """Whether the cart stood still between the windows, and what to say of it."""
+    """Tell whether the cart stood still between the windows, and what to say of it."""
     moved = cart(log)
     if moved is None:
         return None, ("The cart is assumed fixed: no channel shows whether it is.",)
@@ -220,25 +229,28 @@ def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple
         return None, ()
     marks = [slice(*np.searchsorted(log.time, (w.start, w.end))) for w in windows]
     followed, went = (np.ptp([x[m].mean() for m in marks]) for x in (moved, position))
-    if followed <= FIXED * went:
+    if followed <= ExperimentSettings.current().travel_of_a_fixed_cart * went:
         return True, ()
     finding = f"The cart is not fixed: it moved by {followed:.3g} m while the stage moved by {went:.3g} m"
     return False, (f"{finding}; the deflection of the joint was measured nevertheless.",)
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StepStiffness:
+    """Analyse a log of position steps."""
     (log,) = logs
     assert isinstance(log, Log)
     return stiffness_from_steps(log)
 
 
 def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ...]:
-    """The stiffness, but not for a stage that has no joint."""
+    """Return the stiffness, but not for a stage that has no joint."""
     return (replace(result.stiffness, name=KEY),) if stage is None or stage.joint else ()
 
 
 def _claims(course: Course) -> str | None:
-    """The position rests in several places, without a reference that moves, and the force rises with the place."""
+    """Claim a log whose position rests in several places, without a reference that moves, where
+    force rises with place.
+    """
     if course.reference_moves or not course.against_a_spring:
         return None
     return "the position rests here and there, and the force follows from the place, as against a spring"

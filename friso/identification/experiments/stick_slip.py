@@ -28,39 +28,30 @@ from friso.identification.readings.common import (
 )
 from friso.identification.readings.loading import METHOD as LOADED
 from friso.identification.readings.loading import stiffness_of_loading
-from friso.identification.readings.rate_effect import BRISTLE_RATE, static_friction
-from friso.identification.readings.slips import SLIDING, VISIBLE, slips
+from friso.identification.readings.rate_effect import static_friction
+from friso.identification.readings.settings import ReadingSettings
+from friso.identification.readings.slips import slips
+from friso.identification.settings import ExperimentSettings
 from friso.intervals import COVERAGE
 from friso.stage import Stage
-
-CUTOFF = 100.0
-"""Low-pass of deflection and velocity [Hz]."""
-
-HELD = 0.5
-"""Share of the slips before which the force had stopped rising, from which none shows static friction."""
-
-NEAR, LONG = 0.01, 4.0
-"""Near its peak is within this share of it; a force that is there so many times as long as usual had stopped rising."""
-
-AT_STOP = 0.05
-"""Share of the stroke that is left where the limiter counts as touched: it smears in the filter."""
 
 STOPPED = "the force on the cart stops rising before it slips: the limiter was touched, or the sensor is at its end"
 
 KEY = "friction.static"
 
-FAR_BELOW = 0.1
-"""Share of the limiter's stiffness up to which a stiffness is the joint's."""
-
 
 @dataclass(frozen=True)
 class StickSlip:
-    """Static friction [N], in all and per direction; mean break-away force [N] per direction as measured at its force
-    rate, and its range over the slips (5 to 95 %); a force common to both directions (sensor offset, or unequal
-    friction); the joint's `stiffness` [N/m] as force and deflection of this log show it. Per slip, shape (n,): time
-    [s], place on the rail [m], direction, peak deflection [m] (NaN without sensor), break-away force [N] in that
-    direction, force rate [N/s], highest speed of the cart [m/s]. Over time, shape (samples,): force on the cart [N] and
-    its speed [m/s]."""
+    """Static friction from slow motion that sticks and slips.
+
+    Static friction [N] is that in all and per direction; there are the mean break-away force [N] per direction as
+    measured at its force rate, and its range over the slips (5 to 95 %); a force common to both directions (sensor
+    offset, or unequal friction); and the joint's `stiffness` [N/m] as force and deflection of this log show it.
+
+    Per slip, shape (n,): time [s], place on the rail [m], direction, peak deflection [m] (NaN without sensor),
+    break-away force [N] in that direction, force rate [N/s], highest speed of the cart [m/s]. Over time, shape
+    (samples,): force on the cart [N] and its speed [m/s].
+    """
 
     static: Estimate
     forward: Estimate
@@ -83,60 +74,63 @@ class StickSlip:
 
 
 def static_from_stick_slip(
-    log: Log,
-    stiffness: Estimate | float | None = None,
-    stage_mass: float = 0.0,
-    stroke: float = np.inf,
-    bristle_rate: float = BRISTLE_RATE,
+    log: Log, stiffness: Estimate | float | None = None, stage_mass: float = 0.0, stroke: float = np.inf
 ) -> StickSlip:
-    """Static friction from slow motion that sticks and slips.
+    """Estimate static friction from slow motion that sticks and slips.
 
     With the joint's `stiffness` [N/m] (an Estimate brings its interval) the force on the cart is that times the
     deflection measured; without, the actuator force less `stage_mass` [kg] times the acceleration of the position. How
-    far the finite force rate lowers it is extrapolated or bounded, see `rate_effect`, with `bristle_rate` [N/s].
-    Slips from a deflection at the `stroke` [m] of the joint tell nothing of it. What the record cannot show is unknown
-    with its reason. Raises InputError for missing channels or an unusable stiffness.
+    far the finite force rate lowers it is extrapolated or bounded, see `rate_effect`. Slips from a deflection at the
+    `stroke` [m] of the joint tell nothing of it. What the record cannot show is unknown with its reason. Raises
+    InputError for missing channels or an unusable stiffness.
     """
-    deflected, pushed = _deflection(log, CUTOFF), _actuator(log, stage_mass, CUTOFF)
+    settings = ExperimentSettings.current()
+    deflected, pushed = (
+        _deflection(log, settings.low_pass_of_stick_slip),
+        _actuator(log, stage_mass, settings.low_pass_of_stick_slip),
+    )
     pull, relative_error = _pull(log, stiffness, deflected, pushed)
     body = on_bearing(log)
     cart_velocity = np.zeros_like(body)
     rows: list[tuple[float, ...]] = []
     shares, loads = [], []
     for part in log.segments:
-        breaks = slips(body[part], log.sample_time, CUTOFF)
+        breaks = slips(body[part], log.sample_time, settings.low_pass_of_stick_slip)
         cart_velocity[part] = breaks.speed
         shares.append(breaks.share)
         marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.fastest, breaks.directions, strict=True)
         for onset, start, rest, top, direction in marks:
             at, force, before, rising, held = _peak(
-                direction * pull[part], log.sample_time, CUTOFF, (rest, onset, start, top)
+                direction * pull[part], log.sample_time, settings.low_pass_of_stick_slip, (rest, onset, start, top)
             )
             at += part.start
             bent = np.nan if deflected is None else float(direction * deflected[at])
             unseen = _unseen(direction * breaks.speed[onset + 1 : top + 1]) * log.sample_time
-            late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / CUTOFF)
+            late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / settings.low_pass_of_stick_slip)
             place = (float(log.time[at]), float(body[at]), float(direction))
-            held = held or abs(bent) > (1 - AT_STOP) * stroke
+            held = held or abs(bent) > (1 - settings.stroke_share_at_a_stop) * stroke
             loads += [] if held else [slice(part.start + rest, part.start + onset)]
             rows.append((*place, bent, force, rising, float(abs(breaks.speed[top])), held, late))
     table = np.array([row for row in rows if row[5] > 0 or row[7]]).reshape(-1, 9).T
-    joint_stiffness = _stiffness(log, deflected, loads, CUTOFF)
-    return _answer(table, pull, cart_velocity, (relative_error, bristle_rate), joint_stiffness, _why(shares))
+    joint_stiffness = _stiffness(log, deflected, loads, settings.low_pass_of_stick_slip)
+    return _answer(table, pull, cart_velocity, relative_error, joint_stiffness, _why(shares))
 
 
 def _smooth(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
+    """Low-pass values of a log at a cut-off [Hz], segment by segment."""
     return np.concatenate([low_pass(values[s], log.sample_time, cutoff) for s in log.segments])
 
 
 def _deflection(log: Log, cutoff: float) -> np.ndarray | None:
-    """Deflection of the joint [m], low-passed; None where it is not measured."""
+    """Return the deflection of the joint [m], low-passed; None where it is not measured."""
     measured = deflection(log)
     return None if measured is None else _smooth(log, measured, cutoff)
 
 
 def _actuator(log: Log, stage_mass: float, cutoff: float) -> np.ndarray | None:
-    """Force of the actuator less the stage's inertia [N], low-passed; None where it is not measured."""
+    """Return the force of the actuator less the stage's inertia [N], low-passed; None where it
+    is not measured.
+    """
     if "force" not in log:
         return None
     force = _smooth(log, channel(log, "force"), cutoff)
@@ -146,13 +140,16 @@ def _actuator(log: Log, stage_mass: float, cutoff: float) -> np.ndarray | None:
 
 
 def _rate(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
+    """Differentiate values of a log, low-passed at a cut-off [Hz], segment by segment."""
     return np.concatenate([rate(values[s], log.sample_time, cutoff) for s in log.segments])
 
 
 def _pull(
     log: Log, stiffness: Estimate | float | None, deflected: np.ndarray | None, pushed: np.ndarray | None
 ) -> tuple[np.ndarray, float]:
-    """Force on the cart [N], low-passed, and the relative standard deviation of its scale."""
+    """Return the force on the cart [N], low-passed, and the relative standard deviation of its
+    scale.
+    """
     if stiffness is None:
         return channel(log, "force") if pushed is None else pushed, 0.0  # raises: neither of the two is known
     value, half = (stiffness.value, stiffness.half_width) if isinstance(stiffness, Estimate) else (stiffness, 0.0)
@@ -164,7 +161,7 @@ def _pull(
 
 
 def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutoff: float) -> Estimate:
-    """The joint's stiffness as this log shows it."""
+    """Estimate the joint's stiffness as this log shows it."""
     pushed = _actuator(log, 0.0, cutoff)
     if deflected is None or pushed is None or "position" not in log:
         reason = "force, position and deflection are not all measured"
@@ -177,57 +174,64 @@ def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutof
 def _peak(
     pull: np.ndarray, sample_time: float, cutoff: float, marks: tuple[int, int, int, int]
 ) -> tuple[int, float, float, float, bool]:
-    """Where the pull peaks between visible motion and top speed, its height, that at the onset of visible motion, the
-    rate at which it rose over the last third of the rest, and whether it had stopped rising: it stayed within a
-    hundredth of its peak for several times as long as its usual rate takes, and the filter smears."""
+    """Find where the pull peaks between visible motion and top speed, and how high.
+
+    Returns its place and height, the pull at the onset of visible motion, the rate at which it rose over the last third
+    of the rest, and whether it had stopped rising: it stayed within a hundredth of its peak for several times as long
+    as its usual rate takes, and the filter smears.
+    """
+    settings = ExperimentSettings.current()
     rest, onset, start, top = marks
     at = start + int(np.argmax(pull[start : top + 1]))
     begin = max(onset - max((onset - rest) // 3, 5), 0)
     rising = (pull[onset] - pull[begin]) / ((onset - begin) * sample_time)
     tenths = np.unique(np.linspace(rest, onset, 11).astype(int))
     usual = float(np.median(np.diff(pull[tenths]) / (np.diff(tenths) * sample_time)))
-    near = float((pull[rest : at + 1] > (1 - NEAR) * pull[at]).sum()) * sample_time
-    held = near > LONG * (NEAR * abs(pull[at] / usual) + 1 / cutoff) if usual > 0 else True
+    near = float((pull[rest : at + 1] > (1 - settings.share_near_a_peak) * pull[at]).sum()) * sample_time
+    held = (
+        near > settings.duration_near_a_peak * (settings.share_near_a_peak * abs(pull[at] / usual) + 1 / cutoff)
+        if usual > 0
+        else True
+    )
     return at, float(pull[at]), float(pull[onset]), float(rising), bool(held)
 
 
 def _unseen(speed: np.ndarray) -> float:
-    """For how many samples motion may have been hidden in noise before its speed, from then to its highest, shape (n,),
-    stood out: had it grown by a power of two in the time that its first doubling took. A body that speeds up evenly was
-    hidden for less."""
+    """Count the samples for which motion may have been hidden in noise.
+
+    Its speed, from when it stood out to its highest, has the shape (n,): it had grown by a power of two in the time
+    that its first doubling took. A body that speeds up evenly was hidden for less.
+    """
+    settings = ReadingSettings.current()
     first, top = float(speed[0]), float(speed[-1])
-    if not first > VISIBLE * top:
+    if not first > settings.speed_share_of_an_onset * top:
         return 0.0
     doubled = int(np.argmax(speed >= min(2 * first, top)))
-    return doubled * float(np.log2(first / (VISIBLE * top)))
+    return doubled * float(np.log2(first / (settings.speed_share_of_an_onset * top)))
 
 
 def _why(shares: list[float]) -> str:
-    """Why there are no slips, for a reason."""
-    if shares and min(shares) > SLIDING:
+    """Say why there are no slips."""
+    if shares and min(shares) > ReadingSettings.current().time_share_of_sliding:
         return "the cart slides all the time"
     return "the cart shows no slips out of rest"
 
 
 def _answer(
-    table: np.ndarray,
-    pull: np.ndarray,
-    velocity: np.ndarray,
-    uncertainty: tuple[float, float],
-    stiffness: Estimate,
-    why: str,
+    table: np.ndarray, pull: np.ndarray, velocity: np.ndarray, relative_error: float, stiffness: Estimate, why: str
 ) -> StickSlip:
+    """Make the result of all slips."""
+    settings = ExperimentSettings.current()
     times, places, directions, bent, forces, rates, speeds, held, late = table
-    relative_error, bristle_rate = uncertainty
 
     def static(chosen: np.ndarray, words: str) -> Estimate:
         if not chosen.any():
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", f"{why}{words}", 0.0)
-        if held[chosen].mean() > HELD:
+        if held[chosen].mean() > settings.share_of_held_slips:
             low = max(0.0, float(forces[chosen].mean() * (1 - relative_error * COVERAGE)))
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", STOPPED, low)
         used = chosen & (rates > 0)  # held ones may have none
-        return static_friction(KEY, forces[used], rates[used], bristle_rate, relative_error, late[used].mean())
+        return static_friction(KEY, forces[used], rates[used], relative_error, late[used].mean())
 
     masks = dict(by_direction(directions))
     means = {name: _mean(f"break-away force, {name}", forces[m], relative_error, why) for name, m in masks.items()}
@@ -262,7 +266,7 @@ def _answer(
 
 
 def _notes(count: int, offset: Estimate) -> tuple[str, ...]:
-    """What to know before believing it."""
+    """Say what to know before believing the result."""
     notes = []
     if count and not offset.determined:
         notes.append("The zero of the force on the cart is used as measured; slips in one direction cannot verify it.")
@@ -275,6 +279,7 @@ def _notes(count: int, offset: Estimate) -> tuple[str, ...]:
 
 
 def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Estimate:
+    """Return the mean break-away force of one direction."""
     method = "mean of the peaks of the force on the cart before slips"
     if len(forces) < 2:
         return Estimate.unknown(name, "N", method, f"{len(forces)} slips: {why}" if not len(forces) else "1 slip")
@@ -285,8 +290,11 @@ def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Est
 
 
 def _both(forward: Estimate, backward: Estimate) -> Estimate:
-    """The mean of both directions, in which a common offset drops out; that of the only one in which the cart slips.
-    What one direction shows and the other bounds is a bound: the offset is not known."""
+    """Return the mean of both directions, in which a common offset drops out.
+
+    Where the cart slips in one direction alone it is that one's. What one direction shows and the other bounds is a
+    bound: the offset is not known.
+    """
     if not (forward.determined and backward.determined):
         seen, unseen = (forward, backward) if forward.determined else (backward, forward)
         if not unseen.low > 0:  # no slips at all
@@ -304,7 +312,7 @@ def _both(forward: Estimate, backward: Estimate) -> Estimate:
 
 
 def _offset(forward: Estimate, backward: Estimate) -> Estimate:
-    """Half of what the forward break-away exceeds the backward one by."""
+    """Return half of what the forward break-away exceeds the backward one by."""
     name, method = (
         "offset of the force on the cart",
         "half the difference of the break-away forces forward and backward",
@@ -317,7 +325,9 @@ def _offset(forward: Estimate, backward: Estimate) -> Estimate:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StickSlip:
-    """With the joint's stiffness as other experiments show it; else as this log does; else as the stage file has it."""
+    """Analyse logs with the joint's stiffness as other experiments show it; else as this log
+    does; else as the stage has it.
+    """
     (log,) = logs
     assert isinstance(log, Log)
     flat, (_, mass) = prior.flat(log), prior.masses(log)
@@ -329,15 +339,18 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _estimates(result: StickSlip, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Static friction, and the stiffness where it is that of the stage's joint."""
+    """Return static friction, and the stiffness where it is that of the stage's joint."""
     return (result.static, *([result.stiffness] if _of_joint(result.stiffness, stage) else ()))
 
 
 def _of_joint(stiffness: Estimate, stage: Stage | None) -> bool:
-    """Whether a stiffness is that of the stage's joint, and not of the limiter that holds it."""
+    """Tell whether a stiffness is that of the stage's joint, and not of the limiter that holds
+    it.
+    """
+    settings = ExperimentSettings.current()
     if stage is None or stage.joint is None or not stiffness.determined:
         return False
-    return bool(stiffness.value < FAR_BELOW * stage.flat()["joint.limiter_stiffness"])
+    return bool(stiffness.value < settings.stiffness_share_of_a_limiter * stage.flat()["joint.limiter_stiffness"])
 
 
 KIND = ExperimentKind[StickSlip](

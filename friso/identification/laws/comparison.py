@@ -3,7 +3,7 @@
 A law with more numbers always fits better; what it predicts of what it was not fitted to need not be better (cross-
 validation). A law is supported unless it clearly predicts worse than the best: by more than chance would have it (a t
 test of the differences by parts and one of their signs, at a level that counts all laws: Bonferroni), and by more than
-`LEAST_WORSE`.
+a difference of errors up to which laws predict alike.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from friso.errors import InputError
 from friso.identification.kind import Prior
 from friso.identification.laws.dragging import DraggedRecord, blocks, dragged_record
 from friso.identification.laws.fit import LawFit, LawProblem
+from friso.identification.laws.settings import LawSettings
 from friso.identification.logs.log import Log
 from friso.identification.readings.at_bearing import believed_between
 from friso.progress import Progress, silent
@@ -26,23 +27,13 @@ from friso.stage import Stage
 from friso.stage.tables import FRICTION, FrictionSection, friction_law
 from friso.stage.transmission import MOTOR_FRICTION, moving_mass
 
-PIECES = 5
-"""Parts at least into which the records are cut, in time: fewer differences decide nothing."""
-
-LEVEL = 0.05
-"""Probability at most with which a law that predicts as well as the best is called worse."""
-
-LEAST_WORSE = 0.01
-"""Difference of errors, as shares of the friction's standard deviation, up to which laws predict alike."""
-
-EXPLAINED = 0.3
-"""Share of the friction's standard deviation up to which a prediction is one."""
-
 
 @dataclass(frozen=True)
 class LawPrediction:
-    """A law as all records together show it, and by how much its predictions of each part that was left out are off, as
-    a share of the friction's standard deviation there, shape (parts,)."""
+    """A law fitted to all records, with its errors in predicting parts that were left out.
+
+    The errors, shape (parts,), are shares of the friction's standard deviation in each part.
+    """
 
     fit: LawFit
     errors: np.ndarray
@@ -60,8 +51,11 @@ class LawPrediction:
 
 @dataclass(frozen=True)
 class LawComparison:
-    """The laws, the best first; the names of the logs; those that were left out, with the reason; how many parts were
-    predicted; and whether fits began from the stage as it was known before any log (`unseen`)."""
+    """The friction laws by how well they predict, the best first.
+
+    `logs` are the names of those used, `left_out` those that were not, with the reason, and `parts` how many parts were
+    predicted. `unseen` says whether fits began from the stage as it was known before any log.
+    """
 
     predictions: tuple[LawPrediction, ...]
     logs: tuple[str, ...]
@@ -72,33 +66,43 @@ class LawComparison:
     @property
     def explained(self) -> bool:
         """Whether any law predicts the record."""
-        return self.predictions[0].error < EXPLAINED
+        return self.predictions[0].error < LawSettings.current().error_of_a_prediction
 
     @property
     def supported(self) -> tuple[LawPrediction, ...]:
-        """The laws that predict the record, and not clearly worse than the best; none where no law predicts it."""
+        """The laws that predict the record, and not clearly worse than the best; none where no law
+        predicts it.
+        """
+        settings = LawSettings.current()
         best = self.predictions[0]
         if not self.explained:
             return ()
-        level = LEVEL / max(len(self.predictions) - 1, 1)
-        others = (law for law in self.predictions[1:] if law.error < EXPLAINED)
+        level = settings.chance_of_a_worse_law / max(len(self.predictions) - 1, 1)
+        others = (law for law in self.predictions[1:] if law.error < settings.error_of_a_prediction)
         return (best, *(law for law in others if not _worse(law.errors - best.errors, level)))
 
 
 def _worse(differences: np.ndarray, level: float) -> bool:
-    """Whether errors, shape (parts,), are larger than those of another law: by more than parts differ by chance, at a
-    level, and by more than `LEAST_WORSE`, on average or, where single parts stand out, in their sign and median. A law
-    that could not be run for a part is."""
+    """Tell whether errors, shape (parts,), are larger than those of another law by more than
+    chance.
+
+    They are by more than parts differ by chance, at a level, and by more than laws that predict alike differ: on
+    average or, where single parts stand out, in their sign and median. A law that could not be run for a part is worse.
+    """
+    settings = LawSettings.current()
     if not np.isfinite(differences).all():
         return True
     count, level = len(differences), level / 2  # of two tests
     chance = student.ppf(1 - level, count - 1) * differences.std(ddof=1) / np.sqrt(count) if count > 1 else np.inf
     more_often = binomtest(int((differences > 0).sum()), count, alternative="greater").pvalue < level
-    return bool(differences.mean() > max(chance, LEAST_WORSE) or (more_often and np.median(differences) > LEAST_WORSE))
+    return bool(
+        differences.mean() > max(chance, settings.difference_of_worse_laws)
+        or (more_often and np.median(differences) > settings.difference_of_worse_laws)
+    )
 
 
 def comparable() -> list[str]:
-    """The laws that stick and can be made from what is measured."""
+    """List the laws that stick and can be made from what is measured."""
     return [
         name
         for name, law in FRICTION.classes.items()
@@ -107,9 +111,12 @@ def comparable() -> list[str]:
 
 
 def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Progress = silent) -> LawComparison:
-    """Fit every law to the same logs, and let each predict what it was not fitted to: begun from the stage before any
-    log (`prior`), or from the `stage` that all logs show where no fit can begin from its law. Raises InputError where
-    no log shows friction before sliding, and for a stage whose law does not stick."""
+    """Fit every law to the same logs, and let each predict what it was not fitted to.
+
+    Fits begin from the stage before any log (`prior`), or from the `stage` that all logs show where no fit can begin
+    from its law. Raises InputError where no log shows friction before sliding, and for a stage whose law does not
+    stick.
+    """
     records, left_out = _records(logs, prior)
     if not records:
         reasons = "; ".join(f"{name}: {why}" for name, why in left_out.items()) or "no log over time"
@@ -125,7 +132,7 @@ def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Prog
         actual = f'"{model}", from which no fit can begin'
         raise InputError("friction.model", actual, f"one of {', '.join(comparable())}", 'model = "lugre"')
     mass = float(moving_mass(flat))
-    laws, parts = comparable(), blocks(records, PIECES)
+    laws, parts = comparable(), blocks(records, LawSettings.current().parts_left_out)
     predictions = []
     for number, law in enumerate(laws):
         progress(number, len(laws), law)
@@ -136,7 +143,7 @@ def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Prog
 
 
 def _records(logs: Sequence[Log], prior: Prior) -> tuple[list[DraggedRecord], dict[str, str]]:
-    """What can be read from the logs, and why from others nothing can."""
+    """Read records from the logs, and say of others why nothing can be read from them."""
     records, left_out = [], {}
     for log in logs:
         if not {"position", "force"} <= {*log.signals}:
@@ -151,6 +158,7 @@ def _records(logs: Sequence[Log], prior: Prior) -> tuple[list[DraggedRecord], di
 
 
 def _prediction(problem: LawProblem, parts: Sequence[Sequence[np.ndarray]]) -> LawPrediction:
+    """Fit a law to all records and to all but each part in turn, and predict that part."""
     starts = problem.everywhere()  # not the fit to all records, which has seen what is left out
     whole = problem.fitted([np.ones(len(r.force), bool) for r in problem.records], starts)
     errors = []

@@ -11,31 +11,19 @@ import numpy as np
 from friso.engine.driven import Inputs, run_driven
 from friso.engine.kernel import kernel
 from friso.equations.dragged import Dragged
+from friso.identification.laws.settings import LawSettings
 from friso.identification.logs.log import Log
-from friso.identification.readings.at_bearing import (
-    Between,
-    LowPass,
-    at_bearing,
-    cutoff_of,
-    record_of,
-    why_unseen,
-)
+from friso.identification.readings.at_bearing import Between, LowPass, at_bearing, cutoff_of, record_of, why_unseen
 from friso.stage.tables import friction_law
-
-FEWEST, MOST = 400, 8000
-"""Samples of a record at least, and at most: what follows is left out."""
-
-MOTION, FINE = 5.0, 20
-"""Band of the motion over that of the force, and samples per period of the latter that are enough."""
-
-RTOL = 1e-5
-"""Relative tolerance of the runs."""
 
 
 @dataclass(frozen=True)
 class DraggedRecord:
-    """A log by its name. Over time [s], shape (n,): the position [m] of the body on the bearing; and low-passed,
-    inside, shape (m,): the force [N] that has arrived and the acceleration [m/s^2] of the whole moving mass."""
+    """A log as a body that is dragged along what was measured.
+
+    Over time [s] it has the position [m] of the body on the bearing, shape (n,); low-passed, inside the record, the
+    force [N] that has arrived and the acceleration [m/s^2] of the whole moving mass, shape (m,).
+    """
 
     name: str
     position: np.ndarray
@@ -45,12 +33,17 @@ class DraggedRecord:
 
     @property
     def interval(self) -> float:
-        """Between samples [s]."""
+        """Time between samples [s]."""
         return float(self.low_pass.time[1] - self.low_pass.time[0])
 
     def friction(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-        """Friction force [N] of laws of one structure, given as flat keys to numbers or arrays of shape (runs,), along
-        the record, low-passed, shape (runs, m); NaN for runs that failed. The bristles begin unbent."""
+        """Return the friction force [N] of laws of one structure along the record, low-passed, shape
+        (runs, m).
+
+        The laws are given as flat keys to numbers or arrays of shape (runs,); runs that failed are NaN. The bristles
+        begin unbent.
+        """
+        settings = LawSettings.current()
         law = flat["friction.model"]
         first = {key: value[0] if np.ndim(value) else value for key, value in flat.items()}
         shape = kernel(Dragged(law, friction_law(law).variant(first)))
@@ -59,7 +52,9 @@ class DraggedRecord:
         starts[:, shape.position] = self.position[0]
         starts[:, shape.velocity] = inputs.velocity[0]  # a record may begin in motion
         forces = np.full((runs, len(self.force)), np.nan)
-        for part in run_driven(shape, {**flat, "motion.duration": 1.0}, runs, inputs, starts, RTOL):
+        for part in run_driven(
+            shape, {**flat, "motion.duration": 1.0}, runs, inputs, starts, settings.tolerance_of_dragging
+        ):
             impulse = part.states[:, :, -1]
             mean = np.diff(impulse, axis=1) / self.interval
             middle = np.pad((mean[:, 1:] + mean[:, :-1]) / 2, ((0, 0), (1, 1)), mode="edge")
@@ -69,20 +64,30 @@ class DraggedRecord:
 
 
 def dragged_record(log: Log, between: Between) -> DraggedRecord | str:
-    """The longest stretch of a log; or why nothing can be read from it. Raises InputError for missing channels."""
+    """Read the longest stretch of a log; or say why nothing can be read from it.
+
+    Raises InputError for missing channels.
+    """
+    settings = LawSettings.current()
     whole = record_of(log, log.longest, between)
-    if why := why_unseen(whole, FEWEST):
+    if why := why_unseen(whole, settings.samples_of_a_dragged_record):
         return why
     cutoff = cutoff_of(whole)
-    record = whole.seen(MOTION * cutoff, max(int(1 / (FINE * cutoff * whole.interval)), 1)).beginning(MOST)
+    record = whole.seen(
+        settings.band_of_the_motion * cutoff,
+        max(int(1 / (settings.samples_of_a_dragged_period * cutoff * whole.interval)), 1),
+    ).beginning(settings.most_samples_of_a_record)
     low_pass = LowPass(record.time, cutoff)
     body, force, acceleration = at_bearing(record, between, between.mass)
     return DraggedRecord(log.name, body, low_pass, low_pass(force), low_pass(acceleration))
 
 
 def blocks(records: Sequence[DraggedRecord], pieces: int) -> list[list[np.ndarray]]:
-    """What is left out by turns, by record, as masks of shape (m,): each record as a whole, where there are as many as
-    `pieces` are wanted; of fewer, pieces in time, as many of each."""
+    """Choose what is left out by turns, by record, as masks of shape (m,).
+
+    Each record is left out as a whole, where there are as many as `pieces` are wanted; of fewer, pieces in time, as
+    many of each.
+    """
     cuts = -(-pieces // len(records))
     parts = []
     for out in records:

@@ -11,28 +11,19 @@ from scipy.optimize import least_squares
 
 from friso.equations.friction.measured import MeasuredFriction
 from friso.identification.laws.dragging import DraggedRecord
+from friso.identification.laws.settings import LawSettings
 from friso.stage.tables import friction_law
-
-STEP = 1e-4
-"""Change of a logarithm for derivatives."""
 
 FAR = {"mass": 3.0, "coulomb": 30.0, "gap": 100.0, "stribeck_velocity": 100.0, "viscous": 100.0, "stiffness": 30.0,
        "damping": 100.0}  # fmt: skip
 """Numbers that are fitted to every law, and the factor by which they may differ from what was known beforehand."""
 
-LEAST = 1e-3
-"""Share of what a number is measured by (friction, or damping of the bristles) that one begins at which was 0."""
-
-STIFFER = (0.1, 0.3, 1.0, 3.0, 10.0)
-"""Factors of the stiffness of which the best is begun with."""
-
-EVALUATIONS, TOLERANCE = 25, 1e-4
-"""At most, of a fit; and the change of numbers and cost that ends it."""
-
 
 @dataclass(frozen=True)
 class LawFit:
-    """A law fitted to records: the mass [kg], the keys of the law [SI], and the numbers behind them."""
+    """A law fitted to records: the mass [kg], the keys of the law [SI], and the numbers behind
+    them.
+    """
 
     law: str
     mass: float
@@ -42,7 +33,10 @@ class LawFit:
 
 @dataclass(frozen=True)
 class LawProblem:
-    """A law, what is known beforehand (mass [kg] and friction), and the Stribeck exponent, which is not fitted."""
+    """A law to be fitted to records, with the mass [kg] and the friction known beforehand.
+
+    The Stribeck exponent is as known beforehand, and is not fitted.
+    """
 
     law: str
     mass: float
@@ -51,36 +45,37 @@ class LawProblem:
 
     @property
     def names(self) -> list[str]:
-        """Of the numbers that are fitted; each as a logarithm."""
+        """Names of the numbers that are fitted, each as a logarithm."""
         return [*FAR, *friction_law(self.law).shape]
 
     @property
     def start(self) -> np.ndarray:
         """The numbers as known beforehand, shape (parameters,)."""
+        settings = LawSettings.current()
         levels, before = self.before.levels, self.before
         speed = levels.static / levels.stribeck_velocity
         beforehand = {
             "mass": self.mass,
             "coulomb": levels.coulomb,
-            "gap": max(levels.static - levels.coulomb, LEAST * levels.static),
+            "gap": max(levels.static - levels.coulomb, settings.share_of_a_first_value * levels.static),
             "stribeck_velocity": levels.stribeck_velocity,
-            "viscous": max(levels.viscous, LEAST * speed),
+            "viscous": max(levels.viscous, settings.share_of_a_first_value * speed),
             "stiffness": before.stiffness,
-            "damping": max(before.damping, LEAST * np.sqrt(before.stiffness * self.mass)),
+            "damping": max(before.damping, settings.share_of_a_first_value * np.sqrt(before.stiffness * self.mass)),
         }
         shape = [start for _, start, _ in friction_law(self.law).shape.values()]
         return np.log([*(beforehand[name] for name in FAR), *shape])
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of the numbers, shape (parameters,) each."""
+        """Lower and upper bounds of the numbers, each of shape (parameters,)."""
         far, shape = np.log(list(FAR.values())), friction_law(self.law).shape.values()
         centre = self.start[: len(far)]
         low, high = ([np.log(limits[end]) for limits in shape] for end in (0, 2))
         return np.concatenate([centre - far, low]), np.concatenate([centre + far, high])
 
     def keys(self, numbers: np.ndarray) -> dict[str, float]:
-        """The keys of the law [SI] for some numbers, shape (parameters,)."""
+        """Return the keys of the law [SI] for some numbers, shape (parameters,)."""
         value = dict(zip(self.names, np.exp(numbers), strict=True))
         static = value["coulomb"] + value["gap"]
         before = self.before.levels
@@ -96,8 +91,10 @@ class LawProblem:
         return law.shaped(measured, {name: value[name] for name in law.shape})
 
     def errors(self, rows: np.ndarray) -> list[np.ndarray]:
-        """What is left of the force [N] in each record, about its mean, shape (rows, m), for numbers of shape (rows,
-        parameters); infinite where a run failed."""
+        """Return what is left of the force [N] in each record, about its mean, shape (rows, m).
+
+        The numbers have the shape (rows, parameters). What is left is infinite where a run failed.
+        """
         columns = [self.keys(row) for row in rows]
         flat = {key: np.array([keys[key] for keys in columns]) for key in columns[0]}
         # numbers that decide on the equations are the same in all rows
@@ -111,8 +108,11 @@ class LawProblem:
         return left
 
     def fitted(self, used: Sequence[np.ndarray], starts: np.ndarray) -> LawFit:
-        """The fit from the best of some starts, shape (starts, parameters), to the samples that are `used` of each
-        record, masks of shape (m,)."""
+        """Fit the law from the best of some starts to the samples that are `used` of each record.
+
+        The starts have the shape (starts, parameters), and `used` holds a mask of shape (m,) for each record.
+        """
+        settings = LawSettings.current()
         weights = [mask / np.sqrt(max(int(mask.sum()), 1)) / record.force.std() for mask, record in self._pairs(used)]
 
         rows: dict[bytes, np.ndarray] = {}  # the residual with its derivatives: as many runs side by side cost one
@@ -120,36 +120,49 @@ class LawProblem:
         def at(numbers: np.ndarray) -> np.ndarray:
             if numbers.tobytes() not in rows:
                 rows.clear()
-                moved = numbers + STEP * np.eye(len(numbers))
+                moved = numbers + settings.step_of_a_logarithm * np.eye(len(numbers))
                 rows[numbers.tobytes()] = self._weighed(np.vstack([numbers, moved]), weights)
             return rows[numbers.tobytes()]
 
         def jacobian(numbers: np.ndarray) -> np.ndarray:
             here = at(numbers)
-            return (here[1:] - here[0]).T / STEP
+            return (here[1:] - here[0]).T / settings.step_of_a_logarithm
 
         low, high = self.bounds
-        starts = np.clip(starts, low + 2 * STEP, high - 2 * STEP)
+        starts = np.clip(starts, low + 2 * settings.step_of_a_logarithm, high - 2 * settings.step_of_a_logarithm)
         first = starts[np.argmin(np.sum(self._weighed(starts, weights) ** 2, axis=1))]
-        options: dict[str, Any] = {"max_nfev": EVALUATIONS, "xtol": TOLERANCE, "ftol": TOLERANCE, "jac": jacobian}
+        options: dict[str, Any] = {
+            "max_nfev": settings.evaluations_of_a_fit,
+            "xtol": settings.tolerance_of_a_fit,
+            "ftol": settings.tolerance_of_a_fit,
+            "jac": jacobian,
+        }
         best = least_squares(lambda numbers: at(numbers)[0], first, bounds=(low, high), **options).x
         return LawFit(self.law, float(np.exp(best[0])), self.keys(best), best)
 
     def everywhere(self) -> np.ndarray:
-        """Starts, shape (starts, parameters): bristles softer and stiffer than known beforehand."""
-        starts = np.tile(self.start, (len(STIFFER), 1))
-        starts[:, self.names.index("stiffness")] += np.log(STIFFER)
+        """Return starts, shape (starts, parameters), with bristles softer and stiffer than known
+        beforehand.
+        """
+        settings = LawSettings.current()
+        starts = np.tile(self.start, (len(settings.stiffness_factors), 1))
+        starts[:, self.names.index("stiffness")] += np.log(settings.stiffness_factors)
         return starts
 
     def _pairs(self, used: Sequence[np.ndarray]) -> list[tuple[np.ndarray, DraggedRecord]]:
+        """Pair the masks with their records."""
         return list(zip(used, self.records, strict=True))
 
     def _weighed(self, rows: np.ndarray, weights: Sequence[np.ndarray]) -> np.ndarray:
-        """Residuals of all records, shape (rows, samples); a large number where a run failed."""
+        """Return the residuals of all records, shape (rows, samples), weighed; a large number where
+        a run failed.
+        """
+        settings = LawSettings.current()
         with np.errstate(invalid="ignore"):  # a run that failed, where its weight is 0
             parts = [left * weight for left, weight in zip(self.errors(rows), weights, strict=True)]
-        return np.nan_to_num(np.hstack(parts), nan=FAILED, posinf=FAILED, neginf=-FAILED)
-
-
-FAILED = 1.0
-"""Weighed residual of a run that failed: much worse than no model at all."""
+        return np.nan_to_num(
+            np.hstack(parts),
+            nan=settings.residual_of_a_failed_run,
+            posinf=settings.residual_of_a_failed_run,
+            neginf=-settings.residual_of_a_failed_run,
+        )

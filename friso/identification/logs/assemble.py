@@ -16,12 +16,10 @@ from friso.identification.logs.log import ROLES, Log
 from friso.identification.logs.mapping import Mapping, option
 from friso.identification.logs.read import file_format
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
+from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.signals import Notes, Reading, instants, no_time, signal, unused, with_user_units
 from friso.identification.logs.time_base import Track, resample_tracks, track
 from friso.quantities import percent, quoted
-
-LEAST_SAMPLES = 50
-"""Fewer samples than this are refused (our choice: no interval on anything would be worth its name)."""
 
 
 def read_log(
@@ -31,12 +29,12 @@ def read_log(
     needed: Sequence[str] = ("position",),
     foreign: Sequence[str] = (),
 ) -> Log:
-    """The log in a file: signals by role, SI, on one time base; with what was read and what is doubtful, line by line.
+    """Read the log in a file: signals by role, SI, on one time base.
 
-    With `strict`, every signal must be in the SI unit of its role, but those of the `foreign` roles, which may be in
-    another unit of their own; without, all are kept as they are, and listed in `Log.units`. `needed` are the roles that
-    must be there; a position may be the integral of the velocity. Raises LogError (one message) for what cannot be read
-    or used.
+    It says line by line what was read and what is doubtful. With `strict`, every signal must be in the SI unit of its
+    role, but those of the `foreign` roles, which may be in another unit of their own; without, all are kept as they
+    are, and listed in `Log.units`. `needed` are the roles that must be there; a position may be the integral of the
+    velocity. Raises LogError (one message) for what cannot be read or used.
     """
     path, mapping = Path(path), mapping or Mapping()
     form = FORMATS[file_format(path)]
@@ -73,7 +71,7 @@ def read_log(
 
 
 def _undecided(proposal: Proposal) -> list[str]:
-    """A line for each role that no channel has since several could."""
+    """Write a line for each role that no channel has since several could."""
     return [
         f"{role}: several candidates ({', '.join(channel.name for channel in channels)}); to use one: "
         f"{option('--map', role, channels[0].name)}"
@@ -82,8 +80,11 @@ def _undecided(proposal: Proposal) -> list[str]:
 
 
 def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, needed: Sequence[str]) -> dict[str, Track]:
-    """Each role's channel on even instants in the unit of the role. A channel that was only proposed and that nobody
-    needs is left out, with a warning, where it has no instants or no unit; others raise LogError."""
+    """Return each role's channel on even instants in the unit of the role.
+
+    A channel that was only proposed and that nobody needs is left out, with a warning, where it has no instants or no
+    unit; others raise LogError.
+    """
     clock = chosen.get("time")
     tracks: dict[str, Track] = {}
     sizes = [choice.channel.values.size for role, choice in chosen.items() if role in needed or choice.by_user]
@@ -120,7 +121,7 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
 
 
 def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
-    """Where the instants come from, in words."""
+    """Say where the instants come from."""
     if reading.mapping.sample_time is not None:
         return [
             f"time: one sample every {reading.mapping.sample_time:.9g} s, as specified; the times in the file are not "
@@ -133,7 +134,7 @@ def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
 
 
 def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray, notes: Notes) -> Track:
-    """One track, with its lines added to the notes."""
+    """Make one track, with its lines added to the notes."""
     channel_track = track(role, time, values)
     notes.read += channel_track.read
     notes.warnings += channel_track.warnings
@@ -150,9 +151,13 @@ def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray
 
 
 def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -> None:
-    """Raises LogError for a log that is too short and for a signal that does not change and should."""
-    if base.time.size < LEAST_SAMPLES:
-        raise LogError("log", f"{base.time.size} samples", f"at least {LEAST_SAMPLES} samples", "")
+    """Check that a log is long enough, and that signals change that should.
+
+    Raises LogError.
+    """
+    settings = LogSettings.current()
+    if base.time.size < settings.samples_of_a_log:
+        raise LogError("log", f"{base.time.size} samples", f"at least {settings.samples_of_a_log} samples", "")
     if not 1e-9 <= base.period <= 3600:
         expected = "1 ns to 1 h between samples: is the time in another unit?"
         raise LogError("time", f"{base.period:g} s between samples", expected, '--unit TIME="ms"')
@@ -165,13 +170,14 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
 
 
 def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[str]:
-    """What the engineer should know of the signals before believing them."""
+    """List what the engineer should know of the signals before believing them."""
+    settings = LogSettings.current()
     lines, parts, period = [], base.segments, base.period
     for role, values in signals.items():
         if checks.constant(role, values):
             lines.append(f"{role}: constant throughout")
         share = 0.0 if role in ("reference", "disturbance") else checks.clipped_share(values)
-        if share > checks.CLIPPED:
+        if share > settings.share_of_clipped_samples:
             lines.append(
                 f"{role}: {percent(share, 3)} of the samples lie on flat tops at its extremes: saturated or clipped"
             )
@@ -186,7 +192,7 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[s
 
 
 def _lost(base: Track) -> list[str]:
-    """A line on samples that were lost."""
+    """Say how many samples were lost."""
     if not base.bridged.any():
         return []
     places = np.count_nonzero(np.diff(np.r_[False, base.bridged].astype(np.int8)) > 0)
@@ -207,6 +213,6 @@ def _spans(base: Track) -> str:
 
 
 def _instant(base: Track, number: int) -> str:
-    """The instant of a sample; what rounding leaves of the beginning is 0."""
+    """The instant of a sample in words; what rounding leaves of the beginning is 0."""
     time = float(base.time[number])
     return f"{0.0 if abs(time) < 1e-6 * base.period else time:.6g} s"

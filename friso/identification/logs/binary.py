@@ -35,23 +35,24 @@ MOST, PER_BYTE = 256 << 20, 16
 
 
 def is_hdf5(head: bytes) -> bool:
-    """Whether the first 520 bytes are those of HDF5, before which MATLAB puts a block."""
+    """Tell whether the first 520 bytes are those of HDF5, before which MATLAB puts a block."""
     return HDF5 in (head[:8], head[512:520])
 
 
 def mat_tree(path: Path) -> dict[str, Any]:
-    """The tree of a MAT file, by the names of its variables."""
+    """Read the tree of a MAT file, by the names of its variables."""
     with path.open("rb") as file:
         head = file.read(520)
     return _read_hdf5(path) if is_hdf5(head) else _read_old(path)
 
 
 def _object(kind: str) -> dict[str, str]:
+    """Return what stands for an object whose content only MATLAB can read."""
     return {OBJECT: kind}
 
 
 def _read_old(path: Path) -> dict[str, Any]:
-    """The tree of a file up to version 7."""
+    """Read the tree of a file up to version 7."""
     from scipy.io import loadmat
 
     tree: dict[str, Any] = {}
@@ -65,7 +66,7 @@ def _read_old(path: Path) -> dict[str, Any]:
 
 
 def _from_scipy(value: Any) -> Any:
-    """What scipy read, as a tree of dict, list, array and str."""
+    """Turn what scipy read into a tree of dict, list, array and str."""
     from scipy.sparse import issparse
 
     if hasattr(value, "_fieldnames"):
@@ -84,7 +85,7 @@ def _from_scipy(value: Any) -> Any:
 
 
 def _read_hdf5(path: Path) -> dict[str, Any]:
-    """The tree of a file of version 7.3."""
+    """Read the tree of a file of version 7.3."""
     import h5py
 
     with h5py.File(path, "r") as file:
@@ -92,8 +93,11 @@ def _read_hdf5(path: Path) -> dict[str, Any]:
 
 
 def _own(group: Any, name: Any) -> Any:
-    """An item of a group. Raises ValueError for one that is a link: it may lead into any file of the system, by another
-    link too, and the log would show that as its own."""
+    """Return an item of a group.
+
+    Raises ValueError for one that is a link: it may lead into any file of the system, by another link too, and the log
+    would show that as its own.
+    """
     import h5py
 
     if not isinstance(group.get(name, getlink=True), h5py.HardLink):
@@ -102,7 +106,10 @@ def _own(group: Any, name: Any) -> Any:
 
 
 def _from_hdf5(item: Any, file: Any) -> Any:
-    """A group or data set as a tree of dict, list, array and str. MATLAB's arrays stand transposed."""
+    """Turn a group or data set into a tree of dict, list, array and str.
+
+    MATLAB's arrays stand transposed.
+    """
     import h5py
 
     if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):  # references lead to any data set
@@ -128,7 +135,7 @@ def _from_hdf5(item: Any, file: Any) -> Any:
 
 
 def _structures(item: Any, children: dict[str, Any]) -> Any:
-    """A structure, or the structure array whose fields are lists of references."""
+    """Return a structure, or the structure array whose fields are lists of references."""
     import h5py
 
     references = [isinstance(item[name], h5py.Dataset) and item[name].dtype == h5py.ref_dtype for name in item]
@@ -142,7 +149,7 @@ def _structures(item: Any, children: dict[str, Any]) -> Any:
 
 
 def uff_datasets(path: Path) -> dict[str, Any]:
-    """The datasets 58 of a universal file, and the codes of its units."""
+    """Read the datasets 58 of a universal file, and the codes of its units."""
     import pyuff
 
     file: Any = pyuff.UFF(str(path))
@@ -152,14 +159,16 @@ def uff_datasets(path: Path) -> dict[str, Any]:
 
 
 def lvm_content(path: Path) -> dict[str, Any]:
-    """The content of a measurement text of LabVIEW."""
+    """Read the content of a measurement text of LabVIEW."""
     import lvm_read
 
     return {str(key): part for key, part in lvm_read.read(str(path), read_from_pickle=False, dump_file=False).items()}
 
 
 def tdms_channels(path: Path) -> dict[str, Any]:
-    """The channels of a TDMS file, and what the library said: a file that ends early is read as far as it goes."""
+    """Read the channels of a TDMS file, and what the library said: a file that ends early is
+    read as far as it goes.
+    """
     import nptdms
 
     heard, logger = _Heard(), logging.getLogger("nptdms")
@@ -202,7 +211,10 @@ READERS: dict[str, Callable[[Path], dict[str, Any]]] = {
 
 
 def _plain(node: Any) -> Any:
-    """The same of plain types: what a library derives from them would have to be trusted when it is read again."""
+    """Turn a tree into plain types.
+
+    What a library derives from them would have to be trusted when it is read again.
+    """
     if isinstance(node, dict):
         return {str(key): _plain(value) for key, value in node.items()}
     if isinstance(node, list | tuple):
@@ -214,11 +226,12 @@ def _plain(node: Any) -> Any:
 
 
 def most_bytes(size: int) -> int:
-    """How many bytes a file of so many may hold, pickled."""
+    """Return how many bytes a file of so many may hold, pickled."""
     return MOST + PER_BYTE * size
 
 
 def _too_much(size: int, most: int) -> str:
+    """Say that a file would take too much memory."""
     return f"it would take {size / 1e6:.0f} MB of memory, and a file of its size has at most {most / 1e6:.0f} MB"
 
 
@@ -230,7 +243,7 @@ def _end_with_parent() -> None:
 
 
 def main(kind: str, path: Path, memory: int, cpu: float, seconds: float) -> None:
-    """Read a file within so much memory [B], time of a processor [s] and time [s]."""
+    """Read a file within bounds of memory [B], time of a processor [s] and time [s]."""
     faulthandler.dump_traceback_later(seconds, exit=True)  # by a thread that needs no lock of the interpreter
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if sys.platform != "win32":

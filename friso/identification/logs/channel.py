@@ -13,7 +13,8 @@ from friso.escapes import one_line
 
 @dataclass(frozen=True)
 class Channel:
-    """Values of shape (n,) as they stand in the file, with the unit that it states ("" for none).
+    """A channel of a file: values of shape (n,) as they stand there, with the unit that it
+    states ("" for none).
 
     `time` holds the instants in seconds, shape (n,), or None where the file has no time; `source` says where in the
     file the channel stands ("column 3", "exp1.Y(2)"). Texts are one line each, escaped: messages and tables name them.
@@ -26,20 +27,25 @@ class Channel:
     source: str
 
     def __post_init__(self) -> None:
+        """Escape the texts."""
         for name in ("name", "unit", "source"):
             object.__setattr__(self, name, one_line(getattr(self, name)))
 
 
 @dataclass(frozen=True)
 class ChannelTable:
-    """The channels of a file, under names of their own (`unique`), the single numbers in it by name, and what was read,
-    a line each (format, delimiter, decimal sign, rows left out and why)."""
+    """The channels of a file, under names of their own (`unique`).
+
+    `scalars` are single numbers in it by name, and `read` says what was read, a line each (format, delimiter, decimal
+    sign, rows left out and why).
+    """
 
     channels: tuple[Channel, ...]
     scalars: Mapping[str, float] = field(default_factory=dict)
     read: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        """Make the names unique, and escape the texts."""
         names = unique([channel.name for channel in self.channels])
         channels = tuple(replace(c, name=name) for c, name in zip(self.channels, names, strict=True))
         object.__setattr__(self, "channels", channels)
@@ -48,7 +54,7 @@ class ChannelTable:
 
 
 def unique(names: Sequence[str]) -> list[str]:
-    """Names, with a number behind those that are taken; empty ones stay."""
+    """Return names, with a number behind those that are taken; empty ones stay."""
     taken, counts, out = {*names}, Counter[str](), []
     for name in names:
         counts[name] += 1

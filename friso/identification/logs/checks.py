@@ -5,23 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from friso.errors import LogError
-
-CLIPPED, REPEATED = 1e-3, 0.01
-"""Share of the samples in flat tops above which a signal is reported as clipped, and of those that repeat the one
-before up to which it hardly ever repeats a value."""
-
-JUMP, FEW_JUMPS = 10.0, 20
-"""How many times larger than the twentieth largest step one is that is no motion, and that number."""
-
-SLOWEST, ALL = 20, 0.999
-"""Times slower than the log at most that a signal may have been sampled, and share of its bends that count as all: the
-rest is rounding."""
+from friso.identification.logs.settings import LogSettings
 
 
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """A channel without samples that repeat the one before, stamp [s] and value; and how many there were.
+    """Return a channel without samples that repeat the one before, stamp [s] and value; and how
+    many there were.
 
-    Raises LogError for time that decreases and for another value at the same stamp.
+    Raises LogError for time that decreases and for another value at one stamp.
     """
     steps = np.diff(time)
     back = np.flatnonzero(steps < 0)
@@ -50,11 +41,11 @@ COUNTER_BITS = 64
 
 
 def unwrapped(values: np.ndarray) -> tuple[np.ndarray, int]:
-    """Whole numbers of a counter with the jumps of its overflow taken out, and its bits; unchanged with 0 bits where
-    it is no counter that overflows.
+    """Take the jumps of its overflow out of a counter's whole numbers, and return its bits.
 
-    A counter of b bits steps back by nearly 2^b; every other step is below 2^b/4, and with 2^b added the step
-    back is at most twice as large as those (a square wave fails this).
+    Values are unchanged, with 0 bits, where it is no counter that overflows. A counter of b bits steps back by nearly
+    2^b; every other step is below 2^b/4, and with 2^b added the step back is at most twice as large as those (a square
+    wave fails this).
     """
     finite = values[np.isfinite(values)]
     if finite.size < 3 or np.any(finite != np.round(finite)) or np.abs(finite).max() > 2.0**COUNTER_BITS:
@@ -72,25 +63,29 @@ def unwrapped(values: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def constant(name: str, values: np.ndarray) -> bool:
-    """Whether a signal does not change at all."""
+    """Tell whether a signal does not change at all."""
     return bool(np.ptp(values) == 0)
 
 
 def rises_evenly(values: np.ndarray) -> bool:
-    """Whether values rise as those of a clock do, and no measured motion does."""
+    """Tell whether values rise as those of a clock do, and no measured motion does."""
     steps = np.diff(values)
     return bool(values.size > 2 and steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-3, atol=0))
 
 
 def clipped_share(values: np.ndarray) -> float:
-    """Share of the samples in flat tops at the extremes, of at least 3 equal samples, that show that the signal is
-    clipped: it enters them with a kink, the step before being at least a fifth of the largest step, or it hardly ever
-    repeats a value elsewhere."""
+    """Return the share of samples in flat tops at the extremes that show that a signal is
+    clipped.
+
+    A flat top has at least 3 equal samples. The signal enters it with a kink, the step before being at least a fifth of
+    the largest step, or it hardly ever repeats a value elsewhere.
+    """
+    settings = LogSettings.current()
     steps = np.abs(np.diff(values))
     if values.size < 5 or steps.max() == 0:
         return 0.0
     count, inside = 0, (values[1:] > values.min()) & (values[1:] < values.max())
-    repeats = np.count_nonzero(steps[inside] == 0) > REPEATED * np.count_nonzero(inside)
+    repeats = np.count_nonzero(steps[inside] == 0) > settings.share_of_repeated_values * np.count_nonzero(inside)
     for extreme in (values.max(), values.min()):
         edges = np.flatnonzero(np.diff(np.r_[False, values == extreme, False].astype(np.int8)))
         for start, stop in zip(edges[::2], edges[1::2], strict=True):
@@ -101,37 +96,49 @@ def clipped_share(values: np.ndarray) -> float:
 
 
 def jumps(values: np.ndarray) -> tuple[float, int]:
-    """The largest step of a signal and the sample behind it, where it is no part of a motion: many times larger than
-    all steps but a few; else 0 and 0."""
+    """Return the largest step of a signal and the sample behind it, where it is no part of a
+    motion.
+
+    It is many times larger than all steps but a few; else 0 and 0.
+    """
+    settings = LogSettings.current()
     steps = np.diff(values)
-    if steps.size < FEW_JUMPS:
+    if steps.size < settings.number_of_large_steps:
         return 0.0, 0
     sizes = np.abs(steps)
     largest = int(np.argmax(sizes))
-    usual = np.partition(sizes, -FEW_JUMPS)[-FEW_JUMPS]
-    return (float(steps[largest]), largest + 1) if sizes[largest] > JUMP * usual else (0.0, 0)
+    usual = np.partition(sizes, -settings.number_of_large_steps)[-settings.number_of_large_steps]
+    return (float(steps[largest]), largest + 1) if sizes[largest] > settings.ratio_of_a_jump * usual else (0.0, 0)
 
 
 def samples_held(values: np.ndarray) -> int:
-    """For how many samples each value is held, 1 where the signal changes at any sample: the changes all fall on every
-    n-th sample, n up to 20 (a signal that changes more rarely is one of steps)."""
+    """Return for how many samples each value is held; 1 where the signal changes at any sample.
+
+    The changes all fall on every n-th sample, n up to 20 (a signal that changes more rarely is one of steps).
+    """
     changes = np.flatnonzero(np.diff(values) != 0)
     if changes.size < 50:
         return 1
     gaps = np.diff(changes)
     n = int(np.gcd.reduce(gaps))
-    return n if 1 < n <= SLOWEST else 1
+    return n if 1 < n <= LogSettings.current().slowest_sampling else 1
 
 
 def interpolated(values: np.ndarray) -> int:
-    """Over how many samples a signal runs in straight lines, 1 where it does not: its bends all fall on every n-th
-    sample, n up to 20, as those of a slower signal that was resampled."""
+    """Return over how many samples a signal runs in straight lines; 1 where it does not.
+
+    Its bends all fall on every n-th sample, n up to 20, as those of a slower signal that was resampled.
+    """
+    settings = LogSettings.current()
     bends = np.abs(np.diff(values, 2))
-    if bends.size < 50 * SLOWEST or not bends.any():
+    if bends.size < 50 * settings.slowest_sampling or not bends.any():
         return 1
-    for n in range(SLOWEST, 1, -1):
+    for n in range(settings.slowest_sampling, 1, -1):
         whole = bends[: bends.size // n * n].reshape(-1, n)
-        if whole.sum(axis=0).max() > ALL * whole.sum() and np.count_nonzero(whole.max(axis=1)) >= 50:
+        if (
+            whole.sum(axis=0).max() > settings.share_of_all_bends * whole.sum()
+            and np.count_nonzero(whole.max(axis=1)) >= 50
+        ):
             return n
     return 1
 
@@ -139,8 +146,11 @@ def interpolated(values: np.ndarray) -> int:
 def velocity_factor(
     position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]
 ) -> tuple[float, float]:
-    """Ratio of the measured velocity [m/s] to the derivative of position [m], sampled every `period` [s]
-    (least squares, both smoothed over 11 samples) and their correlation; NaN and 0 where there is nothing to compare.
+    """Return the ratio of the measured velocity [m/s] to the derivative of position [m], and
+    their correlation.
+
+    Both are sampled every `period` [s], and smoothed over 11 samples; the ratio is that of least squares. NaN and 0
+    where there is nothing to compare.
     """
     from scipy.signal import savgol_filter
 
@@ -169,8 +179,10 @@ _FACTORS = {
 
 
 def velocity_warning(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
-    """What is wrong between position [m] and velocity [m/s], "" for nothing; a factor points to wrong units or
-    counts."""
+    """Say what is wrong between position [m] and velocity [m/s], "" for nothing.
+
+    Both are sampled every `period` [s]; a factor points to wrong units or counts.
+    """
     ratio, correlation = velocity_factor(position, velocity, period, parts)
     if abs(correlation) < 0.8:
         return (

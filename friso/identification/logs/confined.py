@@ -16,31 +16,30 @@ from typing import Any
 
 from friso.errors import LogError
 from friso.identification.logs import binary
+from friso.identification.logs.settings import LogSettings
 from friso.platform.system import LIMITS_MEMORY
 
 CPU_SIGNAL = getattr(signal, "SIGXCPU", 0)
 """What ends a process that has taken a processor's time for too long, where the system counts that."""
 
-MEMORY, PER_BYTE = 1 << 30, 12
-"""Memory [B] that reading may take, besides a multiple of the size of the file."""
-
-SECONDS, BYTES_A_SECOND, PATIENCE = 10.0, 5e6, 10.0
-"""Time [s] that a processor may take to read a file, besides that for its size; and how many times as long is waited,
-since a machine that is busy, or a disk that is slow, takes longer."""
-
 
 def content(kind: str, path: Path) -> dict[str, Any]:
-    """What a file of a `kind` of `friso.identification.logs.binary` holds. Raises LogError where it cannot be read
-    within bounds of time, and of memory where the system keeps such (`LIMITS_MEMORY`)."""
+    """Read what a file of a `kind` of `friso.identification.logs.binary` holds.
+
+    Raises LogError where it cannot be read within bounds of time, and of memory where the system keeps such
+    (`LIMITS_MEMORY`).
+    """
     status = path.stat()
     return _content(kind, path.resolve(), status.st_size, status.st_mtime_ns)
 
 
 @lru_cache(maxsize=1)  # a file is asked for its kind first, and read then
 def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
-    memory = MEMORY + PER_BYTE * size if LIMITS_MEMORY else 0
-    seconds = SECONDS + size / BYTES_A_SECOND
-    patience = PATIENCE * seconds
+    """Read a file that has not changed since it was last asked for only once."""
+    settings = LogSettings.current()
+    memory = settings.memory_of_reading + settings.memory_per_byte * size if LIMITS_MEMORY else 0
+    seconds = settings.time_of_reading + size / settings.speed_of_reading
+    patience = settings.patience_with_a_busy_machine * seconds
     command = [sys.executable, "-P", binary.__file__, kind, str(path), *map(str, (memory, seconds, 2 * patience))]
     try:
         answer = _answer(command, patience, binary.most_bytes(size))
@@ -59,8 +58,10 @@ def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
 
 
 def _answer(command: list[str], seconds: float, most: int) -> bytes | None:
-    """What a program says, of more than `most` bytes the first; None where it took more of a processor's time than it
-    may. Raises TimeoutError where it takes longer."""
+    """Return what a program says, of more than `most` bytes the first.
+
+    None where it took more of a processor's time than it may. Raises TimeoutError where it takes longer.
+    """
     environ = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each of its threads reserves memory
     pipe, late = subprocess.PIPE, []
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, env=environ) as process:
@@ -80,10 +81,10 @@ def _answer(command: list[str], seconds: float, most: int) -> bytes | None:
 
 
 class _PlainUnpickler(pickle.Unpickler):
-    """Reads plain types and NumPy arrays, and refuses anything else."""
+    """A reader of plain types and NumPy arrays that refuses anything else."""
 
     def find_class(self, module: str, name: str) -> Any:
-        """What an array of numbers is made of."""
+        """Return what an array of numbers is made of, and nothing else."""
         if module.partition(".")[0] == "numpy" and name in ("ndarray", "dtype", "_reconstruct", "_frombuffer"):
             return super().find_class(module, name)
         raise pickle.UnpicklingError(f"{module}.{name}")

@@ -6,22 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-BLOCKS = 8
-"""Parts of the record whose separate estimates give the interval."""
-MOST = 20
-"""Longest delay looked for, in samples."""
-LEAST = 0.25
-"""Shortest delay reported, in samples: derivatives are smoothed more than what they are compared with."""
-CLEAR = 1 / 3
-"""Share of what no delay leaves unexplained that a delay leaves at most: a body that sticks while the force turns looks
-late by some samples as well, and leaves half."""
-WINDOW = 11
-"""Samples over which derivatives are smoothed (Savitzky-Golay, no delay of its own)."""
+from friso.identification.logs.settings import LogSettings
 
 
 def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
-    """A line that offers the delay of the velocity [m/s] behind the derivative of position [m], "" for none; both are
-    sampled every `period` [s]."""
+    """Offer the delay of the velocity [m/s] behind the derivative of position [m], "" for none.
+
+    Both are sampled every `period` [s].
+    """
     part = max(parts, key=lambda span: span.stop - span.start)
     slope, speed = _smoothed(position[part], 1, period), _smoothed(velocity[part], 0, period)
     return _line(
@@ -33,8 +25,8 @@ def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, par
 
 
 def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: list[slice]) -> str:
-    """A line that offers the delay of the motion [m] behind the force [N], "" for none; both are sampled every `period`
-    [s].
+    """Offer the delay of the motion [m] behind the force [N], "" for none; both are sampled
+    every `period` [s].
 
     For each lag the force is fitted by acceleration, velocity, its sign, position and a constant: against acceleration
     alone friction would look like a delay, and so would a spring. The lag with the least residual counts.
@@ -48,71 +40,101 @@ def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: li
 
 
 def lag(first: np.ndarray, second: np.ndarray) -> float:
-    """By how many samples the second signal comes after the first: the peak of their cross-correlation, to a fraction
-    of a sample by a parabola; NaN where its height is below 0.5 or it lies at the border of +-`MOST`."""
+    """Return by how many samples the second signal comes after the first.
+
+    It is the peak of their cross-correlation, to a fraction of a sample by a parabola; NaN where its height is below
+    0.5 or it lies at the border of what is searched.
+    """
+    settings = LogSettings.current()
     first, second = first - first.mean(), second - second.mean()
-    middle = first[MOST:-MOST]
-    products = np.array([middle @ second[MOST + k : second.size - MOST + k] for k in range(-MOST, MOST + 1)])
+    middle = first[settings.longest_delay_samples : -settings.longest_delay_samples]
+    products = np.array(
+        [
+            middle @ second[settings.longest_delay_samples + k : second.size - settings.longest_delay_samples + k]
+            for k in range(-settings.longest_delay_samples, settings.longest_delay_samples + 1)
+        ]
+    )
     norm = np.sqrt((middle @ middle) * (second @ second))
     return _peak(products / norm, 0.5) if norm > 0 else np.nan
 
 
 def fitted_lag(effect: np.ndarray, causes: np.ndarray) -> float:
-    """By how many samples the causes, of shape (n, p), come after what they sum up to by least squares: the lag with
-    the largest share explained, to a fraction of a sample; NaN where that share is below 0.5 or at the border."""
+    """Return by how many samples causes, shape (n, p), come after what they sum up to by least
+    squares.
+
+    It is the lag with the largest share explained, to a fraction of a sample; NaN where that share is below 0.5 or at
+    the border.
+    """
     return _peak(_explained(effect, causes), 0.5)
 
 
 def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
-    """The same; NaN where no lag at all leaves little more."""
+    """Return the lag that fits best; NaN where no lag at all leaves little more."""
+    settings = LogSettings.current()
     shares = _explained(effect, causes)
-    return _peak(shares, 0.5) if 1 - shares.max() < CLEAR * (1 - shares[MOST]) else np.nan
+    return (
+        _peak(shares, 0.5)
+        if 1 - shares.max() < settings.share_left_by_a_delay * (1 - shares[settings.longest_delay_samples])
+        else np.nan
+    )
 
 
 def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
-    """The share of an effect that its causes explain at each lag, of -MOST to MOST samples."""
-    middle = effect[MOST:-MOST] - effect[MOST:-MOST].mean()
+    """Return the share of an effect that its causes explain at each lag that is searched."""
+    settings = LogSettings.current()
+    middle = (
+        effect[settings.longest_delay_samples : -settings.longest_delay_samples]
+        - effect[settings.longest_delay_samples : -settings.longest_delay_samples].mean()
+    )
     energy = middle @ middle
     causes = causes / np.maximum(np.abs(causes).max(axis=0), np.finfo(float).tiny)
     shares = []
-    for k in range(-MOST, MOST + 1):
-        shifted = causes[MOST + k : effect.size - MOST + k]
+    for k in range(-settings.longest_delay_samples, settings.longest_delay_samples + 1):
+        shifted = causes[settings.longest_delay_samples + k : effect.size - settings.longest_delay_samples + k]
         fit = np.linalg.lstsq(shifted.T @ shifted, shifted.T @ middle, rcond=None)[0]
         shares.append(float(fit @ (shifted.T @ middle)) / energy if energy > 0 else 0.0)
     return np.array(shares)
 
 
 def _peak(heights: np.ndarray, least: float) -> float:
-    """Where heights at -MOST ... MOST have their peak, by the parabola through the three highest; NaN below `least`."""
+    """Return where heights have their peak, by the parabola through the three highest; NaN below
+    `least`.
+    """
     i = int(np.argmax(heights))
     if heights[i] < least or i in (0, heights.size - 1):
         return np.nan
     left, top, right = heights[i - 1 : i + 2]
     curve = left - 2 * top + right
-    return i - MOST + (0.5 * (left - right) / curve if curve < 0 else 0.0)
+    return i - LogSettings.current().longest_delay_samples + (0.5 * (left - right) / curve if curve < 0 else 0.0)
 
 
 def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, float]:
-    """Mean of the estimates of the blocks of a record and half its 95 % interval (Student); NaN where fewer than
-    half of them show one."""
+    """Return the mean of the estimates of the blocks of a record and half its 95 % interval
+    (Student).
+
+    NaN where fewer than half of the blocks show one.
+    """
+    settings = LogSettings.current()
     from scipy.stats import t as student
 
-    length = size // BLOCKS
-    if length < 10 * MOST:
+    length = size // settings.blocks_of_a_delay
+    if length < 10 * settings.longest_delay_samples:
         return np.nan, np.nan
-    delays = np.array([estimate(k * length, (k + 1) * length) for k in range(BLOCKS)])
+    delays = np.array([estimate(k * length, (k + 1) * length) for k in range(settings.blocks_of_a_delay)])
     delays = delays[np.isfinite(delays)]
-    if delays.size < BLOCKS / 2:
+    if delays.size < settings.blocks_of_a_delay / 2:
         return np.nan, np.nan
     half = student.ppf(0.975, delays.size - 1) * np.std(delays, ddof=1) / np.sqrt(delays.size)
     return float(delays.mean()), float(half)
 
 
 def _line(late: str, early: str, estimate: tuple[float, float], period: float) -> str:
-    """The words for an estimate in samples, "" where its interval holds 0, it is below a quarter of a sample, or the
-    blocks differ by samples: then the motion does not show a delay."""
+    """Write an estimate in samples in words, "" where the motion does not show a delay.
+
+    Its interval holds 0 then, it is below a quarter of a sample, or the blocks differ by samples.
+    """
     value, half = estimate
-    if not np.isfinite(value) or abs(value) <= max(half, LEAST) or half > 1:
+    if not np.isfinite(value) or abs(value) <= max(half, LogSettings.current().shortest_delay_samples) or half > 1:
         return ""
     late, early = (late, early) if value > 0 else (early, late)
     size = f"{abs(value) * period * 1e3:.3g} ms +/- {half * period * 1e3:.2g} ms (95 %)"
@@ -122,9 +144,14 @@ def _line(late: str, early: str, estimate: tuple[float, float], period: float) -
 
 
 def _smoothed(values: np.ndarray, order: int, period: float) -> np.ndarray:
-    """Derivative of this order, smoothed, without the ends; all values where there are too few."""
+    """Return the derivative of this order, smoothed, without the ends; all values where there
+    are too few.
+    """
+    settings = LogSettings.current()
     from scipy.signal import savgol_filter
 
-    if values.size <= 2 * WINDOW:
+    if values.size <= 2 * settings.samples_of_a_derivative:
         return values
-    return np.asarray(savgol_filter(values, WINDOW, 3, deriv=order, delta=period))[WINDOW:-WINDOW]
+    return np.asarray(savgol_filter(values, settings.samples_of_a_derivative, 3, deriv=order, delta=period))[
+        settings.samples_of_a_derivative : -settings.samples_of_a_derivative
+    ]

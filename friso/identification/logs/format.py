@@ -23,7 +23,7 @@ class FileHead:
 
     @cached_property
     def lines(self) -> list[str]:
-        """Its first lines; none where it is no text."""
+        """Its first lines; [] where it is no text."""
         try:
             return decoded_head(self.path)[1]
         except LogError:
@@ -32,12 +32,14 @@ class FileHead:
 
 @dataclass(frozen=True)
 class LogFormat:
-    """A format of logs: its `title`, whether a file is one, and the reader of its channels, which raises LogError.
+    """A format of logs: its `title`, whether a file is one, and the reader of its channels,
+    which raises LogError.
 
     Formats are asked by rank: 0 for those recognised by their first bytes, 1 for those recognised by their first lines,
     2 for any text. `units`: it can hold units; `times`: its channels come with their instants, which no column of it
     has to tell. A file that `holds_response` holds a frequency response instead of signals over time, which
-    `read_response` reads."""
+    `read_response` reads.
+    """
 
     title: str
     recognise: Callable[[FileHead], bool]

@@ -23,6 +23,7 @@ from friso.identification.logs.roles import (
     role_of,
     words,
 )
+from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.signals import TURNS, Notes, Reading, instants, no_time, unit_gap
 from friso.identification.logs.units import OTHERS, in_si, unit_factor
 from friso.quantities import quoted
@@ -32,10 +33,6 @@ OPTIONAL = ("velocity", "acceleration")
 
 _INITIALS = {"reference": "rs", "position": "xyqps", "velocity": "v", "force": "fuivmk", "disturbance": "d"}
 """Letters with which channels of a role often begin, to choose the example of a message."""
-
-_ALIKE, _LEAST = 0.99, 20
-"""Channels of one size that correlate by more, of so many samples at least, may be what was wanted and what was
-measured of it."""
 
 
 class GapsError(LogError):
@@ -180,15 +177,16 @@ def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Ch
 
 def _are_alike(one: Channel, other: Channel) -> bool:
     """Whether two channels correlate, as a position does with its reference."""
+    settings = LogSettings.current()
     if one.values.size != other.values.size:
         return False
     both = np.isfinite(one.values) & np.isfinite(other.values)
-    if np.count_nonzero(both) < _LEAST:
+    if np.count_nonzero(both) < settings.samples_of_a_pair:
         return False
     first, second = one.values[both], other.values[both]
     with np.errstate(all="ignore"):
         less, more = sorted((np.ptp(first), np.ptp(second)))
-        return bool(0 < more < 2 * less and np.corrcoef(first, second)[0, 1] > _ALIKE)
+        return bool(0 < more < 2 * less and np.corrcoef(first, second)[0, 1] > settings.correlation_of_a_pair)
 
 
 def _noise(channel: Channel) -> float:

@@ -14,8 +14,10 @@ from friso.platform.extras import install, is_installed
 
 
 def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
-    """What a library reads from a file of a kind. Raises LogError, which says how to install the library if it is not
-    there."""
+    """Read a file of a kind by a library.
+
+    Raises LogError, which says how to install the library if it is not there.
+    """
     if not is_installed(library):
         actual = f"a {kind} file, and the library {library} is not installed"
         raise LogError("log", actual, "the library", install(kind.lower()), str(path))
@@ -23,7 +25,9 @@ def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
 
 
 def cut_short(channels: Iterable[Channel], stated: Iterable[float | None]) -> list[str]:
-    """Notes on channels that hold fewer samples than their file states, None for nothing: it was cut short."""
+    """Say which channels hold fewer samples than their file states, None for nothing: it was cut
+    short.
+    """
     return [
         f"{channel.name} ends early: {channel.values.size} of {count:.15g} samples"
         for channel, count in zip(channels, stated, strict=True)
@@ -32,7 +36,10 @@ def cut_short(channels: Iterable[Channel], stated: Iterable[float | None]) -> li
 
 
 def filled_table(kind: str, channels: list[Channel], notes: list[str], path: Path) -> ChannelTable:
-    """The channels with samples. Raises LogError for none."""
+    """Make a table of the channels with samples.
+
+    Raises LogError for none.
+    """
     filled = tuple(channel for channel in channels if channel.values.size)
     if not filled:
         raise LogError("log", f"a {kind} file without numbers", "a file with channels", "", str(path))

@@ -27,17 +27,18 @@ contained in it."""
 
 @dataclass(frozen=True)
 class Log:
-    """Signals by role (see `ROLES`), all of shape (n,), SI, at `time` [s], shape (n,).
+    """What was measured, by role (see `ROLES`): signals of shape (n,), SI, at `time` [s], shape
+    (n,).
 
-    On a rotary `axis` angles stand for lengths and torques for forces, under the units of a linear axis.
+    On a rotary `axis` angles stand for lengths and torques for forces, under the units of a linear axis. Samples are
+    `sample_time` [s] apart within each of the `segments`; between these there are gaps. `units` holds, for a role whose
+    channel could not be turned into the SI unit of the role (a force in volts without a scale, an angle instead of a
+    length), the unit in which it stands.
 
-    Samples are `sample_time` [s] apart within each of the `segments`; between these there are gaps. `units` holds, for
-    a role whose channel could not be turned into the SI unit of the role (a force in volts without a scale, an angle
-    instead of a length), the unit in which it stands. `scalars` are single numbers that stood in the file, by name.
-    `read` lists line by line what was read and how, `warnings` what the engineer should know before believing it.
-    `setup` are keys of the stage file that were otherwise while this log was taken ({"joint.stroke": "8 mm"}).
-    `bridged`, shape (n,), is true at samples that were lost and are interpolated; None where none was. `is_excerpt`
-    tells that the log is a part of a longer one.
+    `scalars` are single numbers that stood in the file, by name. `read` lists line by line what was read and how,
+    `warnings` what the engineer should know before believing it. `setup` are keys of the stage file that were otherwise
+    while this log was taken ({"joint.stroke": "8 mm"}). `bridged`, shape (n,), is true at samples that were lost and
+    are interpolated; None where none was. `is_excerpt` tells that the log is a part of a longer one.
     """
 
     name: str
@@ -55,9 +56,11 @@ class Log:
     is_excerpt: bool = False
 
     def __contains__(self, role: str) -> bool:
+        """Tell whether the log has a role."""
         return role in self.signals
 
     def __getitem__(self, role: str) -> np.ndarray:
+        """Return the signal of a role."""
         return self.signals[role]
 
     @property
@@ -66,12 +69,16 @@ class Log:
         return max(self.segments, key=lambda part: part.stop - part.start)
 
     def measured(self, part: slice) -> np.ndarray:
-        """1 at the samples of a stretch, shape (k,), that were measured, and 0 at those that were lost."""
+        """Return 1 at the samples of a stretch, shape (k,), that were measured, and 0 at those that
+        were lost.
+        """
         return np.ones(part.stop - part.start) if self.bridged is None else 1.0 - self.bridged[part]
 
     def excerpt(self, count: int) -> Log:
-        """At most so many samples of the longest stretch without gaps: those in which the position goes the longest
-        way. The whole log where that stretch is no longer."""
+        """Return at most so many samples of the longest stretch without gaps.
+
+        They are those in which the position goes the longest way; the whole log where that stretch is no longer.
+        """
         part = self.longest
         if part.stop - part.start <= count:
             return self
@@ -84,7 +91,9 @@ class Log:
         return replace(self, time=self.time[chosen], signals=signals, segments=part, bridged=bridged, is_excerpt=True)
 
     def per_unit_of_force(self) -> Log:
-        """The log on an axis with forces in the unit of its own, where that is none of the axis."""
+        """Return the log on an axis with forces in the unit of its own, where that is none of the
+        axis.
+        """
         unit = self.units.get("force")
         if unit is None:
             return self
@@ -92,5 +101,5 @@ class Log:
         return replace(self, axis=self.axis.per(unit), units=units)
 
     def unit(self, role: str) -> str:
-        """The unit in which a role stands, that of a linear axis where it is the role's."""
+        """Return the unit in which a role stands, that of a linear axis where it is the role's."""
         return self.units.get(role, ROLES[role])

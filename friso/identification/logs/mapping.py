@@ -15,6 +15,7 @@ from friso.axis import KINDS, LINEAR, ROTARY, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.roles import role_of
+from friso.identification.logs.settings import LogSettings
 from friso.platform.system import shell_word
 from friso.quantities import Bound, Quantity, as_toml, quoted
 from friso.stage.files import parsed, text_of
@@ -29,9 +30,12 @@ _SAMPLE_TIME = Quantity("s", _INTERVALS, "1 ms")
 
 @dataclass(frozen=True)
 class Mapping:
-    """Roles ({role: channel name}), units ({channel name: unit}), scales ({role: "35.1507 N/V"}), the sample time [s]
-    where the file states none, the kind of experiment and of axis where the user named them; and how the stage was set
-    up for this log, otherwise than in its file ({dotted key: "8 mm"})."""
+    """What the user said of a log: which channel is what, in which unit.
+
+    It has roles ({role: channel name}), units ({channel name: unit}), scales ({role: "35.1507 N/V"}), the sample time
+    [s] where the file states none, and the kind of experiment and of axis where the user named them; `setup` says how
+    the stage was set up for this log, otherwise than in its file ({dotted key: "8 mm"}).
+    """
 
     roles: Table[str, str] = field(default_factory=dict)
     units: Table[str, str] = field(default_factory=dict)
@@ -43,11 +47,11 @@ class Mapping:
 
     @property
     def axis_kind(self) -> AxisKind:
-        """Linear unless the user said otherwise."""
+        """The kind of axis: linear unless the user said otherwise."""
         return LINEAR if self.axis is None else KINDS[self.axis]
 
     def over(self, older: Mapping) -> Mapping:
-        """This mapping, and what an older one says where this one is silent."""
+        """Return this mapping, completed by an older one where this one is silent."""
         rest = older.beside(self)
         return Mapping(
             {**rest.roles, **self.roles},
@@ -60,8 +64,11 @@ class Mapping:
         )
 
     def beside(self, newer: Mapping) -> Mapping:
-        """What this mapping says about which a newer one is silent: a sample time is silenced by a channel of times
-        or the unit of one, a channel of times by a sample time, and a scale by another channel for its role."""
+        """Return what this mapping says about which a newer one is silent.
+
+        A sample time is silenced by a channel of times or the unit of one, a channel of times by a sample time, and a
+        scale by another channel for its role.
+        """
         timed = "time" in newer.roles or any((role_of(name) or ("",))[0] == "time" for name in newer.units)
         roles = {role: name for role, name in self.roles.items() if role not in newer.roles}
         if newer.sample_time is not None:
@@ -79,7 +86,7 @@ class Mapping:
 
     @property
     def words(self) -> str:
-        """What it says, in words; "" for nothing."""
+        """What the mapping says, in words; "" for nothing."""
         time = [] if self.sample_time is None else [f"one sample every {self.sample_time:.6g} s"]
         kinds = [text for text in (self.experiment, self.axis) if text is not None]
         roles = [f"{role} is {name}" for role, name in self.roles.items()]
@@ -90,7 +97,9 @@ class Mapping:
 
     @property
     def options(self) -> tuple[str, ...]:
-        """The options that say it, as a shell takes them, but for the set-up, of which there are none."""
+        """The options that say it, as a shell takes them, but for the set-up, of which there are
+        none.
+        """
         pairs = (("--map", self.roles), ("--unit", self.units), ("--scale", self.scales))
         several = [option(name, left, right) for name, values in pairs for left, right in values.items()]
         time = None if self.sample_time is None else f"{self.sample_time!r} s"
@@ -106,8 +115,11 @@ def from_options(
     experiment: str | None = None,
     axis: str | None = None,
 ) -> Mapping:
-    """From the texts of `--map ROLE=CHANNEL`, `--unit CHANNEL=UNIT`, `--scale ROLE=SCALE`, `--dt "1 ms"`,
-    `--axis rotary`. Raises LogError."""
+    """Make a mapping from the texts of options.
+
+    They are those of `--map ROLE=CHANNEL`, `--unit CHANNEL=UNIT`, `--scale ROLE=SCALE`, `--dt "1 ms"`, `--axis rotary`.
+    Raises LogError.
+    """
     roles = dict(_pair(text, "--map", 'position="Axis1.ActPos"', MAPPABLE) for text in maps)
     channel_units = dict(_pair(text, "--unit", 'Axis1.ActPos="mm"', last=True) for text in units)
     factors = dict(_pair(text, "--scale", 'force="35.1507 N/V"', tuple(ROLES)) for text in scales)
@@ -123,7 +135,10 @@ def from_options(
 def _pair(
     text: str, option: str, example: str, left: tuple[str, ...] | None = None, last: bool = False
 ) -> tuple[str, str]:
-    """What stands left and right of the first (or last) equals sign. Raises LogError."""
+    """Split a text at its first (or last) equals sign.
+
+    Raises LogError.
+    """
     first, sign, second = text.rpartition("=") if last else text.partition("=")
     first, second = first.strip(), second.strip().strip('"')
     if not sign or not first or not second:
@@ -134,30 +149,35 @@ def _pair(
 
 
 def guess(what: str, reason: str = "") -> str:
-    """What an example assumes that nobody told, and what that makes of the log, to be checked before it is copied."""
+    """Say what an example assumes that nobody told, and what that makes of the log, to be
+    checked before it is copied.
+    """
     return f" (guessed: {what}{f', {reason}' if reason else ''}; check it)"
 
 
 def option(name: str, left: str, right: str) -> str:
-    """An option LEFT=RIGHT as a shell takes it."""
+    """Write an option LEFT=RIGHT as a shell takes it."""
     return f"{name} {shell_word(f'{left}={right}')}"
 
 
 def sidecar(log: Path, folder: Path | None = None) -> Path:
-    """Where the mapping of a log is kept: beside it, or in a folder, where logs of the same name from other folders,
-    and those whose long names begin alike, have theirs too."""
+    """Return where the mapping of a log is kept: beside it, or in a folder.
+
+    In a folder, logs of one name from several folders, and those whose long names begin alike, have places of their
+    own.
+    """
+    settings = LogSettings.current()
     if folder is None:
         return log.parent / f"{log.name}{SUFFIX}"
     own = hashlib.sha256(os.fsencode(os.path.abspath(log))).hexdigest()[:8]
-    return folder / f"{log.name.encode(errors='ignore')[:_LONGEST].decode(errors='ignore')}.{own}{SUFFIX}"
-
-
-_LONGEST = 150
-"""Bytes of the name of a log at most in that of its mapping elsewhere."""
+    return (
+        folder
+        / f"{log.name.encode(errors='ignore')[: settings.bytes_of_a_log_name].decode(errors='ignore')}.{own}{SUFFIX}"
+    )
 
 
 def mapping_text(mapping: Mapping) -> str:
-    """The mapping as it is kept beside a log."""
+    """Write a mapping as it is kept beside a log."""
     lines = ["# How this log was read by `friso identify`: reused next time, options override it."]
     if mapping.sample_time is not None:
         lines.append(f'sample_time = "{mapping.sample_time!r} s"')
@@ -173,16 +193,22 @@ def mapping_text(mapping: Mapping) -> str:
 
 
 def place_for(log: Path, folder: Path) -> Path:
-    """Where the mapping of a log can be kept: beside it, or in the folder where that cannot be written. A folder that
-    is write-protected stays so for a superuser."""
+    """Return where the mapping of a log can be kept: beside it, or in the folder where that
+    cannot be written.
+
+    A folder that is write-protected stays so for a superuser.
+    """
     beside = sidecar(log)
     writable = os.access(beside.parent, os.W_OK) and beside.parent.stat().st_mode & stat.S_IWUSR
     return beside if writable else sidecar(log, folder)
 
 
 def load_mapping(log: Path, folder: Path | None = None) -> Mapping | None:
-    """The mapping kept for a log: that beside it, else that in the folder; None where there is none. Raises LogError
-    for a file that is not one."""
+    """Load the mapping kept for a log: that beside it, else that in the folder; None where there
+    is none.
+
+    Raises LogError for a file that is not one.
+    """
     for place in [sidecar(log)] + ([sidecar(log, folder)] if folder is not None else []):
         if os.path.isfile(place):  # nor is there one whose name would be too long
             return _parsed(place)
@@ -193,7 +219,10 @@ _KEPT = "a mapping kept by friso; delete the file to map again"
 
 
 def _parsed(place: Path) -> Mapping:
-    """The mapping in a file. Raises LogError."""
+    """Read the mapping in a file.
+
+    Raises LogError.
+    """
     try:
         document = parsed(text_of(place, _KEPT), _KEPT)
     except InputError as error:
@@ -220,7 +249,10 @@ def _parsed(place: Path) -> Mapping:
 
 
 def _texts(table: dict[str, Any], key: str, place: Path) -> dict[str, str]:
-    """A table of texts; the set-up may have plain numbers and truths as well. Raises LogError."""
+    """Check a table of texts; the set-up may have plain numbers and truths as well.
+
+    Raises LogError.
+    """
     if key == "setup":
         table = {name: as_toml(value) if isinstance(value, int | float) else value for name, value in table.items()}
     for name, value in table.items():

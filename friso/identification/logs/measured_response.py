@@ -14,23 +14,20 @@ from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.roles import words
 from friso.identification.logs.sniff import NUMBER
 from friso.identification.logs.units import RESPONSES, of_decibels, spelled, unit_factor
+from friso.identification.logs.word_lists import channel_words
 from friso.quantities import Quantity, any_sign
 
-_KEYS = {
-    "frequency": frozenset(["f", "freq", "frequency", "frequenz", "w", "omega"]),
-    "magnitude": frozenset(["mag", "magnitude", "gain", "amplitude", "amp", "abs", "modulus", "db"]),
-    "phase": frozenset(["phase", "phi", "ph", "arg", "angle"]),
-    "real": frozenset(["re", "real"]),
-    "imaginary": frozenset(["im", "imag", "imaginary"]),
-    "coherence": frozenset(["coh", "coherence"]),
-}
+_KEYS = channel_words()["response"]
 """Words in a heading that tell what a column is."""
 
 
 @dataclass(frozen=True)
 class MeasuredResponse:
-    """A response at rising frequencies [Hz]: complex values, and coherence or None, all of shape (n,). `unit` is what
-    the values are in, SI where the file states a unit, "" where it states none."""
+    """A frequency response as somebody measured it, at rising frequencies [Hz].
+
+    Complex values, and coherence or None, have the shape (n,). `unit` is what the values are in, SI where the file
+    states a unit, "" where it states none.
+    """
 
     frequency: np.ndarray
     response: np.ndarray
@@ -41,21 +38,28 @@ class MeasuredResponse:
 
 
 def column_kind(name: str) -> str | None:
-    """What a heading says that its column is, first of all in front of what stands in brackets behind it ("FRF (real)",
-    "Magnitude (re 1 N)"); None for nothing of a response."""
+    """Return what a heading says that its column is; None for nothing of a response.
+
+    What stands in front of brackets counts first ("FRF (real)", "Magnitude (re 1 N)").
+    """
     order = ("coherence", "phase", "imaginary", "real", "magnitude", "frequency")
     shown = (set(words(text)) for text in (re.sub(r"[(\[][^()\[\]]*[)\]]$", "", name), name))
     return next((kind for parts in shown for kind in order if parts & _KEYS[kind]), None)
 
 
 def is_response(names: Iterable[str]) -> bool:
-    """Whether headings hold a frequency with magnitude and phase, or with real and imaginary part."""
+    """Tell whether headings hold a frequency with magnitude and phase, or with real and
+    imaginary part.
+    """
     kinds = {column_kind(name) for name in names}
     return "frequency" in kinds and ({"magnitude", "phase"} <= kinds or {"real", "imaginary"} <= kinds)
 
 
 def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
-    """The response in the columns of a table. Raises LogError."""
+    """Make a response of the columns of a table.
+
+    Raises LogError.
+    """
     by_kind: dict[str, list[Channel]] = {}
     for channel in table.channels:
         if column_kind(channel.name) is not None:
@@ -92,7 +96,10 @@ def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
 
 
 def _frequency(column: Channel, path: Path) -> np.ndarray:
-    """Frequencies in Hz. Raises LogError for a column without a unit."""
+    """Return frequencies in Hz.
+
+    Raises LogError for a column without a unit.
+    """
     value = unit_factor(column.unit, "Hz") if column.unit else None
     if value is None:
         actual = f"{column.name} in {column.unit}" if column.unit else f"{column.name} without a unit"
@@ -101,7 +108,10 @@ def _frequency(column: Channel, path: Path) -> np.ndarray:
 
 
 def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, float, str, str]:
-    """Response from magnitude and phase; its scale, unit and words. Raises LogError for a phase without a unit."""
+    """Make a response of magnitude and phase, with its scale, unit and words.
+
+    Raises LogError for a phase without a unit.
+    """
     turn = unit_factor(phase.unit, "rad") if phase.unit else None
     if turn is None:
         raise LogError("phase", f"{phase.name} without a unit", "deg or rad in the heading", "phase [deg]", str(path))
@@ -120,7 +130,9 @@ def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, 
 
 
 def response_unit(text: str) -> tuple[float, str, str]:
-    """Factor to SI, the SI unit, and both in words; a unit of a kind not known here stays as it is."""
+    """Return the factor to SI, the SI unit, and both in words; a unit of a kind not known here
+    stays as it is.
+    """
     text = spelled(text)
     for si in (*RESPONSES, "m"):
         if text and unit_factor(text, si) is not None:
@@ -129,7 +141,10 @@ def response_unit(text: str) -> tuple[float, str, str]:
 
 
 def check_response(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
-    """The response without its line at 0 Hz, checked. Raises LogError for too few or falling frequencies and NaN."""
+    """Return a response without its line at 0 Hz, checked.
+
+    Raises LogError for too few or falling frequencies and NaN.
+    """
     positive = measured.frequency > 0
     if not positive.all():
         arrays = [a if a is None else a[positive] for a in (measured.frequency, measured.response, measured.coherence)]
@@ -154,7 +169,9 @@ def check_response(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
 
 
 def _of_position(measured: MeasuredResponse) -> MeasuredResponse:
-    """The response of the position, where that of the velocity or of the acceleration was measured."""
+    """Return the response of the position, where that of the velocity or of the acceleration was
+    measured.
+    """
     rate = re.fullmatch(r"(?P<place>m|rad)/s(?P<twice>\^2)?/(?P<force>.+)", measured.unit)
     if rate is None:
         return measured

@@ -6,23 +6,16 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.units import is_unit, split_heading, unit_factor
+from friso.identification.logs.word_lists import channel_words
 
-RATES = frozenset(
-    {"fs", "fsample", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "abtastrate",
-     "abtastfrequenz"}
-)  # fmt: skip
-STEPS = frozenset(
-    {"dt", "ts", "tsample", "sampletime", "samplingtime", "sampleinterval", "samplinginterval", "sampleperiod",
-     "samplingperiod", "interval", "timestep", "timeincrement", "increment", "deltat", "abtastzeit", "abtastintervall"}
-)  # fmt: skip
+RATES, STEPS = (channel_words()[name] for name in ("sample_rate", "sample_time"))
 """What a sample rate and a sample time are called, in small letters without what stands between them."""
 _BEFORE, _BEHIND = ' \t\f\v#%*/"', ' \t\f\v;,"'
 """What stands around a key and its value, and is no part of them."""
 _SEPARATOR = re.compile(r"\t\s*[:=;,]|[:=;,\t]")
 _AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?)[\s;,]*(?P<unit>[^\s;,]*)")
-LONGEST = 100
-"""Characters of a value at most that is looked at: an amount with its unit is shorter."""
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:[.,]\d{3})*,\d{3}")
 """Digits in which a comma may group thousands or begin the decimals: 10,000 Hz."""
 _OF_UNITS = re.compile(r"(?:vertical |y )?units?|einheit(?:en)?", re.IGNORECASE)
@@ -31,8 +24,11 @@ _OF_UNIT = re.compile(r"(?:units?|einheit)(?: of)? (?P<after>.+)|(?P<before>.+?)
 
 @dataclass(frozen=True)
 class Preamble:
-    """The sampling `interval` [s], where a line states it with its unit; numbers without a unit by name; units by the
-    name of the column; and what was read, a line each."""
+    """What the lines above a table tell of it.
+
+    It has the sampling `interval` [s], where a line states it with its unit; numbers without a unit by name; units by
+    the name of the column; and what was read, a line each.
+    """
 
     interval: float | None = None
     scalars: Mapping[str, float] = field(default_factory=dict)
@@ -41,7 +37,11 @@ class Preamble:
 
 
 def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Preamble:
-    """What the lines above a table with columns of these names tell. Intervals that contradict each other are none."""
+    """Read what the lines above a table with columns of these names tell.
+
+    Intervals that contradict each other are none.
+    """
+    settings = LogSettings.current()
     lines = [line for line in lines if line.strip()]
     pairs = {line.strip(): pair for line in lines if (pair := _pair(line))}
     pairs |= {f"{name} {value}": (name, value) for name, value in _below_names(lines[-2:], delimiter)}
@@ -51,7 +51,9 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
     for line, (stated, value) in pairs.items():
         name, unit = split_heading(stated)
         key = re.sub(r"[\W\d_]+", "", name.lower())
-        amount = _AMOUNT.fullmatch(value) if key in RATES | STEPS and len(value) < LONGEST else None
+        amount = (
+            _AMOUNT.fullmatch(value) if key in RATES | STEPS and len(value) < settings.characters_of_an_amount else None
+        )
         if amount is None:
             continue
         if _GROUPED.fullmatch(amount["number"]):
@@ -69,7 +71,9 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
 
 
 def _below_names(lines: Sequence[str], delimiter: str) -> list[tuple[str, str]]:
-    """Names and the numbers below them in the two rows above a table, which scopes write beside names and units."""
+    """Return names and the numbers below them in the two rows above a table, which scopes write
+    beside names and units.
+    """
     if len(lines) < 2:
         return []
     names, values = ([cell.strip() for cell in line.split(delimiter)] for line in lines)
@@ -77,7 +81,7 @@ def _below_names(lines: Sequence[str], delimiter: str) -> list[tuple[str, str]]:
 
 
 def _pair(line: str) -> tuple[str, str] | None:
-    """Key and value of a line that has both."""
+    """Return key and value of a line that has both."""
     line = line.lstrip(_BEFORE)
     if (separator := _SEPARATOR.search(line)) is None:
         return None
@@ -89,7 +93,9 @@ def _pair(line: str) -> tuple[str, str] | None:
 
 
 def _seconds(number: float, unit: str) -> float | None:
-    """A sample time or rate in seconds; None without a unit of either, or for what is not positive."""
+    """Return a sample time or rate in seconds; None without a unit of either, or for what is not
+    positive.
+    """
     for si, power in (("s", 1), ("Hz", -1)):
         if number > 0 and unit and (size := unit_factor(unit, si)) is not None:
             return (number * size) ** power
@@ -97,7 +103,9 @@ def _seconds(number: float, unit: str) -> float | None:
 
 
 def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) -> dict[str, str]:
-    """The units of columns where a line lists them, with or without a word for units in front."""
+    """Return the units of columns where a line lists them, with or without a word for units in
+    front.
+    """
     for line in lines:
         key, value = _pair(line) or ("", "")
         listed = _OF_UNITS.fullmatch(key) is not None
@@ -113,13 +121,15 @@ def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) ->
 
 
 def _horizontal(lines: Iterable[str]) -> str:
-    """The unit of the first column of a scope's table, where a line tells it."""
+    """Return the unit of the first column of a scope's table, where a line tells it."""
     pairs = [pair for line in lines if (pair := _pair(line))]
     return next((value.split(",")[0] for key, value in pairs if key.lower() in ("horizontal units", "x units")), "")
 
 
 def _units_by_name(pairs: Iterable[tuple[str, str]], names: Sequence[str]) -> dict[str, str]:
-    """The units of columns where lines tell them one by one: "position unit: mm", or "position: mm"."""
+    """Return the units of columns where lines tell them one by one: "position unit: mm", or
+    "position: mm".
+    """
     plain = {name.lower(): name for name in names if name}
     units = {}
     for key, value in pairs:

@@ -9,10 +9,8 @@ from friso.errors import LogError
 from friso.identification.logs.channel import ChannelTable
 from friso.identification.logs.format import FORMATS, FileHead
 from friso.identification.logs.measured_response import MeasuredResponse
+from friso.identification.logs.settings import LogSettings
 from friso.platform.system import cause_of, once_free
-
-MOST_BYTES = 2 << 30
-"""Largest file that is read, 2 GiB: all its channels are held in memory at once, about as large again."""
 
 _SAVED = "the same saved as one of the formats that friso reads"
 _OTHERS = {
@@ -29,10 +27,11 @@ _OTHERS = {
 
 
 def file_format(path: Path) -> str:
-    """The format of a file by its content, a name of `FORMATS`.
+    """Return the format of a file by its content, a name of `FORMATS`.
 
     Raises LogError for what cannot be read: missing, a folder, empty, too large, no text and no known format.
     """
+    settings = LogSettings.current()
     try:
         if path.is_dir():
             raise LogError("log", "a folder", "a file", "friso identify log.csv", str(path))
@@ -48,8 +47,8 @@ def file_format(path: Path) -> str:
         raise LogError("log", f"a file that cannot be opened ({reason})", "a log", "", str(path)) from None
     if size == 0:
         raise LogError("log", "an empty file (0 bytes)", "a heading and rows of numbers", "", str(path))
-    if size > MOST_BYTES:
-        expected = f"at most {MOST_BYTES / 2**30:.3g} GiB: cut the log, or save only the channels needed"
+    if size > settings.bytes_of_a_log:
+        expected = f"at most {settings.bytes_of_a_log / 2**30:.3g} GiB: cut the log, or save only the channels needed"
         raise LogError("log", f"a file of {size / 2**30:.3g} GiB", expected, "", str(path))
     for name in sorted(FORMATS, key=lambda name: FORMATS[name].rank):
         if FORMATS[name].recognise(head):
@@ -62,19 +61,28 @@ def file_format(path: Path) -> str:
 
 
 def read_table(path: Path | str) -> ChannelTable:
-    """The channels of a log of any format. Raises LogError."""
+    """Read the channels of a log of any format.
+
+    Raises LogError.
+    """
     path = Path(path)
     return FORMATS[file_format(path)].read(path)
 
 
 def is_frequency_response(path: Path | str) -> bool:
-    """Whether a file holds a frequency response instead of signals over time. Raises LogError as `file_format`."""
+    """Tell whether a file holds a frequency response instead of signals over time.
+
+    Raises LogError as `file_format`.
+    """
     path = Path(path)
     return FORMATS[file_format(path)].holds_response(path)
 
 
 def read_frequency_response(path: Path | str) -> MeasuredResponse:
-    """The frequency response in a file of a format that can hold one. Raises LogError."""
+    """Read the frequency response in a file of a format that can hold one.
+
+    Raises LogError.
+    """
     path = Path(path)
     form = FORMATS[file_format(path)]
     if form.read_response is None:

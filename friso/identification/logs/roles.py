@@ -13,119 +13,17 @@ import numpy as np
 from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.units import split_heading, unit_factor, without_accents
+from friso.identification.logs.word_lists import channel_words
 from friso.quantities import quoted
 
-_SET = frozenset(
-    [
-        "ref", "reference", "set", "setpoint", "setpos", "sp", "des", "desired", "target", "cmd", "command",
-        "commanded", "demand", "demanded", "nominal", "traj", "trajectory", "profile", "soll", "consigne", "consigna",
-        "comandata", "comando", "comandada", "riferimento", "referencia", "desiderata", "deseada",
-    ]
-)  # fmt: skip
-_NOT_MEASURED = frozenset(
-    ["err", "error", "pe", "lag", "following", "diff", "max", "min", "limit", "sat", "flag", "status", "enable",
-     "seq", "sequence", "index", "sample", "samples", "secs", "nsecs", "nanosec"]
-)  # fmt: skip
-_CART = frozenset(["cart", "carriage", "slider"])
-_RELATIVE = frozenset(["rel", "relative"])
-_KEYS = {
-    "time": frozenset(
-        [
-            "t",
-            "time",
-            "timestamp",
-            "tout",
-            "zeit",
-            "uhrzeit",
-            "zeitstempel",
-            "tempo",
-            "temps",
-            "heure",
-            "tiempo",
-            "hora",
-            "tijd",
-            "stamp",
-        ]
-    ),
-    "position": frozenset(
-        [
-            "pos",
-            "position",
-            "lage",
-            "positie",
-            "theta",
-            "enc",
-            "encoder",
-            "displacement",
-            "angle",
-            "winkel",
-            "angulo",
-            "angolo",
-            "posizione",
-            "posicion",
-            "posicao",
-        ]
-    ),
-    "velocity": frozenset(
-        [
-            "vel",
-            "velo",
-            "velocity",
-            "speed",
-            "geschw",
-            "geschwindigkeit",
-            "drehzahl",
-            "rpm",
-            "snelheid",
-            "dq",
-            "qdot",
-            "dot",
-            "vitesse",
-            "velocidad",
-            "velocidade",
-            "velocita",
-        ]
-    ),
-    "acceleration": frozenset(["acc", "accel", "acceleration", "ddot"]),
-    "force": frozenset(
-        [
-            "force",
-            "torque",
-            "current",
-            "iq",
-            "kraft",
-            "strom",
-            "drehmoment",
-            "forza",
-            "fuerza",
-            "forca",
-            "coppia",
-            "effort",
-            "tau",
-            "thrust",
-            "kracht",
-            "koppel",
-        ]
-    ),
-    "disturbance": frozenset(["disturbance", "injected", "injection"]),
-}
-"""Words in a name that tell what a channel is."""
-
-_CURRENTS = frozenset(["corrente", "corriente", "courant"])
-"""Words of a current at the beginning of a name; behind another word they mean what is now: Tempo corrente."""
-
-_OTHERS_WANTED = frozenset(
-    ["voltage", "tensione", "tension", "spannung", "moment", "comando", "comandata", "comandada"]
+_WORDS = channel_words()
+_SET, _NOT_MEASURED, _CART, _RELATIVE = (_WORDS[name] for name in ("wanted", "not_measured", "cart", "relative"))
+_KEYS, _CURRENTS, _OTHERS_WANTED, MEASURED = (
+    _WORDS[name] for name in ("roles", "currents", "other_wanted", "measured")
 )
-"""Words of something else that may be wanted than a position, where no word of a position stands beside them."""
 
 _LETTERS = frozenset("vfinw")
 """Symbols of what may be wanted and is no position, directly before the word of what is wanted: v_soll."""
-
-MEASURED = frozenset(
-    ["ist", "act", "actual", "fbk", "meas", "measured", "mes", "mesure", "mesuree", "real", "reale", "reel", "reelle"]
-)
-"""Words of what is, and was measured."""
 
 _TOLD_BY_UNIT = {"position": ("m", "rad"), "force": ("N", "N*m", "A"), "velocity": ("m/s", "rad/s")}
 """Units that tell a role where a single channel without one has them."""
@@ -171,7 +69,10 @@ class AssignedRole:
 
 
 def words(name: str) -> list[str]:
-    """Lower-case words of the last part of a dotted name, without accents: "Axis1.NcToPlc.ActPos" is ["act", "pos"]."""
+    """Return the lower-case words of the last part of a dotted name, without accents.
+
+    "Axis1.NcToPlc.ActPos" is ["act", "pos"].
+    """
     plain = re.sub(r"\([^()]*\d\.\d[^()]*\)$", "", without_accents(name))  # (0.1 %) is a resolution
     last = plain.rstrip(". ").rsplit(".", 1)[-1]
     last = re.sub(r"\b([FRC])(POS|VEL)\b", lambda match: f"{_FIRST_LETTERS[match[1]]} {match[2]}", last)
@@ -181,14 +82,17 @@ def words(name: str) -> list[str]:
 
 
 def _compound(word: str) -> list[str]:
-    """The parts of a German compound, or the word alone."""
+    """Return the parts of a German compound, or the word alone."""
     match = _GERMAN.fullmatch(word)
     return [word] if match is None else [own for part in match.groups() if part for own in _compound(part)]
 
 
 def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
-    """Role that a name stands for, and the word that shows it; None for a name that shows none. The `unit` tells a
-    symbol from the name of an axis: V_soll in mm, v_ist in mm/s."""
+    """Return the role that a name stands for, and the word that shows it; None for a name that
+    shows none.
+
+    The `unit` tells a symbol from the name of an axis: V_soll in mm, v_ist in mm/s.
+    """
     parts = words(name)
     name_words = set(parts)
     if name_words & _NOT_MEASURED:
@@ -214,7 +118,9 @@ def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
 
 
 def _of_symbol(parts: Sequence[str], unit: str) -> tuple[str, str] | None:
-    """Role and letter of a name that is a symbol and the word of what is, in a unit of that symbol; else None."""
+    """Return role and letter of a name that is a symbol and the word of what is, in a unit of
+    that symbol; else None.
+    """
     if len(parts) != 2 or parts[0] not in _SYMBOLS or parts[1] not in MEASURED or not unit:
         return None
     role, units = _SYMBOLS[parts[0]]
@@ -222,23 +128,30 @@ def _of_symbol(parts: Sequence[str], unit: str) -> tuple[str, str] | None:
 
 
 def _has_unit_of(unit: str, kinds: Sequence[str]) -> bool:
-    """Whether a unit is one of these kinds."""
+    """Tell whether a unit is one of some kinds."""
     return bool(unit) and any(unit_factor(unit, kind) is not None for kind in kinds)
 
 
 def _is_symbol(parts: Sequence[str], unit: str) -> bool:
-    """Whether a name is the symbol of what is no position and the word of what is wanted: v_soll."""
+    """Tell whether a name is the symbol of what is no position and the word of what is wanted:
+    v_soll.
+    """
     of_position = _has_unit_of(unit, _TOLD_BY_UNIT["position"])
     return len(parts) > 1 and parts[0] in _LETTERS and parts[1] in _SET and not of_position
 
 
 def is_wanted(name: str) -> bool:
-    """Whether a name tells, or hints within a word, that it is what was wanted, and was not measured."""
+    """Tell whether a name says, or hints within a word, that it is what was wanted, and was not
+    measured.
+    """
     return any(word in (name.lower() if len(word) > 2 else words(name)) for word in _SET)
 
 
 def find(table: ChannelTable, name: str, role: str, origin: str = "") -> Channel:
-    """The channel of this name, with or without its unit in brackets. Raises LogError that lists the channels."""
+    """Find the channel of a name, with or without its unit in brackets.
+
+    Raises LogError that lists the channels.
+    """
     plain = split_heading(name)[0]
     for matches in ([c for c in table.channels if c.name == name], [c for c in table.channels if c.name == plain]):
         if len(matches) == 1:
@@ -249,7 +162,9 @@ def find(table: ChannelTable, name: str, role: str, origin: str = "") -> Channel
 
 
 def _nearest(table: ChannelTable, name: str, role: str) -> str:
-    """The name of the channel that is likely meant: one of that role, else one that is no clock, or the most alike."""
+    """Return the name of the channel that is likely meant: one of that role, else one that is no
+    clock, or the most alike.
+    """
     meant = {channel.name: (role_of(channel.name) or ("",))[0] for channel in table.channels}
     fitting = [one for one, its in meant.items() if its == role] or [one for one, its in meant.items() if its != "time"]
     written = {one.lower(): one for one in fitting or meant}
@@ -258,8 +173,11 @@ def _nearest(table: ChannelTable, name: str, role: str) -> str:
 
 
 def listing(table: ChannelTable, taken: Sequence[Channel] = ()) -> str:
-    """The channels there are, for a message, but for those that are `taken` for other roles; and what was left out as
-    objects."""
+    """List the channels there are, for a message, but for those that are `taken` for other
+    roles.
+
+    It also says what was left out as objects.
+    """
     used = {id(channel) for channel in taken}
     labels = [c.name + (f" [{c.unit}]" if c.unit else "") for c in table.channels if id(c) not in used]
     text = ", ".join(labels[:40]) + (f" and {len(labels) - 40} more" if len(labels) > 40 else "")
@@ -269,16 +187,21 @@ def listing(table: ChannelTable, taken: Sequence[Channel] = ()) -> str:
 
 @dataclass(frozen=True)
 class Proposal:
-    """Roles with their channels, and the `rivals` for those of which several channels could be one."""
+    """Roles with their channels, and the `rivals` for those of which several channels could be
+    one.
+    """
 
     chosen: dict[str, AssignedRole]
     rivals: dict[str, tuple[Channel, ...]]
 
 
 def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") -> Proposal:
-    """Roles with their channels: first what the user assigned, then what the names show, then what units do. Of several
-    channels whose names show a role, the one whose name is nothing else has it. Raises LogError for a name that is not
-    there."""
+    """Give roles to channels: first as the user assigned them, then as names show, then as units
+    do.
+
+    Of several channels whose names show a role, the one whose name is nothing else has it. Raises LogError for a name
+    that is not there.
+    """
     chosen = {
         role: AssignedRole(role, find(table, name, role, origin), "as specified", True)
         for role, name in assigned.items()
@@ -314,7 +237,9 @@ def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") ->
 
 
 def _only_one(role: str, table: ChannelTable, taken: Sequence[Channel]) -> Channel | None:
-    """The only channel in a unit of a role, of those whose names tell nothing of what they are; None without it."""
+    """Return the only channel in a unit of a role, of those whose names tell nothing of what
+    they are; None without it.
+    """
     used = {id(channel) for channel in taken}
     fits = [
         channel
@@ -328,17 +253,19 @@ def _only_one(role: str, table: ChannelTable, taken: Sequence[Channel]) -> Chann
 
 
 def is_clock(channel: Channel) -> bool:
-    """Whether a channel is in a unit of time and always rises."""
+    """Tell whether a channel is in a unit of time and always rises."""
     return _has_unit_of(channel.unit, ("s",)) and channel.values.size > 1 and bool((np.diff(channel.values) > 0).all())
 
 
 def of_no_signal(name: str) -> bool:
-    """Whether a name says that a channel is an error, a limit, a counter or the like."""
+    """Tell whether a name says that a channel is an error, a limit, a counter or the like."""
     return bool({*words(name)} & _NOT_MEASURED)
 
 
 def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, str] | None:
-    """Of several candidates the only one whose name is that of the role, or else the word alone that shows it."""
+    """Return the only candidate whose name is that of the role, or else the word alone that
+    shows it.
+    """
     if len(matches) < 2:
         return None
     for alone in (
@@ -351,6 +278,6 @@ def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, 
 
 
 def _own_times(table: ChannelTable) -> bool:
-    """Whether the channels that are not times themselves have their instants from the file."""
+    """Tell whether the channels that are not times themselves have their instants from the file."""
     others = [channel for channel in table.channels if (role_of(channel.name) or ("",))[0] != "time"]
     return any(channel.time is not None for channel in others)

@@ -16,15 +16,13 @@ from friso.identification.logs.log import ROLES
 from friso.identification.logs.mapping import Mapping, guess, option
 from friso.identification.logs.preamble import RATES, STEPS
 from friso.identification.logs.roles import AssignedRole, find, is_clock, words
+from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.text import with_times
 from friso.identification.logs.units import FOREIGN, RMS, in_si, is_unit, likely_unit, read_scale, unit_factor
 from friso.quantities import quoted
 
 TURNS = f"--axis {ROTARY.name}"
 """The option that tells a rotary axis."""
-
-LARGEST = 1e30
-"""No instrument measures more in any unit; beyond it, squares of squares overflow."""
 
 
 @dataclass
@@ -38,9 +36,11 @@ class Notes:
 
 @dataclass(frozen=True)
 class Reading:
-    """How channels are read: the table, what the user said, whether only the units of the roles will do, whether the
-    file is of a kind that cannot hold units, where it lies, and the roles that may have a `foreign` unit all the same
-    (a force in volts)."""
+    """How channels are read: the table, what the user said, and what will do.
+
+    `strict`: only the units of the roles will do; `bare`: the file is of a kind that cannot hold units; `origin` is
+    where it lies, and `foreign` are roles that may have a foreign unit all the same (a force in volts).
+    """
 
     table: ChannelTable
     mapping: Mapping
@@ -50,17 +50,19 @@ class Reading:
     foreign: tuple[str, ...] = ()
 
     def unit(self, role: str) -> str:
-        """The SI unit of a role on the axis that was logged."""
+        """Return the SI unit of a role on the axis that was logged."""
         return self.mapping.axis_kind.unit(ROLES[role])
 
     def takes(self, role: str, si: str) -> bool:
-        """Whether a signal of a role may stand in a unit that is not the role's."""
+        """Tell whether a signal of a role may stand in a unit that is not the role's."""
         return si == self.unit(role) or not self.strict or (role in self.foreign and si in FOREIGN)
 
 
 def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: str) -> ChannelTable:
-    """The table with the user's units, and with the times that follow from them where the format has no `times` of its
-    own. Raises LogError."""
+    """Return the table with the user's units, and with the times that follow from them.
+
+    Times follow where the format has no `times` of its own. Raises LogError.
+    """
     if not mapping.units:
         return table
     units = {id(find(table, name, "unit", origin)): unit for name, unit in mapping.units.items()}
@@ -78,7 +80,11 @@ def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: 
 
 
 def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
-    """Values of a channel in the unit of its role, with notes on what was done to them. Raises LogError."""
+    """Return the values of a channel in the unit of its role, with notes on what was done to
+    them.
+
+    Raises LogError.
+    """
     channel, role = choice.channel, choice.role
     values, bits = unwrapped(channel.values) if ROLES[role] == "m" else (channel.values, 0)  # encoders overflow
     if bits:
@@ -109,13 +115,14 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
     with np.errstate(all="ignore"):  # what is no number stays so, and is the business of the time base
         values = values * value
         most = np.abs(values[np.isfinite(values)]).max(initial=0.0)
-    if most > LARGEST:
+    if most > LogSettings.current().largest_value:
         actual = f"values up to {most:.3g} {notes.units.get(role, reading.unit(role))}"
         raise LogError(role, actual, "values that an instrument can measure; is the file damaged?", "", reading.origin)
     return values
 
 
 def _scaled(role: str, scale: str, unit: str, reading: Reading) -> tuple[float, str]:
+    """Return the factor of a scale and the unit that it implies."""
     try:
         return read_scale(role, scale, unit, reading.mapping.axis_kind)
     except InputError as error:
@@ -123,8 +130,11 @@ def _scaled(role: str, scale: str, unit: str, reading: Reading) -> tuple[float, 
 
 
 def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
-    """What has to be told of the unit of a channel before it has that of its role; None for nothing. Raises LogError
-    for a scale that does not fit."""
+    """Return what has to be told of the unit of a channel before it has that of its role; None
+    for nothing.
+
+    Raises LogError for a scale that does not fit.
+    """
     si = in_si(choice.channel.unit, reading.unit(choice.role))[1]
     scale = reading.mapping.scales.get(choice.role)
     if scale is not None:
@@ -135,14 +145,16 @@ def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
 
 
 def _taken_as_si(choice: AssignedRole, reading: Reading) -> bool:
-    """Whether a channel without a unit counts as one in SI: the user assigned it, the format holds no units, and it is
-    no current for a force."""
+    """Tell whether a channel without a unit counts as one in SI.
+
+    The user assigned it, the format holds no units, and it is no current for a force.
+    """
     bare = not choice.channel.unit and reading.strict and choice.by_user and reading.bare
     return bare and not _electric_unit(choice)
 
 
 def _electric_unit(choice: AssignedRole) -> str:
-    """A or V, where the name of a channel for a force tells it; "" else."""
+    """Return A or V, where the name of a channel for a force tells it; "" else."""
     unit = likely_unit(words(choice.channel.name)) if choice.role == "force" else ""
     return unit if unit in ("A", "V") else ""
 
@@ -172,8 +184,11 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
 
 
 def _likely_length(place: Channel) -> tuple[str, str]:
-    """The unit of length in which the travel of a position is between 0.5 mm and 0.5 m, or nearest to that; and what
-    the travel is then, in words."""
+    """Return the unit of length in which the travel of a position is likely, and what the travel
+    is then, in words.
+
+    It is between 0.5 mm and 0.5 m, or nearest to that.
+    """
     finite = place.values[np.isfinite(place.values)]
     travel = float(np.ptp(finite)) if finite.size else 0.0
     unit, size = ("m", 1.0) if travel <= 0.5 else ("mm", 1e-3) if travel <= 500 else ("um", 1e-6)
@@ -181,14 +196,17 @@ def _likely_length(place: Channel) -> tuple[str, str]:
 
 
 def _span(values: np.ndarray) -> str:
-    """Between which values a channel runs, in words."""
+    """Say between which values a channel runs."""
     finite = values[np.isfinite(values)]
     return f" and runs from {finite.min():.4g} to {finite.max():.4g}" if finite.size else ""
 
 
 def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading, notes: Notes) -> np.ndarray | None:
-    """Instants of a channel [s]: from the sample time that the user said, the time channel, or the file; None where
-    there are none. Raises LogError."""
+    """Return the instants of a channel [s]: from the user's sample time, the time channel, or
+    the file.
+
+    None where there are none. Raises LogError.
+    """
     channel = choice.channel
     if reading.mapping.sample_time is not None:
         return reading.mapping.sample_time * np.arange(channel.values.size)
@@ -202,7 +220,10 @@ def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading,
 
 
 def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
-    """Seconds in the unit of the time channel. Raises LogError for none."""
+    """Return the seconds in the unit of the time channel.
+
+    Raises LogError for none.
+    """
     name, unit = clock.channel.name, clock.channel.unit
     if not unit and clock.by_user and reading.bare:
         line = f"time: {name} has no unit (this format has none): assumed to be in s"
@@ -219,8 +240,11 @@ def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
 
 
 def _likely_unit(clock: Channel) -> tuple[str, str]:
-    """The unit in which the steps of a time are like those of a log, between 0.1 ms and 100 ms; and what they are then,
-    in words."""
+    """Return the unit in which the steps of a time are like those of a log, and what they are
+    then, in words.
+
+    They are between 0.1 ms and 100 ms.
+    """
     steps = np.diff(clock.values)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
     unit, size = ("s", 1e3) if step <= 0.1 else ("ms", 1.0) if step <= 100 else ("us", 1e-3)
@@ -241,7 +265,9 @@ def no_time(channel: Channel, reading: Reading) -> LogError:
 
 
 def _may_be_a_clock(channel: Channel) -> bool:
-    """Whether a channel is in a unit of time and rises, or in none and rises evenly, and not as a counter by 1."""
+    """Tell whether a channel is in a unit of time and rises, or in none and rises evenly, and
+    not as a counter by 1.
+    """
     if is_clock(channel):
         return True
     steps = np.diff(channel.values)
@@ -249,7 +275,7 @@ def _may_be_a_clock(channel: Channel) -> bool:
 
 
 def _offers(table: ChannelTable) -> str:
-    """What single numbers in the file could mean for the sample time: offered, not used."""
+    """Say what single numbers in the file could mean for the sample time: offered, not used."""
     offers = []
     for name, value in table.scalars.items():
         plain = name.rpartition(".")[2].lower().replace("_", "")
@@ -261,7 +287,10 @@ def _offers(table: ChannelTable) -> str:
 
 
 def unused(mapping: Mapping, chosen: Roles[str, AssignedRole], origin: str) -> None:
-    """Raises LogError for a scale of a role that has no channel."""
+    """Check that every scale is for a role that has a channel.
+
+    Raises LogError.
+    """
     for role in mapping.scales:
         if role not in chosen:
             raise LogError("scale", f"a scale for {role}, which has no channel", "a channel for it",

@@ -13,16 +13,11 @@ from functools import lru_cache
 from pathlib import Path
 
 from friso.errors import LogError
+from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.units import is_unit, split_heading
 
-HEAD_BYTES = 1 << 18
-"""How much of a file is looked at to find how it is written."""
 REMEMBERED = 4
 """Heads of files of which it is remembered how they are written: each is asked for several times."""
-HEAD_LINES = 1000
-"""How many lines of it are tried with each delimiter."""
-MOST_COLUMNS = 10_000
-"""Columns of a table at most: reading that many takes seconds."""
 _BYTE_ORDER_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _CANDIDATES = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (" ", "."), (" ", ","), (",", ","))
 """Delimiter and decimal sign; of two that fit equally well the first is taken."""
@@ -40,8 +35,11 @@ STAMP = re.compile(rf"(?:{ISO.pattern}|(?:{_DATE}[T ]+)?{CLOCK})")
 
 @dataclass(frozen=True)
 class TextLayout:
-    """How a text is written. `first` counts the lines before the numbers, `above`; `names` and `units` are per column;
-    `exact`: every delimiter ends a cell, so that several spaces are empty cells."""
+    """How a text is written.
+
+    `first` counts the lines before the numbers, `above`; `names` and `units` are per column; `exact`: every delimiter
+    ends a cell, so that several spaces are empty cells.
+    """
 
     encoding: str
     delimiter: str
@@ -65,9 +63,12 @@ class TextLayout:
 
 
 def decoded_head(path: Path) -> tuple[str, list[str]]:
-    """Encoding and the first lines of a text file. Raises LogError for what is no text."""
+    """Return encoding and first lines of a text file.
+
+    Raises LogError for what is no text.
+    """
     with path.open("rb") as file:
-        decoded = _decoded(file.read(HEAD_BYTES))
+        decoded = _decoded(file.read(LogSettings.current().bytes_of_a_head))
     if decoded is None:
         raise LogError(
             "log", f"{path.stat().st_size} bytes that are neither text nor a known format",
@@ -79,7 +80,7 @@ def decoded_head(path: Path) -> tuple[str, list[str]]:
 
 @lru_cache(REMEMBERED)
 def _decoded(head: bytes) -> tuple[str, tuple[str, ...]] | None:
-    """Encoding and lines of what a file begins with; None for what is no text."""
+    """Return encoding and lines of what a file begins with; None for what is no text."""
     encoding = next((name for mark, name in _BYTE_ORDER_MARKS if head.startswith(mark)), "")
     if not encoding and b"\0" in head:
         even, odd = head[0:4000:2].count(0), head[1:4000:2].count(0)
@@ -97,16 +98,19 @@ def _decoded(head: bytes) -> tuple[str, tuple[str, ...]] | None:
     if odd > 0.02 * len(text):
         return None
     lines = re.split(r"\r\n|\n|\r", text)
-    is_cut = len(head) == HEAD_BYTES and len(lines) > 1
+    is_cut = len(head) == LogSettings.current().bytes_of_a_head and len(lines) > 1
     return encoding, tuple(lines[:-1] if is_cut or not lines[-1] else lines)
 
 
 def _may_stand_in_text(character: str) -> bool:
+    """Tell whether a character may stand in a text."""
     return character.isprintable() or character in "\t\r\n\f"
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
-    """The cells of a line, without quotes and blanks around; spaces inside brackets do not split."""
+    """Split a line into cells, without quotes and blanks around; spaces inside brackets do not
+    split.
+    """
     if delimiter == " ":
         if '"' not in line:
             line = re.sub(r"(?<!\s)\s+(?=[\[(])", "\0", line.strip())  # "Time (s)" is one heading
@@ -116,7 +120,9 @@ def split_line(line: str, delimiter: str) -> list[str]:
 
 
 def csv_cells(line: str, delimiter: str, skipinitialspace: bool = False) -> list[str]:
-    """The cells of a line as CSV has them; the line itself where one is longer than Python's reader takes."""
+    """Split a line as CSV does; the line itself where one cell is longer than Python's reader
+    takes.
+    """
     try:
         return next(csv.reader([line], delimiter=delimiter, skipinitialspace=skipinitialspace), [])
     except csv.Error:
@@ -124,15 +130,17 @@ def csv_cells(line: str, delimiter: str, skipinitialspace: bool = False) -> list
 
 
 def is_number(cell: str, decimal: str) -> bool:
-    """Whether a cell is a number with this decimal sign."""
+    """Tell whether a cell is a number with this decimal sign."""
     if decimal == ",":
         cell = cell.replace(".", "?").replace(",", ".")
     return _NUMBER.fullmatch(cell) is not None
 
 
 def _is_row(cells: list[str], numeric: list[bool], decimal: str, words: bool) -> bool:
-    """Whether cells, of which some are `numeric`, are a row of values: numbers, gaps and time stamps, with `words` also
-    a few words (a state)."""
+    """Tell whether cells, of which some are `numeric`, are a row of values.
+
+    Such a row has numbers, gaps and time stamps, with `words` also a few words (a state).
+    """
     numbers = sum(numeric)
     rest = [cell for cell, number in zip(cells, numeric, strict=True) if cell and not number]
     if words:  # none of which is a number with the other sign: 1.234 may be a thousand of something
@@ -142,14 +150,17 @@ def _is_row(cells: list[str], numeric: list[bool], decimal: str, words: bool) ->
 
 
 def layout(path: Path) -> TextLayout:
-    """How a text with one table of numbers is written: words stand in its rows only where hardly any row goes without.
-    Raises LogError where there is none."""
+    """Find how a text with one table of numbers is written.
+
+    Words stand in its rows only where hardly any row goes without. Raises LogError where there is none.
+    """
+    settings = LogSettings.current()
     encoding, lines = decoded_head(path)
-    lines = lines[:HEAD_LINES]
+    lines = lines[: settings.lines_of_a_head]
     best = _best_fit(encoding, tuple(lines))
     if best is not None:
-        if best.columns > MOST_COLUMNS:
-            expected = f"at most {MOST_COLUMNS}: one a channel, one row a sample"
+        if best.columns > settings.columns_of_a_table:
+            expected = f"at most {settings.columns_of_a_table}: one a channel, one row a sample"
             raise LogError("log", f"{best.columns} columns", expected, "", str(path))
         _no_open_quote(lines[: best.first], best.delimiter, path)
         return best
@@ -160,7 +171,7 @@ def layout(path: Path) -> TextLayout:
 
 @lru_cache(REMEMBERED)
 def _best_fit(encoding: str, lines: Sequence[str]) -> TextLayout | None:
-    """The layout that fits lines best; None if none fits."""
+    """Return the layout that fits lines best; None if none fits."""
     split = {delimiter: [split_line(line, delimiter) for line in lines] for delimiter, _ in _CANDIDATES}
     fits = [_fits(lines, encoding, delimiter, decimal, split[delimiter]) for delimiter, decimal in _CANDIDATES]
     plain, worded = (
@@ -171,7 +182,10 @@ def _best_fit(encoding: str, lines: Sequence[str]) -> TextLayout | None:
 
 
 def _no_open_quote(above: list[str], delimiter: str, path: Path) -> None:
-    """Raises LogError for a heading with a quotation mark that is not closed: the cells behind it would be one."""
+    """Check that quotation marks of a heading are closed: else the cells behind would be one.
+
+    Raises LogError.
+    """
     number, heading = next(((n, line) for n, line in reversed([*enumerate(above, 1)]) if line.strip()), (0, ""))
     with suppress(csv.Error):
         lines = [f"{heading.strip()}\n", "below"]
@@ -187,8 +201,9 @@ _Fit = tuple[tuple[int, bool, int], TextLayout] | None
 def _fits(
     lines: Sequence[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]]
 ) -> tuple[_Fit, _Fit]:
-    """How well this delimiter, which gives these rows, and decimal sign fit without words in rows of numbers, and with
-    them."""
+    """Return how well a delimiter, which gives these rows, and a decimal sign fit, without words
+    in rows and with them.
+    """
     numeric = [[is_number(cell, decimal) for cell in cells] for cells in rows]
 
     def fit(words: bool) -> _Fit:
@@ -201,7 +216,7 @@ def _fits(
 def _fit(
     lines: Sequence[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]], is_row: list[bool]
 ) -> _Fit:
-    """How well this delimiter and decimal sign fit, with which these are rows of numbers."""
+    """Return how well a delimiter and a decimal sign fit, with which these are rows of numbers."""
     if not any(is_row):
         return None
     first = next(i for i, row in enumerate(is_row) if row and _goes_on(is_row, rows, i))
@@ -213,7 +228,9 @@ def _fit(
 
 
 def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:
-    """Whether a row of numbers is followed by one as long (a single number in the lines before is no table)."""
+    """Tell whether a row of numbers is followed by one as long (a single number in the lines
+    before is no table).
+    """
     following = next((j for j in range(i + 1, len(rows)) if any(rows[j])), None)
     if following is None or not any(is_row[i + 1 :]):
         return True
@@ -223,7 +240,9 @@ def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:
 def _headings(
     lines: Sequence[str], first: int, columns: int, delimiter: str
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names and units per column, from the one or two lines above the numbers that are as long; () for none."""
+    """Return names and units per column, from the one or two lines above the numbers that are as
+    long; () for none.
+    """
     above = [lines[i].lstrip("#% ") for i in range(first) if lines[i].strip()]
     heads = [_heading_cells(line, columns, delimiter) for line in above[-2:]]
     heads = [head[:columns] + _filled(head[columns:]) for head in heads]  # a line may end with a delimiter
@@ -242,12 +261,15 @@ def _headings(
 
 
 def _filled(cells: list[str]) -> list[str]:
-    """The cells up to the last that is not empty."""
+    """Return the cells up to the last that is not empty."""
     return cells[: max((i + 1 for i, cell in enumerate(cells) if cell), default=0)]
 
 
 def _heading_cells(line: str, columns: int, delimiter: str) -> list[str]:
-    """The headings in a line; between spaces also names of several words, where each ends with its unit in brackets."""
+    """Return the headings in a line.
+
+    Between spaces there may be names of several words, where each ends with its unit in brackets.
+    """
     cells = split_line(line, delimiter)
     if delimiter == " " and len(cells) != columns:
         closed = line[: max(map(line.rfind, ")]")) + 1]  # no bracket is looked for an end that is not there

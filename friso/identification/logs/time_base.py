@@ -11,32 +11,17 @@ from scipy.interpolate import CubicSpline
 
 from friso.errors import LogError
 from friso.identification.logs.checks import repeated_stamps
+from friso.identification.logs.settings import LogSettings
 from friso.quantities import percent
-
-GAP = 1.5
-"""A step of time above this many sample times is a gap, unless the steps beside it make up for it: at least one sample
-is missing (one missing makes 2)."""
-BRIDGED = 3
-"""Samples lost in a row at most that are bridged: longer gaps split a record."""
-MOST_GAPS = 0.1
-"""More gaps than this share of the samples is no even sampling."""
-EVEN = 0.01
-"""Time stamps that scatter (rms) by less than this share of a sample time are taken as even: interpolation would change
-a signal by less than 1 % of what it changes per sample."""
-AVERAGED = 5
-"""Steps in a row whose mean is the usual step: one of stamps with few digits is longer or shorter than that."""
-CLEAR = 0.25
-"""Share of a sample time by which it may be off at most: more is no whole number of samples."""
-SCATTER = 4.0
-"""Standard deviations of the other steps by which one over a gap may differ from a whole number of sample times."""
-SHORTEST = 10
-"""Segments of fewer samples are left out: no filter of ours settles within."""
 
 
 @dataclass
 class Track:
-    """A channel with even instants within each segment: `time` [s] and `values` of shape (n,), those that were lost and
-    `bridged` true in an array of that shape; what was done to it."""
+    """A channel with even instants within each segment.
+
+    `time` [s] and `values` have the shape (n,), those that were lost and `bridged` are true in an array of that shape;
+    `read` and `warnings` say what was done to it.
+    """
 
     time: np.ndarray
     values: np.ndarray
@@ -48,12 +33,13 @@ class Track:
 
 
 def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
-    """A channel cleaned of what is no number and of repeated stamps [s], bridged where a few samples are lost, split at
-    longer gaps, on even instants.
+    """Clean a channel, and put it on even instants.
 
-    Raises LogError for too little, for time that decreases, for stamps that are repeated with other values, and for
-    sampling that is not even.
+    What is no number and repeated stamps [s] are left out, a few lost samples bridged, longer gaps split it. Raises
+    LogError for too little, for time that decreases, for stamps that are repeated with other values, and for sampling
+    that is not even.
     """
+    settings = LogSettings.current()
     read: list[str] = []
     time, values, missing = _numbers_only(name, time, values)
     if missing:
@@ -63,16 +49,18 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
         read.append(f"{name}: {repeated} samples repeated with the same time stamp left out")
     steps = np.diff(time)
     gaps = _gaps(steps)
-    if gaps.mean() > MOST_GAPS:
-        actual = (
-            f"time stamps with {percent(gaps.mean())} of the steps over {GAP} times the usual {np.median(steps):.4g} s"
-        )
+    if gaps.mean() > settings.share_of_gaps:
+        usual = f"{settings.sample_times_of_a_gap} times the usual {np.median(steps):.4g} s"
+        actual = f"time stamps with {percent(gaps.mean())} of the steps over {usual}"
         raise LogError(name, actual, "uniform sampling, or the true sample time", '--dt "1 ms"')
     period = usual_step(steps)
     lost = np.round(steps / period) - 1
-    scatter = min(max(EVEN, SCATTER * float(np.std(steps[~gaps])) / period), CLEAR)
+    scatter = min(
+        max(settings.scatter_of_even_stamps, settings.deviations_of_a_gap * float(np.std(steps[~gaps])) / period),
+        settings.error_of_a_whole_gap,
+    )
     whole = np.abs(steps / period - 1 - lost) <= scatter  # else the clock began anew
-    bridged = gaps & whole & (lost >= 1) & (lost <= BRIDGED)
+    bridged = gaps & whole & (lost >= 1) & (lost <= settings.samples_bridged)
     edges = [0, *(np.flatnonzero(gaps & ~bridged) + 1).tolist(), time.size]
     inserted = np.where(bridged, lost, 0).astype(int)
     parts = [_bridged(time[a:b], values[a:b], inserted[a : b - 1]) for a, b in pairwise(edges)]
@@ -82,23 +70,33 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
 
 
 def usual_step(steps: np.ndarray) -> float:
-    """The mean [s] of the steps of time, shape (n,), that are no gaps."""
+    """Return the mean [s] of the steps of time, shape (n,), that are no gaps."""
     return float(steps[~_gaps(steps)].mean())
 
 
 def _gaps(steps: np.ndarray) -> np.ndarray:
-    """Which steps of time, shape (n,), are gaps: the samples behind one stay late, while a step that only scatter made
-    long has short ones beside it."""
+    """Tell which steps of time, shape (n,), are gaps.
+
+    The samples behind a gap stay late, while a step that only scatter made long has short ones beside it.
+    """
+    settings = LogSettings.current()
     usual = float(np.median(steps))
-    if steps.size >= AVERAGED:
-        usual = float(np.median(np.convolve(steps, np.ones(AVERAGED), "valid"))) / AVERAGED
-    beside = np.pad(np.minimum(steps, GAP * usual), 1, constant_values=usual)
-    return (steps > GAP * usual) & (beside[:-2] + steps + beside[2:] > (GAP + 2) * usual)
+    if steps.size >= settings.steps_averaged:
+        usual = (
+            float(np.median(np.convolve(steps, np.ones(settings.steps_averaged), "valid"))) / settings.steps_averaged
+        )
+    beside = np.pad(np.minimum(steps, settings.sample_times_of_a_gap * usual), 1, constant_values=usual)
+    return (steps > settings.sample_times_of_a_gap * usual) & (
+        beside[:-2] + steps + beside[2:] > (settings.sample_times_of_a_gap + 2) * usual
+    )
 
 
 def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Instants and values of shape (n,) with those that are lost behind each of them but the last, shape (n - 1,), and
-    which these are: evenly in between, on a cubic spline through the others."""
+    """Fill in lost samples evenly, on a cubic spline through the others.
+
+    So many are `lost` behind each sample but the last, shape (n - 1,). Returns instants and values, and which of them
+    were lost.
+    """
     if not lost.any():
         return time, values, np.zeros(time.size, bool)
     places = np.repeat(np.arange(lost.size), lost)
@@ -110,7 +108,10 @@ def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np
 
 
 def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """The samples that are numbers, and how many are not between the first and the last. Raises LogError."""
+    """Return the samples that are numbers, and how many are not between the first and the last.
+
+    Raises LogError.
+    """
     finite = np.isfinite(time) & np.isfinite(values)
     if finite.size < 2:
         raise LogError(name, f"{finite.size} sample{'s' * (finite.size != 1)}", "a record over time", "")
@@ -122,8 +123,12 @@ def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.n
 
 
 def _evened(name: str, raw: Track) -> Track:
-    """The track on even instants: its own where the stamps scatter little, or no more than their digits make them, else
-    interpolated, which the notes say."""
+    """Put a track on even instants.
+
+    They are its own where the stamps scatter little, or no more than their digits make them; else it is interpolated,
+    which the notes say.
+    """
+    settings = LogSettings.current()
     order, about = np.empty_like(raw.time), np.empty_like(raw.time)
     for part in raw.segments:
         count = part.stop - part.start
@@ -136,10 +141,10 @@ def _evened(name: str, raw: Track) -> Track:
     raw.read.append(
         f"{name}: {time.size} samples at {1 / raw.period:.6g} Hz, time stamps even to {percent(jitter)} of a step"
     )
-    rounded = _rounded(raw, time) if jitter > EVEN else 0.0
+    rounded = _rounded(raw, time) if jitter > settings.scatter_of_even_stamps else 0.0
     if rounded:
         raw.read.append(f"{name}: time stamps are rounded to {rounded * 1e3:.4g} ms: taken as uniform")
-    if rounded or jitter <= EVEN:
+    if rounded or jitter <= settings.scatter_of_even_stamps:
         raw.time = time
         return raw
     raw.warnings.append(
@@ -161,11 +166,13 @@ def _evened(name: str, raw: Track) -> Track:
 
 
 def _rounded(raw: Track, even: np.ndarray) -> float:
-    """The digit [s] to which stamps of an `even` clock, shape (n,) [s], seem rounded; 0 where they scatter otherwise.
+    """Return the digit [s] to which stamps of an `even` clock, shape (n,) [s], seem rounded; 0
+    where they scatter otherwise.
 
     Between neighbours such a clock has one of two whole numbers of digits, and no stamp is further from it than a
-    digit, half of which is the clock's own offset and rate, which are read off the same stamps.
+    digit, half of which is the clock's own offset and rate, which are read off the stamps too.
     """
+    settings = LogSettings.current()
     bridges = raw.bridged[1:] | raw.bridged[:-1]
     inside = np.ones(raw.time.size - 1, bool)
     inside[[part.start - 1 for part in raw.segments[1:]]] = False
@@ -175,15 +182,18 @@ def _rounded(raw: Track, even: np.ndarray) -> float:
         return 0.0
     lower, upper = float(np.median(steps[short])), float(np.median(steps[~short]))
     digit = upper - lower
-    of_two = np.minimum(np.abs(steps - lower), np.abs(steps - upper)) <= EVEN * digit
-    near = np.abs(raw.time - even) <= (1 + EVEN) * digit
+    of_two = np.minimum(np.abs(steps - lower), np.abs(steps - upper)) <= settings.scatter_of_even_stamps * digit
+    near = np.abs(raw.time - even) <= (1 + settings.scatter_of_even_stamps) * digit
     return digit if of_two.all() and near[~raw.bridged].all() else 0.0
 
 
 def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]:
-    """All tracks at the instants of the coarsest one that all of them cover: these instants as a track, and the values
-    by name. Others are interpolated linearly within their own segments only. Raises LogError where nothing is
-    covered by all."""
+    """Bring all tracks to the instants of the coarsest one that all of them cover.
+
+    Returns these instants as a track, and the values by name. Others are interpolated linearly within their own
+    segments only. Raises LogError where nothing is covered by all.
+    """
+    settings = LogSettings.current()
     base_name = max(tracks, key=lambda name: round(np.log(tracks[name].period), 4))
     base = tracks[base_name]
     read, warnings, values = [], [], {}
@@ -200,22 +210,25 @@ def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.nd
                 f"{name}: interpolated linearly from {1 / single.period:.6g} Hz onto the {1 / base.period:.6g} Hz "
                 f"instants of {base_name}"
             )
-        if single.period < base.period / GAP:
+        if single.period < base.period / settings.sample_times_of_a_gap:
             warnings.append(
                 f"{name}: sampled at {1 / single.period:.6g} Hz and read at {1 / base.period:.6g} Hz without an "
                 "anti-aliasing filter"
             )
     covered = np.all([np.isfinite(value) for value in values.values()], axis=0)
     segments = [run for part in base.segments for run in _runs(covered, part)]
-    short = [run for run in segments if run.stop - run.start < SHORTEST]
-    segments = [run for run in segments if run.stop - run.start >= SHORTEST]
+    short = [run for run in segments if run.stop - run.start < settings.samples_of_a_segment]
+    segments = [run for run in segments if run.stop - run.start >= settings.samples_of_a_segment]
     if not segments:
         spans = ", ".join(f"{name} {trace.time[0]:.6g} s to {trace.time[-1]:.6g} s" for name, trace in tracks.items())
         raise LogError(
-            "log", f"no {SHORTEST} consecutive samples that all channels share: {spans}", "a common span", ""
+            "log",
+            f"no {settings.samples_of_a_segment} consecutive samples that all channels share: {spans}",
+            "a common span",
+            "",
         )
     if short:
-        read.append(f"{len(short)} segments shorter than {SHORTEST} samples left out")
+        read.append(f"{len(short)} segments shorter than {settings.samples_of_a_segment} samples left out")
     parts, start = [], 0
     for run in segments:
         parts.append(slice(start, start + run.stop - run.start))
@@ -226,23 +239,28 @@ def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.nd
 
 
 def _same_instants(first: Track, second: Track) -> bool:
-    """Whether two tracks have the same instants, to a hundredth of a sample time."""
+    """Tell whether two tracks have the same instants, to a hundredth of a sample time."""
+    settings = LogSettings.current()
     same = first.time.size == second.time.size and first.segments == second.segments
-    return same and bool(np.all(np.abs(first.time - second.time) <= EVEN * second.period))
+    return same and bool(np.all(np.abs(first.time - second.time) <= settings.scatter_of_even_stamps * second.period))
 
 
 def _coincident(base: Track, other: Track) -> bool:
-    """Whether the instants of the base within the other's first segment are instants of the other as well."""
+    """Tell whether the instants of the base within the other's first segment are instants of the
+    other as well.
+    """
     part = other.segments[0]
     inside = base.time[(base.time >= other.time[part.start]) & (base.time <= other.time[part.stop - 1])]
     steps = (inside - other.time[part.start]) / other.period
-    return bool(np.all(np.abs(steps - np.round(steps)) <= EVEN))
+    return bool(np.all(np.abs(steps - np.round(steps)) <= LogSettings.current().scatter_of_even_stamps))
 
 
 def _at(base: Track, other: Track, values: np.ndarray) -> np.ndarray:
-    """Values of a track, shape (n,), at the instants of the base, NaN outside of its segments."""
+    """Return values of a track, shape (n,), at the instants of the base, NaN outside of its
+    segments.
+    """
     resampled = np.full(base.time.size, np.nan)
-    slack = EVEN * other.period
+    slack = LogSettings.current().scatter_of_even_stamps * other.period
     for part in other.segments:
         time = other.time[part]
         a, b = np.searchsorted(base.time, (time[0] - slack, time[-1] + slack))
@@ -251,6 +269,6 @@ def _at(base: Track, other: Track, values: np.ndarray) -> np.ndarray:
 
 
 def _runs(covered: np.ndarray, part: slice) -> list[slice]:
-    """The stretches of a segment where all is covered."""
+    """Return the stretches of a segment where all is covered."""
     edges = np.flatnonzero(np.diff(np.r_[False, covered[part], False].astype(np.int8)))
     return [slice(part.start + int(a), part.start + int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -10,14 +10,14 @@ from functools import lru_cache
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
+from friso.identification.logs.settings import LogSettings
+from friso.identification.logs.word_lists import channel_words, read_lists
 from friso.quantities import Quantity, any_sign, quoted
 
-RMS = ("Arms", "Aeff", "A_rms", "A(rms)")
-"""How amperes of a drive are written that are root mean squares of its phases: peaks are the square root of 2 times as
-large."""
+_WORDS = read_lists("units")
+RMS, COUNTS = (frozenset(_WORDS[name]) for name in ("rms", "counts"))
+"""How amperes of a drive are written that are root mean squares of its phases, and steps of a sensor."""
 
-COUNTS = frozenset({"count", "counts", "cnt", "cnts", "inc", "incs", "increments", "lsb", "digit", "digits", "ticks"})
-"""Texts that mean the steps of a sensor."""
 OTHERS = {
     "m": ("rad",),
     "m/s": ("rad/s",),
@@ -39,52 +39,8 @@ RESPONSES = tuple(
     for force in (torque, "A", "V")
 )
 """Units of frequency responses: positions and their rates over forces, or what stands for these."""
-LONGEST = 100
-"""Characters of a unit at most."""
-_SPELLINGS = {
-    "sec": "s",
-    "secs": "s",
-    "seconds": "s",
-    "msec": "ms",
-    "msecs": "ms",
-    "usec": "us",
-    "usecs": "us",
-    "nsec": "ns",
-    "Nm": "N*m",
-    "°": "deg",
-    "degs": "deg",
-    "Volt": "V",
-    "Volts": "V",
-    "volts": "V",
-    "Amp": "A",
-    "Amps": "A",
-    "amps": "A",
-    "Ampere": "A",
-    "Newton": "N",
-    "hz": "Hz",
-    "khz": "kHz",
-    "rev": "turn",
-    "revs": "turn",
-    **dict.fromkeys(("Sec", "SEC", "Seconds", "sec.", "S"), "s"),
-    **dict.fromkeys(("MS", "Msec", "Milliseconds"), "ms"),
-    **dict.fromkeys(("MM", "Millimeter"), "mm"),
-    **dict.fromkeys(("Inch", "Inches"), "in"),
-    **dict.fromkeys(("Grad", "grad", "Deg", "DEG", "Degree", "Degrees"), "deg"),
-    **dict.fromkeys(("RPM", "Rpm", "U/min", "r/min", "1/min", "min-1", "min^-1", "min⁻¹"), "rpm"),
-    **dict.fromkeys(("N-m", "N⋅m"), "N*m"),
-    "Nmm": "N*mm",
-    "Ncm": "N*cm",
-    "mNm": "mN*m",
-    "kNm": "kN*m",
-    "oz-in": "ozf*in",
-    "KN": "kN",
-    "g": "g_0",
-    **dict.fromkeys(RMS, "A"),
-}
-"""How people write units. Grad is the German degree, and neither a gon nor 1e9 rad; g is that
-of an accelerometer, as no log is in grams."""
-_MEGA = 1e5
-"""No log is in megametres, megaseconds or gigaradians: such a text is something else, or written badly."""
+_SPELLINGS = {text: unit for unit, texts in _WORDS["spellings"].items() for text in texts} | dict.fromkeys(RMS, "A")
+"""Units as friso takes them, by how people write them."""
 _GLUED = re.compile(
     r"(?P<stem>.*[A-Za-z0-9]?)_(?:(?P<letter>[smNAV])|(?P<unit>"
     r"secs?|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks|hz|khz))"
@@ -96,31 +52,30 @@ _QUOTIENT = re.compile(r"(?P<name>.*[^\s_](?<!\sin))[\s_]+(?P<over>[^\s_/\[(]+)\
 _DECIBELS = re.compile(r"dB(?![A-Za-z])(?:\s*(?:rel?\b\.?|ref\b\.?))?\s*[(\[]?([^()\[\]]*)[)\]]?", re.IGNORECASE)
 _RATE = re.compile(r".+_(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|s\^?2)")
 """Names that end with a unit: one that is nothing else (pos_in and pos_min are in no unit), or a letter."""
-_MEASURED_IN = {
-    "s": {"t", "time", "zeit", "tempo", "temps", "tiempo"},
-    "m": {"pos", "position", "x", "ref", "reference", "displacement"},
-    "N": {"force", "f", "kraft", "friction", "forza", "fuerza", "forca"},
-    "A": {"current", "iq", "i", "strom"},
-    "V": {"voltage", "u", "vir", "command"},
-}
+_MEASURED_IN = channel_words()["measured_in"]
 """Words in a name that tell what is measured in these letters."""
 
 
 def likely_unit(words: Iterable[str]) -> str:
-    """The unit in which what the words of a name tell is measured; "" for none. A single letter is no word."""
+    """Return the unit in which what the words of a name tell is measured; "" for none.
+
+    A single letter is no word.
+    """
     long_words = {word for word in words if len(word) > 1}
     return next((unit for unit, names in _MEASURED_IN.items() if names & long_words), "")
 
 
 def without_accents(name: str) -> str:
-    """A name in plain letters: "força" is "forca"."""
+    """Return a name in plain letters: "força" is "forca"."""
     return "".join(sign for sign in unicodedata.normalize("NFD", name) if not unicodedata.combining(sign))
 
 
 def spelled(text: str) -> str:
-    """A unit text as `friso.quantities` takes it: "m/s2" becomes "m/s^2", "µm" "um", "sec" "s"; "" for none. A text too
-    long for a unit stays."""
-    if len(text) > LONGEST:
+    """Return a unit text as `friso.quantities` takes it; "" for none.
+
+    "m/s2" becomes "m/s^2", "µm" "um", "sec" "s". A text too long for a unit stays.
+    """
+    if len(text) > LogSettings.current().characters_of_a_unit:
         return text
     text = re.sub(r"(?:(?<!\s)\s+\([A-Z][\w /]*\)|^\(None\))$", "", text.strip())  # TwinCAT: "V (Voltage)", "(None)"
     text = text.replace("µ", "u").replace("μ", "u").replace("Ω", "ohm")
@@ -131,29 +86,34 @@ def spelled(text: str) -> str:
 
 
 def _below(part: str, before: str) -> str:
-    """A part of a unit, in brackets where it is a product below a stroke: the Nm of rad/Nm."""
+    """Return a part of a unit, in brackets where it is a product below a stroke: the Nm of
+    rad/Nm.
+    """
     return f"({part})" if before == "/" and "*" in part else part
 
 
 @lru_cache(maxsize=1024)
 def unit_factor(unit: str, si_unit: str) -> float | None:
-    """SI value of 1 `unit`, or None where it is not of the kind of `si_unit`."""
+    """Return the SI value of 1 `unit`, or None where it is not of the kind of `si_unit`."""
     try:
         factor = Quantity(si_unit, any_sign, "").factor(spelled(unit))
     except InputError:
         return None
-    return None if si_unit in ("m", "s", "rad") and factor > _MEGA else factor
+    return None if si_unit in ("m", "s", "rad") and factor > LogSettings.current().largest_length_unit else factor
 
 
 def is_unit(text: str) -> bool:
-    """Whether a text is a unit that a log could have."""
+    """Tell whether a text is a unit that a log could have."""
     text = spelled(text)
     is_special = text.lower() in COUNTS or text == "%" or of_decibels(text) is not None
     return is_special or any(unit_factor(text, unit) is not None for unit in _KINDS)
 
 
 def of_decibels(text: str) -> str | None:
-    """What decibels are of, "" for nothing told: of "dB re 1 m/N" it is "1 m/N"; None for no decibels."""
+    """Return what decibels are of, "" for nothing told; None for no decibels.
+
+    Of "dB re 1 m/N" it is "1 m/N".
+    """
     match = _DECIBELS.fullmatch(text)
     return None if match is None else match[1].strip()
 
@@ -177,10 +137,12 @@ _KINDS = (
 
 
 def split_heading(heading: str) -> tuple[str, str]:
-    """Name and unit of a heading: "Position (mm)" is ("Position", "mm"). A text in square brackets is always a unit
-    unless it is an index; one in parentheses only where it is a known unit ("current (filtered)" has none), as one
-    behind a stroke or "in": "x/mm", "Kraft in N"; of "Speed m/s" the stroke is in the unit, and "Gain A/V" has none.
-    Else a name may end with its unit, and keeps it: "angle_deg"."""
+    """Split a heading into name and unit: "Position (mm)" is ("Position", "mm").
+
+    A text in square brackets is always a unit unless it is an index; one in parentheses only where it is a known unit
+    ("current (filtered)" has none), as one behind a stroke or "in": "x/mm", "Kraft in N"; of "Speed m/s" the stroke is
+    in the unit, and "Gain A/V" has none. Else a name may end with its unit, and keeps it: "angle_deg".
+    """
     heading = heading.strip()
     quotient = _QUOTIENT.fullmatch(heading)
     if quotient is not None and is_unit(unit := f"{quotient['over']}/{quotient['under']}"):
@@ -199,8 +161,11 @@ def split_heading(heading: str) -> tuple[str, str]:
 
 
 def _last_part(name: str) -> str:
-    """The unit with which a name ends, "" for none: "tempo_ms" is in ms, "vel_mm_s" in mm/s. A single letter is
-    one where the name says what is measured in it: "force_N", but not "pos_s"."""
+    """Return the unit with which a name ends, "" for none: "tempo_ms" is in ms, "vel_mm_s" in
+    mm/s.
+
+    A single letter is one where the name says what is measured in it: "force_N", but not "pos_s".
+    """
     if rate := _RATE.fullmatch(name):
         return f"{rate['length']}/{rate['time'].replace('^', '')}"
     match = _GLUED.fullmatch(name)
@@ -211,8 +176,11 @@ def _last_part(name: str) -> str:
 
 
 def in_si(unit: str, role_unit: str) -> tuple[float, str]:
-    """Factor, and the unit that values have with it: that of the role where possible, else one of `OTHERS`, else the
-    unit as it stands with factor 1 ("1" for no unit)."""
+    """Return a factor, and the unit that values have with it.
+
+    It is that of the role where possible, else one that may stand in its place, else the unit as it stands with factor
+    1 ("1" for no unit).
+    """
     for target in (role_unit, *OTHERS.get(role_unit, ())):
         value = unit_factor(unit, target) if unit else None
         if value is not None:
@@ -222,9 +190,12 @@ def in_si(unit: str, role_unit: str) -> tuple[float, str]:
 
 
 def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR) -> tuple[float, str]:
-    """Factor of a scale such as "35.1507 N/V" for a channel of this unit, to the SI unit of the role on that axis; and
-    what was taken for the channel's unit. A channel without a unit has the one below the scale's stroke. Raises
-    LogError."""
+    """Return the factor of a scale such as "35.1507 N/V" for a channel, and what was taken for
+    the channel's unit.
+
+    The factor leads to the SI unit of the role on that axis. A channel without a unit has the one below the scale's
+    stroke. Raises LogError.
+    """
     match = re.fullmatch(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S.*?)\s*/\s*(\([^()]+\)|[^/]+)\s*", text)
     role_unit = axis.unit(ROLES[role])
     example = f'--scale {role}="35.1507 {role_unit}/V"'
@@ -249,7 +220,10 @@ def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR)
 
 
 def _scale_part(text: str, role_unit: str, scale: str, example: str) -> float:
-    """The SI value above the stroke. Raises LogError."""
+    """Return the SI value above the stroke.
+
+    Raises LogError.
+    """
     try:
         return float(Quantity(role_unit, any_sign, "").read(text))
     except InputError:

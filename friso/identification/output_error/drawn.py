@@ -8,24 +8,27 @@ import numpy as np
 
 from friso.identification.estimate import Estimate
 from friso.identification.output_error.parameters import MASS, RATIO, SHARE, FitParameter
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.intervals import COVERAGE
-
-DRAWS, SEED = 16, 5
-"""Machines that are drawn: two fillings of the lanes."""
 
 
 def drawn_from(
     estimates: Sequence[Estimate], correlation: np.ndarray, parameters: Sequence[FitParameter], inner: np.ndarray
 ) -> np.ndarray:
-    """Fitted numbers, shape (draws, parameters), of machines within the `estimates`, about those of the fit, `inner`.
+    """Draw machines from what a record leaves open, as fitted numbers, shape (draws,
+    parameters).
 
-    What is determined is drawn as its intervals and their `correlation` say, what is not evenly from the range that is
-    left, or of the logarithm; a parameter of which nothing is known from all of its own range.
+    They are drawn about the numbers of the fit, `inner`. What is determined is drawn as its intervals and their
+    `correlation` say. What is not is drawn evenly from the range that is left, or evenly in its logarithm; a parameter
+    without any range is drawn from all of its own.
     """
-    rng = np.random.default_rng(SEED)
+    settings = OutputErrorSettings.current()
+    rng = np.random.default_rng(settings.seed_of_draws)
     determined = [estimate for estimate in estimates if estimate.determined]
     sizes, ways = np.linalg.eigh(correlation)
-    steps = rng.standard_normal((DRAWS, len(determined))) @ (ways * np.sqrt(np.clip(sizes, 0.0, None))).T
+    steps = (
+        rng.standard_normal((settings.machines_drawn, len(determined))) @ (ways * np.sqrt(np.clip(sizes, 0.0, None))).T
+    )
     values = {
         estimate.name: np.clip(estimate.value + step * estimate.half_width / COVERAGE, estimate.low, estimate.high)
         for estimate, step in zip(determined, steps.T, strict=True)
@@ -34,7 +37,7 @@ def drawn_from(
         if not estimate.determined and np.isfinite([estimate.low, estimate.high]).all():
             range_left = FitParameter(estimate.name, "", np.nan, estimate.low, estimate.high, estimate.low > 0)
             values[estimate.name] = _evenly(range_left, rng)
-    rows = np.tile(inner, (DRAWS, 1))
+    rows = np.tile(inner, (settings.machines_drawn, 1))
     for number, parameter in enumerate(parameters):
         drawn = _of_parameter(parameter.name, values)
         drawn = _evenly(parameter, rng) if drawn is None else np.clip(drawn, parameter.low, parameter.high)
@@ -43,12 +46,17 @@ def drawn_from(
 
 
 def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
-    """Values from all of the range of a parameter, shape (draws,)."""
-    return parameter.outer(rng.uniform(parameter.inner(parameter.low), parameter.inner(parameter.high), DRAWS))
+    """Draw values evenly from the whole range of a parameter, shape (draws,)."""
+    settings = OutputErrorSettings.current()
+    return parameter.outer(
+        rng.uniform(parameter.inner(parameter.low), parameter.inner(parameter.high), settings.machines_drawn)
+    )
 
 
 def _of_parameter(name: str, values: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """A parameter of the machines drawn, whose keys have these values; None where these do not tell it."""
+    """Return a parameter of drawn machines from the values of their keys; None where keys do not
+    tell it.
+    """
     if name in (MASS, SHARE):
         masses = [values[key] for key in ("masses.cart", "masses.stage") if key in values]
         if not masses or (name == SHARE and len(masses) < 2):

@@ -13,43 +13,19 @@ from friso.engine.driven import Inputs
 from friso.identification.output_error.parameters import FitParameter, keys_of
 from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.refine import bounds_of, refine_fit
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.spread import correlation_length, groups_of, spread_of
 from friso.intervals import COVERAGE
 from friso.progress import Progress, Tally, share_of, silent
 
-STARTS, TRIED, KEPT = 1024, 20, 6
-"""Starts that are simulated, how many of them are refined at first, and how many to the end."""
-
-NARROW, LINEAR = 0.3, 0.02
-"""Share by which the starts of core parameters are off the inverse model's values, each way; of those whose logarithm
-is not fitted, and which may be 0, the share of their range."""
-
-SCREENED, STRETCHES = 1e7, 8
-"""Samples that the starts are simulated over, all together: long records are cut for them, into so many stretches."""
-
-FIRST, ROUGH, FINE = 3, 5, 30
-"""Iterations at most of the refinement of the starts tried, further ones of those kept, and of the best of these."""
-
-LITTLE = 1e-6
-"""Share by which the sum of squares of the best fit falls at last."""
-
-NEARBY, FAR = 127, 3.0
-"""Starts near an earlier fit, and how many times as far as its covariance they are drawn: the loop of a stage that
-hunts has optima of its own, and the fit it starts from is of another problem."""
-
-EXPLAINED = 2.0
-"""A fit that leaves no more than so many times the noise of the record explains it."""
-
-ALIKE = 1e-3
-"""Share of the largest singular value below which fitted numbers cannot be distinguished."""
-
-SEED = 7
-
 
 @dataclass(frozen=True)
 class OutputErrorFit:
-    """The fitted numbers `inner`, shape (parameters,), of which `free` were fitted; their `covariance`, shape (free,
-    free), and the residual [N], shape (n,)."""
+    """A fit of the whole model to a log, with how well its numbers are known.
+
+    `inner` holds the fitted numbers, shape (parameters,), of which those numbered in `free` were fitted. Their
+    `covariance` has the shape (free, free), and the `residual` [N] the shape (n,).
+    """
 
     problem: Problem
     inner: np.ndarray
@@ -59,20 +35,27 @@ class OutputErrorFit:
 
     @property
     def cost(self) -> float:
+        """The mean square of the residual [N^2]."""
         return float(np.mean(self.residual**2))
 
     @property
     def left(self) -> float:
-        """What the fit leaves [N], RMS, where it counts."""
+        """What the fit leaves of the force [N], RMS over the samples that count."""
         return float(np.sqrt(np.sum(self.residual**2) / max(float(self.problem.counted.sum()), 1.0)))
 
-    def explains(self, noise: float, times: float = EXPLAINED) -> bool:
-        """Whether it leaves less than so many times the `noise` [N] of the log's force."""
+    def explains(self, noise: float, closely: bool = False) -> bool:
+        """Tell whether the fit leaves about the `noise` [N] of the log's force, or `closely` no more
+        than that.
+
+        Of a stage that is held to the log a part of the noise alone passes into the residual.
+        """
+        settings = OutputErrorSettings.current()
+        times = settings.noise_ratio_of_a_closed_fit if closely else settings.noise_ratio_of_an_explained_record
         return self.left < times * noise * self.problem.passes
 
     @property
     def independent(self) -> float:
-        """So many independent samples the residual is worth."""
+        """How many independent samples the residual is worth: neighbouring ones are alike."""
         return max(float(self.problem.counted.sum()), 1.0) / correlation_length(self.residual)
 
     @property
@@ -82,33 +65,56 @@ class OutputErrorFit:
         values = {parameter.name: parameter.outer(inner) for parameter, inner in parameters}
         return {**self.problem.flat, **keys_of(self.problem.flat, values)}
 
+    @property
+    def deviation(self) -> np.ndarray:
+        """Standard deviations of the fitted numbers, shape (free,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def with_deviations(self, wanted: np.ndarray) -> OutputErrorFit:
+        """Return the fit with these deviations, shape (free,), of its numbers, correlated as before.
+
+        A deviation that is 0 or not finite stays: nothing is known of what it would be with another size.
+        """
+        usable = np.isfinite(self.deviation) & (self.deviation > 0)
+        wider = np.divide(wanted, self.deviation, out=np.ones(len(self.free)), where=usable)
+        return replace(self, covariance=self.covariance * np.outer(wider, wider))
+
     def linearised(self) -> tuple[np.ndarray, np.ndarray]:
-        """The residual, shape (n,), and its derivatives to the fitted numbers, shape (n, free)."""
+        """Return the residual, shape (n,), and its derivatives to the fitted numbers, shape (n,
+        free).
+        """
         mask = np.isin(np.arange(len(self.inner)), self.free)
         return self.problem.linearised(self.inner, mask)
 
     def value(self, name: str) -> float:
-        """The SI value of a parameter."""
+        """Return the value of a parameter in SI units."""
         names = [parameter.name for parameter in self.problem.parameters]
         i = names.index(name)
         return float(self.problem.parameters[i].outer(self.inner[i]))
 
 
 def first_values(parameters: Sequence[FitParameter]) -> np.ndarray:
-    """The fitted numbers at which the parameters start, shape (parameters,)."""
+    """Return the fitted numbers at which the parameters start, shape (parameters,)."""
     return np.array([parameter.inner(parameter.start) for parameter in parameters])
 
 
 def fit(problem: Problem, free: Sequence[int], starts: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
-    """Fit the free parameters, given by number, of a problem, from some starts, shape (starts, parameters), the best of
-    which are refined; the others stay as in the first of them."""
+    """Fit the free parameters of a problem, given by number, from several starts.
+
+    The starts have the shape (starts, parameters). All are simulated, and the best of them refined. Parameters that are
+    not free stay as in the first start.
+    """
     return fits([problem], free, starts, progress)[0]
 
 
 def fits(
     problems: Sequence[Problem], free: Sequence[int], starts: np.ndarray, progress: Progress = silent
 ) -> list[OutputErrorFit]:
-    """The same of problems that differ in nothing but what counts."""
+    """Fit several problems that differ in nothing but the samples that count, from the same
+    starts.
+
+    The starts are simulated once for all of them.
+    """
     pieces, works = _parts(problems[0], len(starts)), 1 + len(problems)
     ranked = _ranked(problems, pieces, starts, share_of(progress, 0, works))
     return [
@@ -120,47 +126,69 @@ def fits(
 def _fit(
     problem: Problem, pieces: Sequence[slice], free: Sequence[int], tried: np.ndarray, progress: Progress
 ) -> OutputErrorFit:
-    """Fit from the best starts. What one of them is worth shows after a few iterations, on pieces of a long record: of
-    a stage that sticks and slips the best of the starts as they are lead to other optima."""
+    """Refine the best starts in rounds, of which each keeps fewer, and the last one to the end.
+
+    What a start is worth shows after a few iterations, on pieces of a long record: of a stage that sticks and slips the
+    starts that are best as they are lead to other optima.
+    """
+    settings = OutputErrorSettings.current()
     mask = np.zeros(tried.shape[1], bool)
     mask[list(free)] = True
     rough = [problem] if problem.closed else [problem.part(piece) for piece in pieces]
-    for number, (parts, most, iterations) in enumerate(((rough, TRIED, FIRST), ([problem], KEPT, ROUGH))):
-        part = share_of(progress, number, 3)
-        refined = refine_fit(parts, tried[:most], np.tile(mask, (len(tried[:most]), 1)), iterations, progress=part)
+    rounds = (
+        (rough, settings.starts_refined_first, settings.iterations_of_first_starts),
+        ([problem], settings.starts_refined_further, settings.iterations_of_further_starts),
+    )
+    enough = settings.cost_share_of_refinement
+    for number, (parts, most, iterations) in enumerate(rounds):
+        tried, part = tried[:most], share_of(progress, number, 3)
+        refined = refine_fit(parts, tried, np.tile(mask, (len(tried), 1)), iterations, enough, part)
         tried = refined.inner[np.argsort(refined.cost)]
     return polished(problem, tuple(free), tried[0], share_of(progress, 2, 3))
 
 
 def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.ndarray:
-    """Many starts over the ranges of the free parameters, shape (starts, parameters), behind the `first`: they
-    find parameters that not every motion shows. Core parameters start about the inverse model's values: a first fit
-    of them alone to motion that sticks and slips can be anywhere."""
+    """Lay many starts over the ranges of the free parameters, shape (starts, parameters), behind
+    the `first`.
+
+    They find parameters that not every motion shows. Core parameters start about the inverse model's values, for a
+    first fit of them alone to motion that sticks and slips can end anywhere.
+    """
+    settings = OutputErrorSettings.current()
     low, high = bounds_of(problem)
     core = np.array([parameter.core for parameter in problem.parameters])
     logarithmic = np.array([parameter.logarithmic for parameter in problem.parameters])
-    centre, half = first_values(problem.parameters), np.where(logarithmic, NARROW, LINEAR * (high - low))
+    centre, half = (
+        first_values(problem.parameters),
+        np.where(logarithmic, settings.logarithm_of_core_starts, settings.range_share_of_core_starts * (high - low)),
+    )
     low, high = (
         np.where(core, np.maximum(centre - half, low), low),
         np.where(core, np.minimum(centre + half, high), high),
     )
-    shares = qmc.Sobol(len(first), rng=SEED).random(STARTS)
+    shares = qmc.Sobol(len(first), rng=settings.seed_of_starts).random(settings.starts_of_a_fit)
     starts = np.where(np.isin(np.arange(len(first)), free), low + shares * (high - low), first)
     return np.vstack([first, starts])
 
 
 def nearby(fit: OutputErrorFit) -> np.ndarray:
-    """Starts that another problem's fit allows, shape (starts, parameters), itself the first: drawn from its covariance
-    `FAR` times as wide."""
+    """Draw starts that another problem's fit allows, shape (starts, parameters), behind that fit
+    itself.
+
+    They are drawn from its covariance, several times as wide: the loop of a stage that hunts has optima of its own.
+    """
+    settings = OutputErrorSettings.current()
     low, high = (end[list(fit.free)] for end in bounds_of(fit.problem))
-    deviation = np.sqrt(np.diag(fit.covariance))
+    deviation = fit.deviation
     usable = np.isfinite(deviation) & (deviation > 0)
     correlation = np.eye(len(fit.free))
     part = fit.covariance[np.ix_(usable, usable)]
     correlation[np.ix_(usable, usable)] = part / np.outer(deviation[usable], deviation[usable])
-    spread = np.minimum(FAR * np.where(usable, deviation, np.inf), (high - low) / 4)
-    rows = np.random.default_rng(SEED).multivariate_normal(np.zeros(len(spread)), correlation, NEARBY, method="eigh")
-    starts = np.tile(fit.inner, (NEARBY + 1, 1))
+    spread = np.minimum(settings.deviations_of_near_starts * np.where(usable, deviation, np.inf), (high - low) / 4)
+    rows = np.random.default_rng(settings.seed_of_starts).multivariate_normal(
+        np.zeros(len(spread)), correlation, settings.starts_near_a_fit, method="eigh"
+    )
+    starts = np.tile(fit.inner, (settings.starts_near_a_fit + 1, 1))
     starts[1:, list(fit.free)] += rows * spread
     starts[:, list(fit.free)] = np.clip(starts[:, list(fit.free)], low, high)
     return starts
@@ -169,8 +197,11 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
 def _ranked(
     problems: Sequence[Problem], pieces: Sequence[slice], starts: np.ndarray, progress: Progress
 ) -> list[np.ndarray]:
-    """Of each problem the best starts, shape (tried, parameters), the first one always among them."""
-    if len(starts) <= TRIED:
+    """Return the best starts of each problem, shape (tried, parameters), the first start always
+    among them.
+    """
+    settings = OutputErrorSettings.current()
+    if len(starts) <= settings.starts_refined_first:
         return [starts] * len(problems)
     sums = np.zeros((len(problems), len(starts) - 1))
     tally = Tally(progress, len(pieces) * (len(starts) - 1))
@@ -179,24 +210,37 @@ def _ranked(
         for numbers, record in part.simulated(starts[1:]):
             sums[:, numbers] += counted**2 @ ((part.target - record.force) ** 2).T
             tally.add(len(numbers), "")
-    best = np.argsort(np.where(np.isfinite(sums), sums, np.inf), axis=1)[:, : TRIED - 1]
+    best = np.argsort(np.where(np.isfinite(sums), sums, np.inf), axis=1)[:, : settings.starts_refined_first - 1]
     return [np.vstack([starts[0], starts[1:][chosen]]) for chosen in best]
 
 
 def _parts(problem: Problem, starts: int) -> list[slice]:
-    """What of a record the starts are simulated over: all of a short one; of a long one its beginning in closed loop,
-    whose state is not known later on, and else stretches from all over it: slow motion may come last."""
-    count, most = len(problem.target), int(SCREENED / starts)
+    """Choose the stretches of a record over which starts are simulated.
+
+    All of a short record is. Of a long one in closed loop it is the beginning, for its state later on is unknown; else
+    stretches from all over it, since slow motion may come last.
+    """
+    settings = OutputErrorSettings.current()
+    count, most = len(problem.target), int(settings.samples_of_all_starts / starts)
     if count <= most or problem.closed:
         return [slice(0, min(count, most))]
-    firsts = np.linspace(0, count - most // STRETCHES, STRETCHES).astype(int)
-    return [slice(int(first), int(first) + most // STRETCHES) for first in firsts]
+    firsts = np.linspace(
+        0, count - most // settings.stretches_of_a_screening, settings.stretches_of_a_screening
+    ).astype(int)
+    return [slice(int(first), int(first) + most // settings.stretches_of_a_screening) for first in firsts]
 
 
 def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
-    """The end of the fit, and how well it is known."""
+    """Refine a fit to the end, and find how well its numbers are known.
+
+    Deviations allow for neighbouring errors that are alike, and for inputs that the log allows just as well
+    (`unsettled`).
+    """
+    settings = OutputErrorSettings.current()
     mask = np.isin(np.arange(len(inner)), free)
-    best = refine_fit([problem], inner[None], mask[None], FINE, LITTLE, progress).inner[0]
+    best = refine_fit(
+        [problem], inner[None], mask[None], settings.iterations_of_a_fit, settings.cost_share_of_a_fit, progress
+    ).inner[0]
     rest, slopes = problem.linearised(best, mask)
     counted = problem.counted > 0
     velocity, acceleration = problem.inputs.segments[0, :-1, 2:4].T
@@ -207,8 +251,12 @@ def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progres
 
 
 def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.ndarray:
-    """The covariance of fitted numbers, shape (free, free), with deviations whose intervals hold those about what other
-    inputs make of them, which are `moved` by so much, each of shape (free,): one of these is true, not one between."""
+    """Widen a covariance, shape (free, free), so that intervals hold what other inputs make of
+    the numbers.
+
+    Each of `moved`, shape (free,), says how far one of these inputs moves the fitted numbers. One input is true, and
+    not one in between: half of the distance would be an interval that never holds the truth.
+    """
     if not moved:
         return covariance
     wanted = np.sqrt(np.diag(covariance)) + np.linalg.norm(moved, axis=0) / COVERAGE
@@ -220,10 +268,13 @@ def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.nd
 
 
 def _moved_by(inputs: Inputs, problem: Problem, best: np.ndarray, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """By how much the fitted numbers move, shape (free,), with other inputs, which a log allows just as well."""
+    """Return how far other inputs, which a log allows just as well, move the fitted numbers,
+    shape (free,).
+    """
+    settings = OutputErrorSettings.current()
     change = replace(problem, inputs=inputs).residuals(best[None])[0] - rest
     if not np.isfinite(change).all():
         return np.zeros(slopes.shape[1])
     size = np.linalg.norm(slopes, axis=0)
     size = np.where(size > 0, size, 1.0)
-    return -np.linalg.lstsq(slopes / size, change, rcond=ALIKE)[0] / size
+    return -np.linalg.lstsq(slopes / size, change, rcond=settings.smallest_singular_value)[0] / size

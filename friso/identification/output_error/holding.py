@@ -8,21 +8,15 @@ from dataclasses import replace
 from scipy.stats import chi2
 
 from friso.identification.output_error.fit import OutputErrorFit, polished
-
-SURE = 0.999
-"""Probability with which the worse of both has to be wrong."""
-
-NOISE_ALONE = 1.2
-"""What a fit may leave, in units of the noise, for the difference of both to be judged by that noise: errors of the
-model decide as well."""
+from friso.identification.output_error.settings import OutputErrorSettings
 
 
 def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
-    """The best of fits to a log whose position is smoothed less and less.
+    """Smooth the position of a log less and less, as long as the fit gets better.
 
     Smoothing blurs where a stage breaks away: of one that stuck and slipped, the exponent of the Stribeck curve came
-    out at 1.47 for 2 and the bristles a fifth too soft, without any noise as well. Too little of it leaves the noise of
-    the position to the force.
+    out at 1.47 for 2 and the bristles a fifth too soft, without any noise as well. Too little smoothing leaves the
+    noise of the position to the force.
     """
     while fit.problem.sharper:
         sharper = polished(fit.problem.held_to(0), fit.free, fit.inner)
@@ -33,11 +27,12 @@ def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
 
 
 def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
-    """The better of two fits to a log, with its force held between the samples and not.
+    """Choose whether the force of a log is held between its samples or follows straight lines.
 
-    Half a sample apart, they move the damping of the bristles by half a sample times their stiffness. The other one no
-    longer counts where the better explains the record, to the `noise` [N] of its force, and the other clearly less.
+    Half a sample apart, the two move the damping of the bristles by half a sample times their stiffness. The worse one
+    no longer counts where the better explains the record, to the `noise` [N] of its force, and the worse clearly less.
     """
+    settings = OutputErrorSettings.current()
     problem = fit.problem
     other = next((inputs for inputs in problem.unsettled if inputs.held != problem.inputs.held), None)
     if other is None:
@@ -46,8 +41,8 @@ def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
     turned = tuple(replace(inputs, held=other.held) for inputs in sharper)
     swapped = polished(replace(problem, inputs=other, unsettled=(problem.inputs, *turned)), fit.free, fit.inner)
     better, worse = sorted((fit, swapped), key=lambda one: one.cost)
-    if better.left > NOISE_ALONE * noise * problem.passes or worse.cost < better.cost * (
-        1 + chi2.ppf(SURE, 1) / better.independent
+    if better.left > settings.noise_ratio_of_a_closed_fit * noise * problem.passes or worse.cost < better.cost * (
+        1 + chi2.ppf(settings.probability_of_an_effect, 1) / better.independent
     ):
         return better
     return polished(replace(better.problem, unsettled=turned if better is swapped else sharper), fit.free, better.inner)

@@ -8,32 +8,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.stats import chi2
 
-from friso.identification.output_error.coverage import NEAR, Coverage
+from friso.identification.output_error.coverage import Coverage
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
 from friso.identification.output_error.holding import with_force_settled, with_smoothness_settled
-from friso.identification.output_error.parameters import EXPONENT, MASS, RATIO, SHARE, bends
+from friso.identification.output_error.parameters import BRISTLES, CURVE, EXPONENT, MASS, RATIO, SHARE, STRIBECK, bends
 from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.profile import WORSE, Profile, profile
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.readings.common import low_pass
 from friso.progress import Progress, between, silent
-
-STRIBECK = (RATIO, "friction.stribeck_velocity")
-CURVE = (*STRIBECK, EXPONENT)
-BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
-
-CLOSELY = 1.2
-"""A closed loop that leaves no more than so many times the noise of the record is where it belongs. One that leaves
-more may have found another optimum than the right one, in which its parameters seem to be known as sharply: it is
-fitted once more, from what the stage that follows the log says."""
-
-STEP_OUT = 1.5
-"""A closed loop that leaves so many times the residual of the stage that follows the log has got out of step."""
-
-SURE = 0.99
-"""Probability that parameters which no motion shows one by one improve the fit all the same."""
-
-AGAIN = 3
-"""Times at most that a profile leads to a better fit."""
 
 PLAIN, LOOP, ALONG, AGAIN_LOOP = 0.1, 0.4, 0.85, 0.95
 """Shares of the work up to the ends of its parts: mass and sliding friction, all parameters in closed loop, all along
@@ -43,18 +26,15 @@ FITTED, SETTLED, PROFILED = 0.5, 0.65, 0.95
 """The same of the fit along the log: that of all parameters, what the log does not say between its samples, and how
 well each is known; the last is the fit of those that are shown."""
 
-SWINGS = 0.25
-"""Natural frequency of the mass on its bristles, times the sample time, up to which a log follows how these bend."""
-
-SHARP = 3.0
-"""Factor between the ends of a profile interval within which a parameter counts as shown."""
-
 
 @dataclass(frozen=True)
 class IdentifiableFit:
-    """The fit, profiles by name of the parameters that not every motion shows, where they were asked about, and which
-    of these the record does show; `refuted` are parameters that something else in the record contradicts, with the
-    reason."""
+    """A fit, with the parameters of it that the record shows.
+
+    `profiles` holds, by name, those of the parameters that not every motion shows, as far as they were asked about, and
+    `shown` the names that the record does show. `refuted` are parameters that something else in the record contradicts,
+    with the reason.
+    """
 
     fit: OutputErrorFit
     profiles: Mapping[str, Profile]
@@ -70,13 +50,16 @@ def fit_identifiable(
     noise: float,
     progress: Progress = silent,
 ) -> IdentifiableFit:
-    """The fit and what of it to believe; `bandwidth` [Hz] is that of the motion, `noise` [N] the force's.
+    """Fit the whole model to a log, and decide what of the fit to believe.
+
+    `bandwidth` [Hz] is that of the motion, and `noise` [N] that of the force.
 
     A closed loop that explains the record to its noise has the first and last word, if need be from where the stage
     that follows the log leads. Where none does, that stage decides which parameters are shown, since a loop that hunts
     soon gets out of step, and the loop has no more to say than their values, unless it cannot follow. Where the fit is
-    clearly better with those that are not shown it keeps them: their effect is there, and without it friction and mass
-    would have to explain it."""
+    clearly better with parameters that are not shown it keeps them: their effect is there, and without it friction and
+    mass would have to explain it.
+    """
     names = [parameter.name for parameter in follows.parameters]
     core = {parameter.name for parameter in follows.parameters if parameter.core}
     part = between(progress, 0, PLAIN, "moves: mass and sliding friction along the log")
@@ -86,7 +69,7 @@ def fit_identifiable(
         numbers = tuple(range(len(names)))
         part = between(progress, PLAIN, LOOP, "moves: all parameters in closed loop")
         full = fit(loop, numbers, np.vstack([nearby(plain), everywhere(loop, numbers, plain.inner)]), part)
-        if full.explains(noise, CLOSELY):
+        if full.explains(noise, closely=True):
             return believed(full, core, covered, between(progress, LOOP, 1), explained=True)
         explaining = [full] if full.explains(noise) else []
     part = between(progress, *((PLAIN, 1) if loop is None else (LOOP, ALONG)))
@@ -100,7 +83,7 @@ def fit_identifiable(
     best = min((fit(loop, along.fit.free, starts, part), *explaining), key=lambda one: one.cost)
     if not (_in_step(best, along.fit, bandwidth) and bounds_as_much(best, along.fit)):
         return along
-    if best.explains(noise, CLOSELY):
+    if best.explains(noise, closely=True):
         return believed(best, core, covered, between(progress, AGAIN_LOOP, 1), explained=True)
     return replace(along, fit=best)
 
@@ -108,7 +91,10 @@ def fit_identifiable(
 def _identifiable_on_log(
     follows: Problem, plain: OutputErrorFit, core: set[str], covered: Coverage, noise: float, progress: Progress
 ) -> IdentifiableFit:
-    """What the stage that follows the log shows."""
+    """Fit the stage that follows the log, and find which parameters it shows.
+
+    `plain` is the fit of the `core` parameters alone. Parameters that the motion cannot show are not tried.
+    """
     names = [parameter.name for parameter in follows.parameters]
     hopeful = {name for name in names if name not in core and _may_show(name, covered, follows)}
     if not hopeful:
@@ -134,12 +120,15 @@ def _identifiable_on_log(
 def believed(
     full: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress, explained: bool = False
 ) -> IdentifiableFit:
-    """A fit with the profiles of all that not every motion shows; one that has `explained` the record is believed
-    wherever its profiles are sharp. Where a profile finds a fit that is clearly better, that one takes its place."""
+    """Profile all parameters that not every motion shows, and decide which of them to believe.
+
+    A fit that has `explained` the record is believed wherever its profiles are sharp; another one only where the motion
+    also covers what the parameter does. Where a profile finds a fit that is clearly better, that one takes its place.
+    """
     names = [parameter.name for parameter in full.problem.parameters]
     asked = [i for i in full.free if names[i] not in core]
     profiles: dict[str, Profile] = {}
-    again = AGAIN
+    again = OutputErrorSettings.current().better_fits_by_profiles
     while len(profiles) < len(asked):
         i = asked[len(profiles)]
         progress(len(profiles), len(asked), f"moves: how well {names[i]} is known")
@@ -155,22 +144,32 @@ def believed(
 
 
 def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
-    """Whether a fit with more parameters is better by more than chance would make it, with a probability of 99 %."""
+    """Tell whether a fit with more parameters is better by more than chance would make it."""
+    settings = OutputErrorSettings.current()
     more = len(full.free) - len(plain.free)
-    return bool(plain.cost > full.cost * (1 + chi2.ppf(SURE, more) / full.independent))
+    return bool(
+        plain.cost > full.cost * (1 + chi2.ppf(settings.probability_of_more_parameters, more) / full.independent)
+    )
 
 
 def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -> bool:
-    """Whether a closed loop follows: its residual is no larger than that of the stage that follows the log, where that
-    counts, both within the motion's bandwidth [Hz], since the latter knows no noise above it."""
+    """Tell whether a closed loop follows the log: its residual is about that of the stage held
+    to the log.
+
+    Both are compared within the motion's bandwidth [Hz], and where the latter counts, since it holds no noise above
+    that.
+    """
     step, counted = looped.problem.inputs.sample_time, direct.problem.counted > 0
     powers = [np.sum(low_pass(fit.residual, step, bandwidth)[counted] ** 2) for fit in (looped, direct)]
-    return bool(powers[0] <= STEP_OUT**2 * powers[1])
+    return bool(powers[0] <= OutputErrorSettings.current().residual_ratio_out_of_step ** 2 * powers[1])
 
 
 def bounds_as_much(looped: OutputErrorFit, direct: OutputErrorFit) -> bool:
-    """Whether a closed loop bounds all that the stage that follows the log does. Of a stage that sticks and slips it
-    may end where a few break-aways, a little late or early, are all that its derivatives know."""
+    """Tell whether a closed loop bounds all numbers that the stage which follows the log does.
+
+    Of a stage that sticks and slips, a loop may end where a few break-aways, a little late or early, are all that its
+    derivatives know.
+    """
     bounded = [
         {i for i, variance in zip(fit.free, np.diag(fit.covariance), strict=True) if np.isfinite(variance)}
         for fit in (looped, direct)
@@ -179,17 +178,20 @@ def bounds_as_much(looped: OutputErrorFit, direct: OutputErrorFit) -> bool:
 
 
 def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
+    """Return the places of the chosen names."""
     return tuple(i for i, name in enumerate(names) if name in chosen)
 
 
 def _complete(identifiable: set[str], optional: set[str]) -> set[str]:
-    """Without either of the Stribeck effect's parameters, the other one means nothing."""
+    """Drop the Stribeck curve from what is shown where one of its two parameters is not: alone,
+    neither means anything.
+    """
     effect = set(STRIBECK) & optional
     return identifiable if effect <= identifiable else identifiable - set(CURVE)
 
 
 def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
-    """Whether the motion covers anything that the parameter could show itself in."""
+    """Tell whether the motion covers anything in which a parameter could show itself."""
     parameter = next(candidate for candidate in problem.parameters if candidate.name == name)
     if name in CURVE:
         return bool(covered.steady.size) and covered.steady[0] < covered.steady[-1] / 10
@@ -199,31 +201,32 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
 
 
 def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
-    """Whether a profile closes on both sides, and near by."""
+    """Tell whether a profile closes on both sides, and near the fit."""
+    settings = OutputErrorSettings.current()
     parameter = next(one for one in full.problem.parameters if one.name == seen.name)
     closed = not (seen.open_low or seen.open_high)
-    return closed and (not parameter.logarithmic or seen.high < SHARP * seen.low)
+    return closed and (not parameter.logarithmic or seen.high < settings.factor_of_a_sharp_profile * seen.low)
 
 
 def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
-    """Whether the motion covers where a parameter acts."""
+    """Tell whether the motion covers the speeds, or the ways, at which a fitted parameter acts."""
     if name in CURVE:
         return covered.shows_speed(full.value("friction.stribeck_velocity"))
     if name in BRISTLES:
         stiffness = full.value("friction.bristle_stiffness")
         swings = np.sqrt(stiffness / full.value(MASS)) / (2 * np.pi)
-        fast_enough = swings * full.problem.inputs.sample_time < SWINGS
+        fast_enough = swings * full.problem.inputs.sample_time < OutputErrorSettings.current().sampled_bristle_frequency
         return bool(fast_enough and covered.shows_length(full.value("friction.coulomb") / stiffness))
     return True
 
 
 def why_not_shown(name: str, covered: Coverage) -> str:
-    """Why a parameter is not shown, in a sentence."""
+    """Say in a sentence why a parameter is not shown."""
     if name in CURVE:
         low, high = covered.gap
         if not np.isfinite(high):
             return "no steady motion at all, in which the Stribeck effect would show"
-        if high > NEAR**2 * low:
+        if high > OutputErrorSettings.current().speed_factor_of_coverage ** 2 * low:
             return (
                 f"no steady motion between {low * 1e3:.2g} and {high * 1e3:.3g} mm/s, where the Stribeck effect would "
                 "show"

@@ -10,35 +10,25 @@ import numpy as np
 
 from friso.axis import LINEAR, axis_of
 from friso.errors import InputError
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.stage.tables import friction_law, friction_laws
 
 MASS, SHARE, RATIO = "mass", "cart share", "static friction ratio"
 """The mass that moves; the cart's share of it, which a rigid stage has as given; static over Coulomb friction."""
 
-HIGHEST_RATIO = 4.0
-"""Largest ratio of these that is believed of a bearing; the thesis's rig has 3."""
-
-SHORTEST, LONGEST = 5e-8, 3e-4
-"""Lengths [m] by which bristles are believed to bend at least and at most before they slip."""
-
 EXPONENT = "friction.stribeck_exponent"
-
-EXPONENTS, SLIGHTLY_LESS = (0.5, 2.5), 0.995
-"""Exponents that are believed of a Stribeck curve: 0.5 to 1 (Bo, Pavelescu), 1 (Tustin), 2 (Armstrong-Helouvry, Dupont,
-Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7); and the share of the given one at which its fit begins."""
-
-RADII = 5e-3, 0.5
-"""Radii [m] between which bearings that turn are believed to be: their bristles bend by an angle [rad]."""
-
-STRIBECK_UP_TO = 0.02
-"""Speed [m/s] up to which the Stribeck effect of a bearing may act."""
+STRIBECK = (RATIO, "friction.stribeck_velocity")
+CURVE = (*STRIBECK, EXPONENT)
+BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
+"""Parameters of the Stribeck curve, and those of the bristles."""
 
 
 @dataclass(frozen=True)
 class FitParameter:
-    """A parameter with its SI unit, start value and range; of a `logarithmic` one the logarithm is fitted.
+    """A parameter of the fit with its SI unit, start value and range.
 
-    `core` ones are shown by any motion; the others are asked about one by one.
+    Of a `logarithmic` one the logarithm is fitted. `core` parameters are shown by any motion; the others are asked
+    about one by one.
     """
 
     name: str
@@ -50,43 +40,55 @@ class FitParameter:
     core: bool = True
 
     def inner(self, value: Any) -> Any:
-        """The number that is fitted."""
+        """Return the number that is fitted for an SI value: its logarithm, or the value itself."""
         return np.log(value) if self.logarithmic else value
 
     def outer(self, inner: Any) -> Any:
-        """The SI value."""
+        """Return the SI value of a fitted number."""
         return np.exp(inner) if self.logarithmic else inner
 
 
 def bends(flat: Mapping[str, Any]) -> tuple[float, float]:
-    """Lengths [m], or angles [rad] on a rotary axis, by which bristles bend at least and at most before they slip."""
+    """Return the least and the largest length [m] that bristles bend before they slip; angles
+    [rad] on a rotary axis.
+    """
+    settings = OutputErrorSettings.current()
     if axis_of(flat) == LINEAR:
-        return SHORTEST, LONGEST
-    smallest, largest = RADII
-    return SHORTEST / largest, LONGEST / smallest
+        return settings.shortest_bristle_bend, settings.longest_bristle_bend
+    smallest, largest = settings.bearing_radii
+    return settings.shortest_bristle_bend / largest, settings.longest_bristle_bend / smallest
 
 
 def stribeck_up_to(flat: Mapping[str, Any]) -> float:
-    """The highest Stribeck velocity [m/s] that is believed of a bearing; on a rotary axis [rad/s], at the radius in the
-    middle of those that bearings have."""
-    return STRIBECK_UP_TO if axis_of(flat) == LINEAR else STRIBECK_UP_TO / float(np.sqrt(np.prod(RADII)))
+    """Return the highest Stribeck velocity [m/s] that is believed of a bearing.
+
+    On a rotary axis it is in rad/s, at the radius in the middle of those that bearings have.
+    """
+    settings = OutputErrorSettings.current()
+    return (
+        settings.highest_stribeck_velocity
+        if axis_of(flat) == LINEAR
+        else settings.highest_stribeck_velocity / float(np.sqrt(np.prod(settings.bearing_radii)))
+    )
 
 
 def is_free(flat: Mapping[str, Any]) -> bool:
-    """Whether a stage given as flat keys has a joint that moves."""
+    """Tell whether a stage given as flat keys has a joint that moves."""
     return "joint.stiffness" in flat and not flat["joint.locked"]
 
 
 def fit_parameters(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
 ) -> list[FitParameter]:
-    """The parameters of a stage given as flat keys, that a log may show.
+    """List the parameters of a stage given as flat keys that a log may show, with their starts
+    and ranges.
 
-    `levels` holds first values, of mass, Coulomb and viscous friction and offset, from the inverse model; `speed` [m/s]
-    is the highest of the log, `travel` [m] how far it goes: no bristle bends further, and no Stribeck velocity is
+    `levels` holds first values, of mass, Coulomb and viscous friction and offset, from the inverse model. `speed` [m/s]
+    is the highest of the log, and `travel` [m] how far it goes: no bristle bends further, and no Stribeck velocity is
     higher unless bearings have such. Where it does not go `both_ways`, a constant force and an asymmetry cannot be
     distinguished from friction, and are left out. Raises InputError for a friction law that is not among those that can
-    be fitted."""
+    be fitted.
+    """
     mass = levels["mass"]
     parameters = [FitParameter(MASS, "kg", mass, mass / 5, mass * 5)]
     if friction_law(flat["friction.model"]).fitted:
@@ -113,6 +115,8 @@ def fit_parameters(
 def _friction(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
 ) -> list[FitParameter]:
+    """List the parameters of friction."""
+    settings = OutputErrorSettings.current()
     coulomb, viscous = levels["coulomb"], levels["viscous"]
     parameters = [
         FitParameter("friction.coulomb", "N", coulomb, coulomb / 20, coulomb * 5),
@@ -122,7 +126,7 @@ def _friction(
         if both_ways:
             parameters.append(FitParameter("friction.viscous_asymmetry", "", 1e-6, -0.9, 0.9, logarithmic=False))
         parameters += [
-            FitParameter(RATIO, "", 1.0, 1.0, HIGHEST_RATIO, logarithmic=False, core=False),
+            FitParameter(RATIO, "", 1.0, 1.0, settings.highest_friction_ratio, logarithmic=False, core=False),
             _slow("friction.stribeck_velocity", "m/s", flat, speed / 3e3, max(speed, stribeck_up_to(flat))),
             _exponent(flat["friction.stribeck_exponent"]),
         ]
@@ -137,26 +141,33 @@ def _friction(
 
 
 def _exponent(stated: float) -> FitParameter:
-    """The exponent of the Stribeck curve, from a little below what the stage has: 1 and 2 have equations of their own,
-    in which it does not occur."""
-    start, (least, most) = SLIGHTLY_LESS * stated, EXPONENTS
+    """Return the exponent of the Stribeck curve as a parameter.
+
+    It starts a little below what the stage has: 1 and 2 have equations of their own, in which no exponent occurs.
+    """
+    settings = OutputErrorSettings.current()
+    start, (least, most) = settings.exponent_share_of_a_start * stated, settings.stribeck_exponents
     return FitParameter(EXPONENT, "", start, min(least, start), max(most, start), logarithmic=False, core=False)
 
 
 def _slow(name: str, unit: str, flat: Mapping[str, Any], low: float, high: float) -> FitParameter:
-    """A parameter that slow motion alone shows, from what the stage has, in a range that holds that too."""
+    """Return a parameter that slow motion alone shows; it starts at what the stage has, which
+    widens its range if need be.
+    """
     start = float(flat[name])
     return FitParameter(name, unit, start, float(min(low, start)), float(max(high, start)), core=False)
 
 
 def stages(flat: Mapping[str, Any], parameters: Sequence[FitParameter], inner: np.ndarray) -> dict[str, Any]:
-    """The flat keys of the stages that the numbers fitted, shape (runs, parameters), make of a stage."""
+    """Return the flat keys of the stages that fitted numbers, shape (runs, parameters), make of
+    a stage.
+    """
     values = {parameter.name: parameter.outer(column) for parameter, column in zip(parameters, inner.T, strict=True)}
     return {**flat, **keys_of(flat, values)}
 
 
 def keys_of(flat: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys of the stage file to SI values from values of parameters, numbers or arrays."""
+    """Turn values of parameters, numbers or arrays, into SI values of keys of the stage file."""
     keys = {name: value for name, value in values.items() if name not in (MASS, SHARE, RATIO)}
     bodies = [name for name in ("masses.cart", "masses.stage") if name in flat]
     total = sum(flat[name] for name in bodies)

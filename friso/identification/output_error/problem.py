@@ -17,54 +17,26 @@ from friso.equations.driven import HELD_FORCE, Driven
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import structure
 from friso.errors import InputError
-from friso.identification.inverse_model import SMOOTH, motion
+from friso.identification.inverse_model import motion
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import MASS, FitParameter, stages
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.readings.common import noise_of, robust
+from friso.identification.settings import IdentificationSettings
 from friso.stage.controllers import CONTROLLER
 
-STEP = 1e-4
-"""Steps of the fitted numbers for derivatives: shares of the value for logarithmic ones."""
-
-RTOL = 1e-5
-"""Relative tolerance of the simulations."""
-
 CONTINUOUS = "the controller is simulated in continuous time"
-
-SLOW = 10.0
-"""Bandwidth [Hz] at most of the controller that holds a stage to a log's position."""
-
-REMEMBERED, BEGINNING = 0.1, 0.05
-"""Time [s] for which a closed loop is taken to show where, how fast and with what bristles it was started, and share of
-a record that this takes at most: our choice."""
-
-FIRST = 10
-"""Samples from which the velocity at the beginning is taken."""
-
-REST, STILL = 0.1, 20.0
-"""A stage rests where it goes less than so many standard deviations of the position's noise in this time [s]."""
-
-SHARPER = (1, 2, 4, 8)
-"""Times the cut-off frequency of the inverse model's filter at which the position is smoothed that a stage is held to:
-at first, and as long as it explains more."""
-
-SETTLED = 3.0
-"""Time constants of the controller that holds a stage to a log, after which it has forgotten where that stood."""
 
 PASSES = 5 / 8
 """Noise bandwidth [Hz] of a critically damped second-order loop, in units of its natural frequency [rad/s]."""
 
-AT_ONCE = 16384
-"""Samples of all runs together for which outputs are computed at once: what they are made of stays in the caches."""
-
-SAME = 1e-3
-"""Share by which the sample time of the log and that of the drive may differ to count as one."""
-
 
 @dataclass(frozen=True)
 class Simulated:
-    """Simulated records: position, velocity and force of the controller, SI, shape (runs, n) or of one run (n,); NaN
-    after a failure."""
+    """Simulated records: position, velocity and force of the controller, in SI units.
+
+    Each has the shape (runs, n), or (n,) of one run, and is NaN after a failure.
+    """
 
     position: np.ndarray
     velocity: np.ndarray
@@ -73,14 +45,16 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Problem:
-    """A stage as flat keys that follows a log, the parameters, and the force [N] expected of the controller, `target`.
+    """A stage as flat keys that follows a log, with the parameters to fit and the force [N] to
+    be met, `target`.
 
-    In a `closed` loop the stage has the controller of its machine and follows the log's reference; the target is
-    the log's force. Otherwise it follows the log's position under the log's force, held to it by a controller of our
-    own whose target is zero: what it has to add is what the model does not explain. `start` holds position
-    [m] and velocity [m/s] at the beginning; `counted`, shape (n,), is 0 at the samples that the fit leaves out.
-    `unsettled` are inputs that the log allows as well as those taken, and `sharper` positions [m], smoothed less and
-    less, that the stage may be held to instead.
+    In a `closed` loop the stage has the controller of its machine and follows the log's reference; the target is the
+    log's force. Otherwise it follows the log's position under the log's force, held to it by a controller of our own
+    whose target is zero: what that has to add is what the model does not explain.
+
+    `start` holds position [m] and velocity [m/s] at the beginning; `counted`, shape (n,), is 0 at the samples that the
+    fit leaves out. `unsettled` are inputs that the log allows as well as those taken, and `sharper` positions [m],
+    smoothed less and less, that the stage may be held to instead.
     """
 
     flat: Mapping[str, Any]
@@ -96,20 +70,26 @@ class Problem:
 
     @property
     def kernel(self) -> Kernel:
+        """The compiled equations of the stage."""
         return kernel(self.form)
 
     @property
     def passes(self) -> float:
-        """The share of the noise of the log's force, RMS, that the residual holds: all of it in closed loop, and of a
-        stage that is held to the log what the controller that holds it, (2 w s + w^2) / (s + w)^2, lets through."""
+        """The share of the noise of the log's force, RMS, that the residual holds.
+
+        In closed loop that is all of it; of a stage that is held to the log it is what the controller that holds it
+        lets through, (2 w s + w^2) / (s + w)^2.
+        """
         if self.closed:
             return 1.0
         omega = 2 * self.flat[KP] / self.flat[KD]
         return float(min(1.0, np.sqrt(2 * PASSES * omega * self.inputs.sample_time)))
 
     def held_to(self, level: int) -> Problem:
-        """The same with the stage held to one of the `sharper` positions, by number; the next of them is not
-        settled."""
+        """Return the problem with the stage held to one of the `sharper` positions, by number.
+
+        The next sharper one is then among the inputs that are not settled.
+        """
         inputs = replace(self.inputs, reference=self.sharper[level])
         held = tuple(replace(inputs, held=one.held) for one in self.unsettled if one.held != self.inputs.held)
         sharper = self.sharper[level + 1 :]
@@ -117,8 +97,10 @@ class Problem:
         return replace(self, inputs=inputs, unsettled=(*held, *further), sharper=sharper)
 
     def part(self, samples: slice) -> Problem:
-        """The same with a stretch of the samples alone; one that does not begin with the first begins on the reference,
-        as a stage does that follows a log."""
+        """Return the problem on a stretch of the samples.
+
+        A stretch that does not begin with the first sample begins on the reference, as a stage does that follows a log.
+        """
         reference = self.inputs.reference[samples]
         inputs = replace(self.inputs, reference=reference, force=self.inputs.force[samples])
         start = self.start
@@ -128,28 +110,37 @@ class Problem:
         return replace(self, inputs=inputs, target=target, counted=counted, start=start, unsettled=(), sharper=())
 
     def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
-        """Numbers of the runs and their records, a chunk at a time, for fitted numbers of shape (runs, parameters)."""
+        """Simulate fitted numbers of shape (runs, parameters), and yield numbers of runs with
+        records, a chunk at a time.
+        """
+        settings = OutputErrorSettings.current()
         flat = stages(self.flat, self.parameters, inner)
         starts = self._starts(flat, len(inner))
-        for runs in run_driven(self.kernel, flat, len(inner), self.inputs, starts, RTOL):
+        for runs in run_driven(self.kernel, flat, len(inner), self.inputs, starts, settings.run_tolerance):
             yield runs.numbers, self._record(flat, runs)
 
     def record(self, inner: np.ndarray) -> Simulated:
-        """The record of one run, each of shape (n,)."""
+        """Simulate one run; its signals have the shape (n,)."""
         ((_, record),) = self.simulated(inner[None])
         return Simulated(record.position[0], record.velocity[0], record.force[0])
 
     def residuals(self, inner: np.ndarray) -> np.ndarray:
-        """Wanted minus simulated force [N], shape (runs, n), 0 where it does not count; infinite for runs that
-        failed."""
+        """Return wanted minus simulated force [N], shape (runs, n).
+
+        It is 0 at samples that do not count, and infinite for runs that failed.
+        """
         residuals = np.empty((len(inner), len(self.target)))
         for numbers, record in self.simulated(inner):
             residuals[numbers] = (self.target - record.force) * self.counted
         return np.where(np.isfinite(residuals), residuals, np.inf)
 
     def jacobians(self, inner: np.ndarray, free: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """For each row of fitted numbers, shape (rows, parameters), the residual, shape (n,), and its derivatives to
-        the numbers that are `free` in this row, shape (n, free); all from runs side by side."""
+        """Return the residual and its derivatives for each row of fitted numbers, shape (rows,
+        parameters).
+
+        The residual has the shape (n,), and the derivatives (n, free) are those to the numbers that are `free` in that
+        row. All come from runs side by side.
+        """
         owner, number = np.nonzero(free)
         steps = np.array([self._step(inner[row], int(i)) for row, i in zip(owner, number, strict=True)])
         moved = inner[owner].copy()
@@ -160,9 +151,12 @@ class Problem:
         return [(at[row], slopes[owner == row].T) for row in range(len(inner))]
 
     def linearised(self, inner: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The residual of fitted numbers, shape (parameters,), and its derivatives to those that are `free`, shape (n,
-        free): of the differences to both sides the smaller one at each sample. A break-away that a step just brings
-        about, or prevents, is on one side of it alone, and no derivative."""
+        """Return the residual of fitted numbers, shape (parameters,), and its derivatives to the
+        `free` ones.
+
+        The derivatives have the shape (n, free): of the differences to both sides the smaller one at each sample. A
+        break-away that a step just brings about, or prevents, is on one side of it alone, and no derivative.
+        """
         numbers = np.flatnonzero(free)
         ahead = np.array([self._step(inner, int(i)) for i in numbers])
         ranges = [
@@ -179,13 +173,18 @@ class Problem:
         return at, np.where(np.abs(to) <= np.abs(fro), to, fro).T
 
     def _step(self, inner: np.ndarray, i: int) -> float:
-        """The step of a number, away from the nearer end of its range."""
+        """Return the step of a number for derivatives, away from the nearer end of its range."""
+        settings = OutputErrorSettings.current()
         parameter = self.parameters[i]
-        size = STEP * (1.0 if parameter.logarithmic else 0.01 * (parameter.high - parameter.low))
+        size = settings.derivative_step * (1.0 if parameter.logarithmic else 0.01 * (parameter.high - parameter.low))
         return size if inner[i] < (parameter.inner(parameter.low) + parameter.inner(parameter.high)) / 2 else -size
 
     def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-        """Where the log begins and as fast, the bristles bent as far as the first force bends them."""
+        """Return the states at which runs begin: where the log begins and as fast, with bent
+        bristles.
+
+        The bristles are bent as far as the first force bends them.
+        """
         position, velocity = self.start
         speed = np.gradient(self.inputs.reference[:3], self.inputs.sample_time)[0]
         beginning = Steady(self.inputs.reference[0] - position, position, velocity, speed, self.target[0])
@@ -199,6 +198,7 @@ class Problem:
         return starts
 
     def _record(self, flat: Mapping[str, Any], runs: DrivenRuns) -> Simulated:
+        """Pick position, velocity and force out of finished runs; NaN for runs that failed."""
         position, velocity = (runs.states[:, :, i] for i in (self.kernel.position, self.kernel.velocity))
         held = self.kernel.held
         force = runs.held[:, :, held.index(HELD_FORCE)] if HELD_FORCE in held else self._force(flat, runs)
@@ -206,7 +206,7 @@ class Problem:
         return Simulated(*(np.where(failed[:, None], np.nan, channel) for channel in (position, velocity, force)))
 
     def _force(self, flat: Mapping[str, Any], runs: DrivenRuns) -> np.ndarray:
-        """The force of a controller in continuous time, from the states at the samples."""
+        """Return the force [N] of a controller in continuous time, from the states at the samples."""
         count = runs.states.shape[1]
         if not self.closed:
             return self._holding_force(runs)
@@ -216,7 +216,7 @@ class Problem:
         reference = self.inputs.segments[0, :count, 1:].T[:, None, :]
         states = np.moveaxis(runs.states, 2, 0)
         force = np.empty(runs.states.shape[:2])
-        size = max(1, AT_ONCE // len(runs.numbers))
+        size = max(1, OutputErrorSettings.current().samples_of_outputs // len(runs.numbers))
         for first in range(0, count, size):
             part = slice(first, first + size)
             modes = self.kernel.modes(states[..., part], 0.0, reference[..., part], values)
@@ -225,7 +225,10 @@ class Problem:
         return force
 
     def _holding_force(self, runs: DrivenRuns) -> np.ndarray:
-        """The force [N] of the controller that holds a stage to a log (`tracking`), shape (runs, n)."""
+        """Return the force [N] of the controller that holds a stage to a log, shape (runs, n).
+
+        It is computed here instead of by the model's outputs, which takes longer.
+        """
         rows = self.inputs.segments[0, : runs.states.shape[1]]
         off, slip = (
             rows[:, column] - runs.states[:, :, place]
@@ -235,7 +238,11 @@ class Problem:
 
 
 def loop_problem(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter]) -> Problem:
-    """The stage with its own controller on the log's reference; a `disturbance` in the log acts beside it."""
+    """Set up the stage with its own controller on the log's reference.
+
+    A `disturbance` in the log acts beside it. The beginning does not count while the loop still shows how it was
+    started.
+    """
     sampled = "drive.sample_time" in flat and not why_continuous(flat, log.sample_time)
     samples = round(flat.get("drive.velocity_samples", 1.0)) if sampled else 0
     count = part.stop - part.start
@@ -253,12 +260,16 @@ def loop_problem(flat: Mapping[str, Any], log: Log, part: slice, parameters: Seq
 
 
 def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
-    """Why the controller of a drive that samples is simulated in continuous time all the same, in a sentence; empty
-    where it is not, or where the drive does not tell its sample time. `sample_time` [s] is the log's."""
+    """Say why the controller of a drive that samples is simulated in continuous time all the
+    same.
+
+    The sentence is empty where it is not, or where the drive does not tell its sample time. `sample_time` [s] is the
+    log's.
+    """
     if "drive.sample_time" not in flat:
         return ""
     step = flat["drive.sample_time"]
-    if abs(step / sample_time - 1) >= SAME:
+    if abs(step / sample_time - 1) >= OutputErrorSettings.current().sample_time_tolerance:
         return f"{CONTINUOUS}: the drive samples every {1e3 * step:g} ms, the log every {1e3 * sample_time:g} ms"
     return ""
 
@@ -266,19 +277,30 @@ def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
 def tracking(
     flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter], bandwidth: float
 ) -> Problem:
-    """The stage under the log's force, held to the log's smoothed position by a slow controller; `bandwidth` [Hz] is
-    that of the motion. A faster one, or the noise itself, would shake the bristles of a stage at rest. A log tells
-    neither whether its force is held from sample to sample or follows straight lines, nor how smooth its motion was.
-    Raises InputError for a log that never moves for long enough to count."""
-    omega = 2 * np.pi * min(bandwidth, SLOW)
+    """Set up the stage under the log's force, held to the log's smoothed position by a slow
+    controller.
+
+    `bandwidth` [Hz] is that of the motion. A faster controller, or the noise itself, would shake the bristles of a
+    stage at rest. A log tells neither whether its force is held from sample to sample or follows straight lines, nor
+    how smooth its motion was: these stay unsettled. Raises InputError for a log that never moves for long enough to
+    count.
+    """
+    identification_settings = IdentificationSettings.current()
+    settings = OutputErrorSettings.current()
+    omega = 2 * np.pi * min(bandwidth, settings.bandwidth_of_holding)
+    settling, step = settings.time_constants_of_settling / omega, log.sample_time
     smooth, *sharper = (
-        motion(log["position"][part], log.sample_time, SMOOTH * times * bandwidth).position for times in SHARPER
+        motion(
+            log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * times * bandwidth
+        ).position
+        for times in settings.smoothing_steps
     )
-    held = abs(flat.get("drive.sample_time", np.inf) / log.sample_time - 1) < SAME  # from each sample to the next
-    inputs = Inputs(smooth, log["force"][part], log.sample_time, held)
-    counted = _moving(log["position"][part], smooth, log.sample_time, SETTLED / omega)
+    # held from each sample to the next
+    held = abs(flat.get("drive.sample_time", np.inf) / step - 1) < settings.sample_time_tolerance
+    inputs = Inputs(smooth, log["force"][part], step, held)
+    counted = _moving(log["position"][part], smooth, step, settling)
     if not counted.any():
-        actual = f"{log.sample_time * len(counted):.3g} s, in which it never moves for {SETTLED / omega:.2g} s on end"
+        actual = f"{log.sample_time * len(counted):.3g} s, in which it never moves for {settling:.2g} s on end"
         expected = "moves that last longer: is the time, or the position, in another unit?"
         raise InputError("position", actual, expected, '--unit TIME="ms"', log.name)
     mass = next(parameter.start for parameter in parameters if parameter.name == MASS)
@@ -299,14 +321,16 @@ def tracking(
 
 
 def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settling: float) -> np.ndarray:
-    """1 where a motion, shape (n,) [m], moves, and 0 where it rests.
+    """Return 1 where a motion, shape (n,) [m], moves, and 0 where it rests.
 
     A stage that sticks does so within micrometres of the log, and the controller that holds it to the log then shows
     that distance instead of a force: rests do not count, nor does the time `settling` [s] after each of them and after
-    the beginning."""
-    window = max(3, round(REST / sample_time))
+    the beginning.
+    """
+    settings = OutputErrorSettings.current()
+    window = max(3, round(settings.time_of_a_rest / sample_time))
     span = maximum_filter1d(position, window) - minimum_filter1d(position, window)
-    resting = span <= STILL * blur_of(position, smooth)
+    resting = span <= settings.deviations_of_a_rest * blur_of(position, smooth)
     resting[0] = True
     late = round(settling / sample_time)
     recent = maximum_filter1d(resting.astype(np.int8), 2 * late + 1, origin=late)
@@ -314,20 +338,29 @@ def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settli
 
 
 def blur_of(position: np.ndarray, smooth: np.ndarray) -> float:
-    """Standard deviation [m] of the noise of a position, shape (n,): of what a `smooth` one leaves of it, or of what
-    neighbouring samples do not share, where little is smoothed."""
+    """Return the standard deviation [m] of the noise of a position, shape (n,).
+
+    It is what a `smooth` position leaves of it, or what neighbouring samples do not share, where little is smoothed.
+    """
     return max(robust(position - smooth), noise_of(position))
 
 
 def _after_start(count: int, sample_time: float) -> np.ndarray:
-    """0 while a closed loop still shows how it was started, which a log tells but roughly, and 1 from there on, shape
-    (count,)."""
-    first = round(min(REMEMBERED / sample_time, BEGINNING * count))
+    """Return 0 while a closed loop shows how it was started, and 1 from there on, shape
+    (count,).
+
+    A log tells but roughly how it was.
+    """
+    settings = OutputErrorSettings.current()
+    first = round(min(settings.time_of_a_start / sample_time, settings.record_share_of_a_start * count))
     return np.where(np.arange(count) < first, 0.0, 1.0)
 
 
 def _start(log: Log, part: slice) -> tuple[float, float]:
-    """Position [m] and velocity [m/s] at the beginning, from a parabola through the first samples."""
-    time = np.arange(FIRST) * log.sample_time
-    slope = np.polyfit(time, log["position"][part][:FIRST], 2)[1]
+    """Return position [m] and velocity [m/s] at the beginning, from a parabola through the first
+    samples.
+    """
+    settings = OutputErrorSettings.current()
+    time = np.arange(settings.samples_of_first_velocity) * log.sample_time
+    slope = np.polyfit(time, log["position"][part][: settings.samples_of_first_velocity], 2)[1]
     return float(log["position"][part.start]), float(slope)

@@ -9,19 +9,7 @@ from scipy.stats import chi2
 
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.refine import Refined, bounds_of, costs, refine_fit
-
-POINTS = 7
-"""Values of the parameter over its range (or about the fit), besides its own, at which the others are fitted anew."""
-
-WIDE = 4.0
-"""Standard deviations about the fit that the values reach, for a parameter whose spread is known."""
-
-WIDER = 5.0
-"""Times as far each time that the interval does not end within."""
-
-ROUNDS, SETTLED = 5, 0.1
-"""Iterations of each of these fits at most, and the share of what ends an interval by which one may still fall: along a
-ridge, such as that of a Stribeck curve that is passed quickly, a fit that is ended early makes intervals too narrow."""
+from friso.identification.output_error.settings import OutputErrorSettings
 
 WORSE = float(chi2.ppf(0.95, 1))
 """By how much -2 ln(likelihood) grows at the ends of a 95 % interval."""
@@ -29,9 +17,12 @@ WORSE = float(chi2.ppf(0.95, 1))
 
 @dataclass(frozen=True)
 class Profile:
-    """Values of a parameter, ascending [SI], the mean squares of the residual with the other ones fitted [N^2], and
-    what that may at most be inside the 95 % interval; `low` and `high` are the interval's ends, those of the range
-    where it ends nowhere before (`open_low`, `open_high`)."""
+    """How much worse a fit gets as one parameter is moved away, all others following.
+
+    `values` of the parameter, ascending [SI], have `cost`, the mean squares of the residual [N^2]; inside the 95 %
+    interval that is at most `limit`. `low` and `high` are the interval's ends, or those of the range where it ends
+    nowhere before (`open_low`, `open_high`).
+    """
 
     name: str
     values: np.ndarray
@@ -44,45 +35,55 @@ class Profile:
 
 
 def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: float) -> tuple[Profile, Refined]:
-    """The profile of parameter `number`, with the `others` fitted at each of its values, and what these fits are.
+    """Profile parameter `number`, with the `others` fitted at each of its values.
 
     `best` is the mean square [N^2] of the fit that others are compared with. The values reach as far as the interval,
-    or over the whole range.
+    or over the whole range. Returns the profile and the fits behind it.
     """
+    settings = OutputErrorSettings.current()
     low, high = (float(end[number]) for end in bounds_of(fit.problem))
     centre = fit.inner[number]
     spread = fit.covariance[fit.free.index(number), fit.free.index(number)] if number in fit.free else np.inf
     limit = best * (1 + WORSE / fit.independent)
     parameter = fit.problem.parameters[number]
-    half = WIDE * np.sqrt(spread) if spread > 0 else np.inf
+    half = settings.deviations_of_a_profile * np.sqrt(spread) if spread > 0 else np.inf
     while True:
         near, far = max(low, centre - half), min(high, centre + half)
-        values = np.unique([*np.linspace(near, far, POINTS), centre])
+        values = np.unique([*np.linspace(near, far, settings.points_of_a_profile), centre])
         fits = _fits(fit, number, others, values)
         cost = fits.cost
         left, right, open_left, open_right = _ends(values, cost, limit)
         if not ((open_left and near > low) or (open_right and far < high)):
             break
-        half *= WIDER
+        half *= settings.widening_of_a_profile
     ends = float(parameter.outer(left)), float(parameter.outer(right))
     return Profile(parameter.name, parameter.outer(values), cost, limit, *ends, open_left, open_right), fits
 
 
 def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray) -> Refined:
-    """The fits at values of a parameter, shape (values,), the others free."""
+    """Fit the other parameters at each of some values of one, shape (values,)."""
+    settings = OutputErrorSettings.current()
     starts = np.repeat(fit.inner[None], len(values), axis=0)
     starts[:, number] = values
     free = np.zeros(starts.shape, bool)
     free[:, list(others)] = True
     return (
-        refine_fit([fit.problem], starts, free, ROUNDS, SETTLED * WORSE / fit.independent)
+        refine_fit(
+            [fit.problem],
+            starts,
+            free,
+            settings.iterations_of_a_profile,
+            settings.cost_share_of_a_profile * WORSE / fit.independent,
+        )
         if others
         else Refined(starts, costs([fit.problem], starts))
     )
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:
-    """Where the profile crosses the limit, on both sides of its lowest value, and on which side it does not."""
+    """Find where a profile crosses the limit on both sides of its lowest value, and on which
+    side it does not.
+    """
     lowest = int(np.argmin(cost))
     left, right = values[0], values[-1]
     inside = cost <= max(limit, cost[lowest])
@@ -95,7 +96,10 @@ def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, fl
 
 
 def _crossing(values: np.ndarray, cost: np.ndarray, limit: float, outside: int, inside: int) -> float:
-    """Where the profile crosses the limit between two values, by the square root of what it is worse."""
+    """Find where a profile crosses the limit between two values.
+
+    The square root of what it is worse grows in proportion to the distance.
+    """
     if not np.isfinite(cost[outside]):
         return values[inside]
     base = min(cost[inside], limit)

@@ -8,38 +8,34 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.identification.output_error.problem import Problem
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.progress import Progress, silent
-
-FIRST, MOST = 1e-2, 1e3
-"""Damping of the first step, as a share of the curvature, and that at which a fit that gets no better is left."""
 
 LADDER = np.array([0.1, 1.0, 10.0, 100.0])
 """Dampings that are tried at once, in units of the last one that was best."""
 
-ENOUGH = 1e-4
-"""Share by which the sum of squares of a fit falls at last, unless that has to be told more precisely."""
-
-BOUND = 1e-9
-"""Share of a range by which a number is kept inside it."""
-
 
 @dataclass(frozen=True)
 class Refined:
-    """Fitted numbers, shape (starts, parameters), and mean squares of their residuals [N^2], shape (starts,)."""
+    """Refined numbers, shape (starts, parameters), with mean squares of their residuals [N^2],
+    shape (starts,).
+    """
 
     inner: np.ndarray
     cost: np.ndarray
 
 
 def bounds_of(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of the ranges of the fitted numbers, each of shape (parameters,)."""
+    """Return the ends of the ranges of the fitted numbers, each of shape (parameters,)."""
     low = np.array([parameter.inner(parameter.low) for parameter in problem.parameters])
     high = np.array([parameter.inner(parameter.high) for parameter in problem.parameters])
     return low, high
 
 
 def costs(pieces: Sequence[Problem], inner: np.ndarray) -> np.ndarray:
-    """Mean squares of the residuals [N^2], shape (runs,), of fitted numbers of shape (runs, parameters)."""
+    """Return mean squares of the residuals [N^2], shape (runs,), of fitted numbers, shape (runs,
+    parameters).
+    """
     costs = np.zeros(len(inner))
     for problem in pieces:
         for numbers, record in problem.simulated(inner):
@@ -53,27 +49,32 @@ def refine_fit(
     starts: np.ndarray,
     free: np.ndarray,
     iterations: int,
-    enough: float = ENOUGH,
+    enough: float,
     progress: Progress = silent,
 ) -> Refined:
-    """Fit all `pieces` of a problem from several starts, shape (starts, parameters); of each only the numbers that are
-    `free`, a mask of the same shape. A fit is done when its sum of squares falls by less than the share `enough`.
+    """Fit all `pieces` of a problem from several starts at once, by Levenberg and Marquardt's
+    method.
+
+    The starts have the shape (starts, parameters); of each the numbers are fitted that are `free`, a mask of that
+    shape. A fit is done when its sum of squares falls by less than the share `enough`.
 
     Of every start several dampings are tried side by side, which costs less than the derivatives do; these are computed
-    anew only where one of them was better. A number at an end of its range from which it is driven out stays there."""
+    anew only where one of them was better. A number at an end of its range from which it is driven out stays there.
+    """
+    settings = OutputErrorSettings.current()
     low, high = bounds_of(pieces[0])
-    margin = BOUND * (high - low)
+    margin = settings.range_share_inside * (high - low)
     low, high = low + margin, high - margin
     inner = np.clip(starts, low, high)
     cost = costs(pieces, inner)
-    damping = np.full(len(inner), FIRST)
+    damping = np.full(len(inner), settings.first_damping)
     busy = np.isfinite(cost)
     squares, gradients = np.zeros((*inner.shape, inner.shape[1])), np.zeros(inner.shape)
     moved = busy.copy()
     for iteration in range(iterations):
         progress(iteration, iterations, "")
         squares[moved], gradients[moved] = _curvature(pieces, inner[moved], free[moved])
-        busy &= np.isfinite(gradients).all(axis=1) & (damping < MOST)
+        busy &= np.isfinite(gradients).all(axis=1) & (damping < settings.highest_damping)
         rows = np.flatnonzero(busy)
         if not rows.size:
             break
@@ -95,8 +96,11 @@ def refine_fit(
 
 
 def _curvature(pieces: Sequence[Problem], inner: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of fitted numbers, shape (rows, parameters), the derivatives of the residual times themselves, and times the
-    residual; 0 of numbers that are not `free`."""
+    """Return derivatives of the residual times themselves and times the residual, of each row of
+    numbers.
+
+    They are 0 for numbers that are not `free`.
+    """
     count = inner.shape[1]
     squares, gradients = np.zeros((len(inner), count, count)), np.zeros((len(inner), count))
     for problem in pieces if len(inner) else ():
@@ -107,7 +111,7 @@ def _curvature(pieces: Sequence[Problem], inner: np.ndarray, free: np.ndarray) -
 
 
 def _steps(squares: np.ndarray, downhill: np.ndarray, dampings: np.ndarray) -> np.ndarray:
-    """Damped Gauss-Newton steps, shape (rows, dampings, parameters)."""
+    """Return damped Gauss-Newton steps, shape (rows, dampings, parameters)."""
     curvature = np.diagonal(squares, axis1=1, axis2=2)
     diagonal = np.where(curvature > 0, curvature, 1.0)[:, :, None] * np.eye(downhill.shape[1])
     damped = squares[:, None] + dampings[:, :, None, None] * diagonal[:, None]

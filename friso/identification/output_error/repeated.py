@@ -13,50 +13,50 @@ from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.problem import Problem, blur_of, tracking
 from friso.identification.output_error.refine import refine_fit
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.spread import CONFIDENCE
 from friso.intervals import COVERAGE
 from friso.progress import Progress
-
-TIMES = 4
-"""Simulated logs that the fit is repeated on: Student's t of so many is 1.4 times that of a known spread."""
-
-ITERATIONS = 8
-"""Of each of these fits, which begin at their truth: one that has not settled by then is far off."""
-
-SEED = 11
 
 
 def as_far_off_as_repeated(
     once: OutputErrorFit, log: Log, part: slice, bandwidth: float, noise: float, progress: Progress
 ) -> OutputErrorFit:
-    """The fit of a stage that followed `part` of a log, with deviations no smaller than what fits to simulated logs
-    are off by.
+    """Widen a fit to a log to what fits to simulated logs of the fitted machine are off by.
 
+    The stage followed `part` of the log; `noise` [N] is that of its force, and `bandwidth` [Hz] that of its motion.
     Noise of the position blurs where a stage breaks away, and noise of the force breaks it away early or late: what the
     stage that follows makes of that is no error about the fitted values that a Jacobian could tell, but one to one side
-    (parametric bootstrap: Efron, Tibshirani 1993, chapter 6). `noise` [N] is that of the log's force. A fit that leaves
-    more than those to the simulated logs do is off by as much more than they are: noise that has led it away, as that
-    of a force in coarse digits does, moves the machine it made less than it moved the true one.
+    (parametric bootstrap: Efron, Tibshirani 1993, chapter 6).
+
+    A fit that leaves more than those to the simulated logs do is off by as much more than they are: noise that has led
+    it away, as that of a force in coarse digits does, moves the machine it made less than it moved the true one.
     """
+    settings = OutputErrorSettings.current()
     free = np.isin(np.arange(len(once.inner)), once.free)
     again = [
-        refine_fit([problem], once.inner[None], free[None], ITERATIONS)
+        refine_fit(
+            [problem],
+            once.inner[None],
+            free[None],
+            settings.iterations_of_a_repetition,
+            settings.cost_share_of_refinement,
+        )
         for problem in _simulated_logs(once, log, part, bandwidth, noise, progress)
     ]
     off = np.sqrt(np.mean([(fit.inner[0] - once.inner)[free] ** 2 for fit in again], axis=0))
-    off = off * float(student.ppf(CONFIDENCE, TIMES)) / COVERAGE
+    off = off * float(student.ppf(CONFIDENCE, settings.repetitions_of_a_fit)) / COVERAGE
     usual = float(np.mean([fit.cost[0] for fit in again]))
     off *= np.sqrt(max(1.0, once.cost / usual)) if 0 < usual < np.inf else 1.0
-    deviation = np.sqrt(np.diag(once.covariance))
-    finite = np.isfinite(deviation) & (deviation > 0)
-    wider = np.divide(np.maximum(off, deviation), deviation, out=np.ones_like(off), where=finite)
-    return replace(once, covariance=once.covariance * np.outer(wider, wider))
+    return once.with_deviations(np.maximum(off, once.deviation))
 
 
 def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
-    """The fit of a stage that followed a log which it does not explain to its noise, with a deviation of the damping of
-    the bristles that allows for one sample: what holds the stage to the log knows no better when it breaks away, and a
-    delay passes for damping, times the stiffness."""
+    """Widen the damping of the bristles by what one sample of delay does to it.
+
+    That is for a stage that followed a log which it does not explain to its noise: what holds it to the log knows no
+    better when it breaks away, and a delay passes for damping, times the stiffness.
+    """
     names = [parameter.name for parameter in fit.problem.parameters]
     places = {names[number]: place for place, number in enumerate(fit.free)}
     if not {"friction.bristle_stiffness", "friction.bristle_damping"} <= places.keys():
@@ -71,14 +71,18 @@ def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
 def _simulated_logs(
     once: OutputErrorFit, log: Log, part: slice, bandwidth: float, noise: float, progress: Progress
 ) -> Iterator[Problem]:
-    """Problems like that of a fit, of logs that the stage it made leaves when it does as it did there: the force is
-    that of the log and of the controller that held it, the position is its own, and either has the log's noise."""
+    """Yield problems like that of a fit, of simulated logs whose truth is the fitted machine.
+
+    Their force is that of the log and of the controller that held the stage to it, their position is the stage's own,
+    and either has the log's noise.
+    """
+    settings = OutputErrorSettings.current()
     problem = once.problem
-    record, rng = problem.record(once.inner), np.random.default_rng(SEED)
+    record, rng = problem.record(once.inner), np.random.default_rng(settings.seed_of_repetitions)
     measured = log["position"][part]
     blur = blur_of(measured, problem.inputs.reference)
-    for number in range(TIMES):
-        progress(number, TIMES, "moves: the same fit of simulated logs")
+    for number in range(settings.repetitions_of_a_fit):
+        progress(number, settings.repetitions_of_a_fit, "moves: the same fit of simulated logs")
         signals = {role: values.copy() for role, values in log.signals.items()}
         signals["position"][part] = record.position + blur * rng.standard_normal(len(measured))
         force = problem.inputs.force + record.force

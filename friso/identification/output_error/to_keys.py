@@ -9,25 +9,24 @@ import numpy as np
 from friso.identification.estimate import Estimate
 from friso.identification.output_error.coverage import Coverage
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.identifiable import STRIBECK, IdentifiableFit, why_not_shown
-from friso.identification.output_error.parameters import MASS, RATIO, SHARE, keys_of
+from friso.identification.output_error.identifiable import IdentifiableFit, why_not_shown
+from friso.identification.output_error.parameters import MASS, RATIO, SHARE, STRIBECK, keys_of
 from friso.identification.output_error.profile import Profile
-from friso.identification.readings.common import LINEARITY
+from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.readings.settings import ReadingSettings
 from friso.intervals import COVERAGE
 
 METHOD = "output error"
 
-FOLLOWED = 0.05
-"""Share by which static friction may be off where the stage follows the log instead of its reference: it comes out too
-high, by 3 to 6 % in those of 21 machines of known truth that a narrower interval missed (docs/identify.md)."""
-
-MOST = 0.7
-"""Half of a 95 % interval, of the logarithm, from which on a record does not bound a quantity: beyond a factor of two,
-intervals of a linearised fit do not hold (Stribeck velocity under a noise of a fifth of the force)."""
-
 
 def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    """The keys of the stage file with their intervals, and the correlation of those shown."""
+    """Turn a fit into estimates of keys of the stage file, with the correlation of those shown.
+
+    Intervals reach as far as profiles do, and allow for the linearity of sensors; what the record does not show is a
+    range with the reason.
+    """
+    reading_settings = ReadingSettings.current()
+    settings = OutputErrorSettings.current()
     fit = identified.fit
     parameters = fit.problem.parameters
     spread = np.zeros((len(parameters), len(parameters)))
@@ -37,7 +36,12 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
     keys, slopes = _slopes(fit)
     covariance = slopes @ spread @ slopes.T
     values = _keys_at(fit, fit.inner)
-    shares = [FOLLOWED if key == "friction.static" and not fit.problem.closed else LINEARITY for key in keys]
+    shares = [
+        settings.static_error_of_following
+        if key == "friction.static" and not fit.problem.closed
+        else reading_settings.linearity_of_sensors
+        for key in keys
+    ]
     linear = np.array(shares) * np.abs([values[key] for key in keys]) / COVERAGE
     of_logarithm = {parameter.name for parameter in parameters if parameter.logarithmic}
     logarithmic = np.isin([_OWNERS.get(key, key) for key in keys], [*of_logarithm])
@@ -62,8 +66,10 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
 
 
 def _to_the_farther_end(deviation: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Deviations that reach, about `values` fitted as logarithms, as far as the upper end of the interval of the
-    logarithm does: that of half a value is 0.65 of it above, and 0.4 below."""
+    """Return deviations that reach as far as the upper end of an interval of the logarithm.
+
+    About half a value, such an interval reaches 0.65 of the value above it and 0.4 below.
+    """
     size = np.abs(values)
     relative = np.divide(deviation, size, out=np.zeros_like(size), where=size > 0)
     farther = size * np.expm1(COVERAGE * np.minimum(relative, 1.0)) / COVERAGE
@@ -75,7 +81,8 @@ _OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}
 
 
 def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
-    """Why parameters, or keys that hang on them, are not shown."""
+    """Say why parameters, or keys that hang on them, are not shown."""
+    settings = OutputErrorSettings.current()
     fit = identified.fit
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     unknown = {
@@ -83,9 +90,9 @@ def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
         for name, parameter in parameters.items()
         if name not in identified.shown and not parameter.core
     } | dict(identified.refuted)
-    for number, deviation in zip(fit.free, np.sqrt(np.diag(fit.covariance)), strict=True):
+    for number, deviation in zip(fit.free, fit.deviation, strict=True):
         parameter = fit.problem.parameters[number]
-        most = MOST if parameter.logarithmic else (parameter.high - parameter.low) / 2
+        most = settings.widest_logarithm if parameter.logarithmic else (parameter.high - parameter.low) / 2
         if not COVERAGE * deviation < most:
             unknown.setdefault(parameter.name, "the log does not bound it")
     for name, other in (STRIBECK, STRIBECK[::-1]):
@@ -102,8 +109,10 @@ def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
 
 
 def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.ndarray:
-    """The covariance of the fitted numbers with spreads that reach as far as the profiles do."""
-    spread = np.sqrt(np.diag(fit.covariance))
+    """Widen the covariance of fitted numbers so that their intervals reach as far as the
+    profiles do.
+    """
+    spread = fit.deviation
     factors = np.ones(len(fit.free))
     for i, number in enumerate(fit.free):
         parameter = fit.problem.parameters[number]
@@ -117,6 +126,7 @@ def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.nda
 
 
 def _keys_at(fit: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
+    """Return the keys of the stage file that fitted numbers make."""
     values = {
         parameter.name: parameter.outer(number) for parameter, number in zip(fit.problem.parameters, inner, strict=True)
     }
@@ -124,7 +134,9 @@ def _keys_at(fit: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
 
 
 def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
-    """The keys of the stage file, and their derivatives to the fitted numbers, shape (keys, parameters)."""
+    """Return the keys of the stage file, and their derivatives to the fitted numbers, shape
+    (keys, parameters).
+    """
     at = _keys_at(fit, fit.inner)
     step = 1e-6
     moved = [_keys_at(fit, fit.inner + step * row) for row in np.eye(len(fit.inner))]
@@ -132,8 +144,10 @@ def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
 
 
 def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
-    """What is possible of a key that is not shown: all that is believed of any bearing, since what a fit makes of such
-    a parameter, it makes up for what the model lacks."""
+    """Return what is possible of a key that is not shown: all that is believed of any bearing.
+
+    What a fit makes of such a parameter, it makes up for what the model lacks, and is no bound.
+    """
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     parameter = parameters[owner]
     if owner == RATIO:

@@ -17,35 +17,19 @@ from scipy.signal import bilinear, lfilter, lfilter_zi
 from friso.identification.kind import Prior
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel, deflection, low_pass, motion_bandwidth, robust
+from friso.identification.readings.settings import ReadingSettings
 from friso.stage.transmission import moving_mass
-
-FINER = 8
-"""Points per sample for what a mode of the structure does: a mode of a tenth of the sampling rate is off by 0.05 %."""
-
-LEAST, SAMPLED = 20, 0.2
-"""Periods of the low-pass that a record lasts at least, and the highest frequency of the motion over that of the
-samples."""
-
-EXPLAINED = 0.2
-"""Share of the friction's standard deviation that a model may leave unexplained."""
-
-EDGE = 2.0
-"""Periods of the low-pass at either end of a record that its start and end touch."""
-
-SEEN, ROUNDING = 10.0, 1e-9
-"""Standard deviations of the noise that those of the motion have to reach, and the same over the largest position."""
-
-MOVES, STANDS_OUT, GIVES = 0.02, 3.0, 3.0
-"""A joint bends where its deflection reaches this share of the motion, so many times its sensor's noise, and so many
-times what the contact that holds it gives."""
 
 HELD = "The joint is assumed held, with the limiter's stiffness: no bending shows."
 
 
 @dataclass(frozen=True)
 class StructureMode:
-    """The first mode of a structure on the side of the force and the sensor: a `share` of the moving mass on a spring
-    of its own, and the frequency [Hz] and damping ratio that it has there, the rest being held."""
+    """The first mode of a structure on the side of the force and the sensor.
+
+    A `share` of the moving mass stands on a spring of its own; `frequency` [Hz] and damping ratio are those that it has
+    there, the rest being held.
+    """
 
     share: float
     frequency: float
@@ -54,10 +38,13 @@ class StructureMode:
 
 @dataclass(frozen=True)
 class Between:
-    """What lies between the force that is commanded and the bearing: its `delay` [s] (None: not known) and the
-    `bandwidth` of the current loop [Hz]; the `mass` [kg] that is believed to move and the share of it that is `beyond`
-    the joint; the stiffness [N/m] of the `contact` that holds the joint, and of the `joint` itself; the `mode` of the
-    structure; the viscous friction [N s/m] and the half-width of its interval."""
+    """What lies between the force that is commanded and the bearing.
+
+    `delay` [s] (None: not known) and `bandwidth` of the current loop [Hz] are the drive's. `mass` [kg] is believed to
+    move, of which a share is `beyond` the joint; `contact` [N/m] is the stiffness of what holds the joint, and `joint`
+    [N/m] that of the joint itself. `mode` is that of the structure. `viscous` holds the viscous friction [N s/m] and
+    the half-width of its interval.
+    """
 
     delay: float | None = None
     bandwidth: float = np.inf
@@ -74,11 +61,11 @@ DIRECT = Between()
 
 
 def machine_between(flat: Mapping[str, Any]) -> Between:
-    """What lies between the commanded force and the bearing of a stage given as flat keys, a joint being held by its
-    limiter.
+    """Return what lies between the commanded force and the bearing of a stage given as flat
+    keys.
 
-    The frequency of the parasitic mode is that of both parts of the stage's mass against each other; with the other one
-    held, that of the part on the spring is lower.
+    A joint is taken to be held by its limiter. The frequency of the parasitic mode is that of both parts of the stage's
+    mass against each other; with the other one held, that of the part on the spring is lower.
     """
     drive, joint, mode = (
         {key.removeprefix(name): value for key, value in flat.items() if key.startswith(name)}
@@ -101,8 +88,11 @@ def machine_between(flat: Mapping[str, Any]) -> Between:
 
 
 def believed_between(prior: Prior, log: Log) -> Between:
-    """What lies between force and bearing, as other experiments show it or else the stage file has it, which states no
-    viscous friction better than to its whole size. Raises InputError."""
+    """Return what lies between force and bearing, as other experiments show it or else the stage
+    file has it.
+
+    A stage file states no viscous friction better than to its whole size. Raises InputError.
+    """
     believed = machine_between(prior.believed(log))
     viscous = prior.estimates.get("friction.viscous")
     return replace(believed, viscous=(believed.viscous[0], viscous.half_width if viscous else believed.viscous[0]))
@@ -110,8 +100,11 @@ def believed_between(prior: Prior, log: Log) -> Between:
 
 @dataclass(frozen=True)
 class BearingRecord:
-    """Time [s], position of the body on which the force acts, deflection of the joint that carries it [m] (None: it
-    is held), and force [N], shape (n,)."""
+    """A stretch of a log of a body on a bearing.
+
+    Over `time` [s] it has the position [m] of the body on which the force acts, the deflection [m] of the joint that
+    carries it (None: it is held), and the force [N], each of shape (n,).
+    """
 
     time: np.ndarray
     position: np.ndarray
@@ -120,21 +113,23 @@ class BearingRecord:
 
     @property
     def interval(self) -> float:
-        """Between samples [s]."""
+        """Time between samples [s]."""
         return float(self.time[1] - self.time[0])
 
     @property
     def body(self) -> np.ndarray:
-        """About where the body on the bearing is [m], shape (n,)."""
+        """Position [m] of the body on the bearing, shape (n,), but for what a contact gives."""
         return self.position if self.bent is None else self.position - self.bent
 
     def beginning(self, count: int) -> BearingRecord:
-        """The first so many samples."""
+        """Return the first so many samples."""
         bent = None if self.bent is None else self.bent[:count]
         return BearingRecord(self.time[:count], self.position[:count], bent, self.force[:count])
 
     def seen(self, cutoff: float, step: int = 1) -> BearingRecord:
-        """With the motion low-passed at a frequency [Hz], about its start, and every `step`th sample."""
+        """Return the record with its motion low-passed at a frequency [Hz], about its start, and
+        every `step`th sample.
+        """
         place = low_pass(self.position, self.interval, cutoff)
         bent = None if self.bent is None else low_pass(self.bent, self.interval, cutoff)[::step]
         force = self.force if step == 1 else low_pass(self.force, self.interval, cutoff)
@@ -143,7 +138,7 @@ class BearingRecord:
 
 @dataclass(frozen=True)
 class LowPass:
-    """At a `cutoff` [Hz] over time [s], shape (n,)."""
+    """A low-pass at a `cutoff` [Hz] over time [s], shape (n,)."""
 
     time: np.ndarray
     cutoff: float
@@ -151,16 +146,19 @@ class LowPass:
     @property
     def inside(self) -> slice:
         """The samples which the ends of the record do not touch."""
-        edge = int(EDGE / (self.cutoff * (self.time[1] - self.time[0])))
+        edge = int(ReadingSettings.current().periods_of_an_edge / (self.cutoff * (self.time[1] - self.time[0])))
         return slice(edge, len(self.time) - edge)
 
     def __call__(self, signal: np.ndarray) -> np.ndarray:
-        """The signal, shape (n,), low-passed, inside."""
+        """Return a signal, shape (n,), low-passed, without what the ends touch."""
         return low_pass(signal, float(self.time[1] - self.time[0]), self.cutoff)[self.inside]
 
 
 def record_of(log: Log, part: slice, between: Between) -> BearingRecord:
-    """A part of a log. Raises InputError for missing channels."""
+    """Read a part of a log as a record of the body on the bearing.
+
+    Raises InputError for missing channels.
+    """
     position, force = channel(log, "position")[part], channel(log, "force")[part]
     return BearingRecord(
         log.time[part], position, _bent(log, part, position, float(force.std()) / between.contact), force
@@ -168,34 +166,49 @@ def record_of(log: Log, part: slice, between: Between) -> BearingRecord:
 
 
 def why_unseen(record: BearingRecord, fewest: int) -> str:
-    """Why nothing can be read from a record, of which so many samples are needed; empty where it can."""
+    """Say why nothing can be read from a record, of which so many samples are needed; "" where
+    it can.
+    """
+    settings = ReadingSettings.current()
     if len(record.time) < fewest:
         return f"the record has {len(record.time)} samples: {fewest} are needed"
     if not np.ptp(record.force) > 0:
         return "the force does not change"
     highest = motion_bandwidth(record.body, record.interval)
-    if highest * record.interval > SAMPLED:
-        needed = SAMPLED / highest
+    if highest * record.interval > settings.sampled_frequency:
+        needed = settings.sampled_frequency / highest
         sampled = f"one sample in {record.interval:.3g} s"
         return f"{sampled}, and the motion goes up to {highest:.3g} Hz: one in {needed:.3g} s or less is needed"
-    cutoff = max(highest, LEAST / (len(record.time) * record.interval))
+    cutoff = max(highest, settings.periods_of_a_record / (len(record.time) * record.interval))
     motion = float(low_pass(record.position, record.interval, cutoff).std())
     noise = robust(np.diff(record.position, 2)) / 6**0.5
-    if not motion > max(SEEN * noise, ROUNDING * float(np.abs(record.position).max())):
+    if not motion > max(
+        settings.deviations_of_seen_motion * noise,
+        settings.rounding_of_a_position * float(np.abs(record.position).max()),
+    ):
         return f"the motion, {motion:.2g} m RMS, does not stand out from the noise"
     return ""
 
 
 def cutoff_of(record: BearingRecord) -> float:
-    """The low-pass [Hz] for a record: where its motion ends, but no slower than its length allows."""
+    """Choose the low-pass [Hz] for a record: where its motion ends, but no slower than its
+    length allows.
+    """
+    settings = ReadingSettings.current()
     highest = motion_bandwidth(record.body, record.interval)
-    return max(min(highest, SAMPLED / (2 * record.interval)), LEAST / (len(record.time) * record.interval))
+    return max(
+        min(highest, settings.sampled_frequency / (2 * record.interval)),
+        settings.periods_of_a_record / (len(record.time) * record.interval),
+    )
 
 
 def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position [m] of the body on the bearing, the force [N] that has arrived, and the acceleration [m/s^2] that it
-    gives to the whole moving mass, shape (n,) each: inertia is the mass times that. `mass` [kg] counts where a contact
-    gives way, by the force that goes through it."""
+    """Return the position [m] of the body on the bearing, the force [N] that has arrived, and
+    the acceleration [m/s^2].
+
+    Each has the shape (n,). The acceleration is that of the whole moving mass: inertia is the mass times that. `mass`
+    [kg] counts where a contact gives way, by the force that goes through it.
+    """
     time, acceleration = record.time, rate_of(record.time, rate_of(record.time, record.position))
     force, before = _force_after_delay(time, record.force, between), between.beyond * acceleration
     if between.mode is not None:
@@ -206,25 +219,39 @@ def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np
 
 
 def rate_of(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
-    """Time derivative of a signal at times [s], both of shape (n,), by a spline."""
+    """Differentiate a signal at times [s], both of shape (n,), by a spline."""
     return CubicSpline(time, signal)(time, 1)
 
 
 def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarray | None:
-    """The measured deflection [m] of a joint that bends; None where it is not measured, or held and about what its
-    contact `gives` [m]."""
+    """Return the measured deflection [m] of a joint that bends.
+
+    None where it is not measured, or where it is held and about what its contact `gives` [m].
+    """
+    settings = ReadingSettings.current()
     measured = deflection(log)
-    if measured is None or len(position) < LEAST:
+    if measured is None or len(position) < settings.periods_of_a_record:
         return None
-    bent, cutoff = measured[part], SAMPLED / log.sample_time / 4
+    bent, cutoff = measured[part], settings.sampled_frequency / log.sample_time / 4
     size = low_pass(bent, log.sample_time, cutoff).std()
     noise = low_pass(np.random.default_rng(0).standard_normal(len(bent)), log.sample_time, cutoff).std()
     noise *= robust(np.diff(bent, 2)) / 6**0.5
-    return bent if size > max(STANDS_OUT * noise, MOVES * position.std(), GIVES * gives) else None
+    return (
+        bent
+        if size
+        > max(
+            settings.deviations_of_bending * noise,
+            settings.deflection_share_of_bending * position.std(),
+            settings.contact_ratio_of_bending * gives,
+        )
+        else None
+    )
 
 
 def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:
-    """The force [N] that a command [N], shape (n,), has become: late by the delay and by the current loop."""
+    """Return the force [N] that a command [N], shape (n,), has become: late by the delay and by
+    the current loop.
+    """
     late = CubicSpline(time, command)(np.maximum(time - (between.delay or 0.0), time[0]))
     if not np.isfinite(between.bandwidth):
         return late
@@ -234,9 +261,14 @@ def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) 
 
 
 def _mode_acceleration(time: np.ndarray, acceleration: np.ndarray, mode: StructureMode) -> np.ndarray:
-    """Acceleration of the mass of a mode whose base moves with an acceleration [m/s^2], shape (n,)."""
-    omega, step = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / FINER
-    fine = CubicSpline(time, acceleration)(np.linspace(time[0], time[-1], (len(time) - 1) * FINER + 1))
+    """Return the acceleration of the mass of a mode whose base moves with an acceleration
+    [m/s^2], shape (n,).
+    """
+    settings = ReadingSettings.current()
+    omega, step = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / settings.points_per_sample
+    fine = CubicSpline(time, acceleration)(
+        np.linspace(time[0], time[-1], (len(time) - 1) * settings.points_per_sample + 1)
+    )
     damping = 2 * mode.damping_ratio * omega
     b, a = bilinear([damping, omega**2], [1.0, damping, omega**2], 1 / step)
-    return lfilter(b, a, fine, zi=lfilter_zi(b, a) * fine[0])[0][::FINER]
+    return lfilter(b, a, fine, zi=lfilter_zi(b, a) * fine[0])[0][:: settings.points_per_sample]

@@ -15,33 +15,23 @@ from scipy.stats import t as student
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import ROLES, Log
+from friso.identification.readings.settings import ReadingSettings
 from friso.intervals import COVERAGE
 
 ORDER = 2
 """Order of the low-pass filter, which goes over the record forth and back: 4 in all."""
 
-BLOCKS = 8
-"""Blocks into which a stretch is cut for its mean: enough for an interval, each long enough to forget the last."""
-
 NORMAL_MAD = 1.4826
 """Standard deviation over median absolute deviation, of a normal distribution."""
-
-LINEARITY = 1e-3
-"""Share by which the ratio of two channels may be off, however often it is read: the linearity of good sensors and
-amplifiers."""
-
-DUST = 1e-12
-"""Steps of a signal below this share of it are rounding of numbers, no digit of a sensor."""
-
-LEVELS, OFF_DIGIT = 8, 0.1
-"""Levels at which a signal stays, from which on these show its digit, and the share of a digit by which they may be off
-it."""
 
 _EXAMPLES = {"force": '--scale force="35.1507 N/V"', "position": '--unit position="mm"'}
 
 
 def record(name: str, sample_time: float, **signals: Any) -> Log:
-    """A log of plain SI arrays by role, without gaps, `sample_time` [s] apart. Raises InputError for what is none."""
+    """Make a log of plain SI arrays by role, without gaps, `sample_time` [s] apart.
+
+    Raises InputError for what is none.
+    """
     arrays = {role: np.asarray(values, dtype=float) for role, values in signals.items()}
     for role, values in arrays.items():
         if role not in ROLES:
@@ -55,7 +45,10 @@ def record(name: str, sample_time: float, **signals: Any) -> Log:
 
 
 def channel(log: Log, role: str) -> np.ndarray:
-    """The values of a role, in its SI unit and finite, shape (n,). Raises InputError otherwise."""
+    """Return the values of a role, in its SI unit and finite, shape (n,).
+
+    Raises InputError otherwise.
+    """
     if role not in log:
         actual = f"channels for {', '.join(log.signals) or 'nothing'}"
         raise InputError(role, actual, f"a channel for the {role.replace('_', ' ')}", f'--map {role}="NAME"', log.name)
@@ -70,7 +63,10 @@ def channel(log: Log, role: str) -> np.ndarray:
 
 
 def deflection(log: Log) -> np.ndarray | None:
-    """Position of the stage minus that of the cart [m], shape (n,): measured, or of two sensors; None without."""
+    """Return the position of the stage minus that of the cart [m], shape (n,).
+
+    It is measured, or that of two sensors; None without either.
+    """
     if "relative_position" in log:
         return channel(log, "relative_position")
     if "cart_position" in log and "position" in log:
@@ -79,7 +75,10 @@ def deflection(log: Log) -> np.ndarray | None:
 
 
 def cart(log: Log) -> np.ndarray | None:
-    """Position of the cart [m], shape (n,): measured, or of two sensors; None without."""
+    """Return the position of the cart [m], shape (n,).
+
+    It is measured, or that of two sensors; None without either.
+    """
     if "cart_position" in log:
         return channel(log, "cart_position")
     if "relative_position" in log and "position" in log:
@@ -88,14 +87,20 @@ def cart(log: Log) -> np.ndarray | None:
 
 
 def on_bearing(log: Log) -> np.ndarray:
-    """Position of the body that rides on the bearing [m], shape (n,): the cart, else the one body measured."""
+    """Return the position [m] of the body that rides on the bearing, shape (n,): the cart, else
+    the one body measured.
+    """
     moved = cart(log)
     return channel(log, "position") if moved is None else moved
 
 
 def low_pass(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
-    """Butterworth low-pass forth and back, without phase shift, at `cutoff` [Hz]; a record sampled too slowly to hold
-    anything above the cut-off, or of fewer samples than the filter's own ends take, is returned as it is."""
+    """Low-pass values forth and back by a Butterworth filter, without phase shift, at `cutoff`
+    [Hz].
+
+    A record sampled too slowly to hold anything above the cut-off, or of fewer samples than the filter's own ends take,
+    is returned as it is.
+    """
     if cutoff >= 0.45 / sample_time:
         return values
     sections = _butterworth(sample_time, cutoff)
@@ -105,51 +110,68 @@ def low_pass(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarra
 
 @lru_cache(maxsize=16)
 def _butterworth(sample_time: float, cutoff: float) -> np.ndarray:
-    """Sections of the low-pass; a fit asks for the same one at every step."""
+    """Return the sections of the low-pass; a fit asks for the same ones at every step."""
     return np.asarray(butter(ORDER, cutoff, fs=1 / sample_time, output="sos"))
 
 
 def rate(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
-    """Time derivative of the values, sampled every `sample_time` [s] and low-passed at the `cutoff` [Hz], shape (n,);
-    0 for fewer than two."""
+    """Differentiate values sampled every `sample_time` [s] and low-passed at `cutoff` [Hz],
+    shape (n,).
+
+    The rate of fewer than two values is 0.
+    """
     if len(values) < 2:
         return np.zeros(len(values))
     return np.gradient(low_pass(values, sample_time, cutoff), sample_time)
 
 
-CLEAR, STRONG, FLOOR, RESOLVED = 100.0, 1e-3, 0.25, 1000
-"""Power over that of the noise, and over the largest of the acceleration, from which motion is seen; the share of the
-spectrum, at its top, which is taken for noise; and lines of the spectrum."""
-
-
 def motion_bandwidth(position: np.ndarray, sample_time: float) -> float:
-    """The highest frequency [Hz] up to which a position, shape (n,), moves, and stands out of its noise, which is taken
-    to be white; 0 where it does nowhere."""
-    rates, density = welch(np.diff(position, 2), 1 / sample_time, nperseg=min(len(position) // BLOCKS, 2 * RESOLVED))
+    """Return the highest frequency [Hz] up to which a position, shape (n,), moves, and stands
+    out of its noise.
+
+    The noise is taken to be white; 0 where the position stands out nowhere.
+    """
+    settings = ReadingSettings.current()
+    rates, density = welch(
+        np.diff(position, 2),
+        1 / sample_time,
+        nperseg=min(len(position) // settings.blocks_of_a_mean, 2 * settings.lines_of_a_spectrum),
+    )
     white = np.sin(np.pi * rates * sample_time) ** 4
-    top = slice(-int(np.ceil(FLOOR * len(rates))), None)
+    top = slice(-int(np.ceil(settings.spectrum_share_of_noise * len(rates))), None)
     noise = white * float(np.median(density[top] / white[top]))
-    return float(rates[density > np.maximum(CLEAR * noise, STRONG * density.max())].max(initial=0.0))
+    return float(
+        rates[
+            density
+            > np.maximum(settings.power_of_clear_motion * noise, settings.power_of_strong_motion * density.max())
+        ].max(initial=0.0)
+    )
 
 
 def robust(values: np.ndarray) -> float:
-    """Standard deviation of what most values are like, by the median absolute deviation; 0 of none."""
+    """Return the standard deviation of what most values are like, by the median absolute
+    deviation; 0 of none.
+    """
     if not len(values):
         return 0.0
     return float(NORMAL_MAD * np.median(np.abs(values - np.median(values))))
 
 
 def noise_of(signal: np.ndarray) -> float:
-    """Standard deviation of the noise of a force [N] or a position [m], shape (n,): of what neighbouring samples do not
-    share, as its third differences show it, or of its digits."""
+    """Return the standard deviation of the noise of a force [N] or a position [m], shape (n,).
+
+    It is that of what neighbouring samples do not share, as its third differences show it, or of its digits.
+    """
     rough, digit = np.abs(np.diff(signal, 3)), digit_of(signal)
     white = NORMAL_MAD * _median(rough, digit) / np.sqrt(20) if rough.size else 0.0
     return max(white, digit / np.sqrt(12))
 
 
 def _median(sizes: np.ndarray, digit: float) -> float:
-    """The median of sizes that were rounded to whole digits, as of grouped data: each stands for all within half a
-    digit, none of which is below 0."""
+    """Return the median of sizes that were rounded to whole digits, as of grouped data.
+
+    Each size stands for all within half a digit, none of which is below 0.
+    """
     middle = float(np.median(sizes))
     low = max(middle - digit / 2, 0.0)
     below, within = np.mean(sizes < low), np.mean(np.abs(sizes - middle) < digit / 2)
@@ -157,23 +179,29 @@ def _median(sizes: np.ndarray, digit: float) -> float:
 
 
 def digit_of(signal: np.ndarray) -> float:
-    """The digit of a signal, shape (n,): that of the levels at which it stays, where these are whole numbers of digits
-    apart, which an interpolation between instants leaves as they are; else the smallest step."""
+    """Return the digit of a signal, shape (n,).
+
+    It is that of the levels at which the signal stays, where these are whole numbers of digits apart, which an
+    interpolation between instants leaves as they are; else the smallest step.
+    """
+    settings = ReadingSettings.current()
     steps = np.abs(np.diff(signal))
-    dust = DUST * np.abs(signal).max(initial=0.0)
+    dust = settings.rounding_of_a_signal * np.abs(signal).max(initial=0.0)
     stays = np.sort(signal[1:][steps <= dust])
     apart = np.diff(stays)
     apart = apart[apart > dust]
-    if apart.size >= LEVELS:
+    if apart.size >= settings.levels_of_a_digit:
         digits = apart / apart.min()
-        if np.abs(digits - np.round(digits)).max() <= OFF_DIGIT:
+        if np.abs(digits - np.round(digits)).max() <= settings.error_of_a_digit:
             return float(apart.min())
     real = steps[steps > dust]
     return float(real.min()) if real.size else 0.0
 
 
 def turns_of(position: np.ndarray, swing: float) -> np.ndarray:
-    """The samples at which a motion, shape (n,) [m], turns and goes back by more than `swing` [m]."""
+    """Return the samples at which a motion [m], shape (n,), turns and goes back by more than
+    `swing` [m].
+    """
     turns, values = [], position.tolist()
     lowest = highest = values[0]
     low = high = 0
@@ -193,7 +221,7 @@ def turns_of(position: np.ndarray, swing: float) -> np.ndarray:
 
 
 def runs(mask: np.ndarray) -> list[slice]:
-    """The stretches over which a mask, shape (n,), is true."""
+    """Return the stretches over which a mask, shape (n,), is true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
     return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
@@ -208,65 +236,95 @@ class Mean:
 
 
 def block_mean(values: np.ndarray) -> Mean:
-    """The mean with the error that its blocks show: neighbouring samples are not independent."""
-    count = min(BLOCKS, len(values))
+    """Return the mean with the error that its blocks show: neighbouring samples are not
+    independent.
+    """
+    count = min(ReadingSettings.current().blocks_of_a_mean, len(values))
     means = np.array([part.mean() for part in np.array_split(values, count)])
     error = float(means.std(ddof=1) / np.sqrt(count)) if count > 1 else np.inf
     return Mean(float(values.mean()), error, count - 1)
 
 
 def correlated_mean(values: np.ndarray) -> Mean:
-    """The mean of values in a row, of which each may resemble the one before (first-order autoregression): the degrees
-    of freedom are those of as many independent ones."""
+    """Return the mean of values in a row, of which each may resemble the one before.
+
+    The degrees of freedom are those of as many independent ones, by a first-order autoregression.
+    """
+    settings = ReadingSettings.current()
     count = len(values)
     off = values - values.mean()
     power = float(off @ off)
-    share = min(max(float(off[1:] @ off[:-1]) / power, 0.0), 0.9) if power > 0 and count >= BLOCKS else 0.0
+    share = (
+        min(max(float(off[1:] @ off[:-1]) / power, 0.0), 0.9)
+        if power > 0 and count >= settings.blocks_of_a_mean
+        else 0.0
+    )
     independent = max(count * (1 - share) / (1 + share), 2.0)
     error = float(values.std(ddof=1) / np.sqrt(independent))
     return Mean(float(values.mean()), error, max(round(independent) - 1, 1))
 
 
 def t_value(freedom: float) -> float:
-    """Half-width of a 95 % interval of Student's t distribution, in standard errors."""
+    """Return the half-width of a 95 % interval of Student's t distribution, in standard errors."""
     return float(student.ppf(0.975, freedom))
 
 
 def by_t(name: str, unit: str, mean: Mean, method: str, low: float = 0.0, high: float = 0.0) -> Estimate:
-    """An estimate with Student's interval, widened by what is systematic: `low` below and `high` above."""
+    """Make an estimate with Student's interval, widened by what is systematic: `low` below and
+    `high` above.
+    """
     half = t_value(mean.freedom) * mean.error
     ends = (mean.value - half - low, mean.value + half + high)
     return Estimate(name, unit, mean.value, *ends, method, systematic=(low + high) / 2)
 
 
 def solve_normal_equations(square: np.ndarray, product: np.ndarray) -> np.ndarray:
-    """The solution of normal equations, shape (p, p) and (p,), whose columns are of very different size; 0 for one that
-    is empty."""
+    """Solve normal equations, shape (p, p) and (p,), whose columns are of very different size.
+
+    The solution of a column that is empty is 0.
+    """
     size = np.sqrt(np.maximum(np.diag(square), 0.0))
     size = np.where(size > 0, size, 1.0)
     return np.linalg.lstsq(square / np.outer(size, size), product / size, rcond=None)[0] / size
 
 
 def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Covariance of the coefficients, shape (p, p), of a fit of the target, shape (n,), by columns, shape (n, p)."""
-    parts = zip(np.array_split(columns, BLOCKS), np.array_split(target, BLOCKS), strict=True)
+    """Return the covariance of coefficients, shape (p, p), of a fit of the target, shape (n,),
+    by columns, shape (n, p).
+
+    Blocks of the record are left out in turn.
+    """
+    settings = ReadingSettings.current()
+    parts = zip(
+        np.array_split(columns, settings.blocks_of_a_mean),
+        np.array_split(target, settings.blocks_of_a_mean),
+        strict=True,
+    )
     square, product = columns.T @ columns, columns.T @ target
     without = np.array([solve_normal_equations(square - x.T @ x, product - x.T @ y) for x, y in parts])
     off = without - without.mean(axis=0)
-    return off.T @ off * (BLOCKS - 1) / BLOCKS
+    return off.T @ off * (settings.blocks_of_a_mean - 1) / settings.blocks_of_a_mean
 
 
 def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray) -> np.ndarray:
-    """Correlation, shape (p, p), of quantities of that covariance, which systematic `shifts`, shape (m, p), move
-    together, and doubts of half-width `even`, shape (p,), each by itself."""
+    """Return the correlation, shape (p, p), of quantities with a covariance and systematic
+    errors.
+
+    Systematic `shifts`, shape (m, p), move the quantities together, and doubts of half-width `even`, shape (p,), each
+    by itself.
+    """
     total = covariance + (shifts.T @ shifts + np.diag(even**2)) / COVERAGE**2
     size = np.sqrt(np.maximum(np.diag(total), np.finfo(float).tiny))
     return total / np.outer(size, size)
 
 
 def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.ndarray:
-    """Deflection [m] of bristles, shape (n,), under a body that makes these moves [m], at whose velocities the bristles
-    come to rest at `ends` [m], both of shape (n - 1,), from a deflection at the `start` [m] on; exact in each move."""
+    """Return the deflection [m] of bristles, shape (n,), under a body that makes some moves [m],
+    shape (n - 1,).
+
+    At the velocities of these moves the bristles come to rest at `ends` [m], shape (n - 1,); they begin from a
+    deflection at the `start` [m]. The solution is exact in each move.
+    """
     kept = np.exp(-np.abs(moves) / ends)
     after = np.append(start, np.sign(moves) * ends * (1 - kept))  # each deflection without that before
     bands = np.stack([np.ones(len(after)), np.append(-kept, 0.0)])
@@ -274,7 +332,7 @@ def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.n
 
 
 def by_direction(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Either direction by name, with the mask of what belongs to it."""
+    """Yield either direction by name, with the mask of what belongs to it."""
     yield "forward", directions > 0
     yield "backward", directions < 0
 
@@ -282,6 +340,9 @@ def by_direction(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
 def stribeck_curve(
     speeds: np.ndarray, coulomb: float, static: float, velocity: float, exponent: float = 2.0
 ) -> np.ndarray:
-    """Friction [N] at steady speeds [m/s] without the viscous, of the shape of the speeds: Eq. 4 of the thesis, with
-    Coulomb and static friction [N], the Stribeck velocity [m/s] and the exponent."""
+    """Return friction [N] at steady speeds [m/s] without the viscous part, of the shape of the
+    speeds.
+
+    It is Eq. 4 of the thesis, with Coulomb and static friction [N], the Stribeck velocity [m/s] and the exponent.
+    """
     return coulomb + (static - coulomb) * np.exp(-((speeds / velocity) ** exponent))

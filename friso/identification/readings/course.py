@@ -13,43 +13,17 @@ from friso.identification.logs.log import Log
 from friso.identification.readings.common import runs
 from friso.identification.readings.passes import Pass, passes
 from friso.identification.readings.ramps import force_ramps
+from friso.identification.readings.settings import ReadingSettings
 from friso.identification.response.period import find_periods
-
-BACK = 0.1
-"""A signal turns where it goes back by this share of its range."""
-
-STILL = 0.01
-"""Share of the travel within which a position rests."""
-
-MOSTLY = 0.75
-"""Share of the way that is most of it (our choice; of moves it is a sixth to a half that goes at constant speed)."""
-
-AGAINST, PLACES = 0.99, 4
-"""Share of the force's variance from rest to rest that the place explains at least where a spring holds it, and
-different places that it takes."""
-
-HYSTERESIS, RETURNS = 0.05, 2
-"""By what share of its range the force at a place may depend on the side from which it was reached, and how many places
-have to be reached from both: friction at rest follows the last motion, and with it the place."""
-
-LONG = 0.01
-"""Share of a log for which a position that rests does so."""
-
-RAMPING = 0.25
-"""Share of a log that force ramps take together at least (our choice): moves begin within a few per cent of theirs."""
-
-EVEN, BEFORE = 0.1, 0.05
-"""By what share of its break-away force a ramp may be off its line a quarter of the way up, and by what share of it the
-force off none before: an integrator takes the force through zero without a rest."""
-
-BLUR = 20
-"""Samples over which a position is averaged, for the way that it goes not to be that of its noise."""
 
 
 @dataclass(frozen=True)
 class Repetition:
-    """What repeats in a log: every so many `samples`, with about so many `harmonics`, turning so many times in between,
-    while the position rests for a share of the time."""
+    """What repeats in a log.
+
+    It repeats every so many `samples`, with about so many `harmonics`, and turns so many times in between, while the
+    position rests for a share of the time.
+    """
 
     samples: int
     harmonics: float
@@ -59,7 +33,7 @@ class Repetition:
 
 @dataclass(frozen=True)
 class Course:
-    """How a log goes."""
+    """How a log goes of which nobody has said what experiment it is."""
 
     log: Log
 
@@ -70,12 +44,14 @@ class Course:
 
     @property
     def signal(self) -> str:
-        """The role of what drives it from outside: the force injected, else a reference that moves, else the force."""
+        """The role of what drives the log from outside: the force injected, else a reference that
+        moves, else the force.
+        """
         return external(self.log) or "force"
 
     @cached_property
     def repetition(self) -> Repetition | None:
-        """What repeats in this signal; None where nothing does."""
+        """What repeats in the driving signal; None where nothing does."""
         part = self.log.longest
         try:
             periods = find_periods(self.log[self.signal][part])
@@ -87,22 +63,29 @@ class Course:
 
     @cached_property
     def speeds(self) -> np.ndarray:
-        """The constant speeds [m/s], shape (n,), where most of the way goes at such, which no reference tells; none
-        where the position has no SI unit."""
+        """The constant speeds [m/s], shape (n,), where most of the way goes at such.
+
+        No reference tells them; there are none where the position has no SI unit.
+        """
+        settings = ReadingSettings.current()
         part, position = self.log.longest, self.log["position"]
         try:
             stretches = [] if self.reference_moves else passes(self.log.per_unit_of_force())
         except InputError:
             return np.zeros(0)
         steady = [stretch for stretch in stretches if stretch.steady and self._slides(stretch)]
-        way = float(np.abs(np.diff(uniform_filter1d(position[part], BLUR))).sum())
+        way = float(np.abs(np.diff(uniform_filter1d(position[part], settings.samples_of_a_blur))).sum())
         gone = sum(float(np.ptp(position[stretch.span])) for stretch in steady)
-        return np.array([abs(stretch.velocity) for stretch in steady if gone > MOSTLY * way])
+        return np.array([abs(stretch.velocity) for stretch in steady if gone > settings.share_of_most_of_a_way * way])
 
     @cached_property
     def ramps(self) -> int:
-        """How often the force rises evenly from none until the body moves off, where that is most of what happens and
-        no reference moves; 0 where it is not, or where the position has no SI unit."""
+        """How often the force rises evenly from none until the body moves off.
+
+        That counts where it is most of what happens and no reference moves; 0 where it is not, or where the position
+        has no SI unit.
+        """
+        settings = ReadingSettings.current()
         log = self.log
         try:
             shown = None if self.reference_moves else force_ramps(log.per_unit_of_force())
@@ -112,11 +95,15 @@ class Course:
             return 0
         rows = zip(shown.times, shown.directions * shown.forces, shown.forces / shown.rates, strict=True)
         even = [lasts for at, force, lasts in rows if self._from_none(at, force, lasts)]
-        return len(even) if sum(even) > RAMPING * len(log.time) * log.sample_time else 0
+        return len(even) if sum(even) > settings.log_share_of_ramps * len(log.time) * log.sample_time else 0
 
     def _from_none(self, at: float, force: float, lasts: float) -> bool:
-        """Whether the force rests at none and then rises evenly, for as long as it lasts [s], to what it is at an
-        instant [s]."""
+        """Tell whether the force rests at none and then rises evenly to what it is at an instant
+        [s].
+
+        The rise lasts for some time [s].
+        """
+        settings = ReadingSettings.current()
 
         def mean(first: float, last: float) -> float:
             """Over some part of the way, as a share of the force."""
@@ -124,28 +111,39 @@ class Course:
             values = self.log["force"][edges[0] : edges[1]]
             return float(values.mean()) / force if values.size else 0.0
 
-        return abs(mean(0.2, 0.3) - 0.25) < EVEN and abs(mean(-0.2, -0.1)) < BEFORE
+        return (
+            abs(mean(0.2, 0.3) - 0.25) < settings.force_share_off_a_line
+            and abs(mean(-0.2, -0.1)) < settings.force_share_before_a_ramp
+        )
 
     @property
     def one_way(self) -> bool:
         """Whether most of the way goes in one direction, with stops or not."""
-        position = uniform_filter1d(self.log["position"][self.log.longest], BLUR)
-        return bool(np.ptp(position) > MOSTLY * np.abs(np.diff(position)).sum())
+        settings = ReadingSettings.current()
+        position = uniform_filter1d(self.log["position"][self.log.longest], settings.samples_of_a_blur)
+        return bool(np.ptp(position) > settings.share_of_most_of_a_way * np.abs(np.diff(position)).sum())
 
     def _slides(self, stretch: Pass) -> bool:
-        """Whether the force changes less over a stretch than it holds the body back: else a spring, as bristles are
-        before they slide, sets the speed at which a force that rises moves it."""
+        """Tell whether the force changes less over a stretch than it holds the body back.
+
+        Else a spring, as bristles are before they slide, sets the speed at which a force that rises moves the body.
+        """
         force = self.log["force"][stretch.span]
         half = len(force) // 2
         return bool(abs(force[half:].mean() - force[:half].mean()) < abs(force.mean()))
 
     @cached_property
     def against_a_spring(self) -> bool:
-        """Whether nothing but the place tells the force with which the position rests here and there."""
+        """Whether nothing but the place tells the force with which the position rests here and
+        there.
+        """
+        settings = ReadingSettings.current()
         part = self.log.longest
         position, force = self.log["position"][part], self.log["force"][part]
-        size = max(int(LONG * len(position)), 2)
-        still = maximum_filter1d(position, size) - minimum_filter1d(position, size) < STILL * np.ptp(position)
+        size = max(int(settings.log_share_of_a_rest * len(position)), 2)
+        still = maximum_filter1d(position, size) - minimum_filter1d(
+            position, size
+        ) < settings.travel_share_of_a_rest * np.ptp(position)
         later = [
             slice((rest.start + rest.stop) // 2, rest.stop) for rest in runs(still) if rest.stop - rest.start > size
         ]
@@ -160,7 +158,7 @@ class Course:
 
     @property
     def words(self) -> str:
-        """The whole of it in words."""
+        """How the log goes, in words."""
         repetition = self.repetition
         if repetition is None:
             return "a log whose reference stands still, with nothing periodic in it"
@@ -169,48 +167,63 @@ class Course:
 
 
 def _on_a_spring(places: np.ndarray, forces: np.ndarray) -> bool:
-    """Whether the forces at the places of successive rests, each shape (n,), rise as those of a spring do, from
-    whichever side a place was reached."""
-    if len(places) < PLACES or not (np.ptp(places) > 0 and np.ptp(forces) > 0):
+    """Tell whether the forces at places of successive rests, each shape (n,), rise as those of a
+    spring do.
+
+    They have to do so from whichever side a place was reached.
+    """
+    settings = ReadingSettings.current()
+    if len(places) < settings.places_of_a_spring or not (np.ptp(places) > 0 and np.ptp(forces) > 0):
         return False
     order = np.argsort(places)
-    alike = np.split(order, np.flatnonzero(np.diff(places[order]) > 2 * STILL * np.ptp(places)) + 1)
+    alike = np.split(
+        order, np.flatnonzero(np.diff(places[order]) > 2 * settings.travel_share_of_a_rest * np.ptp(places)) + 1
+    )
     upward = np.diff(places, prepend=np.nan)
     sides = [(forces[here[upward[here] > 0]], forces[here[upward[here] < 0]]) for here in alike]
     apart = [abs(float(np.median(up) - np.median(down))) for up, down in sides if len(up) and len(down)]
-    if len(alike) < PLACES or len(apart) < RETURNS or max(apart) > HYSTERESIS * np.ptp(forces):
+    if (
+        len(alike) < settings.places_of_a_spring
+        or len(apart) < settings.returns_to_a_place
+        or max(apart) > settings.hysteresis_of_a_spring * np.ptp(forces)
+    ):
         return False
-    return float(np.corrcoef(places, forces)[0, 1]) > np.sqrt(AGAINST)
+    return float(np.corrcoef(places, forces)[0, 1]) > np.sqrt(settings.variance_share_of_a_spring)
 
 
 def external(log: Log) -> str | None:
-    """The role of what moves a loop from outside: the force injected, else a reference that moves; None without one.
+    """Return the role of what moves a loop from outside: the force injected, else a reference
+    that moves.
 
-    A reference that is held constant excites nothing.
+    None without one: a reference that is held constant excites nothing.
     """
     roles = ("disturbance", "reference")
     return next((role for role in roles if role in log and np.ptp(log[role][log.longest]) > 0), None)
 
 
 def _harmonics(period: np.ndarray) -> float:
-    """How many harmonics of equal power would spread as those of a signal over one period, shape (samples,), do."""
+    """Count the harmonics of equal power that would spread as those of a signal over one period,
+    shape (samples,).
+    """
     power = np.abs(np.fft.rfft(period)[1:]) ** 2
     return float(power.sum() ** 2 / np.sum(power**2))
 
 
 def _rest(position: np.ndarray, samples: int) -> float:
-    """Share of the time in which the position stays within `STILL` of its travel for a tenth of a period.
+    """Return the share of the time in which the position hardly moves for a tenth of a period.
 
     A sine does so at no time: about its turning points it moves by 2.4 % of its travel.
     """
     size = max(samples // 10, 2)
     moved = maximum_filter1d(position, size) - minimum_filter1d(position, size)
-    return float(np.mean(moved < STILL * np.ptp(position)))
+    return float(np.mean(moved < ReadingSettings.current().travel_share_of_a_rest * np.ptp(position)))
 
 
 def _turns(period: np.ndarray) -> int:
-    """How often a signal over one period, shape (samples,), turns back by more than `BACK` of its range."""
-    least, turns, direction, last = BACK * np.ptp(period), 0, 1.0, period[0]
+    """Count how often a signal over one period, shape (samples,), turns back by a share of its
+    range.
+    """
+    least, turns, direction, last = ReadingSettings.current().range_share_of_a_turn * np.ptp(period), 0, 1.0, period[0]
     for value in period:
         if (value - last) * direction > 0:
             last = value

@@ -16,28 +16,16 @@ from scipy.signal import lfilter, periodogram
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import block_mean, by_t, channel, low_pass, on_bearing
-from friso.identification.readings.passes import CUTOFF, Pass, passes
+from friso.identification.readings.passes import Pass, passes
+from friso.identification.readings.settings import ReadingSettings
 from friso.intervals import COVERAGE
-
-POINTS = 400
-"""Places of a map over the whole travel."""
-
-REPEATS = 0.5
-"""Correlation of the maps of two passes from which they repeat each other."""
-
-DRAWS = 300
-"""Random fields by which the interval of the correlation length is found."""
-
-LEAST_LENGTHS = 5.0
-"""Correlation lengths that a pass must hold for its correlation length to be shown."""
-
-HARMONICS = 3
-"""Harmonics reported of each pass."""
 
 
 @dataclass(frozen=True)
 class Harmonic:
-    """An oscillation over the place: wavelength [m], amplitude [N], and the frequency [Hz] in time at that speed."""
+    """An oscillation over the place: wavelength [m], amplitude [N], and the frequency [Hz] in
+    time at that speed.
+    """
 
     wavelength: float
     amplitude: float
@@ -46,8 +34,12 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class PassMap:
-    """One pass: velocity [m/s]; force [N] over `places` [m], NaN where it was not, shape (POINTS,); mean force and
-    standard deviation about it [N], correlation length [m]; the strongest harmonics; whether the motion was steady."""
+    """Friction along the rail in one pass.
+
+    It has the velocity [m/s]; the force [N] over `places` [m], NaN where the pass was not, both of one shape; mean
+    force and standard deviation about it [N], correlation length [m]; the strongest harmonics; and whether the motion
+    was steady.
+    """
 
     velocity: float
     places: np.ndarray
@@ -61,8 +53,12 @@ class PassMap:
 
 @dataclass(frozen=True)
 class FrictionPosition:
-    """The passes; `repeatability`, the mean correlation of the maps of pairs over the same places, and that of every
-    pair as (first, second, correlation); whether dynamic friction can be `separated`, and the sentence that says so."""
+    """Friction along the rail in several passes.
+
+    `repeatability` is the mean correlation of the maps of pairs over the same places, and `pairs` has that of every
+    pair as (first, second, correlation). Dynamic friction can be `separated` or not, and a sentence, the `verdict`,
+    says so.
+    """
 
     passes: tuple[PassMap, ...]
     repeatability: Estimate
@@ -74,16 +70,19 @@ class FrictionPosition:
     @property
     def repeats(self) -> bool:
         """Whether passes over the same places repeat the force: only then it is one of the places."""
-        return self.repeatability.determined and self.repeatability.value >= REPEATS
+        settings = ReadingSettings.current()
+        return self.repeatability.determined and self.repeatability.value >= settings.correlation_of_passes
 
 
 def friction_position(log: Log, mass: float = 0.0, crossover: float | None = None) -> FrictionPosition:
-    """Friction along the rail from the passes at constant velocity, `mass` [kg] times acceleration taken off.
+    """Read friction along the rail off the passes at constant velocity, `mass` [kg] times
+    acceleration taken off.
 
     With the loop's `crossover` [Hz] the verdict also asks whether it is quick enough for the oscillations seen. Raises
     InputError for missing channels.
     """
-    stretches = passes(log, CUTOFF)
+    settings = ReadingSettings.current()
+    stretches = passes(log)
     position, force = on_bearing(log), channel(log, "force")
     if not stretches:
         unknown = _no_repeatability("no stretch of constant velocity")
@@ -92,8 +91,8 @@ def friction_position(log: Log, mass: float = 0.0, crossover: float | None = Non
     travel = [np.ptp(position[p.span]) for p in stretches]
     long = [p for p, length in zip(stretches, travel, strict=True) if length >= 0.2 * max(travel)]
     ends = [position[p.span] for p in long]
-    places = np.linspace(min(x.min() for x in ends), max(x.max() for x in ends), POINTS)
-    maps = tuple(_map(stretch, places, position, force, log.sample_time, (mass, CUTOFF)) for stretch in long)
+    places = np.linspace(min(x.min() for x in ends), max(x.max() for x in ends), settings.points_of_a_friction_map)
+    maps = tuple(_map(stretch, places, position, force, log.sample_time, mass) for stretch in long)
     pairs = _pairs(maps)
     repeatability = _repeatability(maps, pairs)
     separated, verdict = _verdict(maps, repeatability, crossover)
@@ -109,17 +108,14 @@ def friction_position(log: Log, mass: float = 0.0, crossover: float | None = Non
 
 
 def _map(
-    stretch: Pass,
-    places: np.ndarray,
-    position: np.ndarray,
-    force: np.ndarray,
-    sample_time: float,
-    settings: tuple[float, float],
+    stretch: Pass, places: np.ndarray, position: np.ndarray, force: np.ndarray, sample_time: float, mass: float
 ) -> PassMap:
-    """Mean force by place; places are met once, or several times where the motion goes back a little."""
-    mass, cutoff = settings
+    """Return the mean force by place in one pass.
+
+    Places are met once, or several times where the motion goes back a little.
+    """
     x, f = position[stretch.span], force[stretch.span]
-    smooth = low_pass(x, sample_time, cutoff)
+    smooth = low_pass(x, sample_time, ReadingSettings.current().low_pass_of_passes)
     f = f - mass * np.gradient(np.gradient(smooth, sample_time), sample_time)
     step = places[1] - places[0]
     bins = np.clip(np.round((x - places[0]) / step).astype(int), 0, len(places) - 1)
@@ -145,7 +141,11 @@ def _map(
 
 
 def _length(fields: np.ndarray) -> np.ndarray:
-    """Lag, in places, at which the autocorrelation of each field falls to 1/e, shape (fields,); NaN if it does not."""
+    """Return the lag, in places, at which the autocorrelation of each field falls to 1/e, shape
+    (fields,).
+
+    It is NaN where the autocorrelation does not fall that far.
+    """
     count = fields.shape[1]
     power = np.abs(np.fft.rfft(fields, 2 * count, axis=1)) ** 2
     correlation = np.fft.irfft(power, axis=1)[:, : count // 2]
@@ -158,18 +158,23 @@ def _length(fields: np.ndarray) -> np.ndarray:
 
 
 def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
-    """Where the autocorrelation of the field is 1/e; its interval by the ratio of found to true length of
-    random fields with exponential correlation, detrended in the same way."""
+    """Estimate the length over which the force along the rail stays alike: its autocorrelation
+    falls to 1/e.
+
+    The interval is that of the ratio of found to true length of random fields with exponential correlation, detrended
+    in the same way.
+    """
+    settings = ReadingSettings.current()
     name, unit, method = "correlation length", "m", "autocorrelation of the force over position falls to 1/e"
     if not np.ptp(flat) > 0:
         return Estimate.unknown(name, unit, method, "the force does not vary along the rail")
     length = float(_length(flat[None])[0])
     count = len(flat)
-    if not length * LEAST_LENGTHS <= count:
-        reason = f"the pass holds fewer than {LEAST_LENGTHS:g} correlation lengths"
-        return Estimate.unknown(name, unit, method, reason, low=count / LEAST_LENGTHS * step)
+    if not length * settings.correlation_lengths_of_a_pass <= count:
+        reason = f"the pass holds fewer than {settings.correlation_lengths_of_a_pass:g} correlation lengths"
+        return Estimate.unknown(name, unit, method, reason, low=count / settings.correlation_lengths_of_a_pass * step)
     share = np.exp(-1 / max(length, 0.5))
-    noise = np.random.default_rng(0).standard_normal((DRAWS, count + int(5 * length) + 1))
+    noise = np.random.default_rng(0).standard_normal((settings.fields_drawn, count + int(5 * length) + 1))
     fields = np.asarray(lfilter([1.0], [1.0, -share], noise, axis=1))[:, -count:]
     trend = np.stack([np.ones(count), np.linspace(-1, 1, count)])
     fields -= fields @ np.linalg.pinv(trend) @ trend
@@ -179,16 +184,19 @@ def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
 
 
 def _harmonics(flat: np.ndarray, step: float, speed: float) -> tuple[Harmonic, ...]:
-    """The strongest lines of the spectrum over the place."""
+    """Return the strongest lines of the spectrum over the place."""
     rates, power = periodogram(flat, 1 / step, window="hann", scaling="spectrum")
     inner = np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])) + 1
-    best = inner[np.argsort(power[inner])[::-1][:HARMONICS]]
+    best = inner[np.argsort(power[inner])[::-1][: ReadingSettings.current().harmonics_of_a_pass]]
     return tuple(Harmonic(float(1 / rates[i]), float((2 * power[i]) ** 0.5), float(speed * rates[i])) for i in best)
 
 
 def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
-    """Correlation of the maps, detrended, of all pairs that share at least half of the shorter one's places; passes in
-    opposite directions by the friction against the motion."""
+    """Return the correlation of the maps, detrended, of all pairs that share at least half of
+    the shorter one's places.
+
+    Passes in opposite directions are compared by the friction against the motion.
+    """
     pairs = []
     for (i, first), (j, second) in combinations(enumerate(maps), 2):
         common = np.isfinite(first.force) & np.isfinite(second.force)
@@ -203,13 +211,17 @@ def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
 
 
 def _no_repeatability(reason: str) -> Estimate:
+    """Return the repeatability where it is not shown, with the reason."""
     return Estimate.unknown(
         "repeatability", "1", "correlation of the force over position between passes", reason, -1, 1
     )
 
 
 def _repeatability(maps: tuple[PassMap, ...], pairs: tuple[tuple[int, int, float], ...]) -> Estimate:
-    """Mean correlation of the pairs, by Fisher's z; as many independent places as correlation lengths in a pass."""
+    """Return the mean correlation of the pairs, by Fisher's z.
+
+    It has as many independent places as correlation lengths in a pass.
+    """
     if not pairs:
         return _no_repeatability("no two passes over the same places")
     z = np.arctanh(np.clip([r for _, _, r in pairs], -0.999999, 0.999999))
@@ -226,7 +238,7 @@ def _repeatability(maps: tuple[PassMap, ...], pairs: tuple[tuple[int, int, float
 
 
 def _spreads(maps: Iterable[PassMap]) -> dict[str, list[float]]:
-    """By how much the force varies [N] in passes at each speed [mm/s], the slowest first."""
+    """Return by how much the force varies [N] in passes at each speed [mm/s], the slowest first."""
     spreads: dict[str, list[float]] = {}
     for m in sorted(maps, key=lambda m: abs(m.velocity)):
         spreads.setdefault(f"{abs(m.velocity) * 1e3:.3g}", []).append(m.spread)
@@ -234,12 +246,14 @@ def _spreads(maps: Iterable[PassMap]) -> dict[str, list[float]]:
 
 
 def _from_to(values: list[float]) -> str:
-    """The least and the largest of some values, or one number where they are as good as equal."""
+    """The least and the largest of some values in words, or one number where they are as good as
+    equal.
+    """
     return " to ".join(dict.fromkeys((f"{min(values):.2g}", f"{max(values):.2g}")))
 
 
 def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: float | None) -> tuple[bool, str]:
-    """Whether the force is the friction of the rail, and why not."""
+    """Tell whether the force is the friction of the rail, and why not, in a sentence."""
     reasons = []
     rough = [m for m in maps if not m.steady]
     if rough:
@@ -247,7 +261,7 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
         reasons.append(f"the motion at {speeds} mm/s is not steady (it sticks and slips, or oscillates)")
     if not repeatability.determined:
         reasons.append(f"repeatability is not shown ({repeatability.reason})")
-    elif repeatability.value < REPEATS:
+    elif repeatability.value < ReadingSettings.current().correlation_of_passes:
         reasons.append(
             f"repeated passes over the same places differ (correlation {repeatability.value:.2f}, 95 % interval "
             f"{repeatability.low:.2f} to {repeatability.high:.2f})"

@@ -10,30 +10,22 @@ import numpy as np
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import Mean, by_direction, by_t, t_value
-from friso.identification.readings.passes import CUTOFF, Pass, on_common_places, passes, places_of
+from friso.identification.readings.passes import Pass, on_common_places, passes, places_of
+from friso.identification.readings.settings import ReadingSettings
 from friso.identification.readings.stribeck import FittedStribeck, Forces, Possible, stribeck_fit
 from friso.intervals import COVERAGE
-
-SPAN = 1.5
-"""Ratio of the greatest to the least speed from which Coulomb and viscous friction can be distinguished."""
-
-SPEEDS, DISTINCT = 5, 1.1
-"""Speeds, each so many times the last, from which a curve of four parameters may be fitted."""
-
-STRAIGHT = 3
-"""Speeds, each so many times the last, from which it shows whether friction is a straight line over them."""
-
-ROUNDING = 1e-9
-"""Of the greatest force: no mean is known better."""
 
 METHOD = "mean forces over stretches of constant velocity"
 
 
 @dataclass(frozen=True)
 class Direction:
-    """One direction: Coulomb [N], viscous [N s/m], static [N] friction, Stribeck velocity [m/s] and exponent, with the
+    """Friction over speed in one direction, or in both together.
+
+    It has Coulomb [N], viscous [N s/m] and static [N] friction, Stribeck velocity [m/s] and exponent, with the
     covariance of those fitted (in that order, SI), shape (2, 2), (4, 4) or (5, 5), or (0, 0); and the `curve`, None
-    where a straight line does as well."""
+    where a straight line does as well.
+    """
 
     coulomb: Estimate
     viscous: Estimate
@@ -46,11 +38,16 @@ class Direction:
 
 @dataclass(frozen=True)
 class FrictionVelocity:
-    """The directions "forward" and "backward", each with what constant force there is in its Coulomb friction, both
-    together with that taken out, and the `bias` [N], the constant force on the body as in the stage file, beside equal
-    friction. Per steady stretch, shape (n,):
-    velocity [m/s], mean force [N] less inertia, half-width of its 95 % interval [N]; velocities of those that were not
-    steady, shape (m,); and the `places` [m] from end to end over which the steady ones were read."""
+    """Friction over speed, in both directions, with what it was read from.
+
+    The directions "forward" and "backward" each have what constant force there is in their Coulomb friction; `both`
+    together have that taken out, and `bias` [N] is the constant force on the body as in the stage file, beside equal
+    friction.
+
+    Per steady stretch, shape (n,), there are velocity [m/s], mean force [N] less inertia and half-width of its 95 %
+    interval [N]; `unsteady` are velocities of stretches that were not steady, shape (m,), and `places` [m] the ends
+    between which the steady ones were read.
+    """
 
     directions: Mapping[str, Direction]
     both: Direction
@@ -64,12 +61,16 @@ class FrictionVelocity:
 
 
 def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None) -> FrictionVelocity:
-    """Friction-velocity map from the stretches of constant velocity, over the places that all of them share if they
-    share one, `mass` [kg] times what is left of acceleration taken off. The Stribeck curve has the `exponent` of the
-    stage unless the forces refute that, else what the forces leave possible of it is inside all intervals. What the
-    speeds present cannot show is unknown, with the reason. Raises InputError for missing channels."""
-    stretches = passes(log, CUTOFF)
-    used = on_common_places(log, [stretch for stretch in stretches if stretch.steady], CUTOFF)
+    """Read friction over speed off the stretches of constant velocity, over the places that all
+    of them share.
+
+    They are read as they are where they share too little. `mass` [kg] times what is left of acceleration is taken off.
+    The Stribeck curve has the `exponent` of the stage unless the forces refute that, else what the forces leave
+    possible of it is inside all intervals. What the speeds present cannot show is unknown, with the reason. Raises
+    InputError for missing channels.
+    """
+    stretches = passes(log)
+    used = on_common_places(log, [stretch for stretch in stretches if stretch.steady])
     velocities, forces, errors, swings = np.array([_row(stretch, mass) for stretch in used]).reshape(-1, 4).T
     size = np.abs(forces)
     errors = np.hypot(errors, swings**2 * (size.max(initial=0.0) - size.min(initial=np.inf))) if used else errors
@@ -92,8 +93,11 @@ def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None
 
 
 def _row(stretch: Pass, mass: float) -> tuple[float, float, float, float]:
-    """Velocity [m/s], force [N] less inertia, half-width [N] of its interval, and swing as a share of the velocity: the
-    mean of a curve over it is off by the square of that, as a share of how far the curve falls."""
+    """Return velocity [m/s], force [N] less inertia, half-width [N] of its interval, and swing
+    over velocity, of a stretch.
+
+    The mean of a curve over a swing is off by the square of that, as a share of how far the curve falls.
+    """
     return (
         stretch.velocity,
         stretch.force.value - mass * stretch.acceleration,
@@ -105,15 +109,19 @@ def _row(stretch: Pass, mass: float) -> tuple[float, float, float, float]:
 def _together(
     velocities: np.ndarray, forces: np.ndarray, errors: np.ndarray, exponent: float | None
 ) -> tuple[Estimate, Direction, bool]:
-    """The bias by least squares of Coulomb, viscous and bias on all stretches, or with the Stribeck curve where one
-    shows; the friction without it; and whether the forces refute the exponent."""
+    """Return the constant force, the friction of both directions without it, and whether the
+    forces refute the exponent.
+
+    The force follows from least squares of Coulomb, viscous and constant force on all stretches, or with the Stribeck
+    curve where one shows.
+    """
     name, method = "bias", f"{METHOD}, forward and backward"
     sign = np.sign(velocities)
     if min((sign > 0).sum(), (sign < 0).sum()) < 2:
         reason = "fewer than two steady stretches in one of the directions"
         return Estimate.unknown(name, "N", method, reason), _nothing(reason), False
     columns = [sign, np.ones_like(sign)]
-    if np.abs(velocities).max() >= SPAN * np.abs(velocities).min():
+    if np.abs(velocities).max() >= ReadingSettings.current().span_of_speeds * np.abs(velocities).min():
         columns.insert(1, velocities)
     design = np.stack(columns, axis=1)
     even = np.full_like(errors, np.sqrt(np.mean(errors**2)))  # a curve that the line lacks cancels, there and back
@@ -132,17 +140,21 @@ def _together(
 
 
 def _deviations(forces: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """Standard deviation [N] of each stretch by its half-width in `errors` [N], but no less than the median: one where
-    the velocity swings counts less, one that happens to be even does not count for more than the others."""
-    least = max(float(np.median(errors)), ROUNDING * float(np.abs(forces).max()))
+    """Return the standard deviation [N] of each stretch by its half-width in `errors` [N], but
+    no less than the median.
+
+    A stretch where the velocity swings counts less; one that happens to be even does not count for more than the
+    others.
+    """
+    least = max(float(np.median(errors)), ReadingSettings.current().rounding_of_a_force * float(np.abs(forces).max()))
     return np.maximum(errors, least) / COVERAGE
 
 
 def _linear(design: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Weighted least squares with Coulomb friction in the first column: solution, covariance, degrees of freedom.
+    """Fit friction by weighted least squares with Coulomb friction in the first column.
 
-    Friction varies from place to place, and all stretches lie over the same places: what one of them shows of Coulomb
-    friction is not averaged out over the others.
+    Returns solution, covariance and degrees of freedom. Friction varies from place to place, and all stretches lie over
+    the same places: what one of them shows of Coulomb friction is not averaged out over the others.
     """
     deviations = _deviations(forces, errors)
     inverse = np.linalg.pinv(design / deviations[:, None]) / deviations
@@ -155,8 +167,11 @@ def _linear(design: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple
 def _covariance(
     inverse: np.ndarray, deviations: np.ndarray, scatter: float, errors: np.ndarray, levels: list[int]
 ) -> np.ndarray:
-    """Of a solution, by the `inverse` of its design; `scatter` is the variance over that of the `deviations` [N], which
-    counts where it is greater than 1; `levels` are the places of what is a level of friction."""
+    """Return the covariance of a solution, by the `inverse` of its design.
+
+    `scatter` is the variance over that of the `deviations` [N], which counts where it is greater than 1; `levels` are
+    the places of what is a level of friction.
+    """
     variances = deviations**2 * max(scatter, 1.0)
     covariance = inverse * variances @ inverse.T
     covariance[np.ix_(levels, levels)] += _level(deviations, errors) ** 2
@@ -164,39 +179,36 @@ def _covariance(
 
 
 def _level(deviations: np.ndarray, errors: np.ndarray) -> float:
-    """Standard deviation [N] that all levels of friction share, by the half-widths in `errors` [N]."""
+    """Return the standard deviation [N] that all levels of friction share, by the half-widths in
+    `errors` [N].
+    """
     return float(np.average((errors / COVERAGE) ** 2, weights=deviations**-2)) ** 0.5
 
 
 def _nothing(reason: str) -> Direction:
-    names = (
-        ("coulomb", "N"),
-        ("viscous", "N s/m"),
-        ("static", "N"),
-        ("stribeck_velocity", "m/s"),
-        ("stribeck_exponent", ""),
-    )
-    unknown = [Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in names]
+    """Return a direction of which nothing is known, for a reason."""
+    units = {"coulomb": "N", "viscous": "N s/m", "static": "N", "stribeck_velocity": "m/s", "stribeck_exponent": ""}
+    unknown = (Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in units.items())
     coulomb, viscous, static, velocity, exponent = unknown
     return Direction(coulomb, viscous, static, velocity, exponent, np.empty((0, 0)))
 
 
 def _direction(
-    velocities: np.ndarray,
-    friction: np.ndarray,
-    errors: np.ndarray,
-    words: str,
-    exponent: float | None,
-    spent: int = 0,
+    velocities: np.ndarray, friction: np.ndarray, errors: np.ndarray, words: str, exponent: float | None, spent: int = 0
 ) -> Direction:
-    """Fit of one direction or both, friction [N] positive against the motion, with half-widths `errors` [N]; `spent`
-    degrees of freedom are gone before, for the constant force; with the `exponent` of the stage, if it tells one."""
+    """Fit one direction or both: friction [N] positive against the motion, with half-widths
+    `errors` [N].
+
+    `spent` degrees of freedom are gone before, for the constant force; the `exponent` is that of the stage, if it tells
+    one.
+    """
+    settings = ReadingSettings.current()
     speeds = np.abs(velocities)
     method = f"{METHOD}, {words}"
     if len(speeds) < 3 + spent:
         return _nothing(f"{len(speeds)} steady stretches {words}: {3 + spent} are needed")
     slowest = f"no steady motion below {speeds.min() * 1e3:.3g} mm/s"
-    if speeds.max() < SPAN * speeds.min():
+    if speeds.max() < settings.span_of_speeds * speeds.min():
         return _one_speed(speeds, friction, method, spent)
     solution, covariance, freedom = _linear(np.stack([np.ones_like(speeds), speeds], axis=1), friction, errors)
     covariance, freedom = covariance * freedom / (freedom - spent), freedom - spent
@@ -209,10 +221,10 @@ def _direction(
         nothing, most = _nothing(reason), max(coulomb.high, 0.0)
         coulomb = Estimate.unknown(coulomb.name, "N", method, reason, 0.0, most)
         return replace(nothing, coulomb=coulomb, viscous=viscous if most else nothing.viscous)
-    if distinct(speeds) < STRAIGHT:
+    if distinct(speeds) < settings.speeds_of_a_line:
         reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction still falls there"
         return _still_falling(coulomb, viscous, reason)
-    if freedom >= STRAIGHT and distinct(speeds) >= SPEEDS:
+    if freedom >= settings.speeds_of_a_line and distinct(speeds) >= settings.speeds_of_a_curve:
         deviations = _deviations(friction, errors)
         plain = float(np.sum(((friction - solution[0] - solution[1] * speeds) / deviations) ** 2))
         forces = Forces(speeds, friction, np.sign(velocities), deviations, _level(deviations, errors), spent > 0)
@@ -229,50 +241,46 @@ def _direction(
 
 
 def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int) -> Direction:
-    """At one speed Coulomb and viscous friction go together: a range for either."""
+    """Bound Coulomb and viscous friction at one speed, where they go together."""
     count = len(friction)
     half = t_value(count - 1 - spent) * float(friction.std(ddof=1)) / count**0.5
     top = float(friction.mean()) + half
     reason = f"all speeds about {speeds.mean() * 1e3:.3g} mm/s: Coulomb and viscous friction cannot be distinguished"
-    nothing = _nothing(reason)
-    return Direction(
-        Estimate.unknown("friction.coulomb", "N", method, reason, 0.0, top),
-        Estimate.unknown("friction.viscous", "N s/m", method, reason, 0.0, top / float(speeds.mean())),
-        nothing.static,
-        nothing.stribeck_velocity,
-        nothing.stribeck_exponent,
-        nothing.covariance,
-    )
+    coulomb = Estimate.unknown("friction.coulomb", "N", method, reason, 0.0, top)
+    viscous = Estimate.unknown("friction.viscous", "N s/m", method, reason, 0.0, top / float(speeds.mean()))
+    return replace(_nothing(reason), coulomb=coulomb, viscous=viscous)
 
 
 def distinct(speeds: np.ndarray) -> int:
-    """How many speeds there are, of shape (n,) [m/s]: those within `DISTINCT` count as one."""
-    return 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(DISTINCT)).sum())
+    """Count the distinct speeds [m/s], shape (n,): those within a small ratio count as one."""
+    settings = ReadingSettings.current()
+    return 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(settings.ratio_of_distinct_speeds)).sum())
 
 
 def _still_falling(coulomb: Estimate, viscous: Estimate, reason: str) -> Direction:
-    """A Stribeck effect at the speeds at hand makes the start of a straight line through the forces too high and its
-    slope too low: both are bounds."""
-    nothing = _nothing(reason)
-    return Direction(
-        Estimate.unknown(coulomb.name, "N", coulomb.method, reason, high=coulomb.high),
-        Estimate.unknown(viscous.name, "N s/m", viscous.method, reason, low=viscous.low),
-        nothing.static,
-        nothing.stribeck_velocity,
-        nothing.stribeck_exponent,
-        nothing.covariance,
-    )
+    """Bound Coulomb and viscous friction where friction still falls with the speed.
+
+    A Stribeck effect at the speeds at hand makes the start of a straight line through the forces too high and its slope
+    too low.
+    """
+    high = Estimate.unknown(coulomb.name, "N", coulomb.method, reason, high=coulomb.high)
+    low = Estimate.unknown(viscous.name, "N s/m", viscous.method, reason, low=viscous.low)
+    return replace(_nothing(reason), coulomb=high, viscous=low)
 
 
 def _fitted(
     name: str, unit: str, place: int, solution: np.ndarray, covariance: np.ndarray, freedom: int, method: str
 ) -> Estimate:
+    """Make an estimate of one of the numbers of a linear fit."""
     return by_t(name, unit, Mean(float(solution[place]), float(covariance[place, place] ** 0.5), freedom), method)
 
 
 def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: float | None) -> Direction:
-    """With a Stribeck curve: what the forces leave open of it, over all Stribeck velocities and exponents, is inside
-    the intervals. F_s and v_s are shown only where speeds reach below the Stribeck velocity."""
+    """Make a direction from a Stribeck curve, what the forces leave open of it inside the
+    intervals.
+
+    Static friction and Stribeck velocity are shown only where speeds reach below the Stribeck velocity.
+    """
     velocity, several = curve.velocity, "several exponents with their Stribeck velocities explain the forces alike"
     if exponent is not None and not curve.refuted:
         method = f"{method}; Stribeck exponent {exponent:g} of the stage"
@@ -294,7 +302,7 @@ def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: fl
 
 
 def _ranged(name: str, unit: str, fitted: Possible, method: str, reason: str) -> Estimate:
-    """An estimate by its range; not determined for a `reason`, if there is one."""
+    """Make an estimate from a range; it is not determined where there is a `reason`."""
     key = f"friction.{name}"
     if reason:
         return Estimate.unknown(key, unit, method, reason, max(fitted.low, 0.0), fitted.high)

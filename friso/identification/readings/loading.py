@@ -5,27 +5,30 @@ from __future__ import annotations
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.readings.common import LINEARITY, Mean, by_t, solve_normal_equations
+from friso.identification.readings.common import Mean, by_t, solve_normal_equations
+from friso.identification.readings.settings import ReadingSettings
 
 KEY, UNIT = "joint.stiffness", "N/m"
 METHOD = "force over deflection while the cart sticks"
-LEAST = 3
 SOFT = "more deflection does not need more force"
 
 
 def stiffness_of_loading(
     deflection: np.ndarray, rate: np.ndarray, acceleration: np.ndarray, force: np.ndarray, loads: list[slice]
 ) -> Estimate:
-    """The stiffness [N/m] from the deflection [m] and its rate [m/s], the acceleration of the stage [m/s^2] and the
-    actuator's force [N], all low-passed, shape (n,), over the `loads`, each between two slips.
+    """Estimate the stiffness [N/m] of a joint that is loaded between slips of the cart.
 
-    Least squares of a spring, a damper and a mass, with an offset for each load: after a slip the stage swings on its
-    joint. The error is that of the jackknife over loads. The cart's creep drops out. Of fewer than three loads it is
-    unknown.
+    The deflection [m] and its rate [m/s], the acceleration of the stage [m/s^2] and the actuator's force [N] are
+    low-passed, shape (n,); each of the `loads` lies between two slips.
+
+    Least squares fits a spring, a damper and a mass, with an offset for each load: after a slip the stage swings on its
+    joint. The error is that of the jackknife over loads. The cart's creep drops out. Of fewer than three loads the
+    stiffness is unknown.
     """
+    settings = ReadingSettings.current()
     count = len(loads)
-    if count < LEAST:
-        return Estimate.unknown(KEY, UNIT, METHOD, f"{count} loads between slips: {LEAST} are needed")
+    if count < settings.fewest_loads:
+        return Estimate.unknown(KEY, UNIT, METHOD, f"{count} loads between slips: {settings.fewest_loads} are needed")
     signals = [np.stack([x[s] - x[s].mean() for x in (deflection, rate, acceleration, force)]) for s in loads]
     products = np.array([x @ x.T for x in signals])
     if not products[:, 0, 0].sum() > 0:
@@ -33,7 +36,14 @@ def stiffness_of_loading(
     without = np.array([_spring(products.sum(axis=0) - product) for product in products])
     error = float(np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2)))
     value = _spring(products.sum(axis=0))
-    estimate = by_t(KEY, UNIT, Mean(value, error, count - 1), METHOD, LINEARITY * abs(value), LINEARITY * abs(value))
+    estimate = by_t(
+        KEY,
+        UNIT,
+        Mean(value, error, count - 1),
+        METHOD,
+        settings.linearity_of_sensors * abs(value),
+        settings.linearity_of_sensors * abs(value),
+    )
     return (
         estimate
         if estimate.low > 0
@@ -42,5 +52,7 @@ def stiffness_of_loading(
 
 
 def _spring(products: np.ndarray) -> float:
-    """Coefficient of the first signal in a fit of the last by the others, from the scalar products of all."""
+    """Return the coefficient of the first signal in a fit of the last by the others, from the
+    scalar products of all.
+    """
     return float(solve_normal_equations(products[:-1, :-1], products[:-1, -1])[0])

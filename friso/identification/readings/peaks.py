@@ -11,19 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-REACH = 4
-"""Standard deviations of the Gaussian beyond which it is cut off."""
+from friso.identification.readings.settings import ReadingSettings
 
 LOSS = 2.2
 """A ramp that ends in a sudden fall loses at its smoothed peak so many times its rise R w within one deviation w of the
 Gaussian, where it falls by 10 R w (least over k of k Phi(k) + phi(k) + 10 Phi(-k), of the normal distribution; 1.8 for
 a fall by 5 R w, 2.8 for one by 50), and less where it falls gradually."""
-
-SCALES = 12
-"""Widths of the Gaussian among which one is chosen."""
-
-LONGEST = 0.1
-"""Longest deviation of the Gaussian, as a share of the ramp's second half."""
 
 GAUSSIAN = 0.1325
 """Deviation of a Gaussian in time times the frequency at which it halves the power: sqrt(ln 2) / (2 pi)."""
@@ -31,7 +24,9 @@ GAUSSIAN = 0.1325
 
 @dataclass(frozen=True)
 class Peak:
-    """Where the friction is greatest (index), its level [N], and by how much [N] that may be off to either side."""
+    """Where the friction is greatest (index), its level [N], and by how much [N] that may be off
+    to either side.
+    """
 
     at: int
     level: float
@@ -39,20 +34,25 @@ class Peak:
 
 
 def smoothed(values: np.ndarray, width: float) -> np.ndarray:
-    """Values, shape (n,), under a Gaussian of `width` samples; the ends go on as they came, mirrored about their last
-    value."""
-    more = min(int(REACH * width) + 1, len(values) - 1)
+    """Smooth values, shape (n,), by a Gaussian of `width` samples.
+
+    The ends go on as they came, mirrored about their last value.
+    """
+    settings = ReadingSettings.current()
+    more = min(int(settings.deviations_of_a_kernel * width) + 1, len(values) - 1)
     longer = np.pad(values, more, mode="reflect", reflect_type="odd")
-    return gaussian_filter1d(longer, width, truncate=REACH)[more : len(longer) - more]
+    return gaussian_filter1d(longer, width, truncate=settings.deviations_of_a_kernel)[more : len(longer) - more]
 
 
 def scatter(values: np.ndarray) -> float:
-    """Standard deviation of white noise on values that change slowly, by second differences; 0 of fewer than 3."""
+    """Return the standard deviation of white noise on values that change slowly, by second
+    differences; 0 of fewer than 3.
+    """
     return float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6)) if len(values) > 2 else 0.0
 
 
 def _second(values: np.ndarray) -> np.ndarray:
-    """Second differences, shape (n,); 0 at the ends."""
+    """Return second differences, shape (n,); 0 at the ends."""
     return np.pad(np.diff(values, 2), 1)
 
 
@@ -65,14 +65,18 @@ def peak(
     marks: tuple[int, int],
     cutoff: float,
 ) -> Peak:
-    """The greatest force [N] less `mass` [kg] times the second derivative of the position [m], both of shape (n,) and
-    in the direction of the motion, between two `marks` (indices), over the first half of which the body rests. The
-    force rises at `rising` [N/s]; nothing above the `cutoff` [Hz] counts."""
+    """Find the greatest friction before a body breaks away.
+
+    That is the force [N] less `mass` [kg] times the second derivative of the position [m], both of shape (n,) and in
+    the direction of the motion, between two `marks` (indices), over the first half of which the body rests. The force
+    rises at `rising` [N/s]; nothing above the `cutoff` [Hz] counts.
+    """
+    settings = ReadingSettings.current()
     begin, start = marks
     rest = slice(begin, (begin + start) // 2)
     noise = scatter(force[rest]), mass / sample_time**2 * scatter(position[rest])
     least = max(GAUSSIAN / (cutoff * sample_time), 1.0)
-    widths = np.geomspace(least, max(LONGEST * (start - begin), least), SCALES)
+    widths = np.geomspace(least, max(settings.ramp_share_of_a_width * (start - begin), least), settings.widths_tried)
     # deviations of white noise under a Gaussian, and under its second derivative
     left = np.hypot(noise[0] / np.sqrt(2 * np.pi**0.5 * widths), noise[1] * np.sqrt(3 / (8 * np.pi**0.5 * widths**5)))
     high = left * np.sqrt(2 * np.log(1 + (start - begin) / (2 * widths)))

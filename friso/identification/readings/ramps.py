@@ -9,36 +9,19 @@ import numpy as np
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel, low_pass, on_bearing
 from friso.identification.readings.peaks import peak, smoothed
+from friso.identification.readings.settings import ReadingSettings
 from friso.identification.readings.slips import slips
-
-CUTOFF = 100.0
-"""Low-pass of force and velocity [Hz]."""
-
-SMEARED = 2.0
-"""Periods of the low-pass that the second half of a ramp must last for its break-away to be read."""
-
-SAMPLES = 5
-"""Samples of the second half of a ramp from which its rate is read."""
-
-BROAD = 40
-"""To see where its second half begins the push is smoothed over one in so many samples of the rest and the ramp."""
-
-FEW_RAMPS = 3
-"""Ramps that a log shows for static friction of its own."""
-
-LEAST = 20
-"""Samples of a segment that may hold a ramp."""
-
-FROM = 0.5
-"""Share of its force at the break-away from below which a ramp rises: our choice. A body that stops within a ramp and
-goes on has its bristles bent already."""
 
 
 @dataclass(frozen=True)
 class Ramps:
-    """Per ramp, shape (n,): time [s], place [m], direction, break-away force [N] in that direction, force rate [N/s],
-    by how much [N] noise and smoothing may have moved that force to either side, by how much it may be too large where
-    the mass is not known, and the speed [m/s] that the body has at most by then; the threshold [m/s] of the speed."""
+    """Ramps of the force from rest, each until the body moves off.
+
+    Per ramp, shape (n,), there are time [s], place [m], direction, break-away force [N] in that direction, force rate
+    [N/s], by how much [N] noise and smoothing may have moved that force to either side, by how much it may be too large
+    where the mass is not known, and the speed [m/s] that the body has at most by then. `threshold` [m/s] is that of the
+    speed.
+    """
 
     times: np.ndarray
     places: np.ndarray
@@ -53,28 +36,35 @@ class Ramps:
 
 
 def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
-    """The ramps in a log, each from rest of the body on the bearing.
+    """Find the ramps of the force in a log, each from rest of the body on the bearing.
 
     With the `mass` [kg] that moves, a break-away force is the greatest friction, force less inertia, as motion begins
     (the published definition); without, the force where motion begins to be visible, which contains inertia. Raises
     InputError for a missing channel.
     """
+    settings = ReadingSettings.current()
     force, body = channel(log, "force"), on_bearing(log)
     rows: list[tuple[float, ...]] = []
     threshold, quick, stops = 0.0, 0, 0
     for part in log.segments:
-        if part.stop - part.start < LEAST:
+        if part.stop - part.start < settings.samples_with_a_ramp:
             continue
-        breaks = slips(body[part], log.sample_time, CUTOFF)
+        breaks = slips(body[part], log.sample_time, settings.low_pass_of_ramps)
         threshold = max(threshold, breaks.threshold)
-        pushed = low_pass(force[part], log.sample_time, CUTOFF)
+        pushed = low_pass(force[part], log.sample_time, settings.low_pass_of_ramps)
         marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.fastest, breaks.directions, strict=True)
         for onset, start, rest, fastest, direction in marks:
             push = direction * force[part][rest : start + 1]
-            if _lowest(push) > FROM * float(direction * pushed[start]) > 0:
+            if _lowest(push) > settings.force_share_of_a_start * float(direction * pushed[start]) > 0:
                 stops += 1
                 continue
-            begin, shortest = rest + _half(push), max(SMEARED / (CUTOFF * log.sample_time), SAMPLES)
+            begin, shortest = (
+                rest + _half(push),
+                max(
+                    settings.periods_of_a_ramp / (settings.low_pass_of_ramps * log.sample_time),
+                    settings.samples_of_a_ramp,
+                ),
+            )
             before = pushed[max(rest, start - round(shortest))]
             if start - begin < shortest or direction * (2 * before - pushed[rest] - pushed[start]) < 0:
                 quick += 1
@@ -85,7 +75,9 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
                 # friction opposes the motion: the impulse of the force gives the mass its speed at least
                 heaviest = direction * float(pushed[onset:fastest].sum()) * log.sample_time / abs(breaks.speed[fastest])
                 signals = direction * force[part], direction * body[part]
-                top = peak(*signals, mass or heaviest, log.sample_time, rising, (begin, start), CUTOFF)
+                top = peak(
+                    *signals, mass or heaviest, log.sample_time, rising, (begin, start), settings.low_pass_of_ramps
+                )
                 if mass:
                     at, level, unsure = top.at, top.level, top.unsure
                 else:
@@ -96,7 +88,10 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
     table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 8).T
     notes = []
     if quick:
-        notes.append(f"{quick} ramps rise too fast for a low-pass at {CUTOFF:g} Hz (or the sampling) and are left out.")
+        notes.append(
+            f"{quick} ramps rise too fast for a low-pass at {settings.low_pass_of_ramps:g} Hz (or the sampling) and "
+            "are left out."
+        )
     if stops:
         notes.append(f"{stops} motions continued after a stop within a ramp and are left out: they began from no rest.")
     if len(rows) > table.shape[1]:
@@ -106,11 +101,15 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
 
 
 def _lowest(push: np.ndarray) -> float:
-    """The least value of a push, shape (n,), over the rest before a motion, seen without noise."""
-    return float(smoothed(push, len(push) / BROAD).min())
+    """Return the least value of a push, shape (n,), over the rest before a motion, seen without
+    noise.
+    """
+    return float(smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp).min())
 
 
 def _half(push: np.ndarray) -> int:
-    """The sample, of shape (n,), at which a push has last risen through half of its way, seen without noise."""
-    smooth = smoothed(push, len(push) / BROAD)
+    """Return the sample, of shape (n,), at which a push has last risen through half of its way,
+    seen without noise.
+    """
+    smooth = smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp)
     return int(np.flatnonzero(smooth <= (smooth[0] + smooth[-1]) / 2)[-1])

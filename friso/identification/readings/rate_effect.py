@@ -14,53 +14,38 @@ import numpy as np
 
 from friso.identification.estimate import Estimate
 from friso.identification.readings.common import Mean, by_t, correlated_mean, stribeck_curve, t_value
+from friso.identification.readings.settings import ReadingSettings
 from friso.quantities import percent
-
-BRISTLE_RATE = 100.0
-"""sigma_0 v_s [N/s] taken as the least there is where nothing better is known: that of Canudas de Wit et al. 1995; the
-thesis's Table 2 has 160."""
-
-SPREAD = 3.0
-"""Ratio of the force rates from which break-away forces are extrapolated to rate 0."""
-
-WITHIN = 12.0
-"""Force rates up to this multiple of the lowest enter: the power law holds for small rates only."""
-
-FAR = 0.15
-"""Share of the static friction over which it may be extrapolated, and by which a bound may widen it."""
 
 _SPEEDS = np.geomspace(1e-4, 10, 2001)
 """Speeds over Stribeck velocity among which the greatest force is sought."""
 
 
 def break_away(
-    force_rate: float,
-    static: float,
-    coulomb: float,
-    bristle_stiffness: float,
-    stribeck_velocity: float,
+    force_rate: float, static: float, coulomb: float, bristle_stiffness: float, stribeck_velocity: float
 ) -> float:
-    """Least force [N] at which LuGre friction breaks away while the force rises at `force_rate` [N/s]."""
+    """Return the least force [N] at which LuGre friction breaks away while the force rises at
+    `force_rate` [N/s].
+    """
     level = stribeck_curve(_SPEEDS, coulomb, static, 1.0)
     creep = 1 - force_rate / (bristle_stiffness * stribeck_velocity * _SPEEDS)
     return float(max(np.max(level * creep), coulomb))
 
 
-def share_below(force_rate: float, bristle_rate: float = BRISTLE_RATE) -> float:
-    """By what share of it at most break-away lies below static friction, whatever the Coulomb friction, where sigma_0
-    times v_s is at least `bristle_rate` [N/s]; 1 for rates so high that nothing can be said."""
-    return min(1 - break_away(force_rate, 1.0, 0.0, bristle_rate, 1.0), 1.0)
+def share_below(force_rate: float) -> float:
+    """Return by what share break-away lies below static friction at most, while the force rises at a rate [N/s].
+
+    That holds whatever the Coulomb friction is, where bristle stiffness times Stribeck velocity is no less than that of
+    the settings; 1 for rates so high that nothing can be said.
+    """
+    return min(1 - break_away(force_rate, 1.0, 0.0, ReadingSettings.current().least_bristle_rate, 1.0), 1.0)
 
 
 def static_friction(
-    name: str,
-    forces: np.ndarray,
-    rates: np.ndarray,
-    bristle_rate: float = BRISTLE_RATE,
-    relative_error: float = 0.0,
-    late: float = 0.0,
+    name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float = 0.0, late: float = 0.0
 ) -> Estimate:
-    """Static friction [N] from break-away forces [N] at force rates [N/s], both positive, shape (n,).
+    """Estimate static friction [N] from break-away forces [N] at force rates [N/s], both
+    positive, shape (n,).
 
     Rates that spread are extrapolated to 0; otherwise the interval reaches up to what `share_below` allows.
     `relative_error` is a standard deviation common to all forces, such as that of a stiffness; by up to `late` [N] they
@@ -70,17 +55,21 @@ def static_friction(
         low = float(np.min(forces)) if len(forces) else 0.0
         return Estimate.unknown(name, "N", "break-away forces", f"{len(forces)} break-aways: 3 are needed", low)
     low, high = np.percentile(rates, [10, 90])
-    if high >= SPREAD * low > 0:
-        estimate = _extrapolated(name, forces, rates, bristle_rate, relative_error)
+    if high >= ReadingSettings.current().spread_of_rates * low > 0:
+        estimate = _extrapolated(name, forces, rates, relative_error)
     else:
-        estimate = _bounded(name, forces, rates, bristle_rate, relative_error)
+        estimate = _bounded(name, forces, rates, relative_error)
     return replace(estimate, low=max(float(estimate.low - late), 0.0), systematic=estimate.systematic + late / 2)
 
 
-def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, bristle_rate: float, relative_error: float) -> Estimate:
-    """At one rate: the mean break-away is too low by at most the bound, and half of it is put in the value."""
+def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float) -> Estimate:
+    """Estimate static friction from one rate: the mean break-away is too low by at most a bound.
+
+    Half of the bound is put in the value.
+    """
+    settings = ReadingSettings.current()
     mean = correlated_mean(forces)
-    share = share_below(float(np.median(rates)), bristle_rate)
+    share = share_below(float(np.median(rates)))
     method = (
         f"mean break-away force at {np.median(rates):.3g} N/s; at rate 0 up to {percent(share)} higher is allowed for"
     )
@@ -88,29 +77,36 @@ def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, bristle_rate: flo
     half = float(np.hypot(scatter, t_value(mean.freedom) * relative_error * mean.value))
     low, high = mean.value - half, (mean.value + half) / (1 - share) if share < 1 else np.inf
     low, high = float(low), float(high)
-    if share > 2 * FAR:
+    if share > 2 * settings.share_extrapolated:
         reason = (
             f"at {np.median(rates):.3g} N/s ramps may break away up to {percent(share)} below static friction; ramps "
-            f"below {_slow_enough(bristle_rate):.2g} N/s, or at rates more than {SPREAD:g} times apart, would show it"
+            f"below {_slow_enough():.2g} N/s, or at rates more than {settings.spread_of_rates:g} times apart, would "
+            "show it"
         )
         return Estimate.unknown(name, "N", method, reason, low, high)
     value = float(mean.value * (1 + share / (1 - share) / 2))
     return Estimate(name, "N", value, low, high, method, systematic=(high - low) / 2 - scatter)
 
 
-def _slow_enough(bristle_rate: float) -> float:
-    """The force rate [N/s], to a tenth, up to which ramps of one rate show static friction."""
-    rates = bristle_rate * np.geomspace(1e-6, 1, 145)
-    return float(max(rate for rate in rates if share_below(rate, bristle_rate) <= 2 * FAR))
+def _slow_enough() -> float:
+    """Return the force rate [N/s], to a tenth, up to which ramps of one rate show static
+    friction.
+    """
+    settings = ReadingSettings.current()
+    rates = settings.least_bristle_rate * np.geomspace(1e-6, 1, 145)
+    return float(max(rate for rate in rates if share_below(rate) <= 2 * settings.share_extrapolated))
 
 
-def _extrapolated(
-    name: str, forces: np.ndarray, rates: np.ndarray, bristle_rate: float, relative_error: float
-) -> Estimate:
-    """A straight line over rate^(2/3) at the lower rates; half of the way extrapolated widens it."""
-    near = rates <= max(WITHIN * rates.min(), np.sort(rates)[2])
+def _extrapolated(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float) -> Estimate:
+    """Extrapolate break-away forces to rate 0 by a straight line over rate^(2/3) at the lower
+    rates.
+
+    Half of the way extrapolated widens the interval.
+    """
+    settings = ReadingSettings.current()
+    near = rates <= max(settings.range_of_rates * rates.min(), np.sort(rates)[2])
     if np.ptp(rates[near]) == 0:
-        return _bounded(name, forces[near], rates[near], bristle_rate, relative_error)
+        return _bounded(name, forces[near], rates[near], relative_error)
     power = rates[near] ** (2 / 3)
     design = np.stack([np.ones_like(power), power], axis=1)
     (level, slope), rest, _, _ = np.linalg.lstsq(design, forces[near], rcond=None)
@@ -120,11 +116,11 @@ def _extrapolated(
     method = f"break-away forces at {rates[near].min():.3g} to {rates[near].max():.3g} N/s, extrapolated to 0"
     least = float(np.mean(forces[rates <= 1.5 * rates.min()]))
     if slope + t_value(freedom) * inverse[1, 1] ** 0.5 >= 0:
-        if share_below(float(rates.min()), bristle_rate) <= FAR:
-            return _bounded(name, forces[near], np.full(int(near.sum()), rates.min()), bristle_rate, relative_error)
+        if share_below(float(rates.min())) <= settings.share_extrapolated:
+            return _bounded(name, forces[near], np.full(int(near.sum()), rates.min()), relative_error)
         reason = "break-away does not fall with the force rate: the rates may be too high to show static friction"
         return Estimate.unknown(name, "N", method, reason, least)
-    if offset > FAR * level:
+    if offset > settings.share_extrapolated * level:
         reason = f"the lowest force rate, {rates.min():.3g} N/s, is too high: the forces still rise towards rate 0"
         return Estimate.unknown(name, "N", method, reason, least)
     return by_t(name, "N", Mean(float(level), error, freedom), method, offset / 2, offset / 2)

@@ -7,28 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.identification.readings.common import rate, robust, runs
-
-SPIKE = 0.1
-"""Share of the highest speed from which the body slips."""
-
-STANDS_OUT = 8.0
-"""Standard deviations of noise by which the speed of a slip stands out."""
-
-REST, SHOWS = 0.05, 10
-"""Least rest before a slip, in s and in samples: it shows the rate at which the force rises."""
-
-VISIBLE = 0.01
-"""Share of the highest speed of a slip at which its motion begins to be visible, if it stands out of the noise."""
-
-SLIDING = 0.6
-"""Share of the time above the threshold from which the body counts as sliding, not as sticking and slipping."""
+from friso.identification.readings.settings import ReadingSettings
 
 
 @dataclass(frozen=True)
 class Slips:
-    """Indices, each of shape (n,): `onsets` of visible motion (out of the noise, and a hundredth of the highest speed),
-    `starts` of the slip (above the threshold), where the rest before it began, the fastest sample; direction +1 or -1;
-    the speed [m/s] of the body, shape (samples,); the threshold [m/s]; the share of time above it."""
+    """Where a body that sticks begins to slip.
+
+    Indices, each of shape (n,): `onsets` of visible motion (out of the noise, and a hundredth of the highest speed),
+    `starts` of the slip (above the threshold), where the rest before it began, and the fastest sample. `directions` are
+    +1 or -1; `speed` [m/s] is that of the body, shape (samples,), with its `threshold` [m/s] and the share of time
+    above it.
+    """
 
     onsets: np.ndarray
     starts: np.ndarray
@@ -41,24 +31,32 @@ class Slips:
 
 
 def slips(position: np.ndarray, sample_time: float, cutoff: float) -> Slips:
-    """The slips of a body of this position [m], shape (n,), differentiated below `cutoff` [Hz]."""
+    """Find the slips of a body of this position [m], shape (n,), differentiated below `cutoff`
+    [Hz].
+    """
+    settings = ReadingSettings.current()
     speed = rate(position, sample_time, cutoff)
     size = np.abs(speed)
     slow = speed[size <= np.percentile(size, 50)]
     noise = robust(slow) * 2  # the slower half of a normal scatter spreads by about half of it
-    threshold = max(STANDS_OUT * noise, SPIKE * float(size.max(initial=0.0)))
+    threshold = max(
+        settings.deviations_of_a_slip * noise, settings.speed_share_of_a_slip * float(size.max(initial=0.0))
+    )
     above = size > threshold
-    least = max(int(REST / sample_time), SHOWS)
+    least = max(int(settings.time_before_a_slip / sample_time), settings.samples_before_a_slip)
     edge = int(1 / (cutoff * sample_time))
     spans: list[tuple[int, ...]] = []
     rested = 0
     for run in runs(above):
         if run.start - rested >= least and run.start > edge and threshold > 0:
             top = run.start + int(np.argmax(size[run]))
-            level = min(max(STANDS_OUT * noise, VISIBLE * float(size[top])), threshold)
+            level = min(
+                max(settings.deviations_of_a_slip * noise, settings.speed_share_of_an_onset * float(size[top])),
+                threshold,
+            )
             quiet = np.flatnonzero(size[rested : run.start] <= level)
             onset = rested + int(quiet[-1]) if len(quiet) else rested
-            if onset - rested >= SHOWS:
+            if onset - rested >= settings.samples_before_a_slip:
                 spans.append((onset, run.start - 1, rested, top, int(np.sign(speed[top]))))
         rested = run.stop
     columns = np.array(spans, dtype=int).reshape(-1, 5).T

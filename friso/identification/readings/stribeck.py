@@ -13,29 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as fisher
 
-from friso.identification.output_error.parameters import EXPONENTS
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.readings.common import t_value
-
-SURE = 0.01
-"""Probability by chance below which a curve is taken for shown, or an exponent for another than stated."""
-
-VELOCITIES, SHAPES = 81, 41
-"""Points of the grid: Stribeck velocities and exponents; first of all there are, then of those that are possible."""
-
-FINER, MARGIN = 2, 2
-"""How often the grid is laid out again around what is possible, and by how many steps further than that: the valley of
-velocities with their exponents may be narrower than a step."""
-
-USUAL = 2.0
-"""Exponent with which a curve has to show alone where forces are few: another one costs a parameter."""
-
-SLOWER, FASTER = 30.0, 2.0
-"""How far below the slowest and above the fastest speed a Stribeck velocity may lie, as ratios."""
+from friso.identification.readings.settings import ReadingSettings
 
 
 @dataclass(frozen=True)
 class Possible:
-    """The best value of a parameter, what the forces leave possible of it, and whether that ends within the grid."""
+    """The best value of a parameter, what the forces leave possible of it, and whether that ends
+    within the grid.
+    """
 
     value: float
     low: float
@@ -45,9 +32,12 @@ class Possible:
 
 @dataclass(frozen=True)
 class FittedStribeck:
-    """Coulomb [N], viscous [N s/m] and static friction [N], the Stribeck velocity [m/s], the exponent, and the constant
-    force [N] along the axis by which friction was too large forward, each with its range; the covariance of the first
-    five (of four where the exponent was given), SI; and whether an exponent that was given was `refuted`."""
+    """A Stribeck curve through forces at some speeds, with what these leave open.
+
+    Each has its range: Coulomb [N], viscous [N s/m] and static friction [N], the Stribeck velocity [m/s], the exponent,
+    and the constant force [N] along the axis by which friction was too large forward. The covariance is that of the
+    first five (of four where the exponent was given), SI; an exponent that was given may be `refuted`.
+    """
 
     coulomb: Possible
     viscous: Possible
@@ -61,9 +51,12 @@ class FittedStribeck:
 
 @dataclass(frozen=True)
 class Forces:
-    """Friction [N] against the motion at some speeds [m/s], its directions (1, -1), and the standard deviation [N] of
-    each as a weight, all of shape (n,); the standard deviation [N] that all levels share; and whether directions share
-    one curve, beside a constant force."""
+    """Friction [N] against the motion at some speeds [m/s], shape (n,), to which a curve is
+    fitted.
+
+    `directions` are 1 or -1; `deviations` [N] weigh each force, and `level` [N] is a deviation that all levels share.
+    Directions may share one curve, beside a constant force.
+    """
 
     speeds: np.ndarray
     friction: np.ndarray
@@ -74,11 +67,23 @@ class Forces:
 
 
 def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> FittedStribeck | None:
-    """The curve through the forces; None where a straight line, which leaves `plain` (squares over variances), does as
-    well. With an `exponent` that is not refuted by the forces it is that one; forces too few to tell leave all."""
+    """Fit a Stribeck curve to forces; None where a straight line does as well.
+
+    The line leaves `plain` (squares over variances). An `exponent` that is not refuted by the forces is that of the
+    curve; forces too few to tell leave all exponents possible.
+    """
+    reading_settings = ReadingSettings.current()
+    settings = OutputErrorSettings.current()
     speeds = forces.speeds
-    velocities = np.geomspace(speeds.min() / SLOWER, speeds.max() * FASTER, VELOCITIES)
-    shapes, left = np.linspace(EXPONENTS[0], EXPONENTS[1], SHAPES), len(speeds) - 5 - forces.both
+    velocities = np.geomspace(
+        speeds.min() / reading_settings.ratio_below_the_slowest,
+        speeds.max() * reading_settings.ratio_above_the_fastest,
+        reading_settings.grid_of_velocities,
+    )
+    shapes, left = (
+        np.linspace(settings.stribeck_exponents[0], settings.stribeck_exponents[1], reading_settings.grid_of_exponents),
+        len(speeds) - 5 - forces.both,
+    )
     apart = left < 1
     left += apart
     if left < 1:
@@ -88,28 +93,40 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
     if exponent is not None:
         stated = _Grid(forces, velocities, np.array([exponent]), False).around(left + (not apart))
         worse = (stated.least - grid.least) / max(grid.least / left, 1.0)
-        refuted = not apart and bool(fisher.sf(worse, 1, left) < SURE)
+        refuted = not apart and bool(fisher.sf(worse, 1, left) < reading_settings.chance_of_a_curve)
         if not refuted:
             grid, left = stated, left + (not apart)
     free = len(grid.shapes) > 1 and not apart
-    usual = _Grid(forces, velocities, np.array([USUAL]), False).around(left + free) if free else grid
+    usual = (
+        _Grid(forces, velocities, np.array([reading_settings.usual_exponent]), False).around(left + free)
+        if free
+        else grid
+    )
     if not (_better(plain, grid.least, 2 + free, left) or _better(plain, usual.least, 2, left + free)):
         return None
     return grid.curve(left, refuted, (velocities[0], velocities[-1]))
 
 
 def _better(plain: float, least: float, more: int, left: int) -> bool:
-    """Whether a curve with so many more parameters than a line leaves less than chance would have it."""
-    return least < plain and (least == 0 or bool(fisher.sf((plain - least) / more * left / least, more, left) < SURE))
+    """Tell whether a curve with so many more parameters than a line leaves less than chance
+    would have it.
+    """
+    settings = ReadingSettings.current()
+    return least < plain and (
+        least == 0 or bool(fisher.sf((plain - least) / more * left / least, more, left) < settings.chance_of_a_curve)
+    )
 
 
 class _Grid:
-    """The least squares of all that is linear, at each Stribeck velocity and exponent, shapes (velocities, exponents):
-    `cost` (squares over variances; infinite where friction would not rise towards rest), the solutions (.., p) and
-    their covariance (.., p, p) with all deviations as stated. Exponents taken `apart` are each as good as the best."""
+    """Least squares of all that is linear, at each Stribeck velocity and exponent of a grid.
+
+    Shapes are (velocities, exponents): `cost` (squares over variances; infinite where friction would not rise towards
+    rest), the solutions (.., p) and their covariance (.., p, p) with all deviations as stated. Exponents taken `apart`
+    are each as good as the best.
+    """
 
     def __init__(self, forces: Forces, velocities: np.ndarray, shapes: np.ndarray, apart: bool) -> None:
-        """Shapes (velocities,) and (exponents,)."""
+        """Solve the grid; its points have the shapes (velocities,) and (exponents,)."""
         self.forces, self.velocities, self.shapes, self.apart = forces, velocities, shapes, apart
         speeds = forces.speeds
         decay = np.exp(-((speeds / velocities[:, None, None]) ** shapes[:, None]))
@@ -131,27 +148,39 @@ class _Grid:
         return float(self.cost.min())
 
     def around(self, left: int) -> _Grid:
-        """A grid around what is possible with `left` degrees of freedom, a little further than that where this one goes
-        on; the same where no curve is."""
+        """Lay a grid around what is possible with `left` degrees of freedom.
+
+        It goes a little further where this one goes on; where no curve is possible it is this one.
+        """
+        settings = ReadingSettings.current()
         grid = self
-        for _ in range(FINER if np.isfinite(self.least) and left > 0 else 0):
+        for _ in range(settings.refinements_of_the_grid if np.isfinite(self.least) and left > 0 else 0):
             inside, ends = grid.room(left) >= 0, []
             for points, here in ((grid.velocities, inside.any(axis=1)), (grid.shapes, inside.any(axis=0))):
                 at = np.flatnonzero(here)
-                ends += [points[max(at[0] - MARGIN, 0)], points[min(at[-1] + MARGIN, len(points) - 1)]]
-            shapes = np.linspace(ends[2], ends[3], SHAPES) if len(grid.shapes) > 1 else grid.shapes
-            grid = _Grid(grid.forces, np.geomspace(ends[0], ends[1], VELOCITIES), shapes, grid.apart)
+                ends += [
+                    points[max(at[0] - settings.margin_of_the_grid, 0)],
+                    points[min(at[-1] + settings.margin_of_the_grid, len(points) - 1)],
+                ]
+            shapes = np.linspace(ends[2], ends[3], settings.grid_of_exponents) if len(grid.shapes) > 1 else grid.shapes
+            grid = _Grid(grid.forces, np.geomspace(ends[0], ends[1], settings.grid_of_velocities), shapes, grid.apart)
         return grid
 
     def room(self, left: int) -> np.ndarray:
-        """By how much less than chance allows, with `left` degrees of freedom, each point leaves more than the best."""
+        """Return by how much less than chance allows each point leaves more than the best.
+
+        `left` is the number of degrees of freedom.
+        """
         least = self.cost.min(axis=0, keepdims=True) if self.apart else np.array([[self.least]])
         least = np.where(np.isfinite(least), least, 0.0)
         return t_value(left) ** 2 * np.maximum(least / left, 1.0) - (self.cost - least)
 
     def curve(self, left: int, refuted: bool, outer: tuple[float, float]) -> FittedStribeck:
-        """The best curve with its ranges, of `left` degrees of freedom; those that reach an `outer` Stribeck velocity
-        or exponent are not closed."""
+        """Return the best curve with its ranges, of `left` degrees of freedom.
+
+        Ranges that reach an `outer` Stribeck velocity or exponent are not closed.
+        """
+        settings = OutputErrorSettings.current()
         forces, open_shape = self.forces, len(self.shapes) > 1
         best = np.unravel_index(int(np.argmin(self.cost)), self.cost.shape)
         scatter, t = max(float(self.cost[best]) / left, 1.0), t_value(left)
@@ -159,7 +188,7 @@ class _Grid:
         inside = room >= 0
         fast, shaped = np.asarray(inside.any(axis=1)), np.asarray(inside.any(axis=0))
         ends = [bool(self.velocities[fast][end] == outer[end]) for end in (0, -1)]
-        cut = any(float(self.shapes[shaped][end]) == EXPONENTS[end] for end in (0, -1))
+        cut = any(float(self.shapes[shaped][end]) == settings.stribeck_exponents[end] for end in (0, -1))
 
         def linear(place: int, scale: float, level: float, closed: bool) -> Possible:
             centre = self.solutions[..., place][inside] * scale
@@ -183,8 +212,7 @@ class _Grid:
         )
 
     def _covariance(self, best: tuple[int, int], scatter: float, open_shape: bool) -> np.ndarray:
-        """Of Coulomb, viscous and static friction, Stribeck velocity and, where it is open, exponent, SI, by the slope
-        at the best curve."""
+        """Return the covariance of the curve's parameters, SI, by the slope at the best curve."""
         forces, speeds = self.forces, self.forces.speeds
         velocity, shape = float(self.velocities[best[0]]), float(self.shapes[best[1]])
         ratio = speeds / velocity
@@ -203,7 +231,9 @@ class _Grid:
 
 
 def _between(points: np.ndarray, inside: np.ndarray, ratios: bool) -> tuple[float, float]:
-    """The least and the greatest point of a grid that lie inside, each by half a step further out."""
+    """Return the least and the greatest point of a grid that lie inside, each by half a step
+    further out.
+    """
     (at,) = np.nonzero(inside)
     scale = np.log(points) if ratios else points
     step = float(scale[1] - scale[0]) if len(points) > 1 else 0.0

@@ -23,23 +23,22 @@ from friso.identification.response.period import find_periods
 from friso.identification.response.periodic import multisine
 from friso.identification.response.records import ResponseRecord, from_log, relative_error
 from friso.identification.response.response import Channels, FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 from friso.identification.response.simulated import Explanation, explained
 from friso.identification.response.two_mass import TwoMass, fit_two_mass, widened
-
-ABOVE_FRICTION = 1 / 7
-"""Share of the highest frequency below which friction may bend a response: lines below it are left to a second look."""
-
-RIGID = 0.4
-"""Share of the antiresonance's frequency up to which both masses move as one (to 1/(1 - 0.16) = 1.2)."""
 
 FrequencyRange = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class Bench:
-    """The responses of force to position of the driven mass and, where it is measured, of the other one; what they show
-    between `band` [Hz]; how friction bends the lower end; and `aside`, for every log, the relative errors with which
-    the other logs' model predicts its outputs. `warnings` say what was not found and why."""
+    """What the frequency responses of one bench show.
+
+    `driven` and `other` are the responses of force to position of the driven mass and, where it is measured, of the
+    other one; lines, modes and two masses are what they show between `band` [Hz]; `departs`, `drag` and `explanation`
+    say how friction bends the lower end. `aside` has, for every log, the relative errors with which the other logs'
+    model predicts its outputs. `warnings` say what was not found and why.
+    """
 
     logs: tuple[Log, ...]
     driven: FrequencyResponse
@@ -62,18 +61,23 @@ def analyse(
     period: float | None = None,
     measured: MeasuredResponse | None = None,
 ) -> Bench:
-    """What the logs of one bench, realisations of one experiment, show; or a response as somebody `measured` it.
+    """Analyse the logs of one bench, realisations of one experiment; or a response as somebody
+    `measured` it.
 
     `band` [Hz] is that of the models (default: above where friction bends the response); `period` [s] about that of a
     periodic excitation (default: found). Raises InputError where no response can be estimated.
     """
+    settings = ResponseSettings.current()
     records = {output: [_record(log, output) for log in logs] for output in _outputs(logs)}
     if measured is not None:
         driven, other = as_measured(measured), None
     else:
         driven, other = _clear([_response(of_output, logs[0], output, period) for output, of_output in records.items()])
     warnings = [text for record in records.get("position", []) if record.reference is None for text in feedback(record)]
-    first = band or (float(max(driven.frequency[0], driven.frequency[-1] * ABOVE_FRICTION)), _top(driven))
+    first = band or (
+        float(max(driven.frequency[0], driven.frequency[-1] * settings.frequency_above_friction)),
+        _top(driven),
+    )
     model = _attempt(warnings, "two masses", fit_two_mass, driven, other, first)
     if model and band is None and _below(model, first):
         model = _attempt([], "two masses", fit_two_mass, driven, other, None) or model
@@ -102,14 +106,18 @@ def analyse(
 
 
 def _outputs(logs: Sequence[Log]) -> list[str]:
-    """The roles of the outputs that all logs have: the driven mass, and the other one where it is measured."""
+    """List the roles of the outputs that all logs have: the driven mass, and the other one where
+    it is measured.
+    """
     if not logs:
         return []
     return ["position", *(["cart_position"] if all("cart_position" in log for log in logs) else [])]
 
 
 def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
-    """A response that somebody else measured: how far it can be believed follows from its scatter alone."""
+    """Take a response as somebody else measured it: its scatter alone says how far it can be
+    believed.
+    """
     output, _, unit = measured.unit.partition("/")
     unknown, lines = np.full(len(measured.frequency), np.nan), len(measured.frequency)
     return FrequencyResponse(
@@ -120,10 +128,10 @@ def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
 
 
 def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[float, ...]:
-    """Relative errors with which the two-mass model predicts the outputs of another log, excited every `period` [s],
-    over the band.
+    """Return the relative errors with which the two-mass model predicts the outputs of another
+    log, over the band.
 
-    Raises InputError where there is no model.
+    The log is excited every `period` [s]. Raises InputError where there is no model.
     """
     if bench.two_masses is None:
         raise InputError("--predict", "no two-mass model", "a response with an antiresonance and a resonance")
@@ -131,7 +139,7 @@ def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[floa
 
 
 def _attempt(warnings: list[str], label: str, function, *arguments):
-    """The answer of an analysis, or None and why it has none."""
+    """Return the answer of an analysis; or None, and add to the warnings why it has none."""
     try:
         return function(*arguments)
     except InputError as error:
@@ -140,11 +148,16 @@ def _attempt(warnings: list[str], label: str, function, *arguments):
 
 
 def _record(log: Log, output: str) -> ResponseRecord:
+    """Return a log as a record of force and an output."""
     return from_log(log, "force", output, external(log))[0]
 
 
 def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: float | None) -> FrequencyResponse:
-    """By averaging over periods, or where nothing repeats by the local polynomial method; names are the log's."""
+    """Estimate a response by averaging over periods, or where nothing repeats by the local
+    polynomial method.
+
+    Names of the channels are the log's.
+    """
     channels = from_log(log, "force", output)[1]
     try:
         find_periods(records[0].driving, None if period is None else period / records[0].sample_time)
@@ -156,7 +169,7 @@ def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: 
 
 
 def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, FrequencyResponse | None]:
-    """The responses of the two outputs, or of the one, on the lines on which any of them stands out of the noise.
+    """Keep the lines on which a response of either output stands out of the noise.
 
     Raises InputError where none does.
     """
@@ -166,19 +179,21 @@ def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, F
 
 
 def _below(model: TwoMass, band: FrequencyRange) -> bool:
-    """Whether a two-mass model has no antiresonance, or puts it below a band [Hz], where what it leaves out, such as
-    bristles, may stand for it."""
+    """Tell whether a two-mass model has no antiresonance, or puts it below a band [Hz].
+
+    What the model leaves out, such as bristles, may stand for it there.
+    """
     return not model["antiresonance frequency"].value >= band[0]
 
 
 def _above(driven: FrequencyResponse, departs: Departure | None) -> FrequencyRange:
-    """The band above the departure by friction."""
+    """Return the band above the departure by friction."""
     low = departs.frequency.high if departs is not None and departs.frequency.determined else 0.0
     return max(float(driven.frequency[0]), low), _top(driven)
 
 
 def _top(driven: FrequencyResponse) -> float:
-    """The last line, rounding errors apart."""
+    """Return the last line, rounding errors apart."""
     return float(driven.frequency[-1]) * (1 + 1e-9)
 
 
@@ -190,7 +205,7 @@ def _of_all(
     band: FrequencyRange,
     period: float | None,
 ) -> TwoMass:
-    """The two-mass model of all realisations, its intervals as wide as single ones scatter."""
+    """Fit the two-mass model to all realisations, its intervals as wide as single ones scatter."""
     apart = [_single(records, logs, i, band, period) for i in range(len(logs))]
     return widened(fit_two_mass(driven, other, band), apart)
 
@@ -202,7 +217,7 @@ def _single(
     band: FrequencyRange,
     period: float | None,
 ) -> TwoMass:
-    """The two-mass model of one realisation."""
+    """Fit the two-mass model to one realisation."""
     responses = [_response([of_output[which]], logs[which], output, period) for output, of_output in records.items()]
     return fit_two_mass(responses[0], responses[1] if len(responses) > 1 else None, band)
 
@@ -215,11 +230,13 @@ def _friction(
     model: TwoMass | None,
     period: float | None,
 ) -> tuple[Drag | None, Explanation | None]:
-    """The friction level that explains the departure, and whether a simulation with it does."""
+    """Return the friction level that explains the departure, and whether a simulation with it
+    does.
+    """
     if not records or departs is None or model is None or not departs.frequency.determined:
         return None, None
     step = records[0].sample_time
-    rigid = RIGID * model["antiresonance frequency"].value
+    rigid = ResponseSettings.current().frequency_of_one_body * model["antiresonance frequency"].value
     limits = (float(driven.frequency[0]) / 2, min(2 * departs.frequency.high, rigid))
     smooth = butter(4, min(2 * float(driven.frequency[-1]), 0.45 / step), fs=1 / step, output="sos")
     speeds = [sosfiltfilt(smooth, np.gradient(record.output, step)) for record in records]
@@ -233,7 +250,10 @@ def _friction(
 
 
 def _last_period(record: ResponseRecord, period: float | None) -> np.ndarray:
-    """The input over the last whole period. Raises InputError where nothing repeats."""
+    """Return the input over the last whole period.
+
+    Raises InputError where nothing repeats.
+    """
     periods = find_periods(record.driving, None if period is None else period / record.sample_time)
     return record.input[periods.stop - periods.samples : periods.stop]
 
@@ -245,7 +265,7 @@ def _left_out(
     band: FrequencyRange,
     period: float | None,
 ) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    """For each log, how the model of one other log predicts it."""
+    """Return for each log how the model of one other log predicts it."""
     if len(logs) < 2:
         return ()
     rows = []
@@ -257,7 +277,7 @@ def _left_out(
 
 
 def _errors(model: TwoMass, log: Log, band: FrequencyRange, period: float | None, both: bool) -> tuple[float, ...]:
-    """Relative errors of the driven output and, if asked, of the other one."""
+    """Return the relative errors of the driven output and, if asked, of the other one."""
     outputs = [("position", True), *([("cart_position", False)] if both else [])]
     return tuple(
         relative_error(lambda f, c=collocated: model.predict(f, c), _record(log, output), band, period)

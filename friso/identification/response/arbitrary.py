@@ -12,24 +12,17 @@ from scipy import signal
 from friso.errors import InputError
 from friso.identification.response.records import ResponseRecord
 from friso.identification.response.response import Channels, FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 
 OVERLAP = 1 / 36
 """Squared correlation of neighbouring Hann segments that overlap by half (Welch 1967, doi:10.1109/TAU.1967.1161901)."""
 
-ORDER = 2
-"""Order of the local polynomials of response and transient."""
-
-HALF = 8
-"""Lines on each side in a local fit: 17 complex equations, 6 unknowns."""
-
-WEAK = 1e-4
-"""Amplitude of the external signal, over its largest, below which a line is not excited and not reported (-80 dB)."""
-
 
 def welch(record: ResponseRecord, resolution: float, channels: Channels | None = None) -> FrequencyResponse:
-    """The response by Hann segments of 1/`resolution` [Hz] that overlap by half, with coherence.
+    """Estimate a response by Hann segments of 1/`resolution` [Hz] that overlap by half, with
+    coherence.
 
-    H1 where the record has no reference. Its variance is that of the output not coherent with the external signal
+    It is H1 where the record has no reference. Its variance is that of the output not coherent with the external signal
     (Bendat, Piersol, Random Data, 4th ed., ch. 9), over the effective number of segments. Leakage is no part of it: a
     mode sharper than the resolution comes out too low. Raises InputError for fewer than 4 segments.
     """
@@ -56,7 +49,7 @@ def welch(record: ResponseRecord, resolution: float, channels: Channels | None =
         effective = count / (1 + 2 * OVERLAP * (count - 1) / count)
         deviation = np.sqrt(np.maximum(left, 0.0) * power / (max(effective - 1, 1) * np.abs(driven) ** 2))
         coherence = np.abs(answer) ** 2 / (power * total)
-    excited = np.sqrt(power) > WEAK * np.sqrt(power.max())
+    excited = np.sqrt(power) > ResponseSettings.current().amplitude_of_a_weak_line * np.sqrt(power.max())
     degrees = np.full(len(frequency), 2 * (effective - 1))
     return _response(frequency, response, deviation, degrees, "welch", channels, coherence, record.sample_time).at(
         excited
@@ -64,23 +57,31 @@ def welch(record: ResponseRecord, resolution: float, channels: Channels | None =
 
 
 def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -> FrequencyResponse:
-    """The response by the local polynomial method, free of leakage (Pintelon, Schoukens, 2nd ed., ch. 7).
+    """Estimate a response by the local polynomial method, free of leakage.
 
-    About every line, response and transient are polynomials of order 2 in the frequency over 17 lines of the spectrum
-    of the whole record; what these leave over is the noise. One line in 9 is given, so that neighbours share little.
-    Raises InputError for a record of fewer than 200 samples.
+    The method is that of Pintelon, Schoukens, 2nd ed., ch. 7: about every line, response and transient are polynomials
+    of order 2 in the frequency over 17 lines of the spectrum of the whole record; what these leave over is the noise.
+    One line in 9 is given, so that neighbours share little. Raises InputError for a record of fewer than 200 samples.
     """
+    settings = ResponseSettings.current()
     record = record.checked(200)
     external = record.input if record.reference is None else record.reference
     size = len(external)
     driving, excitation, answer = (
         np.fft.rfft(channel - channel.mean()) / size for channel in (external, record.input, record.output)
     )
-    centres = np.arange(1 + HALF, len(driving) - HALF - 1, HALF + 1)
-    window = centres[:, None] + np.arange(-HALF, HALF + 1)
+    centres = np.arange(
+        1 + settings.lines_on_a_side, len(driving) - settings.lines_on_a_side - 1, settings.lines_on_a_side + 1
+    )
+    window = centres[:, None] + np.arange(-settings.lines_on_a_side, settings.lines_on_a_side + 1)
     strong = np.sqrt(np.mean(np.abs(driving[window]) ** 2, axis=1))
-    centres, window = centres[strong > WEAK * strong.max()], window[strong > WEAK * strong.max()]
-    powers = (np.arange(-HALF, HALF + 1) / HALF)[:, None] ** np.arange(ORDER + 1)
+    centres, window = (
+        centres[strong > settings.amplitude_of_a_weak_line * strong.max()],
+        window[strong > settings.amplitude_of_a_weak_line * strong.max()],
+    )
+    powers = (np.arange(-settings.lines_on_a_side, settings.lines_on_a_side + 1) / settings.lines_on_a_side)[
+        :, None
+    ] ** np.arange(settings.order_of_local_polynomials + 1)
     scale = np.sqrt(np.mean(np.abs(driving[window]) ** 2, axis=1))
     regressors = driving[window][:, :, None] * powers / scale[:, None, None]
     transient = np.broadcast_to(powers, (len(centres), *powers.shape))
@@ -110,6 +111,7 @@ def _response(
     coherence: np.ndarray | None,
     sample_time: float,
 ) -> FrequencyResponse:
+    """Make a response of an arbitrary excitation."""
     unknown = np.full(len(frequency), np.nan)
     warnings = ("noise and nonlinear distortion cannot be distinguished: the deviation covers both",)
     return FrequencyResponse(

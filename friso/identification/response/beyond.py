@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 
 DELAY, HELD, COMPLIANCES = range(3)
 """Places of the parameters: the delay [s]; the square of the time for which the force is held [ms^2]; from the
@@ -25,19 +26,16 @@ IMAGES = np.array([k for k in range(-8, 9) if k])[:, None]
 """Numbers of the images that count, shape (images, 1): those left out are 0.00002 of the response of a mass at four
 samples per period."""
 
-LATEST = 0.4
-"""Largest delay over the period of the highest frequency. A drive that computes for a sample and holds the force for
-another one acts one and a half samples late: 0.38 of a period at four samples for each."""
-
-USUAL = 0.25
-"""Share of the period of the highest frequency that an unknown sample time usually has at most."""
-
 MILLI = 1e-3
 
 
 def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-    """Responses (outputs, lines) over frequencies [Hz] with delay, hold and a compliance for each output, of a `model`
-    that tells those of the masses, shape (outputs, n), at any frequencies [Hz], shape (n,), negative ones included."""
+    """Add delay, hold and a compliance for each output to the responses of masses, shape
+    (outputs, lines).
+
+    The `model` tells those of the masses, shape (outputs, n), at any frequencies [Hz], shape (n,), negative ones
+    included.
+    """
     delay, held, compliances = parameters[DELAY], MILLI * np.sqrt(parameters[HELD]), parameters[COMPLIANCES:, None]
     masses = model(frequency) * np.sinc(frequency * held)
     if held > 0:
@@ -49,19 +47,26 @@ def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, par
 
 
 def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper limits of the parameters, each of shape (COMPLIANCES + outputs,), for a model of a response up to
-    `top` [Hz]."""
-    late, longest = LATEST / top, _longest(response, 0.5)
+    """Return lower and upper limits of the parameters, each of shape (COMPLIANCES + outputs,).
+
+    They are for a model of a response up to `top` [Hz].
+    """
+    late, longest = ResponseSettings.current().periods_of_a_delay / top, _longest(response, 0.5)
     free = np.full(outputs, np.inf)
     return np.array([-late, 0.0, *-free]), np.array([late, (longest / MILLI) ** 2, *free])
 
 
 def believed(response: FrequencyResponse) -> tuple[float, float]:
-    """Value and deviation [ms^2] of the square of the time for which the force is held: none to the sample time."""
-    half = (_longest(response, USUAL) / MILLI) ** 2 / 2
+    """Return value and deviation [ms^2] of the square of the time for which the force is held.
+
+    It may be held for none of the sample time, or for all of it.
+    """
+    half = (_longest(response, ResponseSettings.current().periods_of_a_sample) / MILLI) ** 2 / 2
     return half, half
 
 
 def _longest(response: FrequencyResponse, share: float) -> float:
-    """The sample time [s], or where it is not known this share of the period of the highest frequency."""
+    """Return the sample time [s], or where it is not known a share of the period of the highest
+    frequency.
+    """
     return response.sample_time or share / float(response.frequency[-1])

@@ -10,50 +10,37 @@ from friso.identification.estimate import Estimate
 from friso.identification.response.period import find_periods
 from friso.identification.response.records import ResponseRecord, drift
 from friso.identification.response.response import Channels, FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 from friso.quantities import percent
-
-OWN, OTHER = 60, 8
-"""Past samples of the input, and of the output, from which the input is foretold. Its own past is looked at much
-further back, since an output without feedback remembers the input too."""
-
-LEAST = 600
-"""Samples needed for that."""
-
-SURE = 1e-6
-"""Chance below which the output is said to foretell the input."""
-
-SHARE = 0.05
-"""Share of the input's surprise that the output's past must explain, so that small imperfections do not count."""
-
-GROUPS = 5
-"""Bands, with as many lines each, in which the mean difference of two estimates is tested: a bias is smooth."""
-
-EXACT = 1e-6
-"""Relative difference between periods of an input below which nothing was added to it: it was played from a table."""
 
 
 def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
-    """What speaks for a controller acting from output to input, as sentences; empty where nothing does.
+    """Say in sentences what speaks for a controller acting from output to input; () where
+    nothing does.
 
     Without a loop the output's past cannot help to foretell the input beyond the input's own past (Granger 1969,
-    doi:10.2307/1912791; for feedback: Caines, Chan 1975, doi:10.1109/TAC.1975.1101008). An input that repeats is
-    taken without its periodic part; one that repeats exactly cannot hold any reaction. Slow or weak loops stay unseen.
+    doi:10.2307/1912791; for feedback: Caines, Chan 1975, doi:10.1109/TAC.1975.1101008). An input that repeats is taken
+    without its periodic part; one that repeats exactly cannot hold any reaction. Slow or weak loops stay unseen.
+
     The present sample of the output counts as past, since a position cannot react to a force within the same sample;
     `direct` says that this output can (an acceleration).
     """
-    record = record.checked(LEAST)
+    settings = ResponseSettings.current()
+    record = record.checked(settings.samples_of_a_feedback_test)
     driven, answer = _surprising(record)
     if driven is None or answer is None:
         return ()
     chance, share = _foretold(driven, answer, direct)
-    if chance > SURE or share < SHARE:
+    if chance > settings.chance_of_feedback or share < settings.share_of_surprise:
         return ()
     finding = f"the output predicts {percent(share)} of the innovation of the input (chance {chance:.1g})"
     return (f"{finding}: closed loop, a direct estimate is biased; give the force injected, or a reference that moves",)
 
 
 def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Input and output without their periodic part, if they have one; None where nothing is left of the input."""
+    """Return input and output without their periodic part, if they have one; None where nothing
+    is left of the input.
+    """
     try:
         periods = find_periods(record.input)
     except InputError:
@@ -63,27 +50,33 @@ def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray |
         samples = values[periods.start : periods.stop]
         samples = samples - drift(samples, periods.samples)
         parts.append((samples.reshape(periods.count, -1) - samples.reshape(periods.count, -1).mean(axis=0)).ravel())
-    if np.std(parts[0]) <= EXACT * np.std(record.input):
+    if np.std(parts[0]) <= ResponseSettings.current().difference_of_played_periods * np.std(record.input):
         return None, None
     return parts[0], parts[1]
 
 
 def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[float, float]:
-    """Chance of the F-test that the output's past does not help, and the share of the surprise that it explains."""
-    target = driven[OWN:]
-    past = [driven[OWN - lag : -lag] for lag in range(1, OWN + 1)]
+    """Return the chance of an F-test that the output's past does not help, and the share of the
+    surprise it explains.
+    """
+    settings = ResponseSettings.current()
+    target = driven[settings.past_of_the_input :]
+    past = [driven[settings.past_of_the_input - lag : -lag] for lag in range(1, settings.past_of_the_input + 1)]
     first = int(direct)
-    other = [answer[OWN - lag : len(answer) - lag] for lag in range(first, OTHER + first)]
+    other = [
+        answer[settings.past_of_the_input - lag : len(answer) - lag]
+        for lag in range(first, settings.past_of_the_output + first)
+    ]
     before, after = (_residual_power(target, columns) for columns in (past, past + other))
-    free = len(target) - OWN - OTHER - 1
+    free = len(target) - settings.past_of_the_input - settings.past_of_the_output - 1
     if not after > 0:
         return 1.0, 0.0
-    statistic = (before - after) / OTHER / (after / free)
-    return float(stats.f.sf(statistic, OTHER, free)), float(1 - after / before)
+    statistic = (before - after) / settings.past_of_the_output / (after / free)
+    return float(stats.f.sf(statistic, settings.past_of_the_output, free)), float(1 - after / before)
 
 
 def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
-    """Sum of squares that a regression on columns, and a constant, leaves."""
+    """Return the sum of squares that a regression on columns, and a constant, leaves."""
     matrix = np.stack([np.ones(len(target)), *columns], axis=1)
     matrix /= np.linalg.norm(matrix, axis=0)
     residual = target - matrix @ np.linalg.lstsq(matrix, target, rcond=1e-13)[0]
@@ -91,31 +84,37 @@ def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
 
 
 def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tuple[str, ...]:
-    """A sentence where a direct and an indirect estimate on the same lines differ by more than their deviations."""
+    """Say where a direct and an indirect estimate on the same lines differ by more than their
+    deviations.
+    """
+    settings = ResponseSettings.current()
     _same_lines(direct, indirect)
     weight = 1 / (direct.deviation**2 + indirect.deviation**2)
-    off = np.array_split(weight * (direct.response - indirect.response), GROUPS)
+    off = np.array_split(weight * (direct.response - indirect.response), settings.bands_of_a_bias)
     sums = [
         2 * abs(np.sum(part)) ** 2 / np.sum(scale)
-        for part, scale in zip(off, np.array_split(weight, GROUPS), strict=True)
+        for part, scale in zip(off, np.array_split(weight, settings.bands_of_a_bias), strict=True)
     ]
-    chance = float(stats.chi2.sf(np.sum(sums), 2 * GROUPS))
+    chance = float(stats.chi2.sf(np.sum(sums), 2 * settings.bands_of_a_bias))
     if chance > 1e-3:
         return ()
     return (f"direct and indirect estimates differ (chance {chance:.1g}): the direct one is biased by the loop",)
 
 
 def measured_open_loop(plant: FrequencyResponse, controller: np.ndarray) -> FrequencyResponse:
-    """L = C G from the plant and the controller's known response (lines,), complex, [input per output unit]."""
+    """Return L = C G from the plant and the controller's response (lines,), complex, [input per
+    output unit].
+    """
     loop = plant.times(np.asarray(controller), "loop", plant.channels.input_unit)
     return FrequencyResponse(**{**vars(loop), "channels": Channels("error", "1", "loop", "1")})
 
 
 def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
-    """Frequencies [Hz] at which |L| passes 1, by rising frequency, each with its interval; none is an answer too.
+    """Return frequencies [Hz] at which |L| passes 1, by rising frequency, each with its
+    interval; () is an answer too.
 
-    Interpolated in logarithms; the interval follows from that of the magnitude and the slope over the lines nearby.
-    Three passages (or five, ...) that the noise does not tell apart are one.
+    They are interpolated in logarithms; the interval follows from that of the magnitude and the slope over the lines
+    nearby. Three passages (or five, ...) that the noise does not tell apart are one.
     """
     size, place = np.log(np.abs(loop.response)), np.log(loop.frequency)
     band = loop.band()
@@ -137,10 +136,13 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
 
 
 def _merged_passage(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
-    """Low end, centre and high end of passages taken for one: the middle one, and all that they span."""
+    """Return low end, centre and high end of passages taken for one: the middle one, and all
+    that they span.
+    """
     return min(low for low, _, _ in group), group[len(group) // 2][1], max(high for _, _, high in group)
 
 
 def _same_lines(first: FrequencyResponse, second: FrequencyResponse) -> None:
+    """Check that two responses have the same lines."""
     if not np.array_equal(first.frequency, second.frequency):
         raise InputError("response", "responses on different lines", "the same lines", "both from the same record")

@@ -12,13 +12,8 @@ from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.response.fitting import refined
 from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 from friso.intervals import COVERAGE
-
-WINDOW = 9
-"""Neighbouring lines that are judged together: scatter averages out over them, a departure does not."""
-
-CHANCE = 0.01
-"""Chance below which a window of lines counts as off the model."""
 
 RANDOM = np.sqrt(2 / np.pi)
 """Damping by Coulomb friction F under a velocity of normal distribution with standard deviation v, over F/v (Gelb,
@@ -27,10 +22,11 @@ Vander Velde 1968, table E.2: random-input describing function of the ideal rela
 
 @dataclass(frozen=True)
 class Departure:
-    """Below `frequency` a response differs from the model; `excess` (lines,) is |G/G_model|, on lines `lines` [Hz].
+    """Where a response leaves its linear model at low frequency.
 
-    `differ` says whether realisations differ there by more than noise (chance below 1 %), None where there is one
-    only; `ratio` is their scatter over the noise.
+    Below `frequency` it differs from the model; `excess` (lines,) is |G/G_model|, on lines `lines` [Hz]. `differ` says
+    whether realisations differ there by more than noise (chance below 1 %), None where there is one only; `ratio` is
+    their scatter over the noise.
     """
 
     frequency: Estimate
@@ -41,50 +37,56 @@ class Departure:
 
 
 def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndarray]) -> Departure:
-    """Where the response leaves `model`, a function of frequencies [Hz], at its low end.
+    """Find where a response leaves `model`, a function of frequencies [Hz], at its low end.
 
     The mean of the ratio of response to model, over windows of neighbouring lines, is tested against 1 (F with the
     degrees of the deviations) in the lower half of the lines; the scale of the test is that of the upper half, where
     the model is taken to hold as well as it can. The interval is the last window that is off. Raises InputError for
     fewer than 36 lines.
     """
+    settings = ResponseSettings.current()
     frequency = response.frequency
-    if len(frequency) < 4 * WINDOW:
+    if len(frequency) < 4 * settings.lines_of_a_window:
         raise InputError(
-            "response", f"{len(frequency)} lines", f"at least {4 * WINDOW} lines", "a multisine of 100 lines"
+            "response",
+            f"{len(frequency)} lines",
+            f"at least {4 * settings.lines_of_a_window} lines",
+            "a multisine of 100 lines",
         )
     ratio = response.response / model(frequency)
     weight = 2 * np.abs(response.response) ** 2 / response.scatter() ** 2
-    half, ones = len(frequency) // 2, np.ones(WINDOW)
+    half, ones = len(frequency) // 2, np.ones(settings.lines_of_a_window)
     pulls = np.abs(np.convolve(weight * (ratio - 1), ones, "valid")) ** 2 / np.convolve(weight, ones, "valid") / 2
     scale = max(float(np.mean(pulls[half:])), 1.0)
-    limit = scale * stats.f.ppf(1 - CHANCE, 2, max(np.median(response.degrees), 2.0))
+    limit = scale * stats.f.ppf(1 - settings.chance_of_a_departure, 2, max(np.median(response.degrees), 2.0))
     off = np.flatnonzero(pulls[:half] > limit)
-    name, method = "departure frequency", f"mean over {WINDOW} lines, against the linear model"
+    name, method = "departure frequency", f"mean over {settings.lines_of_a_window} lines, against the linear model"
     if not off.size:
         reason = "the response follows the model down to its lowest line"
         onset = Estimate.unknown(name, "Hz", method, reason, 0.0, float(frequency[0]))
         return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(None)))
-    last = int(off[-1]) + WINDOW - 1
-    low, high = frequency[last - WINDOW + 1], frequency[last]
-    middle = float(frequency[last - WINDOW // 2])
+    last = int(off[-1]) + settings.lines_of_a_window - 1
+    low, high = frequency[last - settings.lines_of_a_window + 1], frequency[last]
+    middle = float(frequency[last - settings.lines_of_a_window // 2])
     onset = Estimate(name, "Hz", middle, float(low), float(high), method)
     return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(0, last + 1)))
 
 
 def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, float]:
-    """Whether distortion is more than noise on some lines, and its ratio to it."""
+    """Tell whether distortion is more than noise on some lines, and return its ratio to it."""
+    settings = ResponseSettings.current()
     noise, distortion = response.noise[part], response.distortion[part]
     if not np.all(np.isfinite(distortion)) or not np.all(noise > 0):
         return None, np.nan
     ratio = np.median((noise**2 + distortion**2) / noise**2)
     degrees = float(np.median(response.degrees))
-    return bool(ratio > stats.f.ppf(1 - CHANCE, degrees, 10 * degrees)), float(np.sqrt(ratio))
+    return bool(ratio > stats.f.ppf(1 - settings.chance_of_a_departure, degrees, 10 * degrees)), float(np.sqrt(ratio))
 
 
 @dataclass(frozen=True)
 class Drag:
-    """What acts on a rigid mass besides its inertia, at low frequency: a spring and a damper that replace friction.
+    """What acts on a rigid mass besides its inertia, at low frequency: a spring and a damper
+    that replace friction.
 
     `coulomb` is the friction level that damps as much at the velocity of this record (a random one of standard
     deviation `velocity`), `sign` is -1 where the output goes against the input; `left` is the share of the departure
@@ -104,13 +106,14 @@ class Drag:
 def friction_from_departure(
     response: FrequencyResponse, velocities: Sequence[np.ndarray], limits: tuple[float, float], sign: float = 1.0
 ) -> Drag:
-    """The friction level that explains how a response leaves its mass line between `limits` [Hz].
+    """Return the friction level that explains how a response leaves its mass line between
+    `limits` [Hz].
 
     `velocities` are those of the realisations, each of shape (n,), [output unit/s]. Under a broad-band excitation
     Coulomb friction F acts as a damper sqrt(2/pi) F/standard deviation of the velocity: 1/(m s^2 + d s + k) is fitted.
     The interval covers that of the damping and the difference between two distributions of the velocity, normal and
-    sinusoidal (gain 4/pi over the amplitude). Valid while the body slides most of the time. `sign` is -1 where the
-    output goes against the input. Raises InputError for fewer than 8 lines.
+    sinusoidal (gain 4/pi over the amplitude). It is valid while the body slides most of the time. `sign` is -1 where
+    the output goes against the input. Raises InputError for fewer than 8 lines.
     """
     part = response.between(*limits)
     if len(part.frequency) < 8:
@@ -142,7 +145,9 @@ def friction_from_departure(
 
 
 def _coulomb(damping: Estimate, velocity: float, unit: str) -> Estimate:
-    """The Coulomb level behind an equivalent damping, with the describing functions of random and sinusoidal motion."""
+    """Return the Coulomb level behind an equivalent damping, by describing functions of random
+    and sinusoidal motion.
+    """
     method = "damping at low frequency, as Coulomb friction under random motion"
     if damping.high <= 0:
         reason = "the response shows no damping at low frequency"

@@ -11,6 +11,7 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 
 ResponseModel = Callable[[np.ndarray], np.ndarray]
 """From parameters (p,) to complex responses (outputs, lines)."""
@@ -18,17 +19,13 @@ ResponseModel = Callable[[np.ndarray], np.ndarray]
 
 NOTHING: Mapping[int, tuple[float, float]] = MappingProxyType({})
 
-CLOSE = 1e-6
-"""Relative change of the sum of squares, or of the parameters, that ends a fit: far below what noise does to them."""
-
-
-LOOSE = 1e3
-"""Factor to either side from which an interval to first order says nothing about a positive quantity."""
-
 
 @dataclass(frozen=True)
 class ResponseFit:
-    """Parameters (p,), their covariance (p, p), the sum of squares in units of the variance, and the counts of data."""
+    """Parameters (p,) fitted to responses, with their covariance (p, p).
+
+    `squares` is the sum of squares in units of the variance, and `count` the number of data.
+    """
 
     parameters: np.ndarray
     covariance: np.ndarray
@@ -42,12 +39,16 @@ class ResponseFit:
 
     @property
     def bic(self) -> float:
-        """Bayesian information criterion, scale of the variance unknown (Schwarz 1978, doi:10.1214/aos/1176344136)."""
+        """Bayesian information criterion, scale of the variance unknown (Schwarz 1978,
+        doi:10.1214/aos/1176344136).
+        """
         return self.count * np.log(self.squares / self.count) + len(self.parameters) * np.log(self.count)
 
     def _at(self, of: Callable[[np.ndarray], float]) -> tuple[float, float]:
-        """What follows from the parameters, and its deviation to first order; NaN or infinite where one is left open,
-        beside whose value others overflow."""
+        """Return what follows from the parameters, and its deviation to first order.
+
+        It is NaN or infinite where a parameter is left open, beside whose value others overflow.
+        """
         steps = 1e-4 * np.sqrt(np.maximum(np.diag(self.covariance), 1e-30))
         beside = [_number(of, self.parameters + h) - _number(of, self.parameters - h) for h in np.diag(steps)]
         with np.errstate(all="ignore"):
@@ -58,7 +59,11 @@ class ResponseFit:
     def estimate(
         self, name: str, unit: str, method: str, of: Callable[[np.ndarray], float], positive: bool = False
     ) -> Estimate:
-        """What follows from the parameters, with its interval to first order; a `positive` one in the logarithm."""
+        """Estimate what follows from the parameters, with its interval to first order.
+
+        The interval of a `positive` quantity is one of its logarithm.
+        """
+        settings = ResponseSettings.current()
         value, deviation = self._at(of)
         if not np.isfinite(value) or (positive and not value > 0):
             return Estimate.unknown(name, unit, method, "the fitted model does not have it")
@@ -67,15 +72,15 @@ class ResponseFit:
         plain = Estimate.normal(name, unit, value, deviation, method)
         if not positive:
             return plain
-        factor = np.exp(min(plain.half_width / value, np.log(2 * LOOSE)))
-        if not factor < LOOSE:
-            reason = f"its interval spans more than a factor of {LOOSE:g} to either side"
+        factor = np.exp(min(plain.half_width / value, np.log(2 * settings.factor_of_a_loose_interval)))
+        if not factor < settings.factor_of_a_loose_interval:
+            reason = f"its interval spans more than a factor of {settings.factor_of_a_loose_interval:g} to either side"
             return Estimate.unknown(name, unit, method, reason, 0.0)
         return Estimate(name, unit, value, value / factor, value * factor, method)
 
 
 def _number(of: Callable[[np.ndarray], float], parameters: np.ndarray) -> float:
-    """What follows from parameters; NaN where they are so large that nothing does."""
+    """Return what follows from parameters; NaN where they are so large that nothing does."""
     try:
         with np.errstate(all="ignore"):
             return float(of(parameters))
@@ -84,7 +89,9 @@ def _number(of: Callable[[np.ndarray], float], parameters: np.ndarray) -> float:
 
 
 def deviations(response: FrequencyResponse) -> np.ndarray:
-    """Deviations as weights, (lines,): not below a thousandth of the response, which no model is right to."""
+    """Return deviations as weights, (lines,): not below a thousandth of the response, which no
+    model is right to.
+    """
     return np.hypot(response.scatter(), 1e-3 * np.abs(response.response))
 
 
@@ -97,13 +104,15 @@ def refined(
     upper: np.ndarray | float = np.inf,
     believed: Mapping[int, tuple[float, float]] = NOTHING,
 ) -> ResponseFit:
-    """The model's parameters by least squares, weighted by the deviations; responses of shape (outputs, lines).
+    """Fit a model's parameters by least squares, weighted by the deviations; responses have the
+    shape (outputs, lines).
 
     The errors of one line may be correlated between outputs, and those of neighbouring lines with each other, since a
     model is never quite right: the covariance is the larger of the plain one, scaled by the residual, and one that
     allows for that (Newey, West 1987, doi:10.2307/1913610). What is `believed` of parameters, by place a value and its
     deviation, counts as one more observation each; limits only keep the fit from going astray.
     """
+    settings = ResponseSettings.current()
     weight = np.sqrt(2) / deviation
     places = list(believed)
     middle, reach = np.array(list(believed.values())).reshape(-1, 2).T
@@ -117,7 +126,15 @@ def refined(
             return np.concatenate([np.stack([error.real, error.imag], axis=-1).ravel(), off])
 
         limits = (lower, upper)
-        return least_squares(residuals, first, bounds=limits, x_scale="jac", ftol=CLOSE, xtol=CLOSE, max_nfev=200)
+        return least_squares(
+            residuals,
+            first,
+            bounds=limits,
+            x_scale="jac",
+            ftol=settings.tolerance_of_a_fit,
+            xtol=settings.tolerance_of_a_fit,
+            max_nfev=200,
+        )
 
     def reduced(solution: OptimizeResult) -> float:
         return float(np.sum(solution.fun[:count] ** 2)) / free
@@ -139,7 +156,7 @@ def refined(
 
 
 def _long_run(scores: np.ndarray) -> np.ndarray:
-    """Covariance of the sum of scores (lines, p) that are correlated over some lines."""
+    """Return the covariance of the sum of scores (lines, p) that are correlated over some lines."""
     total = scores.T @ scores
     reach = int(4 * (len(scores) / 100) ** (2 / 9))
     for lag in range(1, min(reach, len(scores) - 1) + 1):
@@ -149,7 +166,9 @@ def _long_run(scores: np.ndarray) -> np.ndarray:
 
 
 def _larger(plain: np.ndarray, robust: np.ndarray) -> np.ndarray:
-    """The plain covariance with its deviations raised to those of the robust one where they are larger."""
+    """Raise the deviations of the plain covariance to those of the robust one where these are
+    larger.
+    """
     ratio = np.diag(robust) / np.maximum(np.diag(plain), np.finfo(float).tiny)
     raised = np.sqrt(np.maximum(ratio, 1.0))
     return plain * raised[:, None] * raised

@@ -20,8 +20,11 @@ from friso.identification.response.response import FrequencyResponse
 
 @dataclass(frozen=True)
 class Visible:
-    """What a response shows: straight lines by frequency, modes (None: too few lines, or none fits), the `case` of the
-    cart ("stuck", "sliding", or "" where it cannot be decided), and all of it in words."""
+    """What a response shows of a stage on a cart.
+
+    It shows straight lines by frequency, modes (None: too few lines, or none fits), the `case` of the cart ("stuck",
+    "sliding", or "" where it cannot be decided), and all of it in words.
+    """
 
     case: str
     lines: tuple[StraightLine, ...]
@@ -30,7 +33,10 @@ class Visible:
 
 
 def visible(response: FrequencyResponse, modes: Modes | None = None) -> Visible:
-    """Which lines and modes a force-to-position response shows; `modes` are fitted where they are not given."""
+    """Find which lines and modes a force-to-position response shows.
+
+    The `modes` are fitted where they are not given.
+    """
     sign = _sign(response)
     lines = [line for slope in KINDS for line in straight_lines(response, slope, sign)]
     ordered = tuple(sorted(lines, key=lambda line: line.low))
@@ -43,13 +49,13 @@ def visible(response: FrequencyResponse, modes: Modes | None = None) -> Visible:
 
 
 def _sign(response: FrequencyResponse) -> float | None:
-    """The sign of the widest line, whatever its slope."""
+    """Return the sign of the widest line, whatever its slope."""
     lines = [line for slope in KINDS for line in straight_lines(response, slope, None, 1)]
     return max(lines, key=lambda line: line.octaves).sign if lines else None
 
 
 def _resonances(modes: Modes | None) -> Mapping[str, float]:
-    """Frequencies [Hz] of resonances and antiresonances by name, by frequency."""
+    """Return the frequencies [Hz] of resonances and antiresonances by name, by frequency."""
     if modes is None:
         return {}
     frequencies = {
@@ -61,9 +67,10 @@ def _resonances(modes: Modes | None) -> Mapping[str, float]:
 
 
 def _case(lines: tuple[StraightLine, ...], pairs: Mapping[str, float]) -> str:
-    """The case by the lowest line: a spring is a stuck cart, a mass or a damper a sliding one.
+    """Tell by the lowest line whether the cart sticks or slides.
 
-    A line above the first antiresonance, or the first resonance if there is none, says nothing about the cart.
+    A spring is a stuck cart, a mass or a damper a sliding one. A line above the first antiresonance, or the first
+    resonance if there is none, says nothing about the cart.
     """
     kind = "antiresonance" if any(name.startswith("antiresonance") for name in pairs) else "resonance"
     first = min((value for name, value in pairs.items() if name.startswith(kind)), default=np.inf)
@@ -74,12 +81,14 @@ def _case(lines: tuple[StraightLine, ...], pairs: Mapping[str, float]) -> str:
 
 
 def _words(line: StraightLine) -> str:
+    """A straight line in words."""
     value = line.value
     text = f"{value.value:.4g} {value.unit} ({value.low:.4g} to {value.high:.4g})"
     return f"{line.kind} from {line.low:.3g} to {line.high:.3g} Hz: {text}"
 
 
 def _verdict(case: str, pairs: Mapping[str, float]) -> str:
+    """The case of the cart in words."""
     kinds = [name.split()[0] for name in pairs]
     pair = any(a == "antiresonance" and b == "resonance" for a, b in pairwise(kinds))
     if case == "sliding":

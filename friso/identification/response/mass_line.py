@@ -14,23 +14,11 @@ from scipy import stats
 
 from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 from friso.intervals import COVERAGE
-
-WIGGLE = 0.02
-"""Relative scatter that a straight line may have beyond its noise: drives, guides and cables are never quite straight.
-Where neighbouring lines scatter by more than their noise, that counts instead."""
-
-APART = 1.5
-"""Two lines are two only if the level between them leaves both by this factor: a mode, not a bend."""
 
 TURNED = np.radians(30)
 """Phase by which a line of the band may be off, beyond its noise (delay, damping, a mode nearby)."""
-
-LINES, OCTAVES = 4, 0.4
-"""The least number of frequency lines and width of a band."""
-
-EDGES = 300
-"""At most so many frequencies are tried as ends of a band."""
 
 KINDS: Mapping[int, str] = {0: "stiffness line", 1: "damping line", 2: "mass line"}
 """Names of the lines by minus their slope."""
@@ -55,11 +43,13 @@ class StraightLine:
 
     @property
     def octaves(self) -> float:
+        """Width of the band in octaves."""
         return float(np.log2(self.high / self.low))
 
 
 def mass_lines(response: FrequencyResponse, most: int = 3) -> tuple[StraightLine, ...]:
-    """The mass lines of a force-to-position response by frequency, at most so many; none is an answer too.
+    """Find the mass lines of a force-to-position response by frequency, at most so many; () is
+    an answer too.
 
     Below an antiresonance it is the line of the whole mass, above the resonance that of the driven part.
     """
@@ -69,7 +59,8 @@ def mass_lines(response: FrequencyResponse, most: int = 3) -> tuple[StraightLine
 def straight_lines(
     response: FrequencyResponse, slope: int, sign: float | None = None, most: int = 3
 ) -> tuple[StraightLine, ...]:
-    """Bands in which the response falls with `slope` (0, 1 or 2), widest in octaves first found, then by frequency.
+    """Find bands in which a response falls with `slope` (0, 1 or 2), widest in octaves first,
+    then by frequency.
 
     `sign` is 1 or -1 where it is known which way the input acts (default: what most of the band says).
     """
@@ -89,9 +80,9 @@ def straight_lines(
 
 
 def _clear(response: FrequencyResponse, slope: int, band: tuple[int, int, float]) -> bool:
-    """Whether the slope of a band is known well enough to tell it from the slopes one less and one more."""
+    """Tell whether the slope of a band is told from the slopes one less and one more."""
     frequency, level, _, relative = (quantity[band[0] : band[1] + 1] for quantity in _flat(response, slope, band[2]))
-    weight = 1 / (relative**2 / 2 + WIGGLE**2)
+    weight = 1 / (relative**2 / 2 + ResponseSettings.current().scatter_of_a_straight_line ** 2)
     octave = np.log(frequency) - np.average(np.log(frequency), weights=weight)
     spread = np.sum(weight * octave**2)
     return bool(abs(np.sum(weight * octave * level) / spread) + 2 / np.sqrt(spread) < 0.5)
@@ -100,19 +91,21 @@ def _clear(response: FrequencyResponse, slope: int, band: tuple[int, int, float]
 def _parted(
     response: FrequencyResponse, slope: int, first: tuple[int, int, float], second: tuple[int, int, float]
 ) -> bool:
-    """Whether there is a mode between two bands."""
+    """Tell whether there is a mode between two bands."""
     lower, upper = sorted([first, second])
     level = _flat(response, slope, 1.0)[1]
     between = level[lower[1] + 1 : upper[0]]
     means = [np.mean(level[band[0] : band[1] + 1]) for band in (lower, upper)]
     off = np.abs(between[:, None] - means).min(axis=1, initial=np.inf)
-    return bool(np.any(off > np.log(APART)))
+    return bool(np.any(off > np.log(ResponseSettings.current().factor_between_lines)))
 
 
 def _widest(
     response: FrequencyResponse, slope: int, sign: float | None, start: int, stop: int
 ) -> tuple[int, int, float] | None:
-    """First and last line of the widest straight band among those from start to stop, with its sign, or None."""
+    """Return first and last line of the widest straight band among those from start to stop,
+    with its sign, or None.
+    """
     signs = (1.0, -1.0) if sign is None else (sign,)
     bands = [(*band, its_sign) for its_sign in signs if (band := _straight(response, slope, its_sign, start, stop))]
     return (
@@ -121,36 +114,45 @@ def _widest(
 
 
 def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, stop: int) -> tuple[int, int] | None:
-    """The widest band from start to stop with acceptable chi-square and phase, by sums over all pairs of ends."""
-    if stop - start < LINES:
+    """Return the widest band from start to stop with acceptable chi-square and phase, by sums
+    over all pairs of ends.
+    """
+    settings = ResponseSettings.current()
+    if stop - start < settings.lines_of_a_band:
         return None
     frequency, level, phase, relative = (quantity[start:stop] for quantity in _flat(response, slope, sign))
-    weight = 2 / (relative**2 + 2 * WIGGLE**2)
+    weight = 2 / (relative**2 + 2 * settings.scatter_of_a_straight_line**2)
     sums = np.stack([weight, weight * level, weight * level**2, np.abs(phase) > TURNED + 2 * relative])
     sums = np.concatenate([np.zeros((4, 1)), np.cumsum(sums, axis=1)], axis=1)
-    step = max(1, -(-len(frequency) // EDGES))
+    step = max(1, -(-len(frequency) // settings.edges_tried))
     first, last = np.arange(0, len(frequency), step)[:, None], np.arange(0, len(frequency), step)[None, :]
     count = last - first + 1
     total, linear, square, turned = sums[:, np.maximum(last + 1, first)] - sums[:, np.minimum(first, last + 1)]
     with np.errstate(divide="ignore", invalid="ignore"):
         chi = square - linear**2 / total
-        good = (count >= LINES) & (turned == 0) & (chi <= stats.chi2.ppf(0.95, np.maximum(count - 1, 1)))
+        good = (
+            (count >= settings.lines_of_a_band)
+            & (turned == 0)
+            & (chi <= stats.chi2.ppf(0.95, np.maximum(count - 1, 1)))
+        )
     width = np.where(good, np.log2(frequency[last] / frequency[first]), -1.0)
     i, j = np.unravel_index(np.argmax(width), width.shape)
-    if width[i, j] < OCTAVES:
+    if width[i, j] < settings.octaves_of_a_band:
         return None
     return start + int(first[i, 0]), start + int(last[0, j])
 
 
 def _flat(response: FrequencyResponse, slope: int, sign: float) -> tuple[np.ndarray, ...]:
-    """Frequency, logarithm of the level, phase off the line, and relative deviation, each (lines,)."""
+    """Return frequency, logarithm of the level, phase off the line, and relative deviation, each
+    (lines,).
+    """
     value = sign * response.response * (2j * np.pi * response.frequency) ** slope
     relative = response.scatter() / np.abs(response.response)
     return response.frequency, np.log(np.abs(value)), np.angle(value), relative
 
 
 def _line(response: FrequencyResponse, slope: int, sign: float, band: slice) -> StraightLine:
-    """The level of a band with its interval, and what it stands for."""
+    """Return the level of a band with its interval, and what it stands for."""
     mean, half, independent = _level(response, slope, sign, band)
     low, high = float(response.frequency[band][0]), float(response.frequency[band][-1])
     method = f"{KINDS[slope]}, {low:.3g} to {high:.3g} Hz"
@@ -167,17 +169,20 @@ def _line(response: FrequencyResponse, slope: int, sign: float, band: slice) -> 
 
 
 def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) -> tuple[float, float, float]:
-    """Logarithm of the level of a band, the half-width of its interval, and how many independent lines there are.
+    """Return the logarithm of the level of a band, half its interval, and how many independent
+    lines there are.
 
     A line may bend towards a mode above it (with frequency squared) or from one below (with its inverse): where that is
-    significant, the level is that of the straight end. The interval covers the noise, the scatter along the band with
-    as many independent lines as the correlation of neighbours leaves, what a bend may hide to second order, and
-    what the phase leaves open: of friction, 1/level is the magnitude times its cosine; of a delay, the magnitude. Where
-    friction makes neighbouring lines scatter, it also makes the mass read high, by up to as much: by 0.1 to 1.0 times
-    the scatter on 23 machines drawn at random (`benchmarks/identify.py`).
+    significant, the level is that of the straight end.
+
+    The interval covers the noise, the scatter along the band with as many independent lines as the correlation of
+    neighbours leaves, what a bend may hide to second order, and what the phase leaves open: of friction, 1/level is the
+    magnitude times its cosine; of a delay, the magnitude. Where friction makes neighbouring lines scatter, it also
+    makes the mass read high, by up to as much: by 0.1 to 1.0 times the scatter on 23 machines drawn at random
+    (`benchmarks/identify.py`).
     """
     _, level, phase, relative = (quantity[band] for quantity in _flat(response, slope, sign))
-    weight = 1 / (relative**2 / 2 + WIGGLE**2)
+    weight = 1 / (relative**2 / 2 + ResponseSettings.current().scatter_of_a_straight_line ** 2)
     columns, coefficients = _bent(_bends(response, slope, band), level, weight)
     inverse = np.linalg.inv(columns.T @ (weight[:, None] * columns))
     residual = level - columns @ coefficients
@@ -196,7 +201,8 @@ def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) ->
 
 
 def _independent(residual: np.ndarray) -> float:
-    """Effective number of independent lines: correlations of neighbours are summed until they are gone.
+    """Return the effective number of independent lines: correlations of neighbours are summed
+    until they are gone.
 
     That sum comes out too small in a short band; a first-order autoregression does not, which is used if it says less.
     """
@@ -211,10 +217,12 @@ def _independent(residual: np.ndarray) -> float:
 
 
 def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndarray]:
-    """Shapes (lines,) in which the line may bend: towards the nearer mode, above it or below; both if there is none."""
+    """Return shapes (lines,) in which a line may bend: towards the nearer mode, above it or
+    below; both if there is none.
+    """
     frequency, level = _flat(response, slope, 1.0)[:2]
     inside, mean = frequency[band], np.mean(level[band])
-    gone = frequency[np.abs(level - mean) > np.log(APART)]
+    gone = frequency[np.abs(level - mean) > np.log(ResponseSettings.current().factor_between_lines)]
     above, below = gone[gone > inside[-1]], gone[gone < inside[0]]
     up = above[0] / inside[-1] if above.size else np.inf
     down = inside[0] / below[-1] if below.size else np.inf
@@ -223,7 +231,9 @@ def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndar
 
 
 def _bent(shapes: list[np.ndarray], level: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Columns (lines, 1 or 2) and coefficients of the line: straight, or bent where an F-test at 1 % asks for that."""
+    """Return columns (lines, 1 or 2) and coefficients of a line: straight, or bent where an
+    F-test at 1 % asks for that.
+    """
     ones = np.ones((len(level), 1))
     columns, coefficients = ones, np.array([np.average(level, weights=weight)])
     straight = squares = float(np.sum(weight * (level - coefficients[0]) ** 2))

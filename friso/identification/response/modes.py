@@ -20,30 +20,18 @@ from friso.identification.response.rational import (
     simplest_model,
 )
 from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 
 METHOD = "rational fit of the response"
-
-MOST = 4
-"""Modes at most."""
-
-LEAST = 0.01
-"""Relative error of the response below which no model is trusted; keeps a few strong lines from ruling the fit."""
-
-
-EXPLAINED = 3.0
-"""Sum of squares over degrees of freedom up to which a fit counts as right."""
-
-CANCELS = 1.0
-"""Distance of a resonance from an antiresonance, over the smaller of their half-widths, up to which they nearly cancel:
-the response then changes by a factor of two at most, over so narrow a band that any unevenness may look like it."""
 
 
 @dataclass(frozen=True)
 class Modes:
-    """The fit over `band` [Hz], its resonances and antiresonances by frequency: ("resonance 1 frequency", ...).
+    """A fit of modes over `band` [Hz], with its resonances and antiresonances by frequency.
 
-    `order` says how the number of modes was chosen; `low_level` and `high_level` are the acceleration per input below
-    and above all modes (the mass lines), unknown without a rigid body.
+    They are called "resonance 1 frequency" and the like. `order` says how the number of modes was chosen; `low_level`
+    and `high_level` are the acceleration per input below and above all modes (the mass lines), unknown without a rigid
+    body.
     """
 
     shape: RationalShape
@@ -57,65 +45,56 @@ class Modes:
     warnings: tuple[str, ...]
 
     def __getitem__(self, name: str) -> Estimate:
+        """Return an estimate by name."""
         return next(estimate for estimate in self.estimates if estimate.name == name)
 
     def predict(self, frequency: np.ndarray) -> np.ndarray:
-        """The fitted response at frequencies [Hz], complex, same shape."""
+        """Return the fitted response at frequencies [Hz], complex, of their shape."""
         return rational(self.fit.parameters, self.shape, 1j * frequency / self.scale)
 
 
-def fit_modes(
-    response: FrequencyResponse, band: tuple[float, float] | None = None, rigid: bool | None = None, most: int = MOST
-) -> Modes:
-    """Modes of a force-to-position response in a `band` [Hz] (default: all lines).
+def fit_modes(response: FrequencyResponse, band: tuple[float, float] | None = None, rigid: bool | None = None) -> Modes:
+    """Fit modes to a force-to-position response in a `band` [Hz] (default: all lines).
 
     `rigid` says whether the mass moves freely (default: what fits better). Raises InputError for fewer than 12 lines.
     """
+    settings = ResponseSettings.current()
     part = response if band is None else response.between(*band)
     part = part.at(part.frequency > 0)
     if len(part.frequency) < 12:
         raise InputError("band", f"{len(part.frequency)} lines", "at least 12 lines for a fit of modes", "3 to 20 Hz")
     scale = float(np.sqrt(part.frequency[0] * part.frequency[-1]))
     s = 1j * part.frequency / scale
-    deviation = np.hypot(part.scatter(), LEAST * np.abs(part.response))
+    deviation = np.hypot(part.scatter(), settings.error_of_a_response * np.abs(part.response))
     kinds = (True, False) if rigid is None else (rigid,)
-    rows = [row for kind in kinds for row in orders(s, part.response, deviation, kind, most)]
+    rows = [row for kind in kinds for row in orders(s, part.response, deviation, kind, settings.modes_at_most)]
     shape, start, *_ = simplest_model(rows)
     low, high = bounds(shape, s)
     fit = refined(lambda p: rational(p, shape, s)[None], start, part.response[None], deviation[None], low, high)
     limits = (float(part.frequency[0]), float(part.frequency[-1]))
     low_level, high_level = (_level(fit, shape, scale, which, response) for which in ("low", "high"))
     warnings = [*_cancelling(fit, shape, scale, limits)]
-    if fit.reduced > EXPLAINED:
+    if fit.reduced > settings.misfit_of_a_right_model:
         warnings.append(f"the fit misses by more than the deviations (reduced chi-square {fit.reduced:.3g})")
     estimates = _pairs(fit, shape, scale, limits)
-    return Modes(
-        shape,
-        fit,
-        scale,
-        estimates,
-        low_level,
-        high_level,
-        _described(shape, rows),
-        limits,
-        tuple(warnings),
-    )
+    return Modes(shape, fit, scale, estimates, low_level, high_level, _described(shape, rows), limits, tuple(warnings))
 
 
 def _described(shape: RationalShape, rows: list[Row]) -> str:
-    """How the order was chosen."""
+    """Say how the order was chosen."""
     orders = ", ".join(f"{row.shape.words}: {row.bic:.4g}" for row in rows)
     return f"{shape.words} by the Bayesian information criterion ({orders})"
 
 
 def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> Iterator[str]:
-    """A sentence for each resonance within the band that an antiresonance nearly cancels."""
+    """Yield a sentence for each resonance within the band that an antiresonance nearly cancels."""
+    settings = ResponseSettings.current()
     poles, zeros = poles_and_zeros(fit.parameters, shape)
     for pole in sorted(poles, key=abs):
         if not zeros.size or not band[0] <= abs(pole) * scale <= band[1]:
             continue
         zero = zeros[np.argmin(np.abs(zeros - pole))]
-        if abs(zero - pole) <= CANCELS * min(-pole.real, abs(zero.real)):
+        if abs(zero - pole) <= settings.widths_of_cancelling * min(-pole.real, abs(zero.real)):
             yield (
                 f"a resonance at {abs(pole) * scale:.4g} Hz and an antiresonance at {abs(zero) * scale:.4g} Hz nearly "
                 "cancel: an unevenness of the response looks like this, too, and may be no mode"
@@ -123,7 +102,9 @@ def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tupl
 
 
 def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> tuple[Estimate, ...]:
-    """Frequencies and damping ratios of resonances and antiresonances within the band, by frequency."""
+    """Return frequencies and damping ratios of resonances and antiresonances within the band, by
+    frequency.
+    """
     estimates: list[Estimate] = []
     for kind, which in (("resonance", 0), ("antiresonance", 1)):
         inside = [
@@ -142,7 +123,7 @@ def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[flo
 
 
 def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.ndarray], complex]:
-    """The root that is nearest to a given one, as a function of the parameters."""
+    """Return the root that is nearest to a given one, as a function of the parameters."""
 
     def nearest(parameters: np.ndarray) -> complex:
         candidates = poles_and_zeros(parameters, shape)[which]
@@ -152,7 +133,9 @@ def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.nd
 
 
 def _level(fit: ResponseFit, shape: RationalShape, scale: float, which: str, response: FrequencyResponse) -> Estimate:
-    """Acceleration per input below all modes (the rigid body alone) or above all (with their residues)."""
+    """Return the acceleration per input below all modes (the rigid body alone) or above all
+    (with their residues).
+    """
     unit = f"{response.channels.output_unit}/s^2/{response.channels.input_unit}"
     name = f"mass line level, {'below' if which == 'low' else 'above'} the modes"
     if not shape.rigid:

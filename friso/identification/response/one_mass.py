@@ -10,20 +10,8 @@ from scipy import stats
 from friso.identification.response.beyond import COMPLIANCES, HELD, believed, beyond, bounds
 from friso.identification.response.fitting import ResponseFit, deviations, refined
 from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 from friso.identification.response.two_mass import TwoMass
-
-LEFT = 0.5
-"""Share of the squares left by one mass that two may leave where they are said: unevenness of a response gives a
-narrow pair of antiresonance and resonance something to explain anywhere, but not half of it."""
-
-CHANCE = 1e-3
-"""Probability that noise alone makes two masses explain so much more, on any of the lines."""
-
-TRIED = 3
-"""Starts that are refined."""
-
-DAMPED = 0.1
-"""Half-width of the mode on the spring from which a fit starts, over its frequency."""
 
 MASS, DRAG, SPRING, BEYOND = range(4)
 """Places of the parameters: logarithm of the mass, viscous friction, spring to ground; from the last on, those of
@@ -31,26 +19,30 @@ MASS, DRAG, SPRING, BEYOND = range(4)
 
 
 def needs_two(model: TwoMass, driven: FrequencyResponse, other: FrequencyResponse | None = None) -> bool:
-    """Whether two masses explain responses, over the band of their model, considerably better than one mass does.
+    """Tell whether two masses explain responses, over the band of their model, much better than
+    one mass does.
 
     The one mass has viscous friction and a spring to ground, and like the two what the drive and all that lies above
     the band add. An F-test says whether chance explains the difference; since the mode may lie at any line, its level
     is divided by their number.
     """
+    settings = ResponseSettings.current()
     responses = [response for response in (driven, other) if response is not None]
     one, two = fit_one_mass(responses, model.signs, model.band), model.fit
     free, more = max(two.count - len(two.parameters), 1), len(two.parameters) - len(one.parameters)
     better = (one.squares - two.squares) / more / (two.squares / free)
     chance = float(stats.f.sf(better, more, free)) * one.count / (2 * len(responses))
-    return two.squares < LEFT * one.squares and chance < CHANCE
+    return two.squares < settings.squares_left_by_two * one.squares and chance < settings.chance_of_two_masses
 
 
 def fit_one_mass(
     responses: list[FrequencyResponse], signs: tuple[float, ...], band: tuple[float, float]
 ) -> ResponseFit:
-    """One mass fitted to the responses of one or two outputs on the same lines in a band [Hz], signs of -1 reversed:
-    the best of the fits from several corners of friction and spring inside and below the band; parameters as in the
-    module."""
+    """Fit one mass to the responses of one or two outputs on the same lines in a band [Hz].
+
+    Signs of -1 are reversed. It is the best of the fits from several corners of friction and spring inside and below
+    the band; parameters are as in the module.
+    """
     held = {BEYOND + HELD: believed(responses[0])}
     outside = bounds(responses[0], band[1], len(responses))
     responses = [response.between(*band) for response in responses]
@@ -65,13 +57,15 @@ def fit_one_mass(
         return float(np.sum(np.abs((model(start) - values) / deviation) ** 2))
 
     lower, upper = np.array([-np.inf, 0.0, 0.0, *outside[0]]), np.array([np.inf, np.inf, np.inf, *outside[1]])
-    starts = sorted(_starts(values, frequency), key=misfit)[:TRIED]
+    starts = sorted(_starts(values, frequency), key=misfit)[: ResponseSettings.current().starts_refined]
     fits = [refined(model, start, values, deviation, lower, upper, held) for start in starts]
     return min(fits, key=lambda fit: fit.squares)
 
 
 def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Responses of one mass as each output has it, shape (outputs, lines), over frequencies [Hz]."""
+    """Return responses of one mass as each output has it, shape (outputs, lines), over
+    frequencies [Hz].
+    """
     mass, outputs = np.exp(parameters[MASS]), len(parameters) - BEYOND - COMPLIANCES
 
     def masses(frequency: np.ndarray) -> np.ndarray:
@@ -82,11 +76,14 @@ def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
 
 
 def _starts(values: np.ndarray, frequency: np.ndarray) -> list[np.ndarray]:
-    """Starts with corners of friction and spring at none or some of the frequencies, as large as the first response."""
+    """Return starts with corners of friction and spring at none or some frequencies, as large as
+    the first response.
+    """
+    settings = ResponseSettings.current()
     places = 2 * np.pi * np.array([0.0, *np.geomspace(frequency[0] / 3, frequency[-1], 6)])
     starts = []
     for corner, mode in product(places, places):
-        drag, spring = corner + DAMPED * mode, mode**2
+        drag, spring = corner + settings.width_of_a_start * mode, mode**2
         rest = np.zeros(COMPLIANCES + len(values))
         shape = one_mass(np.array([0.0, drag, spring, *rest]), frequency)[0]
         level = float(np.mean(np.log(np.abs(shape) / np.abs(values[0]))))

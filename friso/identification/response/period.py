@@ -8,17 +8,7 @@ import numpy as np
 from scipy import fft
 
 from friso.errors import InputError
-
-QUIET = 0.01
-"""Share of the input's peak-to-peak value below which a trailing stretch counts as switched off."""
-
-LIKE = 0.2
-"""Mean squared change from one period to the next, in units of twice the variance, of an input that repeats."""
-
-
-SLIP, GROWS = 0.02, 2.0
-"""Such a change from one period to the next that at least so many times as much has changed after two is a slip of the
-generator's clock against the recorder's, by a share of a sample each period: two in a row change four times as much."""
+from friso.identification.response.settings import ResponseSettings
 
 
 @dataclass(frozen=True)
@@ -32,18 +22,20 @@ class Periods:
 
     @property
     def count(self) -> int:
+        """How many whole periods there are."""
         return (self.stop - self.start) // self.samples
 
     def cut(self, signal: np.ndarray) -> np.ndarray:
-        """The signal by periods, shape (periods, samples)."""
+        """Cut a signal into periods, shape (periods, samples)."""
         return signal[self.start : self.stop].reshape(self.count, self.samples)
 
 
 def find_periods(signal: np.ndarray, expected: float | None = None) -> Periods:
-    """The whole periods of an input, shape (n,), counted back from the last sample at which it repeats.
+    """Find the whole periods of an input, shape (n,), counted back from the last sample at which
+    it repeats.
 
-    `expected` is about how many samples a period has: it is then looked for within 2 % of that. Raises InputError
-    where the signal does not repeat, or has fewer than two periods.
+    `expected` is about how many samples a period has: it is then looked for within 2 % of that. Raises InputError where
+    the signal does not repeat, or has fewer than two periods.
     """
     stop = _switched_off(signal)
     if np.unique(signal[:stop]).size < 2:
@@ -61,7 +53,9 @@ def find_periods(signal: np.ndarray, expected: float | None = None) -> Periods:
 
 
 def repetition(signal: np.ndarray) -> np.ndarray:
-    """Mean squared change of a signal, shape (n,), over a lag, in units of twice its variance, for lags 0 to n/2."""
+    """Return the mean squared change of a signal, shape (n,), over lags 0 to n/2, in units of
+    twice its variance.
+    """
     centred = signal - signal.mean()
     n, lags = len(centred), np.arange(len(centred) // 2 + 1)
     size = fft.next_fast_len(2 * n, real=True)
@@ -72,51 +66,64 @@ def repetition(signal: np.ndarray) -> np.ndarray:
 
 
 def _switched_off(signal: np.ndarray) -> int:
-    """One past the last sample before the input rests for good, if it does so for more than 10 samples."""
-    moving = np.flatnonzero(np.abs(signal - signal[-1]) > QUIET * np.ptp(signal))
+    """Return one past the last sample before the input rests for good, if it does so for more
+    than 10 samples.
+    """
+    settings = ResponseSettings.current()
+    moving = np.flatnonzero(np.abs(signal - signal[-1]) > settings.amplitude_switched_off * np.ptp(signal))
     stop = int(moving[-1]) + 1 if moving.size else 0
     return stop if len(signal) - stop > max(10, len(signal) // 200) else len(signal)
 
 
 def _shortest(change: np.ndarray) -> int:
-    """The shortest lag at which the signal repeats as well as at any, once it has changed at all."""
+    """Return the shortest lag at which the signal repeats as well as at any, once it has changed
+    at all.
+    """
     away = np.flatnonzero(change > 0.5)
     first = int(away[0]) if away.size else len(change)
     lags = np.arange(max(first, 2), len(change))
-    if not lags.size or change[lags].min() > LIKE:
+    if not lags.size or change[lags].min() > ResponseSettings.current().change_between_periods:
         raise _not_periodic("an input that does not repeat within half the record")
     good = lags[change[lags] <= 1.5 * change[lags].min() + 1e-9]
     return min([_lowest(change, int(good[0])), *_slipping(change, lags)[:1]])
 
 
 def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
-    """The lags, of those given, at which a signal repeats but for a slip of its clock."""
+    """Return the lags at which a signal repeats but for a slip of its clock."""
+    settings = ResponseSettings.current()
     inner = lags[2 * lags < len(change)]
     inner = inner[inner + 1 < len(change)]
-    lowest = (change[inner] <= change[inner - 1]) & (change[inner] <= change[inner + 1]) & (change[inner] < SLIP)
-    return [int(lag) for lag in inner[lowest] if change[2 * lag] > GROWS * change[lag]]
+    lowest = (
+        (change[inner] <= change[inner - 1])
+        & (change[inner] <= change[inner + 1])
+        & (change[inner] < settings.change_of_a_slip)
+    )
+    return [int(lag) for lag in inner[lowest] if change[2 * lag] > settings.growth_of_a_slip * change[lag]]
 
 
 def _lowest(change: np.ndarray, lag: int) -> int:
-    """Down from a lag to the next local minimum."""
+    """Go down from a lag to the next local minimum."""
     while lag + 1 < len(change) and change[lag + 1] < change[lag]:
         lag += 1
     return lag
 
 
 def _near(change: np.ndarray, expected: float) -> int:
+    """Return the lag near an expected one at which the signal repeats best."""
     low, high = int(0.98 * expected), int(np.ceil(1.02 * expected)) + 1
     if not 2 <= expected < len(change):
         raise _not_periodic(f"a period of {expected:g} samples in a record of {2 * len(change) - 2}")
     lags = np.arange(max(low, 2), min(high, len(change)))
     best = int(lags[np.argmin(change[lags])])
-    if change[best] > LIKE:
+    if change[best] > ResponseSettings.current().change_between_periods:
         raise _not_periodic(f"an input that does not repeat near {expected:g} samples")
     return best
 
 
 def _repeating(signal: np.ndarray, samples: int) -> tuple[int, int]:
-    """The stretch that repeats: no late start or ragged end, where most samples are unlike those a period off."""
+    """Return the stretch that repeats: no late start or ragged end, where most samples are
+    unlike those a period off.
+    """
     change = np.abs(signal[samples:] - signal[:-samples])
     unlike = change > 8 * 1.4826 * np.median(change) + 1e-5 * np.ptp(signal)
     width = max(3, samples // 50)
@@ -128,6 +135,7 @@ def _repeating(signal: np.ndarray, samples: int) -> tuple[int, int]:
 
 
 def _not_periodic(problem: str) -> InputError:
+    """The error for an input that does not repeat."""
     return InputError(
         "period", problem, "an input that repeats at least twice", "a multisine of 5 s, repeated 20 times"
     )

@@ -15,21 +15,14 @@ import numpy as np
 from friso.errors import InputError
 from friso.identification.response.records import ResponseRecord, Spectra, spectra
 from friso.identification.response.response import Channels, FrequencyResponse
-
-LINES = 5
-"""Neighbouring lines that share their relative variance where few realisations would leave it all too uncertain."""
-
-CLOCKS, EQUAL = 1e-3, 1e-6
-"""Share by which the periods of realisations may differ, as those of clocks do, and up to which they are equal."""
-
-FEW = 10
-"""Real degrees of freedom per line from which a variance stands on its own."""
+from friso.identification.response.settings import ResponseSettings
 
 
 def multisine(
     records: Sequence[ResponseRecord], period: float | None = None, channels: Channels | None = None
 ) -> FrequencyResponse:
-    """The response on the excited lines, from one or more realisations of a periodic excitation.
+    """Estimate the response on the excited lines, from one or more realisations of a periodic
+    excitation.
 
     A realisation is a record with phases of its own; if it has a reference, the response is the indirect one, that of
     output and input to the reference. `period` [s] is about how long a period is (default: found). The deviation covers
@@ -73,17 +66,21 @@ def multisine(
 
 
 def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
-    """The realisations, if they have the same lines, and what to say of their clocks. Raises InputError."""
+    """Bring realisations to the same lines, and say what there is to say of their clocks.
+
+    Raises InputError for those that do not have them.
+    """
+    settings = ResponseSettings.current()
     if not records:
         raise InputError("records", "none", "at least one record", "two realisations of a multisine")
     spacings = np.array([realisation.frequency[0] for realisation in records])
     apart = float(np.ptp(spacings) / spacings.min())
     counts = np.array([len(realisation.frequency) for realisation in records])
-    if apart > CLOCKS or np.ptp(counts) > 1 + CLOCKS * counts.min():
+    if apart > settings.period_tolerance or np.ptp(counts) > 1 + settings.period_tolerance * counts.min():
         text = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
         raise InputError("records", text, "realisations with the same period and sample time", "5 s each")
     records = [_first_lines(realisation, int(counts.min())) for realisation in records]
-    if apart <= EQUAL:
+    if apart <= settings.tolerance_of_equal_periods:
         return records, []
     mean = float(spacings.mean())
     lines = np.arange(1, counts.min() + 1) * mean
@@ -92,13 +89,13 @@ def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
 
 
 def _first_lines(realisation: Spectra, count: int) -> Spectra:
-    """The first so many lines of a realisation."""
+    """Return the first so many lines of a realisation."""
     names = ("frequency", "reference", "excited", "input", "output")
     return replace(realisation, **{name: getattr(realisation, name)[..., :count] for name in names})
 
 
 def _averaged(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The response and the deviation of it by noise, each (lines,)."""
+    """Return the response and its deviation by noise, each (lines,)."""
     outputs, inputs = _relative(records, excited)
     gain = inputs.mean(axis=0)
     response = outputs.mean(axis=0) / gain
@@ -112,20 +109,25 @@ def _averaged(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Output and input over the external signal, averaged over periods, each (realisations, lines)."""
+    """Return output and input over the external signal, averaged over periods, each
+    (realisations, lines).
+    """
     outputs = [realisation.output[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
     inputs = [realisation.input[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
     return np.array(outputs), np.array(inputs)
 
 
 def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The deviation of the mean, from how realisations differ, and its degrees of freedom, each (lines,)."""
+    """Return the deviation of the mean, from how realisations differ, and its degrees of
+    freedom, each (lines,).
+    """
+    settings = ResponseSettings.current()
     outputs, inputs = _relative(records, excited)
     count = len(records)
     squares = np.sum(np.abs(outputs - response * inputs) ** 2, axis=0)
     relative = squares / (count * (count - 1)) / np.abs(outputs.mean(axis=0)) ** 2
     freedom = 2 * (count - 1)
-    width = 1 if freedom >= FEW else min(LINES, len(relative))
+    width = 1 if freedom >= settings.freedom_of_a_variance else min(settings.lines_sharing_variance, len(relative))
     window = np.ones(width)
     shared = np.convolve(np.ones(len(relative)), window, "same")
     relative = np.convolve(relative, window, "same") / shared
@@ -133,10 +135,13 @@ def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) ->
 
 
 def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarray) -> np.ndarray:
-    """Distortion (lines,) from what the output holds, beyond noise, at lines in the band that are not excited.
+    """Return distortion (lines,) from what the output holds, beyond noise, at lines that are not
+    excited.
 
-    What the input itself holds there is taken off with the interpolated response. NaN where there are no such lines.
+    They are lines in the band. What the input itself holds there is taken off with the interpolated response. NaN where
+    there are no such lines.
     """
+    settings = ResponseSettings.current()
     places = np.flatnonzero(excited)
     free = np.setdiff1d(np.arange(places[0], places[-1] + 1), places)
     if len(free) < 2:
@@ -144,6 +149,6 @@ def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarr
     parts = [np.interp(free, places, part) for part in (np.real(response), np.imag(response))]
     left = realisation.output[:, free] - (parts[0] + 1j * parts[1]) * realisation.input[:, free]
     power = np.abs(left.mean(axis=0)) ** 2 - np.var(left, axis=0, ddof=1) / len(left)
-    near = np.argsort(np.abs(free[:, None] - places), axis=0, kind="stable")[:LINES]
+    near = np.argsort(np.abs(free[:, None] - places), axis=0, kind="stable")[: settings.lines_sharing_variance]
     local = np.maximum(power[near].mean(axis=0), 0.0)
     return np.sqrt(local) / np.abs(realisation.input.mean(axis=0)[places])

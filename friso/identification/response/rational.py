@@ -13,22 +13,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from friso.identification.response.fitting import CLOSE, ResponseFit
-
-CLEAR = 10.0
-"""By how much the information criterion must fall for another mode (Kass, Raftery 1995: very strong evidence)."""
-
-WORTH = 0.8
-"""The share of the sum of squares that another mode may leave at most. The model's error is not independent from line
-to line, so that the criterion alone would go on fitting the wiggles of friction."""
-
-PLACES, DAMPINGS = 60, (0.003, 0.01, 0.03, 0.1, 0.3)
-"""Frequencies and damping ratios at which a further mode is tried."""
+from friso.identification.response.fitting import ResponseFit
+from friso.identification.response.settings import ResponseSettings
 
 
 @dataclass(frozen=True)
 class RationalShape:
-    """What a model is made of: a rigid body or not, its number of modes, and a constant for those beyond the band."""
+    """What a rational model is made of: a rigid body or not, its modes, and a constant for those
+    beyond the band.
+    """
 
     rigid: bool
     modes: int
@@ -36,18 +29,21 @@ class RationalShape:
 
     @property
     def nonlinear(self) -> int:
-        """Parameters in front of the linear ones: viscous pole, delay; logarithms of frequencies, then of dampings."""
+        """Parameters in front of the linear ones: viscous pole, delay; logarithms of frequencies,
+        then of dampings.
+        """
         return 2 + 2 * self.modes
 
     @property
     def words(self) -> str:
+        """The shape in words."""
         parts = [f"{self.modes} mode{'s' if self.modes != 1 else ''}"]
         parts += ["rigid body"] * self.rigid + ["constant"] * self.constant
         return " + ".join(parts)
 
 
 class Row(NamedTuple):
-    """A model that was tried: parameters (p,), criterion, sum of squares."""
+    """A model that was tried: its shape, parameters (p,), criterion, and sum of squares."""
 
     shape: RationalShape
     parameters: np.ndarray
@@ -56,7 +52,7 @@ class Row(NamedTuple):
 
 
 def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool, most: int) -> list[Row]:
-    """Shape, parameters and criterion with 0, 1, ... modes, as long as one more helps; the last also with constant."""
+    """Fit 0, 1, ... modes, as long as one more helps; the last model also with a constant."""
     rows: list[Row] = []
     nonlinear = np.zeros(2)
     for modes in range(most + 1):
@@ -75,7 +71,7 @@ def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool
 
 
 def simplest_model(rows: list[Row]) -> Row:
-    """The simplest model that no larger one beats clearly."""
+    """Return the simplest model that no larger one beats clearly."""
     ordered = sorted(rows, key=lambda row: (len(row.parameters), not row.shape.rigid))
     best = ordered[0]
     for row in ordered[1:]:
@@ -85,11 +81,16 @@ def simplest_model(rows: list[Row]) -> Row:
 
 
 def _better(larger: Row, smaller: Row) -> bool:
-    return larger.bic < smaller.bic - CLEAR and larger.squares < WORTH * smaller.squares
+    """Tell whether a larger model beats a smaller one clearly."""
+    settings = ResponseSettings.current()
+    return (
+        larger.bic < smaller.bic - settings.criterion_of_a_mode
+        and larger.squares < settings.squares_left_by_a_mode * smaller.squares
+    )
 
 
 def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
-    """What the linear parameters multiply, complex, shape (linear, lines)."""
+    """Return what the linear parameters multiply, complex, shape (linear, lines)."""
     viscous, delay = nonlinear[:2]
     omega, damping = np.exp(nonlinear[2 : 2 + shape.modes]), np.exp(nonlinear[2 + shape.modes : shape.nonlinear])
     parts = [1 / (s * (s + viscous))[None]] if shape.rigid else []
@@ -100,12 +101,16 @@ def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.n
 
 
 def rational(parameters: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
-    """The response at complex frequencies s [rad/s], shape (lines,), of parameters of this shape."""
+    """Return the response at complex frequencies s [rad/s], shape (lines,), of parameters of
+    this shape.
+    """
     return parameters[shape.nonlinear :] @ _columns(parameters[: shape.nonlinear], shape, s)
 
 
 def _linear_parameters(columns: np.ndarray, values: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The best real linear parameters and the weighted residuals, real and imaginary part after each other."""
+    """Return the best real linear parameters and the weighted residuals, real and imaginary part
+    after each other.
+    """
     weight = np.sqrt(2) / deviation
     matrix, right = (columns * weight).T, values * weight
     matrix, right = np.concatenate([matrix.real, matrix.imag]), np.concatenate([right.real, right.imag])
@@ -115,7 +120,9 @@ def _linear_parameters(columns: np.ndarray, values: np.ndarray, deviation: np.nd
 
 
 def bounds(shape: RationalShape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Limits of all parameters: modes within an octave of the band, damping ratios from 1e-4 to 2, delays of a turn."""
+    """Return limits of all parameters: modes within an octave of the band, damping ratios 1e-4
+    to 2, delays of a turn.
+    """
     low, high, linear = np.abs(s[0]), np.abs(s[-1]), int(shape.rigid) + shape.modes + int(shape.constant)
     rest = np.full(linear, np.inf)
     omega, damping = np.full(shape.modes, np.log(low / 2)), np.full(shape.modes, np.log(1e-4))
@@ -127,11 +134,14 @@ def bounds(shape: RationalShape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 def _another(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
-    """Nonlinear parameters with one more mode, at the place and damping that leave the least."""
+    """Return nonlinear parameters with one more mode, at the place and damping that leave the
+    least.
+    """
+    settings = ResponseSettings.current()
     before = shape.modes - 1
     best, best_parameters = np.inf, nonlinear
-    for place in np.geomspace(np.abs(s[0]), np.abs(s[-1]), PLACES):
-        for damping in DAMPINGS:
+    for place in np.geomspace(np.abs(s[0]), np.abs(s[-1]), settings.frequencies_tried):
+        for damping in settings.dampings_tried:
             start = np.insert(np.append(nonlinear, np.log(damping)), 2 + before, np.log(place))
             left = _linear_parameters(_columns(start, shape, s), values, deviation)[1]
             if left @ left < best:
@@ -142,19 +152,22 @@ def _another(
 def _eliminated(
     start: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
-    """Nonlinear parameters refined with the linear ones eliminated (Golub, Pereyra 1973)."""
+    """Refine nonlinear parameters with the linear ones eliminated (Golub, Pereyra 1973)."""
+    settings = ResponseSettings.current()
 
     def left(nonlinear: np.ndarray) -> np.ndarray:
         return _linear_parameters(_columns(nonlinear, shape, s), values, deviation)[1]
 
     lower, upper = (limit[: shape.nonlinear] for limit in bounds(shape, s))
-    return least_squares(left, np.clip(start, lower, upper), bounds=(lower, upper), ftol=CLOSE, max_nfev=60).x
+    return least_squares(
+        left, np.clip(start, lower, upper), bounds=(lower, upper), ftol=settings.tolerance_of_a_fit, max_nfev=60
+    ).x
 
 
 def _completed(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> Row:
-    """The model with all its parameters, and how good it is."""
+    """Return the model with all its parameters, and how good it is."""
     linear, left = _linear_parameters(_columns(nonlinear, shape, s), values, deviation)
     parameters = np.concatenate([nonlinear, linear])
     squares = float(left @ left)
@@ -162,7 +175,9 @@ def _completed(
 
 
 def poles_and_zeros(parameters: np.ndarray, shape: RationalShape) -> tuple[np.ndarray, np.ndarray]:
-    """Poles of the modes and zeros of the response, those with positive imaginary part, in units of the scale."""
+    """Return poles of the modes and zeros of the response, those with positive imaginary part,
+    in units of the scale.
+    """
     omega, damping = np.exp(parameters[2 : 2 + shape.modes]), np.exp(parameters[2 + shape.modes : shape.nonlinear])
     linear = parameters[shape.nonlinear :]
     factors = [np.array([1.0, parameters[0], 0.0])] if shape.rigid else []

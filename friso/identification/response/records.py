@@ -12,26 +12,15 @@ from friso.errors import InputError
 from friso.identification.logs.log import Log
 from friso.identification.response.period import Periods, find_periods
 from friso.identification.response.response import Channels
-
-WEAK = 0.01
-"""Amplitude, over that of the strongest line, below which a line does not count as excited (-40 dB)."""
-
-CLEAR = 3.0
-"""How many standard deviations of its mean an excited line stands out of the noise."""
-
-GAP, SHARE = 2.5, 0.95
-"""A step down between line amplitudes that parts those meant from the rest, if the former hold that power."""
-
-SLIPPED = 0.05
-"""Samples by which a generator's clock slips over the record from which on it is taken anew."""
-
-FAR = 1.5
-"""A leading period is a transient if it lies this much further off than any period of the second half."""
+from friso.identification.response.settings import ResponseSettings
 
 
 @dataclass(frozen=True)
 class ResponseRecord:
-    """Input, output and, in closed loop, the external reference (or injected force), each (n,), `sample_time` [s]."""
+    """Input, output and, in closed loop, the external reference (or injected force), each (n,).
+
+    Samples are `sample_time` [s] apart.
+    """
 
     input: np.ndarray
     output: np.ndarray
@@ -44,7 +33,10 @@ class ResponseRecord:
         return self.input if self.reference is None else self.reference
 
     def checked(self, least: int = 8) -> ResponseRecord:
-        """The record as floats. Raises InputError for NaN, unequal lengths, constant signals, too few samples."""
+        """Return the record as floats.
+
+        Raises InputError for NaN, unequal lengths, constant signals, too few samples.
+        """
         named = {"input": self.input, "output": self.output}
         if self.reference is not None:
             named["reference"] = self.reference
@@ -62,7 +54,10 @@ class ResponseRecord:
 def from_log(
     log: Log, driving: str = "force", output: str = "position", reference: str | None = None
 ) -> tuple[ResponseRecord, Channels]:
-    """The longest segment of a log as a record, by roles, with names and units. Raises InputError for a missing one."""
+    """Return the longest segment of a log as a record, by roles, with names and units.
+
+    Raises InputError for a role that is missing.
+    """
     roles = [driving, output] + ([reference] if reference else [])
     for role in roles:
         if role not in log:
@@ -77,6 +72,7 @@ def from_log(
 
 
 def _check_signal(name: str, values: np.ndarray, least: int) -> None:
+    """Check that a signal is finite, changes, and has enough samples."""
     if len(values) < least:
         raise InputError(name, f"{len(values)} samples", f"at least {least}", "20 000 samples")
     bad = int(np.count_nonzero(~np.isfinite(values)))
@@ -92,7 +88,7 @@ def _check_signal(name: str, values: np.ndarray, least: int) -> None:
 class Spectra:
     """Spectra of one realisation at the harmonics `frequency` [Hz] (lines,), from the first on.
 
-    `input` and `output` are (periods, lines); `reference` (lines,) that of the external signal, averaged. `excited`
+    `input` and `output` are (periods, lines); `reference` (lines,) is that of the external signal, averaged. `excited`
     (lines,) are the lines that the external signal holds.
     """
 
@@ -105,10 +101,11 @@ class Spectra:
 
 
 def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
-    """Spectra of whole periods without transient, by the external signal: the reference if there is one, or the input.
+    """Return spectra of whole periods without transient, by the external signal.
 
-    `period` [s] is about how long a period is. What drifts from period to period is taken out beforehand.
-    Raises InputError for what does not repeat and for fewer than two periods that are left.
+    That is the reference if there is one, or the input. `period` [s] is about how long a period is. What drifts from
+    period to period is taken out beforehand. Raises InputError for what does not repeat and for fewer than two periods
+    that are left.
     """
     record = record.checked()
     expected = None if period is None else period / record.sample_time
@@ -116,7 +113,7 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
     driving = _harmonics(record.driving, periods)
     warnings = periods.warnings
     slip = _slip(driving, periods.samples)
-    if abs(slip) * periods.count > SLIPPED:
+    if abs(slip) * periods.count > ResponseSettings.current().samples_of_a_slip:
         text = (
             f"a period has {periods.samples + slip:.7g} samples, because the clocks differ: resampled to whole periods"
         )
@@ -141,6 +138,7 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
 
 
 def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
+    """Yield sentences on periods that are left out."""
     if not alike.all():
         yield f"{np.count_nonzero(~alike)} of {alike.size} periods left out, because their input differs"
     if first:
@@ -148,8 +146,11 @@ def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
 
 
 def _slip(driving: np.ndarray, samples: int) -> float:
-    """By how many samples a period is longer than whole `samples`: by how much the harmonics of the external signal,
-    shape (periods, lines), turn from one period to the next, in proportion to their numbers."""
+    """Return by how many samples a period is longer than whole `samples`.
+
+    The harmonics of the external signal, shape (periods, lines), turn from one period to the next, in proportion to
+    their numbers.
+    """
     turned = np.sum(driving[1:] * driving[:-1].conj(), axis=0)
     number, weight = np.arange(1, driving.shape[1] + 1), np.abs(turned)
     most = float(weight @ number**2)
@@ -157,8 +158,10 @@ def _slip(driving: np.ndarray, samples: int) -> float:
 
 
 def _at_other_rate(record: ResponseRecord, step: float) -> ResponseRecord:
-    """A record taken anew every `step` samples, by cubic splines: what these lose of high frequencies, all of its
-    signals lose."""
+    """Take a record anew every `step` samples, by cubic splines.
+
+    What these lose of high frequencies, all of its signals lose.
+    """
     at = np.arange(int((len(record.input) - 1) / step) + 1) * step
 
     def taken(signal: np.ndarray) -> np.ndarray:
@@ -169,14 +172,17 @@ def _at_other_rate(record: ResponseRecord, step: float) -> ResponseRecord:
 
 
 def _harmonics(signal: np.ndarray, periods: Periods) -> np.ndarray:
-    """Amplitudes of the harmonics in every period, shape (periods, lines), the signal's drift taken out."""
+    """Return amplitudes of the harmonics in every period, shape (periods, lines), the signal's
+    drift taken out.
+    """
     samples = signal[periods.start : periods.stop]
     cut = (samples - drift(samples, periods.samples)).reshape(periods.count, periods.samples)
     return np.fft.rfft(cut, axis=1)[:, 1 : (periods.samples - 1) // 2 + 1] * (2 / periods.samples)
 
 
 def drift(signal: np.ndarray, samples: int) -> np.ndarray:
-    """What is left of a signal, shape (n,), when averaged over a moving period: exactly nothing of the harmonics.
+    """Average a signal, shape (n,), over a moving period: exactly nothing of the harmonics is
+    left.
 
     At both ends, where no whole period fits, it is continued as a straight line.
     """
@@ -191,31 +197,38 @@ def drift(signal: np.ndarray, samples: int) -> np.ndarray:
 
 
 def _same_excitation(driving: np.ndarray) -> np.ndarray:
-    """Which periods have the same external signal as most."""
+    """Tell which periods have the same external signal as most."""
     middle = np.median(np.real(driving), axis=0) + 1j * np.median(np.imag(driving), axis=0)
     off = np.sqrt(np.mean(np.abs(driving - middle) ** 2, axis=1))
     return off <= 5 * np.median(off) + 1e-3 * np.sqrt(np.mean(np.abs(middle) ** 2))
 
 
 def _excited(driving: np.ndarray) -> np.ndarray:
-    """Which lines the external signal holds on purpose, shape (lines,)."""
+    """Tell which lines the external signal holds on purpose, shape (lines,)."""
+    settings = ResponseSettings.current()
     mean = np.abs(driving.mean(axis=0))
     noise = np.std(driving, axis=0, ddof=1) / np.sqrt(len(driving)) if len(driving) > 1 else 0 * mean
-    excited = (mean > WEAK * mean.max()) & (mean > CLEAR * noise)
+    excited = (mean > settings.amplitude_of_an_excited_line * mean.max()) & (
+        mean > settings.deviations_of_an_excited_line * noise
+    )
     sizes = np.sort(mean[excited])[::-1]
     if sizes.size > 2:
         steps = sizes[:-1] / sizes[1:]
         cut = int(np.argmax(steps))
-        if steps[cut] > GAP and np.sum(sizes[: cut + 1] ** 2) > SHARE * np.sum(sizes**2):
+        if steps[cut] > settings.step_between_lines and np.sum(
+            sizes[: cut + 1] ** 2
+        ) > settings.power_of_meant_lines * np.sum(sizes**2):
             excited &= mean >= sizes[cut]
     return excited
 
 
 def _transient_periods(reaction: np.ndarray) -> int:
-    """The number of leading periods that are transient, given the output (periods, lines); at least three stay.
+    """Count the leading periods that are transient, by the output (periods, lines); at least
+    three stay.
 
-    Each period is compared with the later half of the others, which show what is usual. Without a transient
-    they are exchangeable: one of them lies furthest off at the front by chance only, and `FAR` makes that rarer.
+    Each period is compared with the later half of the others, which show what is usual. Without a transient they are
+    exchangeable: one of them lies furthest off at the front by chance only, and the distance asked for makes that
+    rarer.
     """
     count = len(reaction)
     last = max(3, count // 2)
@@ -223,11 +236,13 @@ def _transient_periods(reaction: np.ndarray) -> int:
         return 0
     later = np.arange(count - last, count)
     off = np.array([_distance(reaction[number], reaction[later[later != number]]) for number in range(count)])
-    return int(np.flatnonzero(off <= FAR * off[later].max())[0])
+    return int(np.flatnonzero(off <= ResponseSettings.current().distance_of_a_transient * off[later].max())[0])
 
 
 def _distance(single: np.ndarray, others: np.ndarray) -> float:
-    """How far a period lies from the mean of others, in units of their variance, on the middle one of its lines."""
+    """Return how far a period lies from the mean of others, in units of their variance, on the
+    middle one of its lines.
+    """
     variance = np.maximum(np.var(others, axis=0, ddof=1), np.finfo(float).tiny)
     return float(np.median(np.abs(single - others.mean(axis=0)) ** 2 / variance))
 
@@ -238,7 +253,8 @@ def relative_error(
     band: tuple[float, float],
     period: float | None = None,
 ) -> float:
-    """||G U - Y|| / ||Y|| over the excited lines in `band` [Hz] of a periodic record that the model has not seen.
+    """Return ||G U - Y|| / ||Y|| over the excited lines in `band` [Hz] of a periodic record not
+    seen by the model.
 
     `model` gives complex responses at frequencies [Hz]; U and Y are averaged over periods. `period` [s] is about how
     long one is (default: found). Raises InputError where the record is not periodic or no line lies in the band.

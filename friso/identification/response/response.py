@@ -9,16 +9,10 @@ import numpy as np
 from scipy import stats
 
 from friso.errors import InputError
+from friso.identification.response.settings import ResponseSettings
 
 if TYPE_CHECKING:
     from control import FrequencyResponseData
-
-
-COHERENT = 0.5
-"""Coherence from which on, where it is known, a line is used."""
-
-NEIGHBOURS = 15
-"""Lines from which the scatter between neighbours is taken."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +27,9 @@ class Channels:
 
 @dataclass(frozen=True)
 class ResponseBand:
-    """Limits at 95 %: magnitude [output unit per input unit] and phase [rad], each of shape (lines,)."""
+    """Limits at 95 %: magnitude [output unit per input unit] and phase [rad], each of shape
+    (lines,).
+    """
 
     magnitude_low: np.ndarray
     magnitude_high: np.ndarray
@@ -43,14 +39,16 @@ class ResponseBand:
 
 @dataclass(frozen=True)
 class FrequencyResponse:
-    """A response on the lines `frequency` [Hz]; all arrays of shape (lines,).
+    """A response on the lines `frequency` [Hz]; all arrays have the shape (lines,).
 
     `response` is complex [output unit per input unit]. `deviation` is its standard deviation, sqrt(E|error|^2), in
     total; `noise` and `distortion` are what noise (differs from period to period) and nonlinear distortion (differs
     from realisation to realisation) contribute, deviation^2 = noise^2 + distortion^2 where both are known, NaN where
-    the record cannot tell them. `degrees` is the number of real degrees of freedom behind the deviation. `coherence`
-    is that of input and output, or None. `kind` is "multisine", "welch" or "local polynomial". `sample_time` [s] is
-    that of the record, None where it is not known.
+    the record cannot tell them.
+
+    `degrees` is the number of real degrees of freedom behind the deviation. `coherence` is that of input and output, or
+    None. `kind` is "multisine", "welch" or "local polynomial". `sample_time` [s] is that of the record, None where it
+    is not known.
     """
 
     frequency: np.ndarray
@@ -66,7 +64,10 @@ class FrequencyResponse:
     sample_time: float | None = None
 
     def band(self) -> ResponseBand:
-        """The 95 % intervals of magnitude and phase: half the variance lies along the response, half across it."""
+        """Return the 95 % intervals of magnitude and phase.
+
+        Half the variance lies along the response, half across it.
+        """
         half = stats.t.ppf(0.975, self.degrees) * self.deviation / np.sqrt(2)
         size, phase = np.abs(self.response), np.unwrap(np.angle(self.response))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -74,14 +75,18 @@ class FrequencyResponse:
         return ResponseBand(np.maximum(size - half, 0.0), size + half, phase - turn, phase + turn)
 
     def frd(self) -> FrequencyResponseData:
-        """As data of python-control, its frequencies in rad/s; the line at 0 Hz, if any, included."""
+        """Return data of python-control, its frequencies in rad/s; the line at 0 Hz, if any,
+        included.
+        """
         from control import FrequencyResponseData
 
         omega = 2 * np.pi * self.frequency
         return FrequencyResponseData(self.response, omega, inputs=[self.channels.input], outputs=[self.channels.output])
 
     def times(self, factor: np.ndarray, output: str, output_unit: str) -> FrequencyResponse:
-        """With another output: the old one times a known complex `factor` per line, shape (lines,)."""
+        """Return the response to another output: the old one times a known complex `factor` per
+        line, shape (lines,).
+        """
         size = np.abs(factor)
         return replace(
             self,
@@ -93,18 +98,21 @@ class FrequencyResponse:
         )
 
     def accelerations(self) -> FrequencyResponse:
-        """From position to acceleration: times (i omega)^2."""
+        """Return the response from position to acceleration: times (i omega)^2."""
         unit = f"{self.channels.output_unit}/s^2"
         return self.times(-((2 * np.pi * self.frequency) ** 2), "acceleration", unit)
 
     def at(self, chosen: np.ndarray) -> FrequencyResponse:
-        """The lines chosen by a mask or by numbers."""
+        """Return the lines chosen by a mask or by numbers."""
         names = ("frequency", "response", "deviation", "noise", "distortion", "degrees")
         lines = {name: getattr(self, name)[chosen] for name in names}
         return replace(self, coherence=None if self.coherence is None else self.coherence[chosen], **lines)
 
     def between(self, low: float, high: float) -> FrequencyResponse:
-        """The lines from `low` to `high` [Hz], both included. Raises InputError where there are none."""
+        """Return the lines from `low` to `high` [Hz], both included.
+
+        Raises InputError where there are none.
+        """
         inside = (self.frequency >= low) & (self.frequency <= high)
         if not inside.any():
             text = f"{low:g} to {high:g} Hz"
@@ -113,19 +121,24 @@ class FrequencyResponse:
         return self.at(inside)
 
     def usable(self, ratio: float = 3.0) -> FrequencyResponse:
-        """The lines whose response is at least `ratio` deviations large and whose coherence, if known, suffices.
+        """Return the lines whose response is at least `ratio` deviations large and whose coherence
+        suffices.
 
-        The warnings list the lines left out. Raises InputError where none is left: excitation too weak.
+        The coherence counts if it is known. The warnings list the lines left out. Raises InputError where none is left:
+        excitation too weak.
         """
+        settings = ResponseSettings.current()
         enough = np.abs(self.response) >= ratio * self.deviation
         if self.coherence is not None:
-            enough &= self.coherence >= COHERENT
+            enough &= self.coherence >= settings.coherence_of_a_line
         if not enough.any():
             best = np.max(np.abs(self.response) / np.maximum(self.deviation, np.finfo(float).tiny), initial=0.0)
             text = f"no line stands out of the noise (at best {best:.2g} standard deviations)"
             if self.coherence is not None and self.coherence.size:
                 text += f", coherence at most {np.max(self.coherence):.2g}"
-            expected = f"a response of {ratio:g} deviations and a coherence of {COHERENT:g} on some line"
+            expected = (
+                f"a response of {ratio:g} deviations and a coherence of {settings.coherence_of_a_line:g} on some line"
+            )
             raise InputError("excitation", text, expected, "a larger force, or a longer record")
         if enough.all():
             return self
@@ -135,7 +148,8 @@ class FrequencyResponse:
         return replace(self.at(enough), warnings=(*self.warnings, warning))
 
     def scatter(self) -> np.ndarray:
-        """Deviations (lines,) raised to the scatter between neighbouring lines where that is larger.
+        """Return deviations (lines,) raised to the scatter between neighbouring lines where that is
+        larger.
 
         Nonlinear distortion makes the lines of one realisation scatter by more than its noise; a smooth system cannot.
         """
@@ -143,7 +157,7 @@ class FrequencyResponse:
         if len(size) < 3 or not np.all(size > 0):
             return self.deviation
         second = np.abs(np.diff(np.log(size), 2)) / np.sqrt(6)
-        width = min(NEIGHBOURS, len(second))
+        width = min(ResponseSettings.current().lines_of_a_scatter, len(second))
         medians = np.median(np.lib.stride_tricks.sliding_window_view(second, width), axis=1)
         places = np.arange(len(size)) - 1 - (width - 1) / 2
         rough = 1.4826 * np.interp(places, np.arange(len(medians)), medians)  # normal distribution: median to deviation

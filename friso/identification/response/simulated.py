@@ -12,17 +12,16 @@ from friso.identification.response.departure import Drag
 from friso.identification.response.periodic import multisine
 from friso.identification.response.records import ResponseRecord
 from friso.identification.response.response import FrequencyResponse
-
-PERIODS = 10
-"""Simulated, of which the first four are left out: the start from rest is forgotten by friction within one or two."""
+from friso.identification.response.settings import ResponseSettings
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """Simulated `responses` by the factor on the recorded input, and what they leave of the measured departure.
+    """A simulation of friction, and what it leaves of the departure of a measured response.
 
-    `left` is the share of the departure from the mass line, in units of the deviations, that the simulation with the
-    recorded input leaves; 0 explains all of it, 1 nothing.
+    `responses` are simulated, by the factor on the recorded input. `left` is the share of the departure from the mass
+    line, in units of the deviations, that the simulation with the recorded input leaves; 0 explains all of it, 1
+    nothing.
     """
 
     responses: Mapping[float, FrequencyResponse]
@@ -37,21 +36,25 @@ def explained(
     limits: tuple[float, float],
     factors: Sequence[float] = (0.5, 1.0, 2.0),
 ) -> Explanation:
-    """What Coulomb friction, spring and mass of `drag` make of one period of each realisation's input, (n,) each.
+    """Simulate what Coulomb friction, spring and mass of `drag` make of one period of each
+    realisation's input, (n,).
 
-    Compared with the `measured` response between `limits` [Hz]; the factors, of which 1 must be one, show how the
+    It is compared with the `measured` response between `limits` [Hz]; the factors, of which 1 must be one, show how the
     response depends on the amplitude. Raises InputError where `drag` has no friction level or 1 is missing.
     """
+    settings = ResponseSettings.current()
     if not drag.coulomb.value > 0:
         raise InputError("friction.coulomb", "no level found in the departure", "a level above 0", "0.087 V")
     if 1.0 not in factors:
         raise InputError("factors", f"{list(factors)}", "factors with 1 among them, the recorded input", "(0.5, 1, 2)")
     forces = np.concatenate([factor * drag.sign * np.stack(inputs) for factor in factors])
     spring = max(drag.stiffness.value, 0.0)
-    positions = slid(np.tile(forces, PERIODS), sample_time, drag.mass.value, drag.coulomb.value, spring)[0]
+    positions = slid(
+        np.tile(forces, settings.periods_simulated), sample_time, drag.mass.value, drag.coulomb.value, spring
+    )[0]
     settled = slice(4 * forces.shape[1], None)
     records = [
-        ResponseRecord(drag.sign * np.tile(force, PERIODS)[settled], position[settled], sample_time)
+        ResponseRecord(drag.sign * np.tile(force, settings.periods_simulated)[settled], position[settled], sample_time)
         for force, position in zip(forces, positions, strict=True)
     ]
     groups = {factor: records[i * len(inputs) : (i + 1) * len(inputs)] for i, factor in enumerate(factors)}
@@ -62,11 +65,12 @@ def explained(
 def slid(
     force: np.ndarray, sample_time: float, mass: float, coulomb: float, stiffness: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Position [m] and velocity [m/s], each (lanes, n), of a mass [kg] on a spring [N/m] with Coulomb friction [N]
-    under forces [N] (lanes, n).
+    """Return position [m] and velocity [m/s], each (lanes, n), of a mass [kg] on a spring [N/m]
+    with Coulomb friction [N].
 
-    Time stepping that treats sticking exactly (Moreau 1988, doi:10.1007/978-3-7091-2624-0_1): friction stops the mass
-    where it can within the step. From rest; the error is of first order in the sample time.
+    It is under forces [N] (lanes, n), from rest. Time stepping treats sticking exactly (Moreau 1988,
+    doi:10.1007/978-3-7091-2624-0_1): friction stops the mass where it can within the step. The error is of first order
+    in the sample time.
     """
     position, velocity = np.zeros(len(force)), np.zeros(len(force))
     positions, velocities = np.empty_like(force), np.empty_like(force)
@@ -80,7 +84,9 @@ def slid(
 
 
 def _unexplained(drag: Drag, measured: FrequencyResponse, simulated: FrequencyResponse) -> float:
-    """The share of the departure from the mass line that the simulation leaves, in units of the deviations."""
+    """Return the share of the departure from the mass line that the simulation leaves, in units
+    of the deviations.
+    """
     real, imaginary = (
         np.interp(measured.frequency, simulated.frequency, part(simulated.response)) for part in (np.real, np.imag)
     )

@@ -14,18 +14,10 @@ from friso.identification.response.beyond import COMPLIANCES, DELAY, HELD, belie
 from friso.identification.response.fitting import ResponseFit, deviations, refined
 from friso.identification.response.modes import fit_modes
 from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.settings import ResponseSettings
 from friso.intervals import COVERAGE
 
 METHOD = "two-mass model fitted to the response"
-
-RATIOS = (1.05, 1.2, 1.5, 2.0, 3.0)
-"""Resonance over antiresonance from which the fit starts."""
-
-MISSES = 0.4
-"""Root mean square of the logarithm of response over model beyond which a model is none of the response."""
-
-EXPLAINED = 3.0
-"""Sum of squares over degrees of freedom up to which a model counts as right."""
 
 FAR = np.log(30.0)
 """Logarithm of the factor by which masses and stiffness may move from the start; twice that for damping."""
@@ -37,7 +29,8 @@ last on, those of `beyond`."""
 
 @dataclass(frozen=True)
 class TwoMass:
-    """A driven mass, a joint and another mass; units follow from the response's: mass is input per acceleration.
+    """A driven mass, a joint and another mass; units follow from the response's: mass is input
+    per acceleration.
 
     `fit` holds the parameters (see the module); `signs` of the two outputs are -1 where they go against the input.
     `estimates` hold masses, stiffness, damping, viscous friction, delay, antiresonance and resonance.
@@ -50,17 +43,23 @@ class TwoMass:
     warnings: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
+        """Return an estimate by name."""
         return next(estimate for estimate in self.estimates if estimate.name == name)
 
     def predict(self, frequency: np.ndarray, collocated: bool = True) -> np.ndarray:
-        """The response at frequencies [Hz] of the driven mass, or of the other one; complex, same shape."""
+        """Return the response at frequencies [Hz] of the driven mass, or of the other one; complex,
+        of their shape.
+        """
         which = 0 if collocated else 1
         return self.signs[which] * two_masses(self.fit.parameters, frequency)[which]
 
 
 def two_masses(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Responses of the driven and, where there is a compliance for it, of the other mass to a force on the former,
-    shape (outputs, lines), over frequencies [Hz]."""
+    """Return responses of two masses to a force on the driven one, shape (outputs, lines), over
+    frequencies [Hz].
+
+    The other mass has one where there is a compliance for it.
+    """
     driven, other, stiffness, damping = np.exp(parameters[:DRAG])
     outputs = len(parameters) - BEYOND - COMPLIANCES
 
@@ -79,7 +78,8 @@ def fit_two_mass(
     noncollocated: FrequencyResponse | None = None,
     band: tuple[float, float] | None = None,
 ) -> TwoMass:
-    """The two-mass model of force-to-position responses on the same lines, in a `band` [Hz] (default: all of them).
+    """Fit the two-mass model to force-to-position responses on the same lines, in a `band` [Hz]
+    (default: all of them).
 
     Raises InputError where there are too few lines or the two responses have different ones.
     """
@@ -109,7 +109,7 @@ def fit_two_mass(
 
 
 def widened(fitted: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
-    """The estimates with intervals that also explain how far fits of single realisations, `apart`, lie from each other.
+    """Widen estimates by how far fits of single realisations, `apart`, lie from each other.
 
     Where these scatter more than their intervals allow, friction moves the parameters from one realisation to the next,
     which one response cannot show: the intervals are scaled up by the Birge ratio (Birge 1932,
@@ -122,7 +122,9 @@ def widened(fitted: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
 
 
 def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
-    """An estimate with its interval scaled by the ratio of external to internal scatter of the others, if above 1."""
+    """Scale the interval of an estimate by the ratio of external to internal scatter of the
+    others, if above 1.
+    """
     if not estimate.determined or not all(another.determined and another.half_width > 0 for another in others):
         return estimate
     values, weights = (
@@ -139,21 +141,28 @@ def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
 
 
 def _sign(response: np.ndarray) -> float:
-    """1 where the mass follows the force (-180 degrees) on most lines, -1 where it goes against it."""
+    """Return 1 where the mass follows the force (-180 degrees) on most lines, -1 where it goes
+    against it.
+    """
     return -1.0 if np.sum(np.cos(np.angle(response))) > 0 else 1.0
 
 
 def _follows(values: np.ndarray, model: np.ndarray) -> None:
-    """Raises InputError where a model is nowhere near the response, shape (outputs, lines)."""
+    """Check that a model is near the response, shape (outputs, lines), somewhere.
+
+    Raises InputError where it is not.
+    """
     off = float(np.sqrt(np.mean(np.abs(np.log(np.abs(values) / np.abs(model))) ** 2)))
-    if off > MISSES:
+    if off > ResponseSettings.current().misfit_of_no_model:
         text = f"a response that two masses and a joint miss by a factor of {np.exp(off):.2g} on average"
         expected = "the response of a driven mass, and of the other one: are the two positions exchanged?"
         raise InputError("response", text, expected, '--band "3 Hz .. 20 Hz"')
 
 
 def _from_modes(response: FrequencyResponse, outputs: int) -> list[np.ndarray]:
-    """A start from the first antiresonance and resonance of a rational fit, of whole mass 1; none where it has none."""
+    """Return a start from the first antiresonance and resonance of a rational fit, of whole mass
+    1; [] where it has none.
+    """
     try:
         modes = fit_modes(response)
     except InputError:
@@ -169,6 +178,7 @@ def _from_modes(response: FrequencyResponse, outputs: int) -> list[np.ndarray]:
 
 
 def _start(other: float, stiffness: float, damping: float, outputs: int) -> np.ndarray:
+    """Return parameters of a start."""
     return np.array([*np.log([1 - other, other, stiffness, damping]), *np.zeros(BEYOND - DRAG + COMPLIANCES + outputs)])
 
 
@@ -180,8 +190,12 @@ def _best(
     outside: tuple[np.ndarray, np.ndarray],
     held: Mapping[int, tuple[float, float]],
 ) -> ResponseFit:
-    """The best of the fits from the most promising mass ratio, from the modes `seen` and from the next ratio; the first
-    one that explains the data."""
+    """Return the best of the fits from the most promising mass ratio, from the modes `seen` and
+    from the next ratio.
+
+    The first one that explains the data ends the search.
+    """
+    settings = ResponseSettings.current()
     reach = np.array([FAR] * 3 + [2 * FAR])
 
     def model(parameters: np.ndarray) -> np.ndarray:
@@ -201,16 +215,19 @@ def _best(
         lower = np.array([*(start[:DRAG] - reach), 0.0, 0.0, *outside[0]])
         upper = np.array([*(start[:DRAG] + reach), np.inf, np.inf, *outside[1]])
         fits.append(refined(model, start, values, deviation, lower, upper, held))
-        if fits[-1].reduced < EXPLAINED:
+        if fits[-1].reduced < settings.misfit_of_a_right_model:
             break
     return min(fits, key=lambda fit: fit.squares)
 
 
 def _starts(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
-    """Starts at the highest place of the first acceleration inside the band, with several mass ratios."""
+    """Yield starts at the highest place of the first acceleration inside the band, with several
+    mass ratios.
+    """
+    settings = ResponseSettings.current()
     level = np.abs(values[0]) * (2 * np.pi * frequency) ** 2
     resonance = frequency[1 + int(np.argmax(level[1:-1]))]
-    for ratio in RATIOS:
+    for ratio in settings.resonance_ratios:
         other = 1 - 1 / ratio**2
         stiffness = other * (2 * np.pi * resonance / ratio) ** 2
         damping = 0.1 * np.sqrt(stiffness * other)
@@ -218,22 +235,23 @@ def _starts(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _scaled_to(start: np.ndarray, response: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """A start with masses, stiffness and damping as large as the response asks for."""
+    """Return a start with masses, stiffness and damping as large as the response asks for."""
     scale = np.mean(np.log(np.abs(two_masses(start, frequency)[0]) / np.abs(response)))
     return np.concatenate([start[:DRAG] + scale, start[DRAG:]])
 
 
 def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
+    """Yield what to know before believing the model."""
     if signs[0] < 0:
         yield "the driven mass goes against the input: its sign was reversed"
     if signs[0] != signs[1]:
         yield "the second output has the opposite sign of the first: it was reversed"
-    if fit.reduced > EXPLAINED:
+    if fit.reduced > ResponseSettings.current().misfit_of_a_right_model:
         yield f"the model is not right to the precision of the data (reduced chi-square {fit.reduced:.3g})"
 
 
 def _estimates(fit: ResponseFit, response: FrequencyResponse) -> tuple[Estimate, ...]:
-    """Masses and joint, with what follows from them."""
+    """Return masses and joint, with what follows from them."""
     into, out = response.channels.input_unit, response.channels.output_unit
     rate = f"{into} s/{out}"
 
@@ -258,7 +276,9 @@ def _estimates(fit: ResponseFit, response: FrequencyResponse) -> tuple[Estimate,
 
 
 def _root(parameters: np.ndarray, zero: bool) -> complex:
-    """The zero of the collocated response, or the pole, that is furthest out above the real axis [rad/s]."""
+    """Return the zero of the collocated response, or the pole, that is furthest out above the
+    real axis [rad/s].
+    """
     driven, other, stiffness, damping = np.exp(parameters[:DRAG])
     first = np.array([driven, parameters[DRAG] + damping, stiffness])
     second = np.array([other, parameters[OTHER_DRAG] + damping, stiffness])
@@ -270,5 +290,5 @@ def _root(parameters: np.ndarray, zero: bool) -> complex:
 
 
 def _si(unit: str) -> str:
-    """The usual names where input is in newtons and output in metres."""
+    """Return the usual names of units where input is in newtons and output in metres."""
     return {"N s^2/m": "kg", "N s/m": "N s/m"}.get(unit, unit)

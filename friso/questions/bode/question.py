@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from friso.errors import InputError
-from friso.frequency.bode import Bode
-from friso.interface.answer import Answer, AnswerTable, question
-from friso.interface.inputs import AS_BUILT, Changes, StageLike, read_stage, text_of, wrong
+from friso.interface.answer import Answer, question
+from friso.interface.inputs import AS_BUILT, Changes, FrequencyBand, StageLike, read_stage, text_of, wrong
 from friso.progress import Progress, silent
 from friso.quantities import Bound, Quantity, quoted
 from friso.stage import Stage
 
 if TYPE_CHECKING:
     from friso.shown.drawing.figure import Figure
-    from friso.shown.files import Files
 
 FREQUENCY = Quantity("Hz", Bound("from 1 uHz to 1 GHz", lambda value: (value >= 1e-6) & (value <= 1e9)), "0.1 Hz")
 EXAMPLE = '"0.1 Hz..1 kHz"'
@@ -24,73 +22,30 @@ EXAMPLE = '"0.1 Hz..1 kHz"'
 class BodeAnswer(Answer):
     """The linear analysis of a stage: `result` is a `Bode` with its limit cases, margins and limits."""
 
-    command = "bode"
-
-    def __init__(self, result: Bode) -> None:
-        self.result, self.axis_kind = result, result.stage.axis_kind
-
-    def sentences(self) -> Sequence[str]:
-        """Whether the controller is stable in every state, and how fast it may be."""
-        from friso.questions.bode.words import sentences
-
-        return sentences(self.result)
-
-    def tables(self) -> Sequence[AnswerTable]:
-        """Margins in each state."""
-        from friso.questions.bode.states import shown_states
-        from friso.questions.bode.table import rows
-
-        states = shown_states(self.result)
-        return [AnswerTable(self.result.stage.name, [item.label for item in states], rows(states))]
-
-    def figures(self) -> Sequence[Figure]:
-        """Open loops, plants, Nyquist plots and the family of states."""
-        from friso.questions.bode.figures import bode_figures
-
-        return bode_figures(self.result)
-
     def first_figures(self) -> Sequence[Figure]:
-        """Those of the limit cases, which are there sooner than the others."""
+        """The figures of the limit cases, which are there sooner than the others."""
         from friso.questions.bode.figures import first_figures
 
         return first_figures(self.result)
-
-    def document(self) -> dict[str, Any]:
-        """Margins and limits."""
-        from friso.questions.bode.document import bode_document
-
-        return bode_document(self.result)
-
-    def files(self) -> Files:
-        """The page and the figures."""
-        from friso.questions.bode.page import bode_files
-
-        return bode_files(self.result)
 
 
 @question
 def bode(
     stage: StageLike,
-    frequencies: str | tuple[float, float] | None = None,
+    frequencies: FrequencyBand | tuple[float, float] | None = None,
     series: bool = False,
     *,
     set: Changes = None,
     progress: Progress = silent,
 ) -> BodeAnswer:
-    """Is the controller stable and robust, stuck or sliding, and how fast may it be.
+    """Is the controller stable and robust, stuck or sliding, and how fast may it be: margins and Bode plots.
 
     Parameters
     ----------
-    stage : Stage, path or dict
-        The stage, its file, or the tables of one.
     frequencies : str or tuple of two floats, optional
         Range of the figures, "0.1 Hz..1 kHz" or two numbers [Hz]; default: all that is relevant.
     series : bool
-        Whether the thesis's formula for a touched limiter is shown as well.
-    set : dict, optional
-        Keys to override, ``{"joint.locked": True}``.
-    progress : Progress
-        Not called: the analysis is quick.
+        Show also the thesis's formula for a touched limiter.
 
     Returns
     -------

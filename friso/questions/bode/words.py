@@ -14,8 +14,9 @@ from friso.frequency.crossover import WANTED, Limits
 from friso.frequency.margins import Margins
 from friso.frequency.members import Members
 from friso.frequency.ranges import Range
-from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place
-from friso.questions.bode.table import growth
+from friso.interface.answer import AnswerTable
+from friso.questions.bode.states import SERIES, cart, has_friction, has_limiter, in_words, place, shown_states
+from friso.questions.bode.table import growth, rows
 from friso.shown.drawing.prefixes import listed, range_with_unit, window_with_unit, with_unit
 
 SETTLED = "the limit cases, and stuck under any bias force"
@@ -199,3 +200,9 @@ def _windows(ranges: Sequence[Range], limits: Limits, bode: Bode) -> str:
     unit = _unit(bode)
     windows = [window_with_unit(*window, limits.searched, unit) for window in ranges]
     return listed(windows, "and") or f"none from {range_with_unit(*limits.searched, unit)}"
+
+
+def tables(bode: Bode) -> list[AnswerTable]:
+    """Margins in each state."""
+    states = shown_states(bode)
+    return [AnswerTable(bode.stage.name, [item.label for item in states], rows(states))]

@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from friso.axis import AxisKind
 from friso.equations.bandwidth import range_example
-from friso.hunting import CYCLE_RTOL, Diagram, KeyRange, Plane
+from friso.hunting import CYCLE_RTOL, KeyRange
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import (
+    AxisRange,
     Changes,
+    Links,
     StageLike,
+    Tolerance,
     axes_of,
     mention_unstable_loop,
     pairs_of,
@@ -35,11 +38,9 @@ if TYPE_CHECKING:
 class BoundaryAnswer(Answer):
     """Where hunting ends: `result` is a `Diagram` over one key or a `Plane` of two; `texts`, its ranges as given."""
 
-    command = "boundary"
-
-    def __init__(self, stage: Stage, traced: Diagram | Plane, texts: Sequence[str], name: str) -> None:
-        self.stage, self.result, self.texts, self.name = stage, traced, tuple(texts), name
-        self.axis_kind = stage.axis_kind
+    stage: Stage
+    texts: Sequence[str]
+    name: str
 
     @cached_property
     def keys(self) -> tuple[ShownKey, ...]:
@@ -83,11 +84,11 @@ def boundary(
     stage: StageLike,
     axes: Mapping[str, str] | None = None,
     *,
-    x: str | None = None,
-    y: str | None = None,
-    link: Changes = None,
+    x: AxisRange | None = None,
+    y: AxisRange | None = None,
+    link: Links = None,
     log: bool = False,
-    rtol: float | str = CYCLE_RTOL,
+    rtol: Tolerance = CYCLE_RTOL,
     set: Changes = None,
     progress: Progress = silent,
 ) -> BoundaryAnswer:
@@ -95,22 +96,14 @@ def boundary(
 
     Parameters
     ----------
-    stage : Stage, path or dict
-        The stage, its file, or the tables of one. Its motion plays no part.
     axes : dict, optional
         One key or two with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``; behind ":log", logarithmic.
-    x, y : str, optional
-        The same as texts, as on the command line: ``x="controller.crossover=1 Hz..40 Hz"``.
-    link : dict, optional
-        Keys tied to others: ``{"masses.cart": "0.7 * mass"}``.
-    log : bool
-        Whether both ranges are logarithmic.
+    x : str, optional
+        The key over which cycles are followed: controller.crossover="1 Hz..40 Hz".
+    y : str, optional
+        A second key: curves in the plane of both.
     rtol : float
         Relative tolerance of the solver, at most 1e-6.
-    set : dict, optional
-        Keys to override, ``{"joint.locked": True}``.
-    progress : Progress
-        Called as cycles are followed.
 
     Returns
     -------
@@ -140,7 +133,7 @@ def boundary(
         progress(0, 0, f"following cycles over {' and '.join(ranges)}")
 
     traced = traced_boundary(chosen, ranges, links, tolerance, log, begins, progress)
-    return BoundaryAnswer(chosen, traced, [*ranges.values()], stem_of(stage))
+    return BoundaryAnswer(traced, stage=chosen, texts=[*ranges.values()], name=stem_of(stage))
 
 
 def _in_its_unit(swept: KeyRange, text: str, axis: AxisKind) -> ShownKey:

@@ -15,7 +15,9 @@ from friso.interface.answer import Answer, AnswerTable, question
 from friso.interface.inputs import (
     LOGGER,
     Changes,
+    Seed,
     StageLike,
+    Tolerance,
     Whole,
     correlations_of,
     mention_unstable_loop,
@@ -44,11 +46,9 @@ class CheckAnswer(Answer):
     `draws`, what becomes of stages drawn from its uncertain keys, and `laws`, the verdicts across friction laws, or
     None."""
 
-    command = "check"
-
-    def __init__(self, stage: Stage, cases: dict[str, Case], draws: Draws | None, laws: VerdictsByLaw | None) -> None:
-        self.stage, self.result, self.draws, self.laws = stage, cases, draws, laws
-        self.axis_kind = stage.axis_kind
+    stage: Stage
+    draws: Draws | None
+    laws: VerdictsByLaw | None
 
     @cached_property
     def isolator(self) -> Suggestion | None:
@@ -156,11 +156,11 @@ class CheckAnswer(Answer):
 @question
 def check(
     stage: StageLike,
-    rtol: float | str = RTOL,
+    rtol: Tolerance = RTOL,
     *,
     set: Changes = None,
     draws: Whole | None = None,
-    seed: Whole = 0,
+    seed: Seed = 0,
     laws: bool = False,
     progress: Progress = silent,
 ) -> CheckAnswer:
@@ -168,21 +168,11 @@ def check(
 
     Parameters
     ----------
-    stage : Stage, path or dict
-        The stage, its file, or the tables of one.
-    rtol : float
-        Relative tolerance of the solver, 1e-12 to 1e-2.
-    set : dict, optional
-        Keys to override, ``{"joint.locked": True}``.
     draws : int, optional
-        How many stages to draw from the uncertain keys, to report how many of them hunt; default: as many as a fixed
-        work allows, some tens.
-    seed : int
-        Seed of the draws: the same one gives the same stages.
+        Draw so many stages from the uncertain keys, and report how many hunt; default: as many as a fixed work
+        allows, some tens.
     laws : bool
-        Whether to give the verdict under every friction law that fits the same measurements as well.
-    progress : Progress
-        Called as work is done, also from worker threads.
+        Give also the verdict under every friction law that fits the same measurements.
 
     Returns
     -------
@@ -205,7 +195,6 @@ def check(
     """
     chosen, tolerance = read_stage(stage, set, uncertain_too=True), tolerance_of(rtol)
     loose = max(tolerance, LONG_RUN_RTOL)
-    whole_number(seed, "seed", 0, MOST_SEED, "1000")
     sample = uncertain = None
     if draws is not None:
         whole_number(draws, "draws", 1, MOST, "1000")
@@ -233,7 +222,7 @@ def check(
         from friso.studies.laws.verdicts import verdicts_by_law
 
         across = verdicts_by_law(chosen, loose, progress=progress)
-    return CheckAnswer(chosen, cases, drawn, across)
+    return CheckAnswer(cases, stage=chosen, draws=drawn, laws=across)
 
 
 def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:

@@ -1,1 +1,11 @@
-"""What `friso compare` shows: words, figures, document and page."""
+"""Isolator or firmware: the same drawn machines with a joint, and with other settings."""
+
+from friso.interface.question import STOPS, Question
+
+QUESTION = Question(
+    __name__,
+    120,
+    STOPS,
+    "compare examples/thesis_drive.toml --machines 200 --out compare",
+    details=True,
+)

@@ -47,7 +47,7 @@ def _option(comparison: Comparison, result: OptionResult) -> dict[str, Any]:
     pair = comparison.paired(result)
     crossover = bandwidth(result.option.stage.flat())
     return {
-        "name": result.option.name,
+        "name": result.option.kind.title,
         "crossover_hz": crossover,
         "bandwidth_factor": result.option.factor,
         "swings": asdict(result.swinging),

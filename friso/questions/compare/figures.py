@@ -17,7 +17,6 @@ from friso.shown.drawing.figure import (
     SKY,
     VERMILLION,
     Axis,
-    Dash,
     Figure,
     Markers,
     Panel,
@@ -26,23 +25,9 @@ from friso.shown.drawing.figure import (
 from friso.shown.drawing.prefixes import with_unit
 from friso.studies.compare.study import LONGER, Comparison, OptionResult
 
-LINES: dict[str, tuple[str, Dash]] = {
-    "a": (INK, "solid"),
-    "b": (BLUE, "solid"),
-    "c": (VERMILLION, "solid"),
-    "d": (ORANGE, "dashed"),
-    "e": (PINK, "dashed"),
-    "f": (SKY, "dashed"),
-    "g": (GREEN, "solid"),
-    "h": (BLUE, "dotted"),
-    "i": (VERMILLION, "dotted"),
-    "j": (ORANGE, "dotted"),
-    "k": (PINK, "dotted"),
-    "l": (SKY, "dotted"),
-    "m": (GREEN, "dotted"),
-    "n": (INK, "dashed"),
-}
-"""Colour and dash of the options."""
+_NAMES = ("ink", "blue", "vermillion", "orange", "pink", "sky", "green")
+COLOURS: dict[str, str] = dict(zip(_NAMES, (INK, BLUE, VERMILLION, ORANGE, PINK, SKY, GREEN), strict=True))
+"""Colours of options, by the names that these give."""
 
 BESIDE = 0.16
 """Distance between the markers of an option, in distances between options."""
@@ -51,7 +36,7 @@ MOST = (5, 95)
 """Percentiles between which most machines are."""
 
 
-def figures(comparison: Comparison) -> list[Figure]:
+def compare_figures(comparison: Comparison) -> list[Figure]:
     """Probabilities, settling times and standstill in one figure."""
     within = with_unit(comparison.within, "m")
     caption = (
@@ -114,10 +99,10 @@ def _settling(comparison: Comparison, within: str) -> Panel:
     start = max(first, 1e-3 * end) / 1.3
     series = []
     for result, ordered in zip(comparison.results, times, strict=True):
-        colour, dash = LINES[result.letter]
+        colour, dash = result.option.kind.line
         x = np.concatenate([[start], np.repeat(np.maximum(ordered, start), 2), [end]])
         steps = 100 * np.arange(len(ordered) + 1) / count
-        series.append(Series(x, np.repeat(steps, 2), label(result), colour, dash))
+        series.append(Series(x, np.repeat(steps, 2), label(result), COLOURS[colour], dash))
     axis = Axis("Time after the move", "s", (start, end), log=True, prefixed=False)
     return Panel(f"In position to stay, within {within}", axis, Axis("Share", "%", (-3.0, 103.0)), tuple(series))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from friso.quantities import percent
-from friso.questions.compare.figures import figures as compare_figures
+from friso.questions.compare.figures import compare_figures
 from friso.questions.compare.words import (
     COLUMNS,
     PAIRED,

@@ -4,26 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from friso.interface.answer import Answer, AnswerTable, question
-from friso.interface.inputs import Changes, StageLike, correlations_of, mention_unstable_loop, quantity_of, read_stage
+from friso.interface.inputs import (
+    Changes,
+    LengthLike,
+    Seed,
+    SettingName,
+    StageLike,
+    correlations_of,
+    mention_unstable_loop,
+    quantity_of,
+    read_stage,
+)
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
-from friso.studies.compare.study import Comparison
 
 if TYPE_CHECKING:
-    from friso.shown.drawing.figure import Figure
-    from friso.shown.files import Files
+    pass
 
 
 class CompareAnswer(Answer):
     """Seven options on the same machines: `result` is a `Comparison`."""
-
-    command = "compare"
-
-    def __init__(self, result: Comparison) -> None:
-        self.result, self.axis_kind = result, result.stage.axis_kind
 
     @property
     def failure(self) -> str:
@@ -54,33 +57,15 @@ class CompareAnswer(Answer):
         notes = [f"note: {note}" for note in self.result.notes]
         return [*options, *details(self.result), *population(self.result), *notes]
 
-    def figures(self) -> Sequence[Figure]:
-        """Shares that swing, settling times, standstill."""
-        from friso.questions.compare.figures import figures
-
-        return figures(self.result)
-
-    def document(self) -> dict[str, Any]:
-        """The options with their numbers and intervals."""
-        from friso.questions.compare.document import compare_document
-
-        return compare_document(self.result)
-
-    def files(self) -> Files:
-        """The page and the figures."""
-        from friso.questions.compare.page import compare_files
-
-        return compare_files(self.result)
-
 
 @question
 def compare(
     stage: StageLike,
     *,
     machines: int = 2000,
-    seed: int = 1,
-    within: float | str | None = None,
-    also: Iterable[str] = (),
+    seed: Seed = 1,
+    within: LengthLike | None = None,
+    also: Iterable[SettingName] = (),
     set: Changes = None,
     progress: Progress = silent,
 ) -> CompareAnswer:
@@ -88,21 +73,11 @@ def compare(
 
     Parameters
     ----------
-    stage : Stage, path or dict
-        The stage with its drive, its file, or the tables of one.
     machines : int
         Number of machines drawn around the stage, 20 or more.
-    seed : int
-        Seed of the draws: the same one gives the same machines.
-    within : str or float, optional
-        Deviation that counts as in position, "1 um" or a number [m].
     also : list of str, optional
         Also settings of drives against friction, "limit", "leak", "hysteresis", "standstill", "push", "dither"; active
         disturbance rejection, "adrc"; or "all".
-    set : dict, optional
-        Keys to override.
-    progress : Progress
-        Called as options are simulated.
 
     Returns
     -------

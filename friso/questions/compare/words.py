@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from friso.equations.bandwidth import bandwidth
-from friso.equations.settings import SETTINGS, Setting
 from friso.evidence import value
 from friso.frequency.crossover import WANTED
 from friso.quantities import percent, plain_factor
@@ -27,7 +25,7 @@ from friso.stage import ControllerSection
 from friso.stage.section import numeric_fields
 from friso.stage.standstill import AgainstFriction
 from friso.studies.compare.disturbance_rejection import rejection
-from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
+from friso.studies.compare.options import MODEL_ERROR, Option
 from friso.studies.compare.statistics import EstimatedValue
 from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, OptionResult
 
@@ -56,26 +54,14 @@ UNSHAKEN = "no [floor]"
 PairedRow = tuple[str, list[str]]
 
 
-PROSE = {
-    "a": "the machine as is",
-    "b": "the faster controller",
-    "c": "the isolator",
-    "d": "the deadband",
-    "e": "the reset",
-    "f": "feedforward",
-    "g": "isolator and faster controller",
-    **{setting.letter: f"the {setting.name}" for setting in SETTINGS.values()},
-    "n": "disturbance rejection",
-}
-
-
 def label(result: OptionResult) -> str:
-    return f"{result.letter} {result.option.name}"
+    return result.option.label
 
 
 def in_prose(result: OptionResult) -> str:
     """An option within a sentence."""
-    return f"{PROSE[result.letter]} ({result.letter})"
+    kind = result.option.kind
+    return f"{kind.prose or f'the {kind.title}'} ({kind.letter})"
 
 
 def options_rows(comparison: Comparison) -> list[tuple[str, str]]:
@@ -84,39 +70,17 @@ def options_rows(comparison: Comparison) -> list[tuple[str, str]]:
 
 
 def _about(option: Option, comparison: Comparison) -> str:
-    joint = "the joint free" if option.letter in JOINT else "the joint locked" if comparison.stage.joint else "no joint"
-    deadband = with_unit(comparison.options.deadband, "m")
-    meanings = {
-        "a": "the controller of the file",
-        "b": _bandwidth(option, comparison),
-        "c": "the controller of the file",
-        "d": f"the integrator pauses while the error is below {deadband}",
-        "e": "the integrator is reset where the error changes sign",
-        "f": f"feedforward of Coulomb and viscous friction, both {percent(MODEL_ERROR)} too large or both too small, "
-        "drawn for each machine",
-        "g": _bandwidth(option, comparison),
-        "n": _disturbance_rejection(option.stage.flat()),
-    }
-    setting = option.setting
-    return f"{joint}; {_setting(setting, option.stage.flat()) if setting else meanings[option.letter]}"
-
-
-def _disturbance_rejection(flat: Mapping[str, Any]) -> str:
-    """The controller of an option that has it; empty of others."""
-    numbers = rejection(flat)
-    if numbers is None:
-        return ""
-    return (
-        f"linear active disturbance rejection with a bandwidth of {with_unit(numbers.bandwidth, 'Hz')}, at which the "
-        f"loop crosses 0 dB where it does in a, and an observer {numbers.observer_ratio:g} times as fast"
-    )
-
-
-def _setting(setting: Setting, flat: Mapping[str, Any]) -> str:
-    """A setting against friction, with its numbers."""
+    """Return what an option is: joint, and controller or setting with its numbers."""
+    joint = "the joint free" if option.kind.joint else "the joint locked" if comparison.stage.joint else "no joint"
+    flat = option.stage.flat()
     keys = {name: (ControllerSection.key(name), field.unit) for name, field in numeric_fields(AgainstFriction).items()}
     texts = {name: with_unit(flat[key], unit).strip() for name, (key, unit) in keys.items() if key in flat}
-    return setting.says.format_map(texts)
+    texts |= {"deadband": with_unit(comparison.options.deadband, "m"), "model_error": percent(MODEL_ERROR)}
+    texts |= {"faster": _bandwidth(option, comparison)}
+    if numbers := rejection(flat):
+        texts |= {"rejection_bandwidth": with_unit(numbers.bandwidth, "Hz")}
+        texts |= {"observer_ratio": f"{numbers.observer_ratio:g}"}
+    return f"{joint}; {option.kind.says.format_map(texts)}"
 
 
 def _bandwidth(option: Option, comparison: Comparison) -> str:
@@ -251,7 +215,7 @@ def _number(result: OptionResult, count: int) -> str:
 
 def _cost(result: OptionResult, comparison: Comparison) -> str:
     """What an option takes and leaves, against a."""
-    if result.letter == "a":
+    if result is comparison.results[0]:
         return ""
     loops = f"modulus margin {result.margin.value:.2f}, least {result.loops.margin.min():.2f}"
     if result.unstable:
@@ -271,8 +235,9 @@ def _as_is(comparison: Comparison) -> str:
 def _recommendation(comparison: Comparison) -> list[str]:
     """Whether to buy a joint."""
     resting = _resting(comparison)
-    joint, settings = ([result for result in resting if (result.letter in JOINT) is bought] for bought in (True, False))
-    if any(result.letter == "a" for result in settings):
+    joint = [result for result in resting if result.option.kind.joint]
+    settings = [result for result in resting if not result.option.kind.joint]
+    if any(result is comparison.results[0] for result in settings):
         return ["These machines need neither a joint nor other settings."]
     if joint and settings:
         return [
@@ -282,7 +247,7 @@ def _recommendation(comparison: Comparison) -> list[str]:
     if joint:
         return [f"Only a joint brings these machines to rest: {_names(joint)}. No setting does so alone."]
     if settings:
-        with_joint = any(result.letter in JOINT for result in comparison.results)
+        with_joint = any(result.option.kind.joint for result in comparison.results)
         return [f"Controller settings suffice ({_names(settings)}){'; a joint does not' if with_joint else ''}."]
     return []
 
@@ -324,7 +289,7 @@ def _standstill(comparison: Comparison) -> list[str]:
         f"{value('rig.in-position', 'rms_ratio'):.2g} times as much (RMS) as with the joint locked "
         "(friso rig in-position)."
     )
-    bought = any(result.letter in JOINT for result in comparison.results)
+    bought = any(result.option.kind.joint for result in comparison.results)
     return [f"Standstill is not compared: the stage file has no [floor].{joint if bought else ''}"]
 
 

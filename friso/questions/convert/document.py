@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from friso.questions.convert.words import SHOWN, conversion_sentences
+from friso.questions.convert.words import SHOWN, sentences
 from friso.shown.documents import plain_json
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ def convert_document(conversion: LawConversion) -> dict[str, Any]:
     flat = conversion.stage.flat()
     return plain_json(
         {
-            "conclusion": " ".join(conversion_sentences(conversion)),
+            "conclusion": " ".join(sentences(conversion)),
             "stage": conversion.stage.name,
             "law": conversion.law,
             "friction": {key.removeprefix("friction."): v for key, v in flat.items() if key.startswith("friction.")},

@@ -19,7 +19,7 @@ DRAWN = 40
 """Measured points that are drawn, at most."""
 
 
-def conversion_figure(conversion: LawConversion) -> Figure:
+def convert_figures(conversion: LawConversion) -> list[Figure]:
     """Virgin curves and steady friction over speed, before and after."""
     levels, before = conversion.before.levels, conversion.before
     stages = (
@@ -47,4 +47,4 @@ def conversion_figure(conversion: LawConversion) -> Figure:
         Panel("Steady motion", Axis("Speed", "m/s", log=True), Axis("Friction force", "N"), tuple(steady)),
     )
     caption = "Friction as measurements show it, before and after the conversion."
-    return Figure("friction", "Friction before and after", caption, panels, 2, conversion.stage.name)
+    return [Figure("friction", "Friction before and after", caption, panels, 2, conversion.stage.name)]

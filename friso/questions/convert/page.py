@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from friso.questions.convert.figures import conversion_figure
+from friso.questions.convert.figures import convert_figures
 from friso.shown.files import Content, image_files
 
 if TYPE_CHECKING:
@@ -13,5 +13,5 @@ if TYPE_CHECKING:
 
 def convert_files(conversion: LawConversion, stem: str) -> dict[str, Content]:
     """The stage file with the law, and the figure."""
-    image = image_files(conversion_figure(conversion), stem, ["png"])
-    return {f"{stem}.toml": conversion.stage.to_toml(), **image}
+    (figure,) = convert_figures(conversion)
+    return {f"{stem}.toml": conversion.stage.to_toml(), **image_files(figure, stem, ["png"])}

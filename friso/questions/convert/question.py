@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from friso.interface.answer import Answer, AnswerTable, question
-from friso.interface.inputs import Changes, StageLike, Whole, read_stage, stem_of, whole_number
+from friso.interface.inputs import Changes, LawName, StageLike, Whole, read_stage, stem_of, whole_number
 from friso.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files
-    from friso.studies.laws.conversion import LawConversion
 
 MOST = 12
 """Elements at most."""
@@ -22,41 +20,14 @@ MOST = 12
 class ConvertAnswer(Answer):
     """A stage under another friction law: `result` is the `LawConversion`, ``answer.stage`` the stage."""
 
-    command = "convert"
-
-    def __init__(self, result: LawConversion, title: str, name: str) -> None:
-        self.result, self.title, self.name = result, title, name
-        self.axis_kind = result.stage.axis_kind
-
-    def sentences(self) -> Sequence[str]:
-        """What is kept, and what is not."""
-        from friso.questions.convert.words import conversion_sentences
-
-        return conversion_sentences(self.result)
-
-    def blocks(self) -> Sequence[str]:
-        """The [friction] table."""
-        from friso.questions.convert.words import friction_table
-
-        return [friction_table(self.result)]
+    title: str
+    name: str
 
     def tables(self) -> Sequence[AnswerTable]:
         """What measurements show of both laws."""
         from friso.questions.convert.words import COLUMNS, conversion_rows
 
         return [AnswerTable(self.title, COLUMNS, conversion_rows(self.result))]
-
-    def figures(self) -> Sequence[Figure]:
-        """Virgin curves and steady friction, before and after."""
-        from friso.questions.convert.figures import conversion_figure
-
-        return [conversion_figure(self.result)]
-
-    def document(self) -> dict[str, Any]:
-        """The keys, and what is kept."""
-        from friso.questions.convert.document import convert_document
-
-        return convert_document(self.result)
 
     def files(self) -> Files:
         """The stage file and the figure."""
@@ -68,7 +39,7 @@ class ConvertAnswer(Answer):
 @question
 def convert(
     stage: StageLike,
-    friction: str,
+    friction: LawName,
     *,
     elements: Whole = 6,
     virgin: str | os.PathLike[str] | None = None,
@@ -79,8 +50,6 @@ def convert(
 
     Parameters
     ----------
-    stage : Stage, path or dict
-        The stage, its file, or the tables of one.
     friction : str
         The friction law to convert to; a wrong one is answered with all of them.
     elements : int
@@ -88,10 +57,6 @@ def convert(
     virgin : path, optional
         A file of any log format with measured force over displacement from rest up to break-away, one channel of each,
         with its unit; in place of what the stage's own law says of it.
-    set : dict, optional
-        Keys to override.
-    progress : Progress
-        Not called: this is quick.
 
     Returns
     -------
@@ -112,4 +77,6 @@ def convert(
     whole_number(elements, "elements", 1, MOST, "6")
     from friso.studies.laws.conversion import convert as converted
 
-    return ConvertAnswer(converted(chosen, friction, elements, virgin), chosen.name, f"{stem_of(stage)}_{friction}")
+    return ConvertAnswer(
+        converted(chosen, friction, elements, virgin), title=chosen.name, name=f"{stem_of(stage)}_{friction}"
+    )

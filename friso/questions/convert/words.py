@@ -29,7 +29,7 @@ COLUMNS = ("before", "after", "off by", "kept")
 """Of the table of what is compared."""
 
 
-def conversion_sentences(conversion: LawConversion) -> list[str]:
+def sentences(conversion: LawConversion) -> list[str]:
     """What could not be kept comes first; then what is left open, and whether the law may give energy back."""
     law, lost = conversion.law, conversion.lost
     name = conversion.stage.name or "the stage"
@@ -90,9 +90,9 @@ def conversion_rows(conversion: LawConversion) -> list[tuple[str, list[str]]]:
     ]
 
 
-def friction_table(conversion: LawConversion) -> str:
+def blocks(conversion: LawConversion) -> list[str]:
     """The table [friction] of the stage file."""
     text = conversion.stage.to_toml()
     begin = text.index("[friction]")
     end = text.find("\n[", begin + 1)
-    return text[begin : end if end > 0 else None].strip()
+    return [text[begin : end if end > 0 else None].strip()]

@@ -5,33 +5,25 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from friso.design_method.method import Design
 from friso.design_method.outline import outline
 from friso.design_method.prepare import assumed, by_rules, check_designable
 from friso.design_method.spec import Spec, load_spec, read_spec
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import AS_BUILT, LOGGER, Changes, StageLike, mention_unstable_loop, read_stage
 from friso.platform.extras import need
-from friso.platform.system import shell_word
 from friso.progress import Progress, silent
 from friso.stage import Stage, numeric_keys
 
 if TYPE_CHECKING:
-    from friso.shown.drawing.figure import Figure
-    from friso.shown.files import Files
-
-STAGES = ("design.toml", "worst.toml")
+    pass
 
 
 class DesignAnswer(Answer):
     """A design: `result` is a `Design`, ``answer.stage`` the designed stage."""
 
-    command, status = "design", 2
-
-    def __init__(self, result: Design) -> None:
-        self.result, self.axis_kind = result, result.stage.axis_kind
+    status = 2
 
     @property
     def failure(self) -> str:
@@ -40,12 +32,6 @@ class DesignAnswer(Answer):
 
         return "" if self.result.meets else f"the design does not meet the specification: {shortfall(self.result)}"
 
-    def sentences(self) -> Sequence[str]:
-        """The design in short."""
-        from friso.questions.design.words import headline
-
-        return [sentence for _, sentence in headline(self.result)]
-
     def details(self) -> Sequence[str]:
         """The steps of the method."""
         from friso.questions.design.steps import steps
@@ -53,28 +39,6 @@ class DesignAnswer(Answer):
         return [
             f"{number}. {step.title}: {' '.join(step.sentences)}" for number, step in enumerate(steps(self.result), 1)
         ]
-
-    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """The check of the design."""
-        return [f"friso check {shell_word(str(files[0]))}"] if files else []
-
-    def figures(self) -> Sequence[Figure]:
-        """Window of crossovers, leaves, map of hunting, moves."""
-        from friso.questions.design.figures import design_figures
-
-        return design_figures(self.result)
-
-    def document(self) -> dict[str, Any]:
-        """The numbers of every step."""
-        from friso.questions.design.document import design_document
-
-        return design_document(self.result)
-
-    def files(self) -> Files:
-        """The stages, the page, the drawing, the figures."""
-        from friso.questions.design.page import design_files
-
-        return design_files(self.result)
 
 
 @question
@@ -86,20 +50,14 @@ def design(
     laws: bool = False,
     progress: Progress = silent,
 ) -> DesignAnswer:
-    """From a specification to leaf springs, stroke and controller that do not hunt.
+    """From a specification to leaf springs, stroke and controller that do not hunt: design.toml, and its reasons.
 
     Parameters
     ----------
-    stage : Stage, path or dict
-        The stage as it is, its file, or the tables of one.
     spec : path, optional
         The specification: crossover limit, friction, moves, load, space, sheets; default: one made from the stage.
-    set : dict, optional
-        Keys of the stage to override.
     laws : bool
-        Whether edges of hunting are the worst over all friction laws that keep what is measured.
-    progress : Progress
-        Called as the steps of the method are done.
+        Take the worst edge of hunting over all friction laws that keep what is measured.
 
     Returns
     -------

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from friso.design_method.geometry import Geometry
 from friso.design_method.method import Design, Need, NoDesign
 from friso.design_method.relax import Relaxation
 from friso.design_method.verification import MachineOutcomes
+from friso.platform.system import shell_word
 from friso.quantities import outwards, percent
 from friso.questions.map.words import in_sentence
 from friso.shown.drawing.figure import GREEN, ORANGE, VERMILLION
@@ -235,3 +237,13 @@ def hertz(frequency: float) -> str:
 def seconds(time: float) -> str:
     """A settling time."""
     return with_unit(time, "s") if math.isfinite(time) else "never"
+
+
+def sentences(design: Design) -> list[str]:
+    """The design in short."""
+    return [sentence for _, sentence in headline(design)]
+
+
+def next_steps(design: Design, files: Sequence[Path]) -> list[str]:
+    """The check of the design."""
+    return [f"friso check {shell_word(str(files[0]))}"] if files else []

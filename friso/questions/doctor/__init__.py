@@ -1,1 +1,5 @@
-"""What `friso doctor` shows."""
+"""Does friso work on this machine."""
+
+from friso.interface.question import HELP, Question
+
+QUESTION = Question(__name__, 150, HELP, "doctor", takes=(), writes=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from friso.drives.gains import Gains
+from friso.interface.answer import AnswerTable
 
 COLUMNS = ("Symbol", "In this file", "In other units")
 
@@ -45,3 +46,13 @@ def _with_unit(value: tuple[float, str]) -> str:
     number, unit = value
     rounded = float(f"{number:.{DIGITS}g}")
     return f"{rounded:.10g} {unit}".rstrip()
+
+
+def tables(gains: Gains) -> list[AnswerTable]:
+    """Each gain with its symbol and its values."""
+    return [AnswerTable(title(gains), COLUMNS, rows(gains))]
+
+
+def blocks(gains: Gains) -> list[str]:
+    """The loop drawn, and the parameters of a drive."""
+    return [text for text in (gains.diagram, gains.text) if text]

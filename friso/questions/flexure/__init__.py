@@ -1,1 +1,11 @@
-"""What `friso flexure` shows: words, figures, document and page."""
+"""What the leaf springs of a joint are worth."""
+
+from friso.interface.question import STOPS, Question
+
+QUESTION = Question(
+    __name__,
+    70,
+    STOPS,
+    'flexure rig.toml --stroke "1 mm" --out flexure',
+    during="bending the leaves",
+)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from friso.errors import InputError
 from friso.interface.answer import Answer, AnswerTable, question
-from friso.interface.inputs import Changes, StageLike, read_stage, text_of, wrong
-from friso.leaf_springs.both_models import BothModels
+from friso.interface.inputs import Changes, LengthLike, StageLike, read_stage, text_of, wrong
 from friso.leaf_springs.mechanism import Mechanism
 from friso.platform.extras import need
 from friso.progress import Progress, silent
@@ -16,8 +15,7 @@ from friso.quantities import Quantity, positive, quoted
 from friso.stage import Stage
 
 if TYPE_CHECKING:
-    from friso.shown.drawing.figure import Figure
-    from friso.shown.files import Files
+    pass
 
 STROKE = Quantity("m", positive, "1 mm")
 EXAMPLE = """[flexure]
@@ -31,11 +29,6 @@ EXAMPLE = """[flexure]
 
 class FlexureAnswer(Answer):
     """The leaf springs of a joint: `result` has the evaluations by beams and by closed forms."""
-
-    command = "flexure"
-
-    def __init__(self, result: BothModels) -> None:
-        self.result, self.axis_kind = result, result.stage.axis_kind
 
     @property
     def failure(self) -> str:
@@ -54,41 +47,17 @@ class FlexureAnswer(Answer):
 
         return [AnswerTable(self.result.stage.name, list(self.result.models), rows(self.result))]
 
-    def figures(self) -> Sequence[Figure]:
-        """Stiffness over the stroke, stress, modes."""
-        from friso.questions.flexure.figures import flexure_figures
-
-        return flexure_figures(self.result)
-
-    def document(self) -> dict[str, Any]:
-        """The evaluations."""
-        from friso.questions.flexure.document import flexure_document
-
-        return flexure_document(self.result)
-
-    def files(self) -> Files:
-        """The page, the drawing, the figures."""
-        from friso.questions.flexure.page import flexure_files
-
-        return flexure_files(self.result)
-
 
 @question
 def flexure(
-    stage: StageLike, stroke: float | str | None = None, *, set: Changes = None, progress: Progress = silent
+    stage: StageLike, stroke: LengthLike | None = None, *, set: Changes = None, progress: Progress = silent
 ) -> FlexureAnswer:
-    """How good are the leaf springs of a joint: stiffness, modes, stress, fatigue and buckling.
+    """How good are the leaf springs of a joint: stiffness, modes, stress, fatigue and buckling, with a drawing.
 
     Parameters
     ----------
-    stage : Stage, path or dict
-        The stage with a [flexure] table, its file, or the tables of one.
     stroke : str or float, optional
         Deflection to one side, "1 mm" or a number [m]; default: `joint.stroke`.
-    set : dict, optional
-        Keys to override, ``{"flexure.thickness": "0.3 mm"}``.
-    progress : Progress
-        Called once before the leaves are bent.
 
     Returns
     -------

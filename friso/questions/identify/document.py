@@ -20,7 +20,10 @@ from friso.shown.documents import plain_json
 def identify_document(
     identification: Identification, files: Sequence[LogFile], predictions: Sequence[Prediction]
 ) -> dict[str, Any]:
-    """All but the files written."""
+    """Return the JSON document of an identification, but for the files written.
+
+    It has the conclusion, the logs, the experiments with their numbers, all estimates, and predictions of other logs.
+    """
     document = {
         "conclusion": headline(identification)[0][1],
         "stage": identification.stage.name if identification.stage else None,
@@ -40,6 +43,7 @@ def identify_document(
 
 
 def _log(file: LogFile) -> dict[str, Any]:
+    """Return how a file was read, for the document."""
     return {
         "file": str(file.path),
         "kind": file.kind,
@@ -51,7 +55,7 @@ def _log(file: LogFile) -> dict[str, Any]:
 
 
 def _content(source: Source) -> dict[str, Any]:
-    """What a file holds: signals over time, or a response."""
+    """Return what a file holds: signals over time, or a response."""
     if not isinstance(source, Log):
         return {"roles": {}, "lines": len(source.frequency), "unit": source.unit, "warnings": []}
     return {
@@ -64,6 +68,7 @@ def _content(source: Source) -> dict[str, Any]:
 
 
 def _experiment(experiment: Experiment) -> dict[str, Any]:
+    """Return an experiment with its numbers and estimates, for the document."""
     return {
         "kind": experiment.kind,
         "logs": [log.name for log in experiment.logs],

@@ -13,10 +13,14 @@ from friso.identification.stage_file import estimate_text
 
 
 def ends_document(estimate: Estimate) -> dict[str, Any]:
+    """Return the ends of an interval, None where one is infinite."""
     return {"value": estimate.value, "low": estimate.low, "high": estimate.high}
 
 
 def estimate_document(estimate: Estimate) -> dict[str, Any]:
+    """Return an estimate with its interval, or with the reason why there is no value, for the
+    document.
+    """
     about = {
         "unit": unit_shown(estimate.unit),
         **ends_document(estimate),
@@ -28,7 +32,7 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
 
 
 def key_document(estimate: Estimate) -> dict[str, Any]:
-    """An estimate of a key of the stage file, with the text that stands there."""
+    """Return an estimate of a key of the stage file, with the text that stands there."""
     document = estimate_document(estimate)
     stands = np.isfinite([estimate.low, estimate.high]).all() and estimate.high > estimate.low
     text = estimate_text(replace(estimate, unit=unit_shown(estimate.unit))) if stands else None

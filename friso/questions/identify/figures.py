@@ -30,7 +30,7 @@ SHORT = {
 
 
 def identify_figures(identification: Identification, predictions: Sequence[Prediction]) -> list[Figure]:
-    """All figures, in the order in which they are read."""
+    """Return all figures, in the order in which they are read."""
     figures, subject = _intervals(identification), identification.stage.name if identification.stage else ""
     for experiment, label in zip(identification.experiments, labels(identification), strict=True):
         figures += view_of(experiment.kind).figures(experiment.result, experiment.logs, f"identify_{label}")
@@ -40,7 +40,7 @@ def identify_figures(identification: Identification, predictions: Sequence[Predi
 
 
 def _intervals(identification: Identification) -> list[Figure]:
-    """How well every key is known: half its interval over the middle of it."""
+    """Draw how well every key is known: half its interval over the middle of it."""
     bounded = [
         estimate
         for estimate in ordered(identification.estimates)

@@ -26,8 +26,11 @@ TIME = Axis("Time", "s")
 
 @dataclass(frozen=True)
 class PredictionView(Generic[Result]):
-    """How another log that a kind of experiment predicts is shown: the `worst` of its relative errors, a sentence of
-    them, its numbers as in the JSON document, and its figures, of which the number is that of the log."""
+    """How another log that a kind of experiment predicts is shown.
+
+    It has the `worst` of its relative errors, a sentence of them, its numbers as in the JSON document, and its figures,
+    of which the number is that of the log.
+    """
 
     worst: Callable[[Result], float]
     sentence: Callable[[Result], str]
@@ -39,11 +42,11 @@ class PredictionView(Generic[Result]):
 class KindView(Generic[Result]):
     """How results of a kind of experiment are shown.
 
-    Its `title`; `facts` and `sentences` for terminal and page, with `warnings`; `numbers` for the JSON document, SI,
-    the unit in the key's suffix or beside; `figures`, whose names begin with the text given. `headline` is a sentence
-    for the head of the page beside the estimates of keys, "" for none. `longest`: of a log with gaps, the longest
-    stretch without any is all that is used.
-    `opening` is the last part of the name of the figure that opens the page, "" for none.
+    It has a `title`; `facts` and `sentences` for terminal and page, with `warnings`; `numbers` for the JSON document,
+    SI, the unit in the key's suffix or beside; and `figures`, whose names begin with the text given. `headline` is a
+    sentence for the head of the page beside the estimates of keys, "" for none. `longest`: of a log with gaps, the
+    longest stretch without any is all that is used. `opening` is the last part of the name of the figure that opens the
+    page, "" for none.
     """
 
     title: str
@@ -63,11 +66,17 @@ VIEWS: Registry[KindView[Any]] = Registry("friso.questions.identify.kinds", "VIE
 
 
 def view_of(kind: str) -> KindView[Any]:
-    """How results of a kind of experiment are shown: as its view declares, or else by its estimates and its logs."""
+    """Return how results of a kind are shown: as its view declares, or else by its estimates and
+    its logs.
+    """
     return VIEWS[kind] if kind in VIEWS else _by_estimates(kind)
 
 
 def _by_estimates(kind: str) -> KindView[Any]:
+    """Return a view that shows the estimates of a result and its logs, for a kind that declares
+    none.
+    """
+
     def facts(result: Any) -> Facts:
         return tuple(
             (name_of(estimate.name), with_interval(estimate)) for estimate in KINDS[kind].estimates(result, None)
@@ -84,7 +93,7 @@ def _by_estimates(kind: str) -> KindView[Any]:
 
 
 def log_figure(log: Log, roles: Sequence[str], name: str) -> Figure:
-    """Some signals of a log, by role, over time."""
+    """Draw some signals of a log, by role, over time."""
     panels = tuple(
         Panel(
             "", TIME, Axis(role.replace("_", " ").capitalize(), log.unit(role)), (Series(log.time, log[role], "", INK),)

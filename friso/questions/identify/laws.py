@@ -14,7 +14,7 @@ TITLE = "Friction laws, fitted to the same logs"
 
 
 def law_sentence(comparison: LawComparison) -> str:
-    """The answer, in a sentence."""
+    """Say in a sentence which friction laws the records support."""
     best, supported = comparison.predictions[0], comparison.supported
     if not supported:
         return (
@@ -36,17 +36,20 @@ def law_sentence(comparison: LawComparison) -> str:
 
 
 def _predict(laws: Sequence[LawPrediction]) -> str:
+    """Write "predicts" or "predict" for so many laws."""
     return "predicts" if len(laws) == 1 else "predict"
 
 
 def law_facts(comparison: LawComparison) -> tuple[tuple[str, str], ...]:
-    """Each law by name: by how much it is off, and what was fitted; and the logs left out, with the reason."""
+    """List each law by name: by how much it is off, and what was fitted; and the logs left out,
+    with the reason.
+    """
     laws = tuple((prediction.law, _errors_and_keys(prediction)) for prediction in comparison.predictions)
     return laws + tuple((f"{name}, left out", why) for name, why in comparison.left_out.items())
 
 
 def how(comparison: LawComparison) -> str:
-    """How they were compared, in a sentence."""
+    """Say in a sentence how the laws were compared."""
     whole = comparison.parts == len(comparison.logs)
     parts = "each of the logs" if whole else f"each of {comparison.parts} pieces of the logs"
     begun = "the stage file" if comparison.unseen else "all logs, since none can from the law of the stage file"
@@ -58,7 +61,7 @@ def how(comparison: LawComparison) -> str:
 
 
 def laws_document(comparison: LawComparison) -> dict[str, Any]:
-    """For the JSON document."""
+    """Return the compared laws, for the JSON document."""
     supported = [law.law for law in comparison.supported]
     return {
         "supported": supported,
@@ -79,14 +82,17 @@ def laws_document(comparison: LawComparison) -> dict[str, Any]:
 
 
 def _error_share(prediction: LawPrediction) -> str:
+    """Write the error of a law as a share of the friction's deviation."""
     return percent(prediction.error)
 
 
 def _laws_with_errors(laws: Sequence[LawPrediction]) -> str:
+    """Write laws with their errors."""
     return ", ".join(f"{law.law} (off by {_error_share(law)})" for law in laws)
 
 
 def _errors_and_keys(prediction: LawPrediction) -> str:
+    """Write the errors of a law and the keys that were fitted."""
     low, high = percent(prediction.errors.min()), percent(prediction.errors.max())
     keys = ", ".join(f"{key.removeprefix('friction.')} {value:.4g}" for key, value in prediction.fit.keys.items())
     return f"off by {_error_share(prediction)} ({low} to {high}); {keys}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.identification.inverse_model import EDGE, SMOOTH, motion
+from friso.identification.inverse_model import motion
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves
 from friso.identification.output_error.parameters import FitParameter
@@ -12,6 +12,7 @@ from friso.identification.output_error.problem import Simulated
 from friso.identification.output_error.profile import Profile
 from friso.identification.quality import steady_friction
 from friso.identification.readings.common import cart, low_pass, on_bearing
+from friso.identification.settings import IdentificationSettings
 from friso.questions.identify.kind_view import TIME
 from friso.questions.identify.numbers import digits, name_of, unit_of
 from friso.shown.drawing.figure import (
@@ -47,7 +48,7 @@ PALE = "#dbe9f4"
 
 
 def moves_figures(moves: IdentifiedMoves, name: str) -> list[Figure]:
-    """All figures of one log of moves; their names begin with this one."""
+    """Return all figures of one log of moves; their names begin with this one."""
     flat = moves.fit.problem.flat
     apart = "joint.stiffness" in flat and not flat["joint.locked"]  # a cart of its own, whose speed has to be measured
     friction = [_friction(moves, name)] if not apart or cart(moves.log) is not None else []
@@ -55,7 +56,7 @@ def moves_figures(moves: IdentifiedMoves, name: str) -> list[Figure]:
 
 
 def _force(moves: IdentifiedMoves, name: str) -> Figure:
-    """Measured and simulated force where the stage moves most."""
+    """Draw measured and simulated force where the stage moves most."""
     stretch = _liveliest(moves)
     log, part = moves.log, moves.part
     time, force = log.time[part][stretch], log["force"][part][stretch]
@@ -70,7 +71,7 @@ def _force(moves: IdentifiedMoves, name: str) -> Figure:
 
 
 def _liveliest(moves: IdentifiedMoves) -> slice:
-    """The samples of the stretch of a log, of `LONG` periods at most, that goes the longest way."""
+    """Return the samples of the stretch of a log, a few periods long, that goes the longest way."""
     position = moves.log["position"][moves.part]
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(position)))])
     length = min(len(position), max(2, round(LONG / (moves.inverse.bandwidth * moves.log.sample_time))))
@@ -79,7 +80,7 @@ def _liveliest(moves: IdentifiedMoves) -> slice:
 
 
 def _traces(moves: IdentifiedMoves, name: str) -> Figure:
-    """Measured and simulated over time."""
+    """Draw the record as measured and simulated over time."""
     if moves.loop is not None:
         caption = "The identified machine in closed loop on the logged reference; the measured motion does not enter."
         panels = record_panels(moves.log, moves.part, moves.simulated)
@@ -96,7 +97,7 @@ def _traces(moves: IdentifiedMoves, name: str) -> Figure:
 
 
 def record_panels(log: Log, part: slice, simulated: Simulated) -> tuple[Panel, ...]:
-    """Position, force and the residuals of both, of a record simulated in closed loop."""
+    """Draw position, force and the residuals of both, of a record simulated in closed loop."""
     time, position, force = log.time[part], log["position"][part], log["force"][part]
     expected = simulated.force + (log["disturbance"][part] if "disturbance" in log else 0.0)
     apart = Series(time, position - simulated.position, "", VERMILLION, width=1.0)
@@ -109,16 +110,23 @@ def record_panels(log: Log, part: slice, simulated: Simulated) -> tuple[Panel, .
 
 
 def _both(time: Array, measured: Array, simulated: Array, word: str) -> tuple[Series, ...]:
+    """Draw a signal as measured and as simulated."""
     return Series(time, measured, "measured", GREY, width=2.0), Series(time, simulated, word, VERMILLION, width=0.8)
 
 
 def _difference(time: Array, left: Array, unit: str) -> Panel:
+    """Draw what is left of a signal over time."""
     return Panel("", TIME, Axis("Measured − simulated", unit), (Series(time, left, "", VERMILLION, width=0.9),))
 
 
 def _residual(moves: IdentifiedMoves, name: str) -> Figure:
-    """The residual force over place and speed."""
-    moved = motion(moves.log["position"][moves.part], moves.log.sample_time, SMOOTH * moves.inverse.bandwidth)
+    """Draw the residual force over place and speed."""
+    settings = IdentificationSettings.current()
+    moved = motion(
+        moves.log["position"][moves.part],
+        moves.log.sample_time,
+        settings.smoothing_bandwidths * moves.inverse.bandwidth,
+    )
     left, axis = moves.fit.residual, Axis("Residual force", moves.force_unit)
     panels = (
         Panel("", Axis("Position", "m"), axis, (Series(moved.position, left, "", VERMILLION, width=0.5),)),
@@ -132,16 +140,19 @@ def _residual(moves: IdentifiedMoves, name: str) -> Figure:
 
 
 def _friction(moves: IdentifiedMoves, name: str) -> Figure:
-    """Force less inertia over velocity, and the friction found."""
+    """Draw the force less inertia over velocity, and the friction that was identified."""
+    settings = IdentificationSettings.current()
     flat = moves.flat
     masses = [flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage")]
-    step, cutoff = moves.log.sample_time, SMOOTH * moves.inverse.bandwidth
+    step, cutoff = moves.log.sample_time, settings.smoothing_bandwidths * moves.inverse.bandwidth
     moved, stage = (
         motion(position[moves.part], step, cutoff) for position in (on_bearing(moves.log), moves.log["position"])
     )
     force = low_pass(moves.log["force"][moves.part], step, cutoff)
     friction = force - masses[0] * moved.acceleration - masses[1] * stage.acceleration
-    inner = slice(EDGE, -EDGE)  # at the ends of a record the filter swings in
+    inner = slice(
+        settings.samples_of_an_edge, -settings.samples_of_an_edge
+    )  # at the ends of a record the filter swings in
     loops = Series(moved.velocity[inner], friction[inner], "measured force less inertia", GREY, width=0.6)
     top = float(np.abs(moved.velocity).max())
     reach = 1.1 * float(np.percentile(np.abs(friction), 99.5))
@@ -167,7 +178,7 @@ def _friction(moves: IdentifiedMoves, name: str) -> Figure:
 
 
 def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
-    """How much worse the fit gets as one parameter is moved."""
+    """Draw how much worse the fit gets as one parameter is moved."""
     best = moves.fit.cost
     parameters = {parameter.name: parameter for parameter in moves.fit.problem.parameters}
     fitted = {moves.fit.problem.parameters[number].name for number in moves.fit.free}
@@ -188,7 +199,7 @@ def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
 
 
 def _profile(profile: Profile, parameter: FitParameter, best: float, fitted: bool) -> Panel:
-    """One parameter's panel."""
+    """Draw the panel of one parameter."""
     worse = (profile.cost - best) / (profile.limit - best)
     log = parameter.logarithmic and profile.values[-1] > WIDE * profile.values[0]
     lowest = min(-0.2, 1.2 * float(worse.min()))

@@ -41,18 +41,20 @@ _NAMES = {
 
 
 def name_of(key: str) -> str:
-    """A key of the stage file, or another quantity found, in words."""
+    """Write a key of the stage file, or another quantity, in words."""
     return _NAMES.get(key) or quantity(key)
 
 
 def within(key: str) -> str:
-    """The same inside a sentence: names of people stay as they are."""
+    """Write the name of a key inside a sentence: names of people stay as they are."""
     name = name_of(key)
     return name if name.startswith(("Coulomb", "Stribeck")) else name[0].lower() + name[1:]
 
 
 def unit_of(unit: str) -> str:
-    """A unit as prefixes know it: "N s/m" is "N*s/m", and ones are left out, "1 s^2/1" is "s^2"."""
+    """Write a unit as prefixes know it: "N s/m" is "N*s/m", and ones are left out, "1 s^2/1" is
+    "s^2".
+    """
     top, *below = unit.split("/")
     factors = [part for part in top.replace("*", " ").split() if part != "1"]
     below = [part for part in below if part != "1"]
@@ -60,7 +62,7 @@ def unit_of(unit: str) -> str:
 
 
 def value_text(estimate: Estimate) -> str:
-    """A value with its unit, e.g. "95.28 kg"; a dash where there is none."""
+    """Write a value with its unit, e.g. "95.28 kg"; a dash where there is none."""
     if not math.isfinite(estimate.value):
         return NOTHING
     factor, unit = _scale(estimate)
@@ -68,7 +70,9 @@ def value_text(estimate: Estimate) -> str:
 
 
 def interval_text(estimate: Estimate) -> str:
-    """The interval, e.g. "94.84 to 95.72 kg"; of what the logs do not show, the range that they allow."""
+    """Write the interval, e.g. "94.84 to 95.72 kg"; of what the logs do not show, the range that
+    they allow.
+    """
     low, high = math.isfinite(estimate.low), math.isfinite(estimate.high)
     if not (low or high):
         return NOTHING
@@ -83,7 +87,7 @@ def interval_text(estimate: Estimate) -> str:
 
 
 def with_interval(estimate: Estimate) -> str:
-    """Both in a sentence, e.g. "95.28 kg (94.84 to 95.72)"."""
+    """Write value and interval in a sentence, e.g. "95.28 kg (94.84 to 95.72)"."""
     if not estimate.determined:
         return f"not identified ({estimate.reason})"
     unit = _scale(estimate)[1]
@@ -91,12 +95,12 @@ def with_interval(estimate: Estimate) -> str:
 
 
 def estimates_in_words(estimates: Sequence[Estimate]) -> str:
-    """Several in a sentence, by name."""
+    """Write several estimates in a sentence, by name."""
     return ", ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in estimates)
 
 
 def digits(value: float, unit: str) -> str:
-    """A value [unit] to three digits, with a prefix of its own: "2.1 µm"."""
+    """Write a value [unit] to three digits, with a prefix of its own: "2.1 µm"."""
     if not math.isfinite(value):
         return NOTHING
     factor, text = choose(np.array([value]), unit)
@@ -104,7 +108,9 @@ def digits(value: float, unit: str) -> str:
 
 
 def _scale(estimate: Estimate) -> tuple[float, str]:
-    """Factor and unit with prefix that suit the value, or else the range that is possible."""
+    """Return factor and unit with prefix that suit the value, or else the range that is
+    possible.
+    """
     finite = [estimate.low, estimate.high]
     if math.isfinite(estimate.value):  # of a value next to 0, its interval tells the size
         finite = [max(abs(estimate.value), estimate.half_width) if estimate.value else 0.0]
@@ -115,7 +121,7 @@ def _scale(estimate: Estimate) -> tuple[float, str]:
 
 
 def _places(estimate: Estimate, factor: float) -> int:
-    """Decimal places that the interval allows."""
+    """Return the decimal places that the interval allows."""
     half = estimate.half_width * factor
     if not (math.isfinite(half) and half > 0):
         finite = [
@@ -128,6 +134,7 @@ def _places(estimate: Estimate, factor: float) -> int:
 
 
 def _written(value: float, factor: float, places: int) -> str:
+    """Write a number with so many decimal places."""
     if math.isfinite(value) and not -LARGE <= places <= SMALL:
         size = math.floor(math.log10(abs(value * factor))) if value * factor else 0
         return f"{value * factor:.{max(MOST - 1, min(places + size, EXACT))}e}"

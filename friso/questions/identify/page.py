@@ -31,7 +31,10 @@ STAGE = "identified.toml"
 def identify_files(
     identification: Identification, logs: Sequence[LogFile], predictions: Sequence[Prediction]
 ) -> dict[str, Content]:
-    """All files; a stage file and correlations of an earlier run go where there are none now."""
+    """Return all files of an identification.
+
+    A stage file and correlations of an earlier run are removed where there are none now.
+    """
     stage, correlations = identification.stage, None
     if stage is not None and identification.correlations.keys:
         correlations = correlations_text(identification.correlations, stage)
@@ -51,7 +54,7 @@ def identify_html(
     predictions: Sequence[Prediction],
     figures: Sequence[Figure],
 ) -> str:
-    """The whole page of an identification and its figures."""
+    """Return the whole page of an identification and its figures."""
     several = zip(identification.experiments, labels(identification), strict=True)
     opening = [f"identify_{label}_{view_of(experiment.kind).opening}" for experiment, label in several]
     return Report.of_stage(

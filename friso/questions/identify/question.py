@@ -8,16 +8,30 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from friso.axis import LINEAR, AxisKind, speak_of
+from friso.axis import LINEAR, speak_of
 from friso.errors import InputError
 from friso.identification.kind import AnalysisSettings
 from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import Mapping
-from friso.identification.method import Identification, Prediction, around, axis_of_all, check_predictions
+from friso.identification.method import Prediction, around, axis_of_all, check_predictions
 from friso.identification.sources import LogFile, per_unit_of_force, read_all
 from friso.identification.stage_file import TOLD_BY_LOGS, completed
 from friso.interface.answer import Answer, AnswerTable, question
-from friso.interface.inputs import Changes, StageLike, changes_of, stage_of, tables_of, text_of
+from friso.interface.inputs import (
+    Changes,
+    ChannelUnits,
+    FrequencyBand,
+    FrequencyLike,
+    KindName,
+    Roles,
+    RoleScales,
+    StageLike,
+    TimeLike,
+    changes_of,
+    stage_of,
+    tables_of,
+    text_of,
+)
 from friso.intervals import Span
 from friso.platform.system import shell_word
 from friso.progress import Progress, silent
@@ -40,17 +54,8 @@ class IdentifyAnswer(Answer):
     """What logs show of a machine: `result` is an `Identification` with the estimates and, where the logs describe a
     whole machine, the `stage`; `inputs` are the files read, `predictions` those of other logs."""
 
-    command = "identify"
-
-    def __init__(
-        self,
-        result: Identification,
-        inputs: Sequence[LogFile],
-        predictions: Sequence[Prediction],
-        axis_kind: AxisKind = LINEAR,
-    ) -> None:
-        self.result, self.inputs, self.predictions = result, tuple(inputs), tuple(predictions)
-        self.axis_kind = axis_kind
+    inputs: Sequence[LogFile]
+    predictions: Sequence[Prediction]
 
     @property
     def failure(self) -> str:
@@ -108,16 +113,16 @@ def identify(
     *,
     stage: StageLike | None = None,
     set: Changes = None,
-    as_: str | None = None,
-    map: Changes = None,
-    unit: Changes = None,
-    scale: Changes = None,
-    dt: str | float | None = None,
-    axis: str | None = None,
+    as_: KindName | None = None,
+    map: Roles = None,
+    unit: ChannelUnits = None,
+    scale: RoleScales = None,
+    dt: TimeLike | None = None,
+    axis: KindName | None = None,
     predict: LogFiles = (),
-    bandwidth: str | float | None = None,
-    band: str | None = None,
-    period: str | float | None = None,
+    bandwidth: FrequencyLike | None = None,
+    band: FrequencyBand | None = None,
+    period: TimeLike | None = None,
     laws: bool = False,
     folder: Path = Path(),
     keep: MappingKeeper | None = None,
@@ -125,23 +130,15 @@ def identify(
 ) -> IdentifyAnswer:
     """A stage with uncertainties from measured logs: mass, friction, stiffness, and what the logs cannot show.
 
+    The exit status is 1 where a model does not describe its log.
+
     Parameters
     ----------
-    logs : path or list of paths
-        Files, in a format that `friso logs --help` lists.
     stage : Stage, path or dict, optional
         What is known beforehand: structure, controller, drive. Masses, friction and motion may be left out: where it
         has no such tables, a log of moves tells them.
-    set : dict, optional
-        Keys of that stage to override.
     as_ : str, optional
-        Kind of experiment; moves and frequency responses are recognised.
-    map, unit, scale : dict, optional
-        Roles and their channels, channels and their units, roles and their scales, as in `friso.logs`.
-    dt : str or float, optional
-        Sample time, "1 ms" or a number [s], if a file does not contain it.
-    axis : str, optional
-        "rotary" for angles, torques and moments of inertia; a stage file may state this instead.
+        Kind of experiment; moves and frequency responses are recognised. friso identify --help lists the kinds.
     predict : path or list of paths, optional
         Other logs, simulated with the identified stage.
     bandwidth : str or float, optional
@@ -151,13 +148,11 @@ def identify(
     period : str or float, optional
         Period of a periodic excitation, "5 s" or a number [s].
     laws : bool
-        Whether to fit every friction law to the logs and to say which of them the record supports; needs a stage.
+        Fit every friction law too, and say which of them the record supports; needs a stage.
     folder : Path
         Where what was said of channels is looked for, if not beside the logs.
     keep : callable, optional
         Called with what was said of the channels of each file, to keep it.
-    progress : Progress
-        Called as experiments are analysed.
 
     Returns
     -------
@@ -213,11 +208,14 @@ def identify(
     reused = tuple(file.reused for file in inputs if file.reused)
     result = replace(result, warnings=(*reused, *_taken_from_logs(made_up), *result.warnings))
     predictions = [predicted(result, log, settings, assumed) for log in others]
-    return IdentifyAnswer(result, inputs, predictions, axis_kind)
+    return IdentifyAnswer(result, inputs=inputs, predictions=predictions, axis_kind=axis_kind)
 
 
 def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Changes) -> Stage:
-    """The stage of a file that lacks tables which a stage `made` up around a log has. Raises InputError."""
+    """Return the stage of a file that lacks tables which a stage `made` up around a log has.
+
+    Raises InputError.
+    """
     try:
         return changed(completed(tables, made), changes_of(changes))
     except InputError as error:
@@ -225,22 +223,27 @@ def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Cha
 
 
 def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]:
-    """The keys of tables that a stage file lacks, of a stage `made` up around a log, but for those that are set."""
+    """List the keys of tables that a stage file lacks, of a stage `made` up around a log, but
+    for those that are set.
+    """
     keys_set = changes_of(changes)
     keys = [f"{name}.{key}" for name in lacking for key in made.as_written()[name]]
     return [key for key in keys if key not in keys_set]
 
 
 def _taken_from_logs(made_up: Sequence[str]) -> list[str]:
-    """A sentence on the tables of keys that were made up around a log."""
+    """Say which tables of keys were made up around a log."""
     if not made_up:
         return []
     listed = ", ".join(dict.fromkeys(f"[{key.partition('.')[0]}]" for key in made_up))
     return [f"the stage file has no {listed}: begun from the log, and our choice where that does not tell"]
 
 
-def _settings(bandwidth: str | float | None, band: str | None, period: str | float | None) -> AnalysisSettings:
-    """What the user chose for the analyses. Raises InputError."""
+def _settings(bandwidth: FrequencyLike | None, band: FrequencyBand | None, period: TimeLike | None) -> AnalysisSettings:
+    """Return what the user chose for the analyses.
+
+    Raises InputError.
+    """
     values = []
     for name, value, quantity in (("bandwidth", bandwidth, _HERTZ), ("period", period, _SECONDS)):
         text = None if value is None else text_of(value, quantity.unit)
@@ -256,7 +259,10 @@ def _settings(bandwidth: str | float | None, band: str | None, period: str | flo
 
 
 def _logs_to_predict(inputs: Sequence[LogFile]) -> list[Log]:
-    """The logs to be predicted. Raises InputError."""
+    """Read the logs to be predicted.
+
+    Raises InputError.
+    """
     logs = [item.source for item in inputs if isinstance(item.source, Log)]
     if len(logs) < len(inputs):
         raise InputError("predict", "a measured frequency response", "a log over time", "predict=other.mat")

@@ -33,7 +33,7 @@ FACTOR_COLOURS = (GREEN, BLUE, PINK)
 
 
 def response_figures(bench: Bench, name: str) -> list[Figure]:
-    """All figures of one bench; their names begin with this one."""
+    """Return all figures of one bench; their names begin with this one."""
     figures = [_bode(bench, name), *_levels(bench, name)]
     if bench.departs is not None:
         figures.append(_departure(bench, name))
@@ -43,7 +43,7 @@ def response_figures(bench: Bench, name: str) -> list[Figure]:
 
 
 def _bode(bench: Bench, name: str) -> Figure:
-    """Magnitude over phase, a column for each output."""
+    """Draw magnitude over phase, a column for each output."""
     outputs = [response for response in (bench.driven, bench.other) if response is not None]
     columns = [_column(bench, response, number == 0) for number, response in enumerate(outputs)]
     panels = tuple(column[row] for row in range(2) for column in columns)
@@ -56,7 +56,7 @@ def _bode(bench: Bench, name: str) -> Figure:
 
 
 def _column(bench: Bench, response: FrequencyResponse, driven: bool) -> tuple[Panel, Panel]:
-    """Magnitude and phase of one output."""
+    """Draw magnitude and phase of one output."""
     hertz = response.frequency
     inside = hertz[(hertz >= bench.band[0]) & (hertz <= bench.band[1])]
     fine = np.geomspace(inside[0], inside[-1], 400)
@@ -89,35 +89,36 @@ def _column(bench: Bench, response: FrequencyResponse, driven: bool) -> tuple[Pa
 
 
 def _phase_turns(hertz: Array, measured: Array, fine: Array, fitted: Array) -> Array:
-    """Phases of a fit [deg] in the turn in which the measured ones are."""
+    """Return phases of a fit [deg] in the turn in which the measured ones are."""
     off = np.interp(fine, hertz, measured) - fitted
     return fitted + 360 * np.round(np.median(off) / 360)
 
 
 def _mass_line(line: StraightLine, hertz: Array, named: bool) -> Series:
-    """A mass line over its band and an octave to each side."""
+    """Draw a mass line over its band and an octave to each side."""
     reach = np.array([max(line.low / 2, hertz[0]), min(line.high * 2, hertz[-1])])
     label = line.kind if named else ""
     return Series(reach, line.level.value / (2 * np.pi * reach) ** 2, label, INK, "dotted", 1.6)
 
 
 def _unit(response: FrequencyResponse, power: str = "") -> str:
-    """Of the response, its output divided by a power of time."""
+    """Return the unit of a response, its output divided by a power of time."""
     return unit_of(f"{response.channels.output_unit}{power}/{response.channels.input_unit}")
 
 
 def _title(response: FrequencyResponse) -> str:
+    """Write which output over which input a response is."""
     return f"{response.channels.output} over {response.channels.input}".replace("_", " ")
 
 
 def _around(*several: Array) -> tuple[float, float]:
-    """Limits of a logarithmic axis a little beyond all values above 0."""
+    """Return limits of a logarithmic axis a little beyond all values above 0."""
     values = np.concatenate([estimate[np.isfinite(estimate) & (estimate > 0)] for estimate in several])
     return float(values.min()) / 1.2, float(values.max()) * 1.2
 
 
 def _levels(bench: Bench, name: str) -> list[Figure]:
-    """Response, noise and distortion, where the record shows these."""
+    """Draw response, noise and distortion, where the record shows these."""
     outputs = [response for response in (bench.driven, bench.other) if response is not None]
     panels = tuple(_level_panel(response) for response in outputs)
     if min(len(panel.series) for panel in panels) < 2:
@@ -130,7 +131,7 @@ def _levels(bench: Bench, name: str) -> list[Figure]:
 
 
 def _level_panel(response: FrequencyResponse) -> Panel:
-    """The sizes of one output."""
+    """Draw the sizes of one output."""
     rows = [("response", GREY, np.abs(response.response)), ("noise", BLUE, response.noise)]
     rows.append(("nonlinear distortion", VERMILLION, response.distortion))
     if not np.isfinite(response.noise).any():
@@ -145,7 +146,7 @@ def _level_panel(response: FrequencyResponse) -> Panel:
 
 
 def _departure(bench: Bench, name: str) -> Figure:
-    """Response over model, and where it leaves it."""
+    """Draw the response over the model, and where it leaves it."""
     departs = bench.departs
     assert departs is not None
     limits = _around(departs.excess)
@@ -163,7 +164,7 @@ def _departure(bench: Bench, name: str) -> Figure:
 
 
 def _amplitudes(bench: Bench, name: str) -> Figure:
-    """Measured and simulated accelerations per input at low frequency."""
+    """Draw measured and simulated accelerations per input at low frequency."""
     assert bench.explanation is not None
     assert bench.drag is not None
     top = max(response.frequency[-1] for response in bench.explanation.responses.values())
@@ -186,7 +187,7 @@ def _amplitudes(bench: Bench, name: str) -> Figure:
 
 
 def _rising(response: FrequencyResponse, high: float) -> tuple[Array, Array]:
-    """Frequencies [Hz] up to one, and the size of the acceleration per input there."""
+    """Return frequencies [Hz] up to one, and the size of the acceleration per input there."""
     chosen = (response.frequency > 0) & (response.frequency <= high)
     hertz = response.frequency[chosen]
     return hertz, np.abs(response.response[chosen]) * (2 * np.pi * hertz) ** 2

@@ -49,8 +49,10 @@ POOR = 0.5
 
 @dataclass(frozen=True)
 class ExperimentSummary:
-    """An experiment: `label`, of which the names of its figures are made, title, sentences, numbers by name, and
-    warnings."""
+    """An experiment in words.
+
+    It has a `label`, of which the names of its figures are made, a title, sentences, numbers by name, and warnings.
+    """
 
     label: str
     title: str
@@ -68,11 +70,12 @@ class EstimateRow:
 
 
 def headline(identification: Identification) -> list[tuple[str, str]]:
-    """What is identified, and what is not and why; each sentence with its colour."""
+    """Say what is identified, and what is not and why; each sentence with its colour."""
     return [(colour, axis_shown().text(sentence)) for colour, sentence in _headline(identification)]
 
 
 def _headline(identification: Identification) -> list[tuple[str, str]]:
+    """Say what is identified, before doubts are put first or last."""
     estimates = ordered(identification.estimates)
     visible = [estimate for estimate in estimates if estimate.determined]
     effects = [estimate for estimate in visible if not _absent(estimate)]
@@ -104,6 +107,7 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
 
 
 def _why_no_stage(identification: Identification) -> str:
+    """Say why there is no stage."""
     if identification.failed or nothing_learnt(identification.estimates, False):
         return NOTHING_HOLDS
     shown = axis_shown()
@@ -133,12 +137,15 @@ SHOWN_BY = {
 
 
 def _absent(estimate: Estimate) -> bool:
+    """Tell whether an estimate says that something is not there: its interval holds 0."""
     return estimate.name in ABSENT and estimate.low <= 0 <= estimate.high
 
 
 def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
-    """The experiments that would show what is not identified, but for a kind that alone was `done`: what that lacked
-    is in the reasons."""
+    """Name the experiments that would show what is not identified.
+
+    A kind that alone was `done` is left out: what that lacked is in the reasons.
+    """
     names: dict[str, list[str]] = {}
     for estimate in estimates:
         way = SHOWN_BY.get(estimate.name) or SHOWN_BY.get(estimate.name.split(".")[0])
@@ -148,7 +155,7 @@ def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
 
 
 def missing(estimates: Sequence[Estimate]) -> str:
-    """What is not identified, with its reason, which several may share."""
+    """Say what is not identified, with its reason, which several may share."""
     names: dict[str, list[str]] = {}
     for estimate in estimates:
         if not estimate.determined:
@@ -157,39 +164,40 @@ def missing(estimates: Sequence[Estimate]) -> str:
 
 
 def prediction_view(prediction: Prediction) -> PredictionView[Any]:
-    """How the kind of experiment that predicts shows it."""
+    """Return how the kind of experiment that predicts shows a prediction."""
     view = view_of(prediction.kind).prediction
     assert view is not None, f"{prediction.kind} predicts logs, and its view does not show it"
     return view
 
 
 def prediction_line(prediction: Prediction) -> tuple[str, str]:
-    """How well another log is predicted, with its colour."""
+    """Say how well another log is predicted, with the colour of the sentence."""
     view = prediction_view(prediction)
     colour = GREEN if view.worst(prediction.result) < POOR else VERMILLION
     return colour, f"Prediction of {prediction.log.name}: {view.sentence(prediction.result)}"
 
 
 def estimate_rows(identification: Identification) -> list[EstimateRow]:
-    """The table of estimates, in words of `COLUMNS`."""
+    """Return the table of estimates, in words of `COLUMNS`."""
     return [_row(estimate) for estimate in ordered(identification.estimates)]
 
 
 def ordered(estimates: Sequence[Estimate]) -> list[Estimate]:
-    """The estimates in the order of the stage file's tables; others last."""
+    """Return the estimates in the order of the stage file's tables; others last."""
     tables = ("masses", "friction", "bias", "joint")
     places = {name: number for number, name in enumerate(tables)}
     return sorted(estimates, key=lambda estimate: places.get(estimate.name.split(".")[0], len(tables)))
 
 
 def _row(estimate: Estimate) -> EstimateRow:
+    """Write an estimate as a line of the table."""
     value = value_text(estimate) if estimate.determined else LEFT
     why = axis_shown().text(estimate.reason or estimate.method)
     return EstimateRow(estimate.determined, (name_of(estimate.name), value, interval_text(estimate), why))
 
 
 def summaries(identification: Identification) -> list[ExperimentSummary]:
-    """The experiments, in words."""
+    """Return the experiments, in words."""
     several = zip(identification.experiments, labels(identification), strict=True)
     experiments = [_summary(experiment, label) for experiment, label in several]
     laws = identification.laws
@@ -201,6 +209,7 @@ def summaries(identification: Identification) -> list[ExperimentSummary]:
 
 
 def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
+    """Write an experiment in words."""
     view, result, axis = view_of(experiment.kind), experiment.result, axis_shown()
     facts = tuple((name, axis.text(fact)) for name, fact in view.facts(result))
     return ExperimentSummary(
@@ -213,7 +222,9 @@ def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
 
 
 def _used(logs: Sequence[Source]) -> Facts:
-    """How much is used of logs with gaps, where an analysis takes the longest stretch without any."""
+    """Say how much is used of logs with gaps, where an analysis takes the longest stretch
+    without any.
+    """
     gapped = [log for log in logs if isinstance(log, Log) and len(log.segments) > 1]
     if not gapped:
         return ()
@@ -223,7 +234,10 @@ def _used(logs: Sequence[Source]) -> Facts:
 
 
 def labels(identification: Identification) -> list[str]:
-    """A name for every experiment, of which those of its figures are made: its kind, numbered where there are more."""
+    """Return a name for every experiment, of which those of its figures are made.
+
+    It is its kind, numbered where there are more.
+    """
     kinds = [experiment.kind for experiment in identification.experiments]
     return [
         kind.replace("-", "_") + (str(kinds[: i + 1].count(kind)) if kinds.count(kind) > 1 else "")
@@ -232,7 +246,9 @@ def labels(identification: Identification) -> list[str]:
 
 
 def read_rows(files: Sequence[LogFile]) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
-    """For every file: what it counts as and why, what was read, and what to know before believing it."""
+    """Say of every file what it counts as and why, what was read, and what to know before
+    believing it.
+    """
     rows = []
     for file in files:
         read = file.source.read
@@ -243,14 +259,16 @@ def read_rows(files: Sequence[LogFile]) -> list[tuple[str, tuple[str, ...], tupl
 
 
 def answer(identification: Identification, files: Sequence[LogFile], predictions: Sequence[Prediction]) -> list[str]:
-    """All lines: the answer, the estimates, the experiments behind them, and what was read."""
+    """Return all lines: the answer, the estimates, the experiments behind them, and what was
+    read.
+    """
     rows = estimate_rows(identification)
     estimates = ["", *_aligned(rows)] if rows else []
     return [*sentences(identification, predictions), *estimates, *details(identification, files)]
 
 
 def sentences(identification: Identification, predictions: Sequence[Prediction]) -> list[str]:
-    """The answer, how well other logs are predicted, and notes."""
+    """Return the answer, how well other logs are predicted, and notes."""
     lines = [sentence for _, sentence in headline(identification)]
     lines += [] if identification.laws is None else [law_sentence(identification.laws)]
     lines += [prediction_line(prediction)[1] for prediction in predictions]
@@ -259,7 +277,9 @@ def sentences(identification: Identification, predictions: Sequence[Prediction])
 
 
 def _chosen(identification: Identification) -> list[str]:
-    """That a verdict on the stage rests on a controller that is none of the user's, if it does."""
+    """Say that a verdict on the stage rests on a controller that is none of the user's, if it
+    does.
+    """
     table = "controller"
     sources = {source for key, source in identification.origins.items() if key.startswith(f"{table}.")}
     if identification.stage is None or sources != {CHOSEN}:
@@ -268,7 +288,7 @@ def _chosen(identification: Identification) -> list[str]:
 
 
 def details(identification: Identification, files: Sequence[LogFile]) -> list[str]:
-    """The experiments behind the estimates, and what was read."""
+    """Return the experiments behind the estimates, and what was read, line by line."""
     lines = []
     for part in summaries(identification):
         lines += ["", part.title, *(f"  {sentence}" for sentence in part.sentences)]
@@ -280,7 +300,7 @@ def details(identification: Identification, files: Sequence[LogFile]) -> list[st
 
 
 def _aligned(rows: Sequence[EstimateRow]) -> list[str]:
-    """Quantity, value and interval in columns; the reason where there is no value."""
+    """Align quantity, value and interval in columns; the reason where there is no value."""
     table = [COLUMNS[:-1], *(row.texts[:-1] for row in rows)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in table]

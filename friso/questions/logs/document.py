@@ -11,11 +11,12 @@ from friso.shown.documents import plain_json
 
 
 def logs_document(contents: Sequence[LogContent]) -> dict[str, Any]:
-    """All files, but for those that are written."""
+    """Return the JSON document of all files, but for those that are written."""
     return plain_json({"logs": [_log(content) for content in contents]})
 
 
 def _log(content: LogContent) -> dict[str, Any]:
+    """Return what a file holds, for the document."""
     response = content.response
     return {
         "file": str(content.path),
@@ -36,6 +37,7 @@ def _log(content: LogContent) -> dict[str, Any]:
 
 
 def _channel(channel: ChannelContent) -> dict[str, Any]:
+    """Return a channel, for the document."""
     low, high = channel.range or (None, None)
     return {
         "name": channel.name,

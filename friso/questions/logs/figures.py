@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from friso.identification.contents import ChannelContent, LogContent
-from friso.identification.logs.signals import LARGEST
+from friso.identification.logs.settings import LogSettings
 from friso.questions.logs.words import title
 from friso.shown.drawing.figure import BLUE, Axis, Figure, Panel, Series
 
@@ -16,11 +16,12 @@ MOST = 12
 
 
 def logs_figures(contents: Sequence[LogContent]) -> list[Figure]:
-    """A figure for each file of channels are drawn, those with a role first."""
+    """Draw a figure for each file of channels, those with a role first."""
     return [_figure(content, number) for number, content in enumerate(contents, 1) if content.channels]
 
 
 def _figure(content: LogContent, number: int) -> Figure:
+    """Draw the channels of a file."""
     channels = sorted((c for c in content.channels if c.role != "time"), key=lambda channel: not channel.role)
     left = f" {MOST} of {len(channels)} channels are drawn, those with a role first." if len(channels) > MOST else ""
     caption = f"As they stand in the file, in its own units.{left}"
@@ -29,6 +30,7 @@ def _figure(content: LogContent, number: int) -> Figure:
 
 
 def _panel(channel: ChannelContent) -> Panel:
+    """Draw a channel over time, or over its samples."""
     time = channel.time
     timed = time is not None and time.size == channel.values.size and not np.isnan(_within_range(time)).all()
     x = _within_range(time) if timed and time is not None else np.arange(channel.values.size, dtype=float)
@@ -36,12 +38,16 @@ def _panel(channel: ChannelContent) -> Panel:
     role = channel.role.replace("_", " ")
     words = f"{channel.name}: {role}" if role and role != channel.name else channel.name
     if np.isnan(values[np.isfinite(channel.values)]).any():
-        words += f" (values beyond {LARGEST:g} not drawn)"
+        words += f" (values beyond {LogSettings.current().largest_value:g} not drawn)"
     across = Axis("Time", "s", prefixed=False) if timed else Axis("Sample", "", prefixed=False)
     return Panel(words, across, Axis("", channel.unit, prefixed=False), (Series(x, values, "", BLUE, width=1.0),))
 
 
 def _within_range(values: np.ndarray) -> np.ndarray:
-    """The values that a picture can show, which no instrument exceeds; NaN for others, 0 for what is next to it."""
+    """Return the values that a picture can show, which no instrument exceeds.
+
+    Others are NaN, and what is next to 0 is 0.
+    """
+    settings = LogSettings.current()
     sizes = np.abs(values)
-    return np.where(sizes <= LARGEST, np.where(sizes < 1 / LARGEST, 0.0, values), np.nan)
+    return np.where(sizes <= settings.largest_value, np.where(sizes < 1 / settings.largest_value, 0.0, values), np.nan)

@@ -13,14 +13,14 @@ from friso.shown.pages import Report
 
 
 def logs_files(contents: Sequence[LogContent]) -> dict[str, Content]:
-    """The page, and every figure in all formats."""
+    """Return the page, and every figure in all formats."""
     figures = logs_figures(contents)
     images = pictures(figures)
     return {"logs.html": logs_html(contents, figures), **images}
 
 
 def logs_html(contents: Sequence[LogContent], figures: Sequence[Figure]) -> str:
-    """The whole page of files of logs and their figures."""
+    """Return the whole page of files of logs and their figures."""
     files = [
         {
             "name": content.path.name,

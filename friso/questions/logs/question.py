@@ -11,11 +11,10 @@ from friso.errors import InputError
 from friso.identification.contents import LogContent, log_content
 from friso.identification.logs.mapping import from_options
 from friso.interface.answer import Answer, AnswerTable, question
-from friso.interface.inputs import Changes, text_of
+from friso.interface.inputs import Changes, ChannelUnits, KindName, Roles, RoleScales, TimeLike, text_of
 from friso.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files
 
 LogFiles = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
@@ -25,11 +24,8 @@ LogFiles = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 class LogsAnswer(Answer):
     """What files hold: `result` has a `LogContent` for each that could be read, `wrong` what is wrong with others."""
 
-    command = "logs"
     status = 2
-
-    def __init__(self, contents: Sequence[LogContent], errors: Sequence[InputError]) -> None:
-        self.result, self.errors = list(contents), list(errors)
+    errors: Sequence[InputError]
 
     @property
     def failure(self) -> str:
@@ -58,18 +54,6 @@ class LogsAnswer(Answer):
         from friso.questions.logs.words import next_command
 
         return [command for content in self.result if (command := next_command(content))]
-
-    def figures(self) -> Sequence[Figure]:
-        """The channels over time."""
-        from friso.questions.logs.figures import logs_figures
-
-        return logs_figures(self.result)
-
-    def document(self) -> dict[str, Any]:
-        """Channels, units, rates, ranges."""
-        from friso.questions.logs.document import logs_document
-
-        return logs_document(self.result)
 
     def files(self) -> Files:
         """The page."""
@@ -103,37 +87,23 @@ def paths_of(logs: LogFiles) -> list[Path]:
 def logs(
     logs: LogFiles,
     *,
-    map: Changes = None,
-    unit: Changes = None,
-    scale: Changes = None,
-    dt: str | float | None = None,
-    axis: str | None = None,
+    map: Roles = None,
+    unit: ChannelUnits = None,
+    scale: RoleScales = None,
+    dt: TimeLike | None = None,
+    axis: KindName | None = None,
     folder: Path | None = None,
     partly: bool = False,
     progress: Progress = silent,
 ) -> LogsAnswer:
-    """What log files hold: channels, units, rates, ranges, and the role that friso gives each channel, with the reason.
+    """What log files hold: channels, units, rates, ranges and small plots, and the role that friso gives each channel.
 
     Parameters
     ----------
-    logs : path or list of paths
-        Files, in a format that `friso logs --help` lists.
-    map : dict, optional
-        Roles and their channels: ``{"position": "Axis1.ActPos"}``.
-    unit : dict, optional
-        Channels and their units: ``{"Axis1.ActPos": "mm"}``.
-    scale : dict, optional
-        Roles and their scales: ``{"force": "35.15 N/V"}``.
-    dt : str or float, optional
-        Sample time, "1 ms" or a number [s], if a file does not contain it.
-    axis : str, optional
-        "rotary" for angles, torques and moments of inertia.
     folder : Path, optional
         Where what was said of channels is kept, if not beside the logs.
     partly : bool
         Whether files that cannot be read are left to `errors` of the answer, instead of being raised.
-    progress : Progress
-        Called before each file.
 
     Returns
     -------
@@ -159,7 +129,7 @@ def logs(
             contents.append(log_content(path, options, folder))
         except InputError as error:
             wrong.append(error)
-    answer = LogsAnswer(contents, wrong)
+    answer = LogsAnswer(contents, errors=wrong)
     if wrong and not partly:
         raise unreadable(wrong)
     return answer

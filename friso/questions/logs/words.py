@@ -19,12 +19,14 @@ _BLOCKS = "▁▂▃▄▅▆▇█"
 
 
 def title(content: LogContent) -> str:
-    """The file and its format."""
+    """Write the file and its format."""
     return f"{content.path.name} ({content.title})"
 
 
 def conclusions(content: LogContent) -> list[tuple[str, str]]:
-    """What the file holds and what it counts as, or what is open; each sentence with its colour."""
+    """Say what the file holds and what it counts as, or what is open; each sentence with its
+    colour.
+    """
     holds = f"{title(content)} holds {_holds(content)}"
     if content.kind:
         return [(GREEN, f"{holds}. friso identify takes it as {content.kind}: {content.reason}.")]
@@ -33,7 +35,7 @@ def conclusions(content: LogContent) -> list[tuple[str, str]]:
 
 
 def open_questions(content: LogContent) -> list[str]:
-    """What has to be told, each in a sentence with the option that tells it."""
+    """Say what has to be told, each in a sentence with the option that tells it."""
     return [
         f"{gap.key}: {gap.expected}; given: {gap.actual}" + (f"; for example {gap.example}" if gap.example else "")
         for gap in content.gaps
@@ -41,8 +43,11 @@ def open_questions(content: LogContent) -> list[str]:
 
 
 def next_command(content: LogContent) -> str | None:
-    """The command that identifies the file, with the options given and those still needed; None where no option tells
-    what the file lacks."""
+    """Return the command that identifies the file, with the options given and those still
+    needed.
+
+    None where no option tells what the file lacks.
+    """
     options = dict.fromkeys([*content.options, *(gap.example for gap in content.gaps)])
     if "" in options:
         return None
@@ -50,17 +55,18 @@ def next_command(content: LogContent) -> str | None:
 
 
 def channel_rows(content: LogContent) -> list[tuple[str, list[str]]]:
-    """The channels by name, with the texts of `COLUMNS`."""
+    """Return the channels by name, with the texts of `COLUMNS`."""
     return [(channel.name, _cells(channel)) for channel in content.channels]
 
 
 def _cells(channel: ChannelContent) -> list[str]:
+    """Write a channel as a row of the table."""
     role = f"{channel.role.replace('_', ' ')}: {channel.reason}" if channel.role else channel.reason or NOTHING
     return [channel.unit or NOTHING, role, _range(channel), sparkline(channel.course()), _samples(channel)]
 
 
 def _range(channel: ChannelContent) -> str:
-    """The least and the greatest number as they stand in the file."""
+    """Write the least and the greatest number as they stand in the file."""
     ends = channel.range
     if ends is None:
         return NOTHING
@@ -68,19 +74,24 @@ def _range(channel: ChannelContent) -> str:
 
 
 def _number(value: float) -> str:
-    """Four digits, without an exponent where a plain number is as short to read."""
+    """Write four digits, without an exponent where a plain number is as short to read."""
     text = f"{value:.4g}"
     return f"{float(text):.0f}" if "e+" in text and abs(value) < PLAIN else text
 
 
 def _samples(channel: ChannelContent) -> str:
+    """Write the number of samples, and how many are missing."""
     rate = "" if channel.sample_rate is None else f" at {with_unit(channel.sample_rate, 'Hz', 4)}"
     gaps = f", {channel.missing} not numbers" if channel.missing else ""
     return f"{channel.values.size}{rate}{gaps}"
 
 
 def sparkline(values: np.ndarray) -> str:
-    """A line of blocks as high as the values, shape (n,), are between the least and the greatest; a space for NaN."""
+    """Return a line of blocks as high as the values, shape (n,), between the least and the
+    greatest.
+
+    NaN is a space.
+    """
     values = values / max(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)), np.finfo(float).tiny)
     finite = values[np.isfinite(values)]
     low, span = (float(finite.min()), float(np.ptp(finite))) if finite.size else (0.0, 0.0)
@@ -89,6 +100,7 @@ def sparkline(values: np.ndarray) -> str:
 
 
 def _holds(content: LogContent) -> str:
+    """Say what the file holds."""
     if content.response is not None:
         frequency = content.response.frequency
         ends = range_with_unit(float(frequency[0]), float(frequency[-1]), "Hz")

@@ -1,1 +1,24 @@
-"""What `friso map` shows: words, figures, document and page."""
+"""Where does it hunt: keys swept over ranges, in memory or in a store that an interrupted study resumes from."""
+
+from friso.interface.question import WHERE, Choices, Question
+
+
+def listed_metrics() -> list[tuple[str, str]]:
+    """List what `--metric` takes, each in one line."""
+    from friso.studies.metric import METRICS
+
+    return [(name, METRICS.one_line(name)) for name in METRICS]
+
+
+QUESTION = Question(
+    __name__,
+    40,
+    WHERE,
+    'map rig.toml --x controller.crossover="1 Hz..16 Hz:41" --y joint.stroke="0 m..1 mm:41"\n'
+    "To resume an interrupted study: friso map thesis_rig_map.zarr",
+    function_name="sweep",
+    metavars={"stage": "STAGE.toml|STORE", "rtol": "NUMBER|auto", "verify": "SHARE"},
+    defaults={"verify": 0.05},
+    choices=Choices("Metrics (--metric)", listed_metrics),
+    runner="friso.cli.runs.map",
+)

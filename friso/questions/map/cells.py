@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.questions.map.words import (
-    CATEGORIES,
     FAILED,
-    INFERRED,
     INVALID,
     NOT_RUN,
     QUIET,
+    categories_of,
     in_order,
     no_number,
     quantity,
@@ -28,7 +27,8 @@ from friso.questions.map.words import (
 from friso.shown.drawing.colours import ramp
 from friso.shown.drawing.figure import Array, Axis, Category
 from friso.shown.drawing.prefixes import choose
-from friso.studies.cells import CYCLE_UNITS
+from friso.studies.cells import INFERRED
+from friso.studies.metric import metrics, worded
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -175,10 +175,10 @@ def plane_first(axes: Sequence[CellAxis]) -> list[CellAxis]:
 
 
 def look(runs: xr.Dataset, metric: str) -> Look:
-    """How `metric` is coloured: a numeric variable, "outcome" or "verdict". ValueError for others."""
-    if metric not in metrics(runs):
-        raise ValueError(f"metric: got {metric!r}, expected one of {', '.join(metrics(runs))}")
-    if metric in CATEGORIES:
+    """Return how a metric is coloured, be it of words or of numbers. Raises ValueError for what the runs lack."""
+    if metric not in coloured(runs):
+        raise ValueError(f"metric: got {metric!r}, expected one of {', '.join(coloured(runs))}")
+    if metric in worded():
         codes, words = words_of(runs, metric)
         template = runs[metric]
         numbers = template.copy(data=np.full(template.shape, np.nan))
@@ -194,25 +194,25 @@ def look(runs: xr.Dataset, metric: str) -> Look:
     return Look(variable(metric), unit_of(runs[metric]), limits, log, colours, categories, *arrays)
 
 
-def metrics(runs: xr.Dataset) -> list[str]:
-    """The variables that a map can show, the words last."""
+def coloured(runs: xr.Dataset) -> list[str]:
+    """List the variables that a map can show, the words last."""
     numeric = [str(name) for name, array in runs.data_vars.items() if array.dtype.kind in "iuf"]
-    return numeric + [name for name in CATEGORIES if name in runs]
+    return numeric + [name for name in worded() if name in runs]
 
 
-def _range(metric: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, bool, tuple[str, ...]]:
-    """Limits, whether they are logarithmic, and the colours of counted peaks (0 in the colour of rest, 1 next to it).
+def _range(name: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, bool, tuple[str, ...]]:
+    """Return the limits of a scale, whether it is logarithmic, and the colours of counts (0 in the colour of rest).
 
     Positive numbers over more than three decades show on a logarithmic scale, of at most six decades: what a stage
     at rest still moves is the noise of the solver.
     """
-    finite = numbers[np.isfinite(numbers)]
+    finite, metric = numbers[np.isfinite(numbers)], metrics().get(name)
     if not finite.size:
         return None, False, ()
     low, high = float(finite.min()), float(finite.max())
-    if metric == "multiplier":
-        return (-1.0, 1.0), False, ()
-    if metric in ("peaks", "distinct_peaks"):
+    if metric and metric.limits:
+        return metric.limits, False, ()
+    if metric and metric.counts:
         return None, False, (QUIET, *ramp(max(1, int(high)))[::-1])
     positive = finite[finite > 0]
     if low >= 0 and positive.size and high > 1e3 * float(positive.min()):
@@ -226,12 +226,12 @@ def _without_number(runs: xr.Dataset, metric: str, values: np.ndarray) -> tuple[
     outcome = _texts(runs, "outcome", dims)
     status = _texts(runs, "status", dims)
     pairs = [_state(word, reason) for word in outcome[1] for reason in status[1]]
-    attractor = _texts(runs, "attractor", dims) if metric in CYCLE_UNITS else (np.zeros((), dtype=int), [None])
-    none = [no_number(metric, word) for word in attractor[1]]
+    places, words = _texts(runs, metrics()[metric].reasons if metric in metrics() else "", dims)
+    none = [no_number(metric, word) for word in words]
     categories = in_order(category for category in (*pairs, *none) if category is not None)
     table = np.array([np.nan if category is None else categories.index(category) for category in pairs], dtype=float)
     codes = np.broadcast_to(table[outcome[0] * len(status[1]) + status[0]], shape)
-    reasons = np.array([categories.index(category) for category in none], dtype=float)[attractor[0]]
+    reasons = np.array([categories.index(category) for category in none], dtype=float)[places]
     return categories, np.where(np.isnan(codes) & ~np.isfinite(values), reasons, codes)
 
 
@@ -245,8 +245,8 @@ def _texts(runs: xr.Dataset, name: str, dims: tuple[Hashable, ...]) -> tuple[np.
 def _state(outcome: str | None, status: str | None) -> Category | None:
     """Why a cell has no numbers of its own; None where it was run to its end."""
     reason = status or ""
-    if reason.startswith("inferred"):
-        return INFERRED.get(outcome or "") or Category("inferred", "#eeeeee")
+    if reason.startswith(INFERRED):
+        return categories_of("outcome", True).get(outcome or "") or Category("inferred", "#eeeeee")
     if outcome == "" or reason.startswith("not run"):
         return NOT_RUN
     if outcome == "invalid" or reason.startswith("invalid"):

@@ -13,14 +13,15 @@ from friso.axis import unit_shown
 from friso.errors import InputError
 from friso.hunting.measures import BANDS
 from friso.questions.check.traces import common_range
-from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, look, metrics, pick, plane_first
+from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, coloured, look, pick, plane_first
 from friso.questions.map.places import SHOWN
-from friso.questions.map.words import CATEGORIES, variable, words_of
+from friso.questions.map.words import variable, words_of
 from friso.shown.drawing.colours import scale
 from friso.shown.drawing.drawable import colour_prefix
 from friso.shown.drawing.figure import Array, Cloud
 from friso.shown.drawing.prefixes import choose
 from friso.stage import Stage, loads
+from friso.studies.metric import worded
 from friso.studies.scalings import SCALINGS
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
         "axes": [_axis(axis, positions, flat) for axis, positions in zip(axes, cells.positions(), strict=True)],
         "machine": SHOWN,
         "order": [axes.index(axis) for axis in order],
-        "variables": [_coloured(runs, name, cells) for name in metrics(runs)],
+        "variables": [_coloured(runs, name, cells) for name in coloured(runs)],
         "lines": None if drawn is None else _lines(drawn, runs, cells),
         "texts": [_text(runs, str(name), cells) for name, array in runs.data_vars.items() if array.dtype.kind in "OUT"],
     }
@@ -149,7 +150,7 @@ def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
         Cloud(none, none, numbers * factor, colouring.quantity, unit, limits, colouring.log, colouring.colours)
     )
     codes = cells.take(colouring.codes)
-    stored = colouring.numbers if name in CATEGORIES else runs[name]
+    stored = colouring.numbers if name in worded() else runs[name]
     categories = [{"label": category.label, "colour": category.colour} for category in colouring.categories]
     return {
         "name": name,

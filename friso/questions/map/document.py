@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from friso.questions.map.findings import headline, loop_first
 from friso.questions.map.words import text_counts, word_counts
 from friso.shown.documents import plain_json
-from friso.studies.cells import SKETCH
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,7 +37,7 @@ def map_document(runs: xr.Dataset, study: Study, store: Path | None, metric: str
         "conclusion": " ".join([*loop_first(study.stage), headline(runs, metric)]),
         "outcomes": word_counts(runs, "outcome"),
         "verdicts": word_counts(runs, "verdict") or None,
-        "sketched_verdicts": word_counts(runs, SKETCH) or None,
+        "sketched_verdicts": word_counts(runs, "sketch") or None,
         "attractors": text_counts(runs, "attractor") or None,
         "criteria": criteria,
         "verified": verified or None,

@@ -16,7 +16,7 @@ from friso.questions.map.findings import statement
 from friso.questions.map.words import variable
 from friso.shown.drawing.drawable import cell_edges
 from friso.shown.drawing.figure import BLUE, INK, Axis, Cloud, Figure, Map, Markers, Panel, Series
-from friso.studies.cells import VERDICTS
+from friso.studies.metric import metrics
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,12 +48,17 @@ def map_figure(runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, f
     return Figure(
         name=f"map-{metric}",
         title=variable(metric),
-        caption=caption or ("Every cell is one stage." if metric in VERDICTS else "Every cell is one run."),
+        caption=caption or (f"Every cell is one {_subject(metric)}."),
         panels=tuple(panels),
         columns=columns,
         subject=str(runs.attrs.get("name", "")),
         note=statement(runs, metric) + (f"\n{caption}" if caption else ""),
     )
+
+
+def _subject(metric: str) -> str:
+    """Return what a cell of a map stands for: a run, or the stage whatever its motion."""
+    return "stage" if metric in metrics() and metrics()[metric].source != "run" else "run"
 
 
 def map_panel(

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from friso.axis import axis_shown
-from friso.hunting.criteria import ATTRACTED, BAND, CREEPS, LASTING, RESTS, SWINGS
+from friso.hunting.criteria import ATTRACTED, RESTS, SWINGS
 from friso.quantities import percent
 from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, dims_of
 from friso.questions.map.words import (
     AT_ONCE,
-    CATEGORIES,
     INVALID,
     NOT_RUN,
     failures,
     grouped,
     in_sentence,
+    tallied,
     tally,
     text_counts,
     word_counts,
@@ -26,7 +25,7 @@ from friso.questions.map.words import (
 from friso.shares import share_interval
 from friso.shown.drawing.prefixes import listed, percentage
 from friso.shown.loop_words import unstable_loop
-from friso.studies.cells import CYCLE, CYCLE_UNITS, SKETCH, SWING, UNKNOWN, VERDICTS
+from friso.studies.metric import MapFinding, metrics, worded
 from friso.studies.scalings import SCALINGS
 
 if TYPE_CHECKING:
@@ -35,86 +34,37 @@ if TYPE_CHECKING:
     from friso.stage import Stage
     from friso.studies.study import Study
 
-_OF_VERDICTS = {
-    "hunts": "a cycle of the stage attracts, and the motion of the stage file ends in it",
-    "bistable": "a cycle attracts, but this motion comes to rest; a kick or another move can start hunting",
-    "transient": "no cycle attracts, but this motion is not at rest by its end",
-    "settles": "no cycle attracts, and this motion comes to rest",
-}
-MEANINGS = {
-    "outcome": {
-        SWINGS: f"the run still swings at its end: periodically, more than {2e6 * BAND:g} µm peak to peak in the last "
-        f"quarter, by at least {percent(LASTING)} of what it swings in the last half",
-        CREEPS: f"the run ends more than {1e6 * BAND:g} µm off its reference without swinging: it drifts, sticks or "
-        "decays",
-        RESTS: f"the run comes to rest within {1e6 * BAND:g} µm of its reference",
-    },
-    **dict.fromkeys(VERDICTS, _OF_VERDICTS),
-}
-"""What the words of a map mean, by variable."""
-
 _NO_RESULT = {"failed": "the run was not completed", "invalid": "these values are not a valid stage"}
 
-PEAKS = ("peaks", "distinct_peaks")
-
-
-@dataclass(frozen=True)
-class Question:
-    """What a map is asked first: in which cells the `variable` has one of the `words` (of counts: is more than 0), and
-    the subject and verb of the answer."""
-
-    variable: str
-    clause: str
-    words: tuple[str, ...] = ()
-
-    def holds(self, values: np.ndarray) -> np.ndarray:
-        """Where it does."""
-        if self.variable in PEAKS:
-            return values.astype(float) > 0
-        return np.isin(values.astype(str), self.words)
-
-
-_HUNTS = Question("verdict", "The stage hunts", ("hunts",))
-_BISTABLE = Question("verdict", "It is bistable (a kick or another move can start hunting)", ("bistable",))
 _QUIET = ("transient", "settles")
-_ATTRACTS = Question("attractor", "A lasting swing attracts the stage", (CYCLE, SWING))
-_SWINGS = Question("outcome", "The run swings at its end", (SWINGS,))
 
 
-def headline(runs: xr.Dataset, metric: str) -> str:
-    """What share of the map swings (of a map of verdicts: hunts, or is bistable; of counts: has counted peaks; of
-    measures of what attracts: has a swing that attracts), and where: the ranges of the axes outside of which no cell
-    does. Empty where the runs do not say."""
-    if metric in VERDICTS and metric in runs:
-        bistable = [_BISTABLE] if text_counts(runs, metric).get("bistable") else []
-        return " ".join(_answer(runs, replace(question, variable=metric)) for question in [_HUNTS, *bistable])
-    if metric in CYCLE_UNITS and "attractor" in runs:
-        unknown = text_counts(runs, "attractor").get(UNKNOWN, 0)
-        doubt = f"In {grouped(unknown)} of the cells it is not certain what attracts." if unknown else ""
-        return " ".join(filter(None, (_answer(runs, _ATTRACTS), doubt)))
-    if metric in PEAKS and metric in runs:
-        return _answer(runs, Question(metric, "Peaks are counted"))
-    return " ".join([_answer(runs, _SWINGS), *_creeping(runs)]) if "outcome" in runs else ""
+def headline(runs: xr.Dataset, name: str) -> str:
+    """Return what a map of a metric is asked first (`Metric.findings`): in what share of it, and in which ranges of the
+    axes, that holds; and what is in doubt. Empty where the runs do not say."""
+    every = metrics()
+    asked = name if name in runs and name in every and every[name].findings else ""
+    asked = asked or (every[name].answered_by if name in every else "outcome")
+    asked = asked if asked in runs else "outcome"
+    if asked not in runs:
+        return ""
+    counts = {} if every[asked].counts else text_counts(runs, asked)
+    findings = [one for one in every[asked].findings if not one.if_any or any(map(counts.get, one.words))]
+    word, sentence = every[asked].doubt or ("", "")
+    doubts = []
+    if word and (cells := counts.get(word, 0)):
+        doubts = [sentence.format(count=grouped(cells), share=_percent(cells, runs[asked].size))]
+    return " ".join([*(_answer(runs, asked, finding) for finding in findings), *doubts])
 
 
-def _creeping(runs: xr.Dataset) -> list[str]:
-    """What it means that runs creep: the next breakaway may come after their end."""
-    creeping = text_counts(runs, "outcome").get(CREEPS, 0)
-    if not creeping:
-        return []
-    where = f"in {_percent(creeping, runs['outcome'].size)} of the map"
-    shows = "a longer run, or the verdict of every cell (--metric sketch), shows whether it hunts there"
-    return [f"It still creeps at its end {where}: {shows}."]
-
-
-def _answer(runs: xr.Dataset, question: Question) -> str:
-    """In what share of the map it holds, and where."""
-    holds, completed = _flags(runs, question)
+def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
+    """Return in what share of the map a finding holds, and where."""
+    holds, completed = _flags(runs, name, finding.words)
     if not completed.any():
         return "No cell of the map has a result."
     if not holds.any() or np.array_equal(holds, completed):
-        return f"{question.clause} in {'every' if holds.any() else 'no'} cell of the map."
-    share = f"{question.clause} in {_percent(holds.sum(), completed.sum())} of the map"
+        return f"{finding.clause} in {'every' if holds.any() else 'no'} cell of the map."
+    share = f"{finding.clause} in {_percent(holds.sum(), completed.sum())} of the map"
     axes, inside = axes_of(runs), completed.copy()
     where = []
     for k, axis in enumerate(axes):
@@ -132,18 +82,20 @@ def _answer(runs: xr.Dataset, question: Question) -> str:
     return f"{share}: at {listed(where, 'and')} ({filled})."
 
 
-def _flags(runs: xr.Dataset, question: Question) -> tuple[np.ndarray, np.ndarray]:
-    """Where it holds, and where runs have a result, both of the shape of the runs: a large store is read in parts."""
-    values = runs[question.variable]
+def _flags(runs: xr.Dataset, name: str, words: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a metric has one of the words (a count: is more than 0), and where it has a result.
+
+    Both have the shape of the runs; a large store is read in parts.
+    """
+    values = runs[name]
     holds, completed = np.zeros(values.shape, bool), np.zeros(values.shape, bool)
     rows = max(1, AT_ONCE // max(1, int(np.prod(values.shape[1:]))))
     for first in range(0, len(values), rows):
         part = np.asarray(values[first : first + rows].values)
-        ran = (
-            np.isfinite(part) if question.variable in PEAKS else ~np.isin(part.astype(str), ["", *_NO_RESULT, UNKNOWN])
-        )
+        texts = part.astype(str)
+        ran = ~np.isin(texts, ["", *_NO_RESULT, "unknown"]) if words else np.isfinite(part)
         completed[first : first + rows] = ran
-        holds[first : first + rows] = ran & question.holds(part)
+        holds[first : first + rows] = ran & (np.isin(texts, words) if words else part.astype(float) > 0)
     return holds, completed
 
 
@@ -201,24 +153,23 @@ def statement(runs: xr.Dataset, metric: str) -> str:
 
 
 def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
-    """What the words mean that stand in a map."""
+    """List what the words that stand in a map mean."""
+    texts = {name: {word.text: word.meaning for word in metrics()[name].words} for name in tallied()}
     return [
         (word, axis_shown().text(text))
-        for name, texts in MEANINGS.items()
+        for name, meanings_ in texts.items()
         for word in word_counts(runs, name)
-        if (text := (texts | _NO_RESULT).get(word))
+        if (text := (meanings_ | _NO_RESULT).get(word))
     ]
 
 
-def caveats(runs: xr.Dataset, metric: str) -> list[str]:
-    """Where the peak count, if a map shows it, says something else than the end of the run."""
-    if metric not in PEAKS or not {metric, "outcome"} <= set(runs.data_vars):
+def caveats(runs: xr.Dataset, name: str) -> list[str]:
+    """Say where counts, if a map shows them, say something else than the end of the run."""
+    if name not in metrics() or not metrics()[name].counts or not {name, "outcome"} <= set(runs.data_vars):
         return []
-    counted, outcome = runs[metric].values > 0, runs["outcome"].values
-    over, missed = (
-        int((counted & (outcome == RESTS)).sum()),
-        int(((runs[metric].values == 0) & (outcome == SWINGS)).sum()),
-    )
+    counted, outcome = runs[name].values, runs["outcome"].values
+    over = int(((counted > 0) & (outcome == RESTS)).sum())
+    missed = int(((counted == 0) & (outcome == SWINGS)).sum())
     over_text = [f"In {grouped(over)} of the cells with counted peaks the run rests at its end."] if over else []
     return over_text + ([f"In {grouped(missed)} of the cells without any the run swings."] if missed else [])
 
@@ -232,14 +183,14 @@ def _extent(runs: xr.Dataset) -> str:
     text = f"{grouped(cells - idle - inferred)} runs at rtol {float(runs.attrs['rtol']):g}"
     if inferred:
         text += f", {grouped(inferred)} cells inferred from their neighbours"
-    listing = "; ".join(filter(None, (tally(runs, name) for name in CATEGORIES)))
+    listing = "; ".join(filter(None, (tally(runs, name) for name in tallied())))
     return f"{text}: {listing}." if listing else f"{text}."
 
 
 def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
     """All that is said on the terminal: first whether the loop is unstable, then what share of the map swings, and
     where."""
-    words = "; ".join(filter(None, (tally(runs, name) for name in CATEGORIES)))
+    words = "; ".join(filter(None, (tally(runs, name) for name in tallied())))
     size = " x ".join(map(str, study.shape))
     reasons = [f"{count} cells without a result: {reason}" for reason, count in failures(runs).items()]
     extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}"
@@ -250,7 +201,7 @@ def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
 def own_place(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
     """How far, along each axis of a map of verdicts, the stage as its file gives it is from the next edge of hunting;
     none where it is not on the map."""
-    if metric not in VERDICTS or metric not in runs or study.links or SAMPLE in runs.dims:
+    if metric not in worded(verdicts=True)[1:] or metric not in runs or study.links or SAMPLE in runs.dims:
         return []
     axes, flat = axes_of(runs), {**dict.fromkeys(SCALINGS, 1.0), **study.stage.flat()}
     own = [flat[axis.key] for axis in axes if axis.key in flat and _spans(axis, flat[axis.key])]
@@ -267,7 +218,7 @@ def own_place(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
     exact = all(np.isclose(axis.positions[k], value, rtol=1e-3) for axis, value, k in zip(axes, own, at, strict=True))
     subject = "Your stage" if exact else "The cell nearest to your stage"
     verb = words[at] if words[at] in ("hunts", "settles") else f"is {words[at]}"
-    by = " by this sketch" if metric == SKETCH else ""
+    by = f" {basis}" if (basis := metrics()[metric].basis) else ""
     does = "begins" if words[at] in _QUIET else "ends"
     where = f"; hunting {does} at {listed(ways, 'or')}" if ways else ""
     return [f"{subject} {verb}{by}{where}."]

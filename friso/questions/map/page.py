@@ -12,7 +12,7 @@ from friso.questions.map.data import machine_of, page_data, picked
 from friso.questions.map.figures import map_figure
 from friso.questions.map.findings import caveats, failures, headline, meanings, verification
 from friso.questions.map.places import SHOWN, with_places
-from friso.questions.map.words import CATEGORIES, grouped, tally, variable
+from friso.questions.map.words import grouped, tallied, tally, variable
 from friso.shown.drawing.images import FORMATS, ON_PAGE, Image, draw_beforehand, save
 from friso.shown.drawing.packing import packed_json
 from friso.shown.files import Content
@@ -89,10 +89,10 @@ def _facts(runs: xr.Dataset, metric: str) -> list[tuple[str, str]]:
     facts += [(axis.quantity, f"{axis.span()} ({axis.key})") for axis in axes_of(runs)]
     facts.append(("Relative tolerance", f"{float(runs.attrs['rtol']):g}"))
     facts.append(("Verification", verification(runs)))
-    for name in CATEGORIES:
+    for name in tallied():
         facts += [(variable(name), words)] if (words := tally(runs, name)) else []
     facts += meanings(runs)
-    facts += [("Criterion", text)] if (text := runs[metric].attrs.get("criterion")) and metric not in CATEGORIES else []
+    facts += [("Criterion", text)] if (text := runs[metric].attrs.get("criterion")) and metric not in tallied() else []
     facts += [("Note", " ".join(notes))] if (notes := caveats(runs, metric)) else []
     links = json.loads(runs.attrs.get("links", "{}"))
     facts += [("Links", "; ".join(f"{key} = {text}" for key, text in links.items()))] if links else []

@@ -15,7 +15,20 @@ import numpy as np
 from friso.axis import speak_of
 from friso.errors import InputError, StoreError
 from friso.interface.answer import Answer, question
-from friso.interface.inputs import LOGGER, Changes, StageLike, mention_unstable_loop, read_stage, tolerance_of, wrong
+from friso.interface.inputs import (
+    LOGGER,
+    Address,
+    AxisPoints,
+    Changes,
+    Links,
+    MetricName,
+    StageLike,
+    Tolerance,
+    mention_unstable_loop,
+    read_stage,
+    tolerance_of,
+    wrong,
+)
 from friso.interface.output_folder import check_file, refuse_place, write
 from friso.platform.extras import need
 from friso.platform.system import MOST_PROCESSES, cause_of, path_of, shell_word, usable_cores
@@ -36,7 +49,6 @@ from friso.questions.map.study import (
 )
 from friso.stage import Stage
 from friso.studies.axes import AxisValues
-from friso.studies.cells import SKETCH
 from friso.studies.execute import Crew, local_crew
 from friso.studies.samples import Samples
 from friso.studies.store import Store, check_store, holds_all, in_memory, read_store
@@ -59,13 +71,10 @@ class SweepAnswer(Answer):
     """What the runs of a sweep do: `result` is an xarray.Dataset with a dimension per axis; `metric` colours its map,
     `store` is the folder that it is in, or None."""
 
-    command = "map"
-
-    def __init__(
-        self, study: Study, runs: xr.Dataset, metric: str, store: Path | None, exports: Sequence[Path]
-    ) -> None:
-        self.study, self.result, self.metric, self.store, self.exports = study, runs, metric, store, tuple(exports)
-        self.axis_kind = study.stage.axis_kind
+    study: Study
+    metric: str
+    store: Path | None
+    exports: Sequence[Path]
 
     @property
     def data(self) -> xr.Dataset:
@@ -132,84 +141,109 @@ class SweepAnswer(Answer):
         return map_files(self.result, self.metric, again, partial(drawn_runs, self.study, self.result, progress))
 
 
+class StoreAnswer(Answer):
+    """Whether a store is whole: `result` is a `StoreState`, with its blocks, those done, and those damaged."""
+
+    store: Path
+
+    @property
+    def failure(self) -> str:
+        """Whether anything in it is damaged or may not be read."""
+        state = self.result
+        return "the store is not whole" if state.damaged or state.files or state.unreadable else ""
+
+    def sentences(self) -> Sequence[str]:
+        """How many blocks are done, and which are damaged."""
+        state, damaged = self.result, ", ".join([*self.result.damaged, *self.result.files])
+        again = f"friso map {shell_word(str(self.store))} recomputes the damaged blocks"
+        unread = f"; may not be read: {', '.join(state.unreadable)}" if state.unreadable else ""
+        damage = f"damaged: {damaged} ({again})" if damaged else "nothing is damaged"
+        return [f"{self.store}: blocks done: {state.done} of {state.blocks}; {damage}{unread}"]
+
+    def document(self) -> dict[str, Any]:
+        """Blocks, how many are done, which are damaged or may not be read."""
+        state = self.result
+        damage = {"damaged": state.damaged, "damaged_files": state.files, "unreadable": state.unreadable}
+        return {"store": str(self.store), "blocks": state.blocks, "done": state.done, **damage}
+
+
 @question
 def sweep(
     stage: StageLike,
     axes: Mapping[str, AxisValues] | None = None,
     samples: int | Samples | None = None,
     *,
-    x: str | None = None,
-    y: str | None = None,
-    axis: Iterable[str] = (),
-    link: Changes = None,
+    x: AxisPoints | None = None,
+    y: AxisPoints | None = None,
+    axis: Iterable[AxisPoints] = (),
+    link: Links = None,
     latin: bool = False,
     log: bool = False,
     set: Changes = None,
-    metric: str | None = None,
+    metric: MetricName | None = None,
     confirm: bool = False,
-    rtol: float | str | None = None,
+    rtol: Tolerance | None = None,
     verify: float = 0.0,
     refine: bool = False,
     workers: int | None = None,
-    scheduler: str | None = None,
+    scheduler: Address | None = None,
     export: Iterable[str | os.PathLike[str]] = (),
     out: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
+    check: bool = False,
     yes: bool = False,
     beside: bool = False,
     progress: Progress = silent,
-) -> SweepAnswer:
-    """Run every combination of the values of some keys: what `friso map` does.
+) -> SweepAnswer | StoreAnswer:
+    """Where does it hunt: two (or more) keys swept; a Zarr store, a figure, and a page whose cells can be clicked.
 
     Parameters
     ----------
     stage : Stage, path or dict
-        The stage, its file, or the tables of one; or the folder of a study that is to go on.
+        A stage, as everywhere in friso, or the folder of a study that is to go on.
     axes : dict, optional
         Keys with their values: ``(np.linspace(1, 40, 41), "Hz")``, a range ``"1 Hz..40 Hz:41"`` (behind ":log",
         logarithmic), or a list of texts with units, bare numbers, words or booleans, where the key takes these.
     samples : int or Samples, optional
-        Number of Sobol points over the ranges, instead of a grid; or several keys that vary at once.
-    x, y, axis : str, optional
-        Axes as texts, as on the command line: ``x="controller.crossover=1 Hz..40 Hz:41"``.
-    link : dict, optional
-        SI expressions for keys that follow: ``{"masses.cart": "0.7 * mass"}``.
+        Number of Sobol points over the ranges FIRST..LAST, instead of a grid; or several keys that vary at once.
+    x : str, optional
+        Horizontal axis, controller.crossover="1 Hz..40 Hz:41"; also a list: KEY="4 Hz, 8 Hz". Besides keys: speed (the
+        controller so many times as fast) and friction (so many times yours).
+    y : str, optional
+        Vertical axis.
+    axis : list of str, optional
+        A further axis; may be repeated.
     latin : bool
-        Whether samples are a Latin hypercube.
-    log : bool
-        Whether all ranges are logarithmic.
-    set : dict, optional
-        Keys to override.
+        Make the samples a Latin hypercube.
     metric : str, optional
-        What the map shows in colour. Of the stage: "sketch" (default), which tells whether it hunts by coarse return
-        maps, and by closed orbits where these are in doubt; "verdict", "multiplier", "amplitude", "period", by a search
-        of every cell. Of each run: "outcome", "peaks", ...
+        Quantity shown in colour; default: sketch, whether the stage hunts by coarse return maps.
     confirm : bool
-        Whether every cell of a map of verdicts is searched: metric "verdict" instead of "sketch".
+        Search every cell, instead of a sketch, which takes up to five times as long.
     rtol : float or "auto", optional
         Relative tolerance, default 1e-6; "auto": the loosest safe one.
     verify : float
-        Share of the cells that is run again at rtol/100; `verified_surviving` among the attributes counts the outcomes
-        that survived.
+        Share of the cells to run again at rtol/100; `verified_surviving` among the attributes counts the outcomes that
+        survive.
     refine : bool
-        Whether the grid is made 4 times finer, and run only along its boundaries.
+        Make the grid 4 times finer, and run it only along its boundaries.
     workers : int, optional
         Number of processes to run in; default: the threads of this one.
     scheduler : str, optional
-        Address of a Dask scheduler to run on.
+        Address of a Dask scheduler to run on. Anyone who can reach the address can run code there and here; tls://,
+        with the certificates of the configuration of Dask, keeps others out.
     export : list of paths, optional
         Files ending in .nc or .csv that are written as well.
     out : path, optional
-        Folder of a Zarr store, filled as results come, and resumed if it exists; default: results are kept in memory.
+        Folder of the results, a Zarr store, resumed if it exists; of a store: folder of its figure and page.
     overwrite : bool
-        Whether the store of another study may be replaced, and figures and exports.
+        Replace the store of another study, and figures and exports of the same name.
+    check : bool
+        Run nothing; say whether a store is intact.
     yes : bool
-        Whether a study of more than ten million cells is meant.
+        Confirm a study of more than ten million cells.
     beside : bool
         Whether the caller writes figure, page and exports (``answer.files_beside()``): that they can be is made sure
         before anything is run. Default: exports are written, all of them or none.
-    progress : Progress
-        Called as cells are done.
 
     Returns
     -------
@@ -229,8 +263,10 @@ def sweep(
     >>> runs.sizes["joint.stroke"]
     3
     """
+    if check:
+        return _whole(stage)
     exports, share = _checked_exports(export), checked_share(verify)
-    if confirm and metric not in (None, SKETCH, "verdict"):
+    if confirm and metric not in (None, "sketch", "verdict"):
         raise InputError("confirm", f"--confirm and --metric {metric}", "one of the two: it searches for verdicts", "")
     varied = Varied.of_texts(axes or {}, x, y, axis, link, samples, latin, log)
     store = None if out is None else place_of_store(out)
@@ -244,7 +280,7 @@ def sweep(
             store = place_of_store(resumed)
             study, metric = stored_study(store, metric, None if yes else LARGE)
         else:
-            metric = ("verdict" if confirm else SKETCH) if metric in (None, SKETCH) else metric
+            metric = ("verdict" if confirm else "sketch") if metric in (None, "sketch") else metric
             chosen = read_stage(stage, set)
             study = study_for(chosen, varied, metric, refine, None if yes else LARGE, crew)
             study = replace(study, rtol=_chosen_rtol(1e-6 if rtol is None else rtol, study, crew))
@@ -265,15 +301,22 @@ def sweep(
         write(export_files(held, exports), exports if overwrite else ())
     elif exports and not beside:
         write_beside(export_files(held, exports), store, overwrite, progress, can_note)
-    return SweepAnswer(study, held, coloured_by(study, metric), store, exports)
+    return SweepAnswer(
+        held,
+        stage=study.stage,
+        study=study,
+        metric=coloured_by(study, metric),
+        store=store,
+        exports=tuple(exports),
+    )
 
 
-def whole(store: str | os.PathLike[str]) -> dict[str, Any]:
-    """Whether a store is whole: blocks, how many are done, which are damaged or may not be read. Raises StoreError
-    where it cannot be read at all."""
-    state = check_store(Path(store))
-    damage = {"damaged": state.damaged, "damaged_files": state.files, "unreadable": state.unreadable}
-    return {"store": str(store), "blocks": state.blocks, "done": state.done, **damage}
+def _whole(store: Any) -> StoreAnswer:
+    """Whether a store is whole. Raises InputError for what is no store, StoreError where it cannot be read at all."""
+    if not isinstance(store, str | os.PathLike) or Path(store).is_file():
+        stem = Path(store).stem if isinstance(store, str | os.PathLike) else "rig"
+        raise InputError("check", f"{store}, a file", "the store of a study", f"friso map {stem}_map.zarr --check")
+    return StoreAnswer(check_store(Path(store)), store=Path(store))
 
 
 def _another_study(store: Path) -> InputError:
@@ -300,7 +343,7 @@ def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
 
 
 @contextmanager
-def _crew(workers: int | None, scheduler: str | None) -> Iterator[Crew]:
+def _crew(workers: int | None, scheduler: Address | None) -> Iterator[Crew]:
     if workers is not None and scheduler is not None:
         raise InputError("workers", "--workers and --scheduler", "one of the two", "workers=4")
     most = min(usable_cores(), MOST_PROCESSES)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -21,8 +21,9 @@ from friso.progress import Progress, silent
 from friso.quantities import quoted
 from friso.stage import Stage
 from friso.studies.axes import AxisValues
-from friso.studies.cells import BY_ATTRACTORS, CYCLE_UNITS, INFERRED, METRICS, USUAL, VERDICTS
+from friso.studies.cells import INFERRED
 from friso.studies.execute import Crew
+from friso.studies.metric import METRICS, metrics, with_usual
 from friso.studies.refine import FINER, SHARE, finer
 from friso.studies.request import Request
 from friso.studies.samples import Samples
@@ -83,14 +84,12 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
         axes, samples = {}, Samples(axes, samples, "latin" if varied.latin else "sobol")
     elif varied.latin:
         raise InputError("latin", "no --samples beside it", "how many samples", "--samples 1024 --latin")
-    _check_metric(metric, METRICS)
+    METRICS.checked(metric, "metric", "metric={}")
     request = Request(stage, axes, samples, links, varied.log)
     runs = int(request.size() * (SHARE * FINER ** len(axes) if refine else 1))
     if most is not None and runs > most:
         raise _too_large(runs, request.trial(), crew)
-    metrics = (*USUAL, *CYCLE_UNITS) if metric in (*BY_ATTRACTORS, "period") else USUAL
-    metrics = (*metrics, metric) if metric in VERDICTS else metrics
-    study = request.study(metrics)
+    study = request.study(with_usual(metric))
     return finer(study) if refine else study
 
 
@@ -106,11 +105,13 @@ def stored_study(store: Path, metric: str | None, most: int | None) -> tuple[Stu
         actual = f"{study.cells:.3g} cells in {store}, not all of which were run"
         raise InputError("yes", actual, "--yes, if so many are meant; nothing was run", "yes=True")
     metric = metric or str(checked_metadata(store).notes.get("metric", "outcome"))
-    if metric in METRICS and metric not in study.metrics:
+    coloured = [name for name in study.metrics if name in metrics()]
+    if metric in metrics() and metric not in coloured:
         actual, expected = f"{metric}, which {store} does not hold", "one that it holds, or a new map"
         example = f"friso map STAGE.toml ... --metric {metric} --out {shell_word(f'{store.stem}-{metric}.zarr')}"
         raise InputError("metric", actual, expected, example)
-    _check_metric(metric, study.metrics)
+    if metric not in metrics():
+        raise InputError("metric", quoted(metric), f"one of {', '.join(coloured)}", "metric=peak_to_peak")
     return study, metric
 
 
@@ -137,16 +138,10 @@ def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
     return study if lacking else stored
 
 
-def _check_metric(metric: str, possible: Sequence[str]) -> None:
-    """Raises InputError for a metric that there is not."""
-    names = [name for name in possible if name != "status"]
-    if metric not in names:
-        raise InputError("metric", quoted(metric), f"one of {', '.join(names)}", "metric=peak_to_peak")
-
-
 def coloured_by(study: Study, metric: str) -> str:
-    """The variable that colours the map: "period" is that of the hunting cycle, where the study has it."""
-    return "cycle_period" if metric == "period" and study.cycles else metric
+    """Return the variable that colours the map: the metric, or what it is shown as where the study has that."""
+    other = metrics()[metric].shown_as
+    return other if other in study.metrics else metric
 
 
 def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:

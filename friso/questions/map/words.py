@@ -12,7 +12,7 @@ from friso.axis import axis_shown
 from friso.shown.drawing.figure import GREY, INK, ORANGE, PINK, VERMILLION, Category
 from friso.stage.controllers import CONTROLLER, CONTROLLERS, FORCE_LIMIT
 from friso.stage.tables import friction_laws
-from friso.studies.cells import NOTHING, SKETCH, SWING, UNKNOWN, VERDICTS
+from friso.studies.metric import metrics, worded
 from friso.studies.scalings import SCALINGS
 
 if TYPE_CHECKING:
@@ -29,61 +29,14 @@ _QUANTITIES = {
     "masses.cart": "Cart mass",
     "masses.stage": "Stage mass",
 }
-_VARIABLES = {
-    "outcome": "What the run does at its end",
-    "verdict": "Verdict on the stage",
-    SKETCH: "Verdict on the stage, sketched",
-    "peaks": "Counted peaks",
-    "distinct_peaks": "Counted peaks, distinct ones",
-    "status": "Status",
-    "peak_to_peak": "Peak to peak, last quarter",
-    "period": "Period",
-    "settling_time": "Settling time into 1 µm",
-    "settling_time_10um": "Settling time into 10 µm",
-    "largest_force": "Largest actuator force",
-    "attractor": "What attracts the stage",
-    "multiplier": "Multiplier of the cycle that attracts",
-    "amplitude": "Amplitude of what attracts",
-    "cycle_period": "Period of what attracts",
-    "steps": "Solver steps",
-    "rejected": "Rejected solver steps",
-}
-
 QUIET = "#d3e6f3"  # rest: a pale blue, far from every colour of swings and from white and grey
 INVALID = Category("invalid", "#b4b4b4")
 FAILED = Category("failed", INK)
 NOT_RUN = Category("not run", "#ffffff")
 _NO_RESULT = {"failed": FAILED, "invalid": INVALID, "": NOT_RUN}
-_VERDICTS = {
-    "hunts": Category("hunts", VERMILLION),
-    "bistable": Category("bistable", PINK),
-    "transient": Category("transient", ORANGE),
-    "settles": Category("settles", QUIET),
-    **_NO_RESULT,
-}
-CATEGORIES = {
-    "outcome": {
-        "swings": Category("swings", VERMILLION),
-        "creeps": Category("creeps", ORANGE),
-        "rests": Category("rests", QUIET),
-        **_NO_RESULT,
-    },
-    **dict.fromkeys(VERDICTS, _VERDICTS),
-}
-"""By variable the words that a cell can have, the worst first, in the colours of every map."""
-# Cells without numbers of their own: paler than the word they are said to have, so that both can stand in a map.
-INFERRED = {
-    "swings": Category("swings (inferred)", "#f3c39e"),
-    "creeps": Category("creeps (inferred)", "#f7dfa8"),
-    "rests": Category("rests (inferred)", "#e4efe0"),
-}
 _NO_NUMBER = "#e8dcc6"
-_OF_ATTRACTORS = {
-    NOTHING: Category("nothing attracts", QUIET),
-    UNKNOWN: Category("not certain what attracts", "#8c6d8f"),
-    SWING: Category("attracts, but not closed as an orbit", PINK),
-}
-"""Why a cell has no measure of what attracts its stage, by the word for that."""
+PALETTE = {"vermillion": VERMILLION, "orange": ORANGE, "pink": PINK, "quiet": QUIET}
+"""Colours of words that metrics name; they may give others as "#rrggbb"."""
 
 
 def quantity(key: Hashable) -> str:
@@ -107,23 +60,29 @@ def in_sentence(key: Hashable) -> str:
 
 
 def variable(name: Hashable) -> str:
-    """A variable in words: "period" is "Period"."""
-    return axis_shown().text(_VARIABLES.get(str(name)) or quantity(name))
+    """Return a variable in words: "period" is "Period"."""
+    metric = metrics().get(str(name))
+    return axis_shown().text(metric.title if metric else quantity(name))
+
+
+def categories_of(name: str, inferred: bool = False) -> dict[str, Category]:
+    """Return label and colour of each word of a metric, the worst first; with `inferred`, of cells said to have it."""
+    words = (metrics()[name] if name in metrics() else metrics()["outcome"]).words
+    if inferred:
+        return {word.text: Category(f"{word.text} (inferred)", word.inferred) for word in words if word.inferred}
+    return {word.text: Category(word.label or word.text, PALETTE.get(word.colour, word.colour)) for word in words}
 
 
 def word_category(name: str, word: str) -> Category:
-    """Label and colour of a word of the variable `name`; one that is not known here is grey, under its own name."""
-    return CATEGORIES[name].get(word) or Category(word, GREY)
+    """Return label and colour of a word of a metric; a word that the metric does not declare is grey."""
+    return (categories_of(name) | _NO_RESULT).get(word) or Category(word, GREY)
 
 
-def no_number(name: str, attractor: str | None = None) -> Category:
-    """What it means that a run that was completed has no such number; `attractor`: the word for what attracts."""
-    if name.startswith("settling_time"):
-        band = variable(name).removeprefix("Settling time into ")
-        return Category(f"does not stay within {band}", _NO_NUMBER)
-    if attractor in _OF_ATTRACTORS:
-        return _OF_ATTRACTORS[attractor]
-    return Category("no period" if name == "period" else "no value", _NO_NUMBER)
+def no_number(name: str, reason: str | None = None) -> Category:
+    """Return what it means that a cell that was run has no such number; `reason`: the word of `Metric.reasons`."""
+    metric = metrics().get(name)
+    reasons = categories_of(metric.reasons) if metric and metric.reasons else {}
+    return reasons.get(reason or "") or Category(metric.missing if metric else "no value", _NO_NUMBER)
 
 
 def grouped(number: int) -> str:
@@ -132,18 +91,11 @@ def grouped(number: int) -> str:
 
 
 def in_order(categories: Iterable[Category]) -> tuple[Category, ...]:
-    """Each category once, in the order of every legend: words, the worst first, then what has none."""
-    words = {category: None for categories in CATEGORIES.values() for category in categories.values()}
-    order = [
-        *(category for category in words if category not in _NO_RESULT.values()),
-        *_NO_RESULT.values(),
-        *INFERRED.values(),
-    ]
-    return tuple(
-        sorted(
-            dict.fromkeys(categories), key=lambda category: order.index(category) if category in order else len(order)
-        )
-    )
+    """Return each category once, in the order of every legend: words, the worst first, then what has none."""
+    words = [category for name in worded() for category in categories_of(name).values()]
+    order = [*words, *_NO_RESULT.values(), *(one for name in worded() for one in categories_of(name, True).values())]
+    places = {category: place for place, category in reversed([*enumerate(order)])}
+    return tuple(sorted(dict.fromkeys(categories), key=lambda category: places.get(category, len(order))))
 
 
 def unit_of(array: xr.DataArray) -> str:
@@ -184,20 +136,22 @@ def failures(runs: xr.Dataset) -> dict[str, int]:
 
 
 def word_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
-    """How many cells have each word of the variable `name`, in the order of the legend; none without that variable."""
+    """How many cells have each word of the metric `name`, in the order of the legend; none without that variable."""
     cells = {word_category(name, word): number for word, number in text_counts(runs, name).items()}
     return {category.label: cells[category] for category in in_order(cells)}
 
 
 def tally(runs: xr.Dataset, name: str) -> str:
-    """How many cells have each word, in a sentence: "1 swings, 3 creep"; empty without the variable `name`."""
+    """Count the cells with each word of a metric in a sentence: "1 swings, 3 creep"; empty without the metric."""
     return ", ".join(f"{grouped(number)} {_verb(word, number)}" for word, number in word_counts(runs, name).items())
 
 
+def tallied() -> list[str]:
+    """List the metrics whose words sentences and tables count."""
+    return [name for name in worded() if metrics()[name].tallied]
+
+
 def _verb(word: str, number: int) -> str:
-    """A word of a map as it agrees with a number of cells."""
+    """Return a word of a map as it agrees with a number of cells: "3 creep", "3 bistable"."""
     first, *rest = word.split(" ")
-    return " ".join([first if number == 1 or first not in _VERBS else first.removesuffix("s"), *rest])
-
-
-_VERBS = ("swings", "creeps", "rests", "hunts", "settles")
+    return " ".join([first if number == 1 else first.removesuffix("s"), *rest])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from friso.questions.rig.outcome_view import view_of
-from friso.questions.rig.page import sentences
+from friso.questions.rig.words import sentences
 from friso.shown.documents import plain_json
 from friso.studies.rig.outcome import Outcome
 

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from friso.axis import speak_of
 from friso.equations.as_built import whole_samples
 from friso.interface.answer import Answer, question
-from friso.interface.inputs import LOGGER, Changes, StageLike, mention_unstable_loop, stage_of, wrong
+from friso.interface.inputs import LOGGER, Changes, ExperimentName, Seed, StageLike, mention_unstable_loop, stage_of
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
-from friso.studies.rig.outcome import Outcome
 from friso.virtual_rig.run import as_built_keys
 from friso.virtual_rig.task import SAMPLE_TIME
 
 if TYPE_CHECKING:
-    from friso.shown.drawing.figure import Figure
-    from friso.shown.files import Files
-
-MOST_SEED = 10**15
+    pass
 
 MANY = 4
 """Samples from which a delay is worth a word."""
@@ -29,64 +24,27 @@ MANY = 4
 class RigAnswer(Answer):
     """An experiment on the machine as built: `result` is its `Outcome`, with logs and the truth behind them."""
 
-    command = "rig"
-
-    def __init__(self, result: Outcome) -> None:
-        self.result, self.axis_kind = result, result.stage.axis_kind
-
     @property
     def failure(self) -> str:
         """How many logs end early."""
         failed = sum(bool(log.failure) for log in self.result.logs)
         return f"{failed} of {len(self.result.logs)} logs end where the run stopped" if failed else ""
 
-    def sentences(self) -> Sequence[str]:
-        """What the experiment shows."""
-        from friso.questions.rig.page import sentences
-
-        return sentences(self.result)
-
-    def details(self) -> Sequence[str]:
-        """What to know of the experiment."""
-        return [f"seed of the noise: {self.result.seed}", *(f"note: {note}" for note in self.result.notes)]
-
-    def figures(self) -> Sequence[Figure]:
-        """The figures, in the arrangement of the thesis."""
-        from friso.questions.rig.page import figures
-
-        return figures(self.result)
-
-    def document(self) -> dict[str, Any]:
-        """Results and logs."""
-        from friso.questions.rig.document import rig_document
-
-        return rig_document(self.result)
-
-    def files(self) -> Files:
-        """The page, the logs, the truth, the figures."""
-        from friso.questions.rig.page import rig_files
-
-        return rig_files(self.result)
-
 
 @question
 def rig(
-    experiment: str, stage: StageLike, *, seed: int = 1, set: Changes = None, progress: Progress = silent
+    experiment: ExperimentName, stage: StageLike, *, seed: Seed = 1, set: Changes = None, progress: Progress = silent
 ) -> RigAnswer:
     """Rehearse an experiment on the machine as built: sampled, quantised, saturated, on a rail that varies.
+
+    Writes logs for friso identify and, in a separate folder, the true signals behind each.
 
     Parameters
     ----------
     experiment : str
         Its name, such as "stiffness" or "hunting"; a wrong one is answered with all of them.
-    stage : Stage, path or dict
-        The stage with its drive, rail, cable and floor, its file, or the tables of one.
     seed : int
         Seed of the noise; the rail has its own, `rail.seed`.
-    set : dict, optional
-        Keys to override.
-    progress : Progress
-        Called as runs are done.
 
     Returns
     -------
@@ -107,8 +65,6 @@ def rig(
     chosen = stage_of(stage, set)
     speak_of(chosen.axis_kind)
     _announce(chosen)
-    if not 0 <= seed < MOST_SEED:
-        raise wrong("seed", str(seed), f"a whole number from 0, below {MOST_SEED:g}", "1")
     mention_unstable_loop(chosen)
     return RigAnswer(run(chosen, seed, progress))
 

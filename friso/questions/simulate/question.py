@@ -15,6 +15,8 @@ from friso.interface.answer import Answer, question
 from friso.interface.inputs import (
     Changes,
     StageLike,
+    TimeLike,
+    Tolerance,
     mention_unstable_loop,
     read_stage,
     seconds_of,
@@ -37,11 +39,9 @@ if TYPE_CHECKING:
 class SimulateAnswer(Answer):
     """A time response: `result` is the Dataset over `time` [s], ``answer["position"]`` a variable of it."""
 
-    command = "simulate"
-
-    def __init__(self, stage: Stage, response: xr.Dataset, name: str, of_cell: bool = False) -> None:
-        self.stage, self.result, self.name, self.of_cell = stage, response, name, of_cell
-        self.axis_kind = stage.axis_kind
+    stage: Stage
+    name: str
+    of_cell: bool
 
     @property
     def data(self) -> xr.Dataset:
@@ -92,30 +92,26 @@ class SimulateAnswer(Answer):
 
 @question
 def simulate(
-    stage: StageLike | Sequence[int | str] | None = None,
-    rtol: float | str | None = None,
-    sample_time: float | str | None = None,
+    stage: Sequence[int | str] | StageLike | None = None,
+    rtol: Tolerance | None = None,
+    sample_time: TimeLike | None = None,
     *,
     set: Changes = None,
     cell: str | os.PathLike[str] | None = None,
     progress: Progress = silent,
 ) -> SimulateAnswer:
-    """Time response of a stage to its motion.
+    """What does one run do: the time response of a stage to its motion, as NetCDF, CSV and a plot.
 
     Parameters
     ----------
     stage : Stage, path or dict
-        The stage, its file, or the tables of one; with `cell`, the numbers of the cell: ``[3, 4]``.
+        A stage, as everywhere in friso; with `cell`, the numbers of the cell: 3 4.
     rtol : float, optional
         Relative tolerance of the solver; default: 1e-9, or that of the study.
     sample_time : str or float, optional
-        Sampling interval, "1 ms" or a number [s]; default: a 20 000th of the duration.
-    set : dict, optional
-        Keys to override, ``{"joint.locked": True}``.
+        Sampling interval, "1 ms" or a number [s]; default: the duration over 20 000.
     cell : path, optional
-        The store of a study, a cell of which is run again by itself.
-    progress : Progress
-        Not called: a run is quick.
+        Run a single cell of this study again.
 
     Returns
     -------
@@ -156,7 +152,7 @@ def simulate(
 
     mention_unstable_loop(chosen)
     response = simulated(chosen, tolerance or usual, interval)
-    return SimulateAnswer(chosen, response, name, cell is not None)
+    return SimulateAnswer(response, stage=chosen, name=name, of_cell=cell is not None)
 
 
 def _cell(store: Path, numbers: list[str], changes: Changes) -> tuple[Stage, str, float]:

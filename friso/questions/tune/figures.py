@@ -48,7 +48,7 @@ RTOL = 1e-7
 """Relative tolerance of the responses that are drawn."""
 
 
-def figures(tuning: Advice) -> list[Figure]:
+def tune_figures(tuning: Advice) -> list[Figure]:
     """The response, the settling times and the sensitivities."""
     lines = drawn_stages(tuning)
     panels = (_response(tuning, lines), _settling(tuning, lines), _sensitivity(tuning, lines), *_windows(tuning))

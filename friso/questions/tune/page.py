@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from friso.questions.tune.figures import figures as tune_figures
+from friso.questions.tune.figures import tune_figures
 from friso.questions.tune.gain_words import gain_facts
 from friso.questions.tune.sensitivity_words import sensitivity_sentences
 from friso.questions.tune.words import COLUMNS, answer, assumptions, failing, rows, window_facts

@@ -5,23 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
 from friso.errors import InputError
-from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.answer import Answer, question
 from friso.interface.inputs import (
     LOGGER,
     Changes,
+    ForceLike,
+    FrequencyLike,
+    LengthLike,
+    RatioLike,
+    Seed,
     StageLike,
-    Whole,
+    TimeLike,
     choice,
     correlations_of,
     mention_unstable_loop,
     read_stage,
     text_of,
-    whole_number,
     wrong,
 )
 from friso.platform.extras import install, missing
@@ -33,11 +37,7 @@ from friso.remedies.goal import Goal
 from friso.stage import Stage
 
 if TYPE_CHECKING:
-    from friso.remedies.method import Advice
-    from friso.shown.drawing.figure import Figure
-    from friso.shown.files import Files
-
-MOST_SEED = 2**31 - 1
+    pass
 
 _IN_POSITION = Bound("greater than 0 and at most 1", lambda value: (value > 0) & (value <= 1))
 """Deviations [m or rad] that may count as in position."""
@@ -46,10 +46,7 @@ _IN_POSITION = Bound("greater than 0 and at most 1", lambda value: (value > 0) &
 class TuneAnswer(Answer):
     """The remedies, the least change first: `result` is the `Advice`."""
 
-    command, status = "tune", 2
-
-    def __init__(self, result: Advice) -> None:
-        self.result, self.axis_kind = result, result.stage.axis_kind
+    status = 2
 
     @property
     def failure(self) -> str:
@@ -63,18 +60,6 @@ class TuneAnswer(Answer):
     def interrupted(self) -> bool:
         """Whether the search was."""
         return self.result.interrupted
-
-    def sentences(self) -> Sequence[str]:
-        """What to change, what it brings and costs, and why the other remedies do not work."""
-        from friso.questions.tune.words import answer, failing
-
-        return [*answer(self.result), *failing(self.result)]
-
-    def tables(self) -> Sequence[AnswerTable]:
-        """The remedies beside each other."""
-        from friso.questions.tune.words import COLUMNS, rows
-
-        return [AnswerTable(self.result.stage.name, COLUMNS, rows(self.result))]
 
     def details(self) -> Sequence[str]:
         """Gains in the terms of drives, how far the numbers may be off, and what is assumed."""
@@ -104,37 +89,19 @@ class TuneAnswer(Answer):
             for file in isolators
         ]
 
-    def figures(self) -> Sequence[Figure]:
-        """Responses, settling times, sensitivities."""
-        from friso.questions.tune.figures import figures
-
-        return figures(self.result)
-
-    def document(self) -> dict[str, Any]:
-        """The remedies with their numbers."""
-        from friso.questions.tune.document import tune_document
-
-        return tune_document(self.result)
-
-    def files(self) -> Files:
-        """A stage file for every remedy, the page, the figures."""
-        from friso.questions.tune.page import tune_files
-
-        return tune_files(self.result)
-
 
 @question
 def tune(
     stage: StageLike,
     *,
-    within: float | str | None = None,
-    settle: float | str | None = None,
-    force_limit: float | str | None = None,
-    bandwidth_limit: float | str | None = None,
-    margin: float | str | None = None,
+    within: LengthLike | None = None,
+    settle: TimeLike | None = None,
+    force_limit: ForceLike | None = None,
+    bandwidth_limit: FrequencyLike | None = None,
+    margin: RatioLike | None = None,
     only: Changeable | None = None,
     keep: Changeable | None = None,
-    seed: Whole = 1,
+    seed: Seed = 1,
     set: Changes = None,
     progress: Progress = silent,
 ) -> TuneAnswer:
@@ -142,10 +109,6 @@ def tune(
 
     Parameters
     ----------
-    stage : Stage, path or dict
-        The stage, its file, or the tables of one.
-    within : str or float, optional
-        Deviation that counts as in position, "1 um" or a number [m].
     settle : str or float, optional
         Time after the move in which 95 % of the machines are in position, "0.3 s" or a number [s].
     force_limit : str or float, optional
@@ -154,14 +117,10 @@ def tune(
         Highest bandwidth that modes missing from the stage file allow, "25 Hz" or a number [Hz].
     margin : float or str, optional
         Least modulus margin of 95 % of the machines, between 0 and 1; 0.5 if not given.
-    only, keep : str, optional
-        The part to change alone, and the part to leave unchanged: "controller" or "joint".
-    seed : int
-        Seed of the draws: the same one gives the same machines.
-    set : dict, optional
-        Keys to override.
-    progress : Progress
-        Called as remedies are tried.
+    only : str, optional
+        The part to change alone: "controller" or "joint".
+    keep : str, optional
+        The part to leave unchanged: "controller" or "joint".
 
     Returns
     -------
@@ -180,7 +139,6 @@ def tune(
     """
     chosen = read_stage(stage, set, leaves_out=("rail", "cable", "floor"), uncertain_too=True)
     goal = _goal(chosen, within, settle, force_limit, bandwidth_limit, margin, only, keep)
-    whole_number(seed, "seed", 0, MOST_SEED, "1")
     correlations = correlations_of(stage, chosen)
     if missing("design"):
         LOGGER.warning(f"no leaf springs are sized for a joint: that takes {install('design')}")

@@ -13,6 +13,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.equations.breakaway import breakaway, least_breakaway
 from friso.frequency.bandwidth import bandwidths_at
 from friso.frequency.crossover import WANTED
+from friso.interface.answer import AnswerTable
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.platform.extras import install
@@ -590,3 +591,13 @@ def assumptions(tuning: Advice) -> list[str]:
     if machines.left_out:
         lines.append(f"{machines.left_out} draws that no stage may have were replaced by others.")
     return lines
+
+
+def sentences(tuning: Advice) -> list[str]:
+    """What to change, what it brings and costs, and why the other remedies do not work."""
+    return [*answer(tuning), *failing(tuning)]
+
+
+def tables(tuning: Advice) -> list[AnswerTable]:
+    """The remedies beside each other."""
+    return [AnswerTable(tuning.stage.name, COLUMNS, rows(tuning))]

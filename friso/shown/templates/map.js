@@ -245,7 +245,7 @@
     data.axes.forEach((axis, i) => row(axis.label, valueAt(axis, data.sampled ? cell : at[i])));
     for (const item of data.texts) row(item.label, item.words[item.codes[cell]] || "–");
     for (const item of data.variables) {
-      if (["outcome", "verdict", "sketch"].includes(item.name)) continue; // shown among the texts
+      if (data.texts.some((texts) => texts.name === item.name)) continue;
       const value = item.numbers[cell];
       const kind = item.codes[cell] === NONE ? "" : item.kinds[item.codes[cell]].label;
       row(item.label, Number.isFinite(value) ? withUnit(value, item.unit) : kind);

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
+from types import MappingProxyType
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -17,7 +19,7 @@ from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
-from friso.studies.compare.disturbance_rejection import rejecting
+from friso.studies.compare.disturbance_rejection import ADRC, rejecting
 from friso.studies.compare.machines import Machines
 
 DEADBAND = 0.5
@@ -30,46 +32,112 @@ MODEL_ERROR = 0.2
 PER_PERIOD = 10
 """Samples that a period of the crossover has at least, as the stage file demands."""
 
-NAMES = {
-    "a": "as is",
-    "b": "faster",
-    "c": "isolator",
-    "d": "deadband",
-    "e": "reset",
-    "f": "feedforward",
-    "g": "isolator, faster",
-    **{setting.letter: setting.name for setting in SETTINGS.values()},
-    "n": "disturbance rejection",
-}
 
-JOINT: tuple[str, ...] = ("c", "g")
-"""The options for which a joint has to be bought."""
+class UnavailableError(Exception):
+    """An option that the machines cannot have, and why."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The machines that are to be settled, and the tolerance `within` [m] for being in position."""
+
+    machines: Machines
+    within: float
+
+    @property
+    def locked(self) -> Stage:
+        """The stage with its joint locked; as it is if it has none."""
+        return self.machines.stage.variants().get("locked", self.machines.stage)
+
+    @property
+    def free(self) -> Stage:
+        """The stage on its free joint. Raises UnavailableError where it has none."""
+        free = self.machines.stage.variants().get("free")
+        if free is None:
+            raise UnavailableError("the stage file has no joint with stiffness, damping and stroke")
+        return free
+
+    @property
+    def integrating(self) -> Stage:
+        """The stage with its joint locked. Raises UnavailableError where its controller does not integrate."""
+        flat = self.machines.stage.flat()
+        if not controller_of(flat).integrates(flat):
+            raise UnavailableError("the controller does not integrate")
+        return self.locked
+
+    @property
+    def deadband(self) -> float:
+        """Deadband of the integrator [m]."""
+        return DEADBAND * self.within
+
+
+class Variant(NamedTuple):
+    """A stage as an option has it, the keys that differ from machine to machine (numbers, or arrays of one for each
+    machine), and the factor by which its controller is faster."""
+
+    stage: Stage
+    changes: Mapping[str, Any] = MappingProxyType({})
+    factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class OptionKind:
+    """One way to settle a machine.
+
+    Parameters
+    ----------
+    name : str
+        What code, and for settings against friction `--also`, call it.
+    letter, title : str
+        What tables, figures and JSON call it.
+    says : str
+        What it does, with the numbers of words.py in braces.
+    variant : callable
+        Makes the stage that has it. Raises UnavailableError where the machines cannot have it.
+    line : tuple of str
+        Colour and dash of its curves.
+    prose : str
+        How it stands in a sentence; default: "the" and its title.
+    joint : bool
+        Whether a joint has to be bought for it.
+    own_loop : bool
+        Whether its linear loop differs from that of the machine as is: rests of the integrator and feedforward do not.
+    """
+
+    name: str
+    letter: str
+    title: str
+    says: str
+    variant: Callable[[Situation], Variant]
+    line: tuple[str, Literal["solid", "dashed", "dotted"]]
+    prose: str = ""
+    joint: bool = False
+    own_loop: bool = False
 
 
 @dataclass(frozen=True)
 class Option:
-    """One way: its `letter`, the stage that has it, what it changes of the keys (numbers, or arrays of one for each
-    machine), by which `factor` its controller is faster, and which `setting` against friction it is, if any."""
+    """An option that the machines can have: its kind, and stage, changes and factor as in `Variant`."""
 
-    letter: str
+    kind: OptionKind
     stage: Stage
     changes: Mapping[str, Any] = field(default_factory=dict)
     factor: float = 1.0
-    setting: Setting | None = None
 
     @property
-    def name(self) -> str:
-        return NAMES[self.letter]
+    def letter(self) -> str:
+        return self.kind.letter
 
     @property
-    def loop(self) -> str:
-        """The option whose linear loop it has: rests of the integrator and feedforward are no part of that."""
-        return self.letter if self.letter in "abcgn" else "a"
+    def label(self) -> str:
+        """What a table calls it: "c isolator"."""
+        return f"{self.kind.letter} {self.kind.title}"
 
 
 @dataclass(frozen=True)
 class CompareOptions:
-    """Those that the stage can have; why others, by letter, are left out; and the deadband of the integrator [m]."""
+    """The options that the machines can have; why others, by letter, are left out; the deadband of the integrator
+    [m]."""
 
     options: tuple[Option, ...]
     left_out: Mapping[str, str]
@@ -88,52 +156,28 @@ def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def options(
-    machines: Machines, within: float, also: tuple[Setting, ...] = (), with_adrc: bool = False
-) -> CompareOptions:
-    """The options of machines that are to be in position `within` a tolerance [m], some settings `also`, and active
-    disturbance rejection if that is asked for."""
-    stage = machines.stage
-    variants = stage.variants()
-    locked, free = variants.get("locked", stage), variants.get("free")
-    left_out: dict[str, str] = (
-        {} if free else dict.fromkeys(JOINT, "the stage file has no joint with stiffness, damping and stroke")
-    )
-    deadband = DEADBAND * within
-    listed = [Option("a", locked), *_faster("b", locked, left_out)]
-    if free:
-        listed.append(Option("c", free))
-    if _integrates(stage):
-        waiting = locked.with_numbers({"drive.integrator_deadband": deadband})
-        listed += [Option("d", waiting), Option("e", locked.replace({"drive.integrator_reset": True}))]
-    else:
-        left_out |= dict.fromkeys("de", "the controller does not integrate")
-    ahead = _feedforward(machines)
-    if any(np.any(force) for force in ahead.values()):
-        listed.append(Option("f", locked, ahead))
-    else:
-        left_out["f"] = "the stage file has neither Coulomb nor viscous friction"
-    if free:
-        listed += _faster("g", free, left_out)
-    for setting in also:
-        if setting.integral and not _integrates(stage):
-            left_out[setting.letter] = "the controller does not integrate"
-        else:
-            numbers = setting.numbers(locked.flat(), within)
-            listed.append(Option(setting.letter, locked.with_numbers(numbers), setting=setting))
-    if with_adrc:
-        flat = locked.flat()
-        crossings = margins(linear_flat(locked, flat), limit_cases(flat)["sliding"]).crossovers
+def options(machines: Machines, within: float, also: Collection[str] = ()) -> CompareOptions:
+    """Return the options of machines that are to be in position `within` a tolerance [m]; those named `also`, or "all",
+    join the usual ones."""
+    situation = Situation(machines, within)
+    tried: list[Option] = []
+    left_out: dict[str, str] = {}
+    for kind in OPTIONS.values():
+        if kind.name in ALSO and not {kind.name, "all"} & {*also}:
+            continue
         try:
-            listed.append(Option("n", rejecting(locked, crossings)))
-        except InputError as error:
-            left_out["n"] = str(error)
-    return CompareOptions(tuple(listed), dict(sorted(left_out.items())), deadband)
+            tried.append(Option(kind, *kind.variant(situation)))
+        except UnavailableError as error:
+            left_out[kind.letter] = str(error)
+    return CompareOptions(tuple(tried), left_out, situation.deadband)
 
 
-def _faster(letter: str, stage: Stage, left_out: dict[str, str]) -> list[Option]:
-    """The stage with the highest bandwidth at which the machine of the file keeps its margin: an engineer tunes one
-    machine, and all others get its settings. Nothing, and why not, where it is that fast already."""
+def _faster(stage: Stage) -> Variant:
+    """Return a stage with the highest bandwidth at which the machine of the file keeps its margin.
+
+    An engineer tunes one machine, and all others get its settings. Raises UnavailableError where it is that fast
+    already.
+    """
     flat = stage.flat()
     highest = limits(linear_flat(stage, flat)).highest_comfortable
     tuned = bandwidth(flat)
@@ -141,25 +185,134 @@ def _faster(letter: str, stage: Stage, left_out: dict[str, str]) -> list[Option]
     if tuned is not None and highest is not None:
         highest = min(highest, 1 / (PER_PERIOD * flat["drive.sample_time"]))
     if highest is None or highest <= present:
-        left_out[letter] = f"no higher bandwidth keeps a modulus margin of {WANTED:g}"
-        return []
+        raise UnavailableError(f"no higher bandwidth keeps a modulus margin of {WANTED:g}")
     factor = float(highest / present)
     changes = {key: value for key, value in sped_up(flat, factor).items() if value != flat[key]}
-    return [Option(letter, stage.with_numbers(changes), factor=factor)]
+    return Variant(stage.with_numbers(changes), factor=factor)
 
 
-def _integrates(stage: Stage) -> bool:
-    """Whether there is an integrator that could rest."""
-    flat = stage.flat()
-    return controller_of(flat).integrates(flat)
-
-
-def _feedforward(machines: Machines) -> dict[str, np.ndarray]:
-    """Feedforward of Coulomb and viscous friction of each machine, both wrong by the model error."""
+def _feedforward(situation: Situation) -> Variant:
+    """Return the locked stage with feedforward of each machine's Coulomb and viscous friction, both off by the model
+    error. Raises UnavailableError where there is no such friction."""
+    machines = situation.machines
     flat = anywhere(machines.flat(machines.stage, {}))
     coulomb = level_under_conditions(flat, "coulomb") if "friction.coulomb" in flat else 0.0
     off = 1 + MODEL_ERROR * machines.signs
-    return {
+    ahead = {
         "drive.feedforward_coulomb": off * coulomb,
         "drive.feedforward_viscous": off * flat.get("friction.viscous", 0.0),
     }
+    if not any(np.any(force) for force in ahead.values()):
+        raise UnavailableError("the stage file has neither Coulomb nor viscous friction")
+    return Variant(situation.locked, ahead)
+
+
+def _with_setting(setting: Setting, situation: Situation) -> Variant:
+    """Return the locked stage with one size of a setting against friction."""
+    stage = situation.integrating if setting.integral else situation.locked
+    return Variant(stage.with_numbers(setting.numbers(stage.flat(), situation.within)))
+
+
+def _rejecting(situation: Situation) -> Variant:
+    """Return the locked stage with active disturbance rejection, as fast as its controller is now."""
+    flat = situation.locked.flat()
+    crossings = margins(linear_flat(situation.locked, flat), limit_cases(flat)["sliding"]).crossovers
+    try:
+        return Variant(rejecting(situation.locked, crossings))
+    except InputError as error:
+        raise UnavailableError(str(error)) from None
+
+
+_OPTIONS = (
+    OptionKind(
+        "as-is",
+        "a",
+        "as is",
+        "the controller of the file",
+        lambda situation: Variant(situation.locked),
+        ("ink", "solid"),
+        prose="the machine as is",
+        own_loop=True,
+    ),
+    OptionKind(
+        "faster",
+        "b",
+        "faster",
+        "{faster}",
+        lambda situation: _faster(situation.locked),
+        ("blue", "solid"),
+        prose="the faster controller",
+        own_loop=True,
+    ),
+    OptionKind(
+        "isolator",
+        "c",
+        "isolator",
+        "the controller of the file",
+        lambda situation: Variant(situation.free),
+        ("vermillion", "solid"),
+        joint=True,
+        own_loop=True,
+    ),
+    OptionKind(
+        "deadband",
+        "d",
+        "deadband",
+        "the integrator pauses while the error is below {deadband}",
+        lambda situation: Variant(
+            situation.integrating.with_numbers({"drive.integrator_deadband": situation.deadband})
+        ),
+        ("orange", "dashed"),
+    ),
+    OptionKind(
+        "reset",
+        "e",
+        "reset",
+        "the integrator is reset where the error changes sign",
+        lambda situation: Variant(situation.integrating.replace({"drive.integrator_reset": True})),
+        ("pink", "dashed"),
+    ),
+    OptionKind(
+        "feedforward",
+        "f",
+        "feedforward",
+        "feedforward of Coulomb and viscous friction, both {model_error} too large or both too small, drawn for each "
+        "machine",
+        _feedforward,
+        ("sky", "dashed"),
+        prose="feedforward",
+    ),
+    OptionKind(
+        "isolator-faster",
+        "g",
+        "isolator, faster",
+        "{faster}",
+        lambda situation: _faster(situation.free),
+        ("green", "solid"),
+        prose="isolator and faster controller",
+        joint=True,
+        own_loop=True,
+    ),
+    *(
+        OptionKind(name, letter, setting.name, setting.says, partial(_with_setting, setting), (colour, "dotted"))
+        for (name, setting), letter, colour in zip(
+            SETTINGS.items(), "hijklm", ("blue", "vermillion", "orange", "pink", "sky", "green"), strict=True
+        )
+    ),
+    OptionKind(
+        ADRC,
+        "n",
+        "disturbance rejection",
+        "linear active disturbance rejection with a bandwidth of {rejection_bandwidth}, at which the loop crosses 0 dB "
+        "where it does in a, and an observer {observer_ratio} times as fast",
+        _rejecting,
+        ("ink", "dashed"),
+        prose="disturbance rejection",
+        own_loop=True,
+    ),
+)
+OPTIONS: Mapping[str, OptionKind] = {kind.name: kind for kind in _OPTIONS}
+"""All options, by name, in the order of their letters."""
+
+ALSO = (*SETTINGS, ADRC)
+"""Options that are tried where they are asked for."""

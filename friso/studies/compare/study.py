@@ -25,7 +25,7 @@ from friso.studies.compare.measures import (
     measure_chunk,
     staying_in_position,
 )
-from friso.studies.compare.options import NAMES, CompareOptions, Option, linear_flat, options
+from friso.studies.compare.options import OPTIONS, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import EstimatedValue, difference, median
 from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import MoveTask, own_motion
@@ -185,19 +185,20 @@ def compare(
     """
     if not 0 < within < np.inf:
         raise InputError("--within", f"{within:g} m", "a length greater than 0", '--within "1 um"')
-    settings = settings_named(also, (ADRC,))
+    settings_named(also, (ADRC,))  # refuses what there is none of
     machines = draw_machines(stage, correlations or Correlations(), count, seed)
     places = _places(machines.stage)
     begins()
     progress(0, 1, "how fast the controller may be")
-    tried = options(machines, within, settings, bool({ADRC, "all"} & {*also}))
+    tried = options(machines, within, also)
     work = _Work(machines, own_motion(machines.stage), places, within, progress, len(tried.options))
     results: list[OptionResult] = []
     for option in tried.options:
         measures, later = work.runs(option, len(results)), work.longer(option)
-        loops = {result.letter: result.loops for result in results}
-        results.append(OptionResult(option, measures, later, loops.get(option.loop) or _loops(machines, option)))
-    left_out = [f"{letter} {NAMES[letter]} is left out: {why}" for letter, why in tried.left_out.items()]
+        loops = results[0].loops if results and not option.kind.own_loop else _loops(machines, option)
+        results.append(OptionResult(option, measures, later, loops))
+    titles = {kind.letter: kind.title for kind in OPTIONS.values()}
+    left_out = [f"{letter} {titles[letter]} is left out: {why}" for letter, why in tried.left_out.items()]
     notes = (*machines.notes, *_missing(machines.stage), *left_out, *_troubles(results, count))
     return Comparison(machines, tried, tuple(results), within, seed, notes)
 
@@ -230,7 +231,7 @@ class _Work:
     def runs(self, option: Option, before: int) -> MachineMeasures:
         """An option on all machines, after some other options."""
         count, parts = self.machines.count, []
-        label, total = f"{option.letter} {option.name}", count * self.options
+        label, total = option.label, count * self.options
         self.progress(before * count, total, label)
         for recorded in self._recorded(option, self.task, count, 1):
             parts.append(measure_chunk(recorded, self.places, self.within))
@@ -288,5 +289,5 @@ def _troubles(results: list[OptionResult], count: int) -> list[str]:
         )
         for trouble, number, consequence in troubles:
             if number:
-                notes.append(f"{result.letter} {result.option.name}, {trouble}: {number} of {count}; {consequence}")
+                notes.append(f"{result.option.label}, {trouble}: {number} of {count}; {consequence}")
     return notes

@@ -1,1 +1,13 @@
-"""What `friso guideline` shows: words, figures, document and page."""
+"""The design guideline: two formulas for the crossover at which hunting ends, with their errors."""
+
+from friso.interface.question import WHERE, Question
+
+QUESTION = Question(
+    __name__,
+    140,
+    WHERE,
+    "guideline --out guideline\nA quick try: friso guideline --samples 64 --out guideline",
+    takes=(),
+    folder="guideline",
+    runner="friso_thesis.commands.guideline",
+)

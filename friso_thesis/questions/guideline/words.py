@@ -127,3 +127,8 @@ def _ranges(state: str, damping: float, modes: Sequence[ParasiticLimits]) -> str
 def _spread(values: Sequence[float]) -> str:
     low, high = number(min(values)), number(max(values))
     return low if low == high else f"{low} to {high}"
+
+
+def sentences(guideline: Guideline) -> list[str]:
+    """How accurate the laws are."""
+    return accuracy(guideline)

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from friso.interface.answer import Answer, AnswerTable, question
-from friso.interface.inputs import tolerance_of
+from friso.interface.inputs import ClaimName, StudyName, Tolerance, tolerance_of
 from friso.platform.extras import need
 from friso.progress import Progress, silent
 from friso_thesis.studies.thesis.plausible import DRAWS
-from friso_thesis.studies.thesis.reproduce import POINTS, Reproduction
+from friso_thesis.studies.thesis.reproduce import POINTS
 
 if TYPE_CHECKING:
     from friso.shown.drawing.figure import Figure
@@ -24,10 +24,7 @@ class ReproduceAnswer(Answer):
     """The thesis recomputed: `result` is a `Reproduction` with maps, responses and a verdict per claim; `laws`, where
     asked, how its conclusions are judged under each friction law."""
 
-    command = "reproduce"
-
-    def __init__(self, result: Reproduction, laws: ConclusionsByLaw | None = None) -> None:
-        self.result, self.laws = result, laws
+    laws: ConclusionsByLaw | None
 
     @cached_property
     def _document(self) -> dict[str, Any]:
@@ -91,17 +88,20 @@ def _drawn(space: dict[str, Any] | None) -> str:
 
 @question
 def reproduce(
-    names: Iterable[str] | None = None,
+    names: Iterable[StudyName] | None = None,
     points: int = POINTS,
-    rtol: float | str = 1e-6,
+    rtol: Tolerance = 1e-6,
     *,
-    only: Iterable[str] | None = None,
+    only: Iterable[ClaimName] | None = None,
     draws: int = DRAWS,
     laws: bool = False,
     folder: Path | None = None,
     progress: Progress = silent,
 ) -> ReproduceAnswer:
-    """Every figure and claim of the thesis that computation can decide, judged.
+    """Every figure and claim of the thesis that computation can decide, judged: reproduction.html, claims.json.
+
+    Writes into the folder reproduction; single claims go into one such as reproduction-F15B.
+    An interrupted run keeps what it has finished; the same command resumes it.
 
     Parameters
     ----------
@@ -109,18 +109,14 @@ def reproduce(
         Studies of Table 3; default: all of them.
     points : int
         Values per axis of every map.
-    rtol : float
-        Relative tolerance of the solver.
     only : list of str, optional
         Claims, such as "F15B", that alone are judged, with what they need; default: all of them.
     draws : int
         Joint draws of the values that the thesis does not state, in each of which every claim is judged.
     laws : bool
-        Whether to judge the conclusions of the thesis under every friction law too.
+        Judge the conclusions of the thesis under every friction law too.
     folder : Path, optional
         Where finished pieces are kept, from which an interrupted run resumes.
-    progress : Progress
-        Called as pieces are done.
 
     Returns
     -------
@@ -143,4 +139,4 @@ def reproduce(
     from friso_thesis.studies.thesis.reproduce import reproduce as reproduced
 
     result = reproduced(names, points, tolerance_of(rtol), progress, draws=draws, only=only, kept=Kept(folder))
-    return ReproduceAnswer(result, conclusions_by_law(result, progress) if laws else None)
+    return ReproduceAnswer(result, laws=conclusions_by_law(result, progress) if laws else None)

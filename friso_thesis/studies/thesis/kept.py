@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from friso.studies.cells import WORDS
 from friso.studies.metadata import digest
+from friso.studies.metric import form_of
 from friso.studies.store_files import keep_arrays, kept_arrays, put, stored
 from friso.studies.study import Study
 from friso.studies.sweep import dataset
@@ -61,7 +61,7 @@ class Kept(KeptWork):
             return runs
         runs = make()
         if file is not None:
-            arrays: dict[str, Any] = {name: runs[name].values.astype(WORDS.get(name, "f8")) for name in study.metrics}
+            arrays: dict[str, Any] = {name: runs[name].values.astype(form_of(name)) for name in study.metrics}
             verified = {name: value for name, value in runs.attrs.items() if name.startswith("verified")}
             keep_arrays(file, {"notes": np.array(json.dumps(verified)), **arrays})
         return runs

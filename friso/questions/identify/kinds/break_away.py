@@ -17,6 +17,7 @@ from friso.shown.drawing.prefixes import range_with_unit
 
 
 def _facts(result: BreakAway) -> Facts:
+    """List static friction in all and by direction, and what it was read from."""
     facts = [
         ("Static friction", with_interval(result.static)),
         ("Forward", with_interval(result.forward)),
@@ -29,6 +30,7 @@ def _facts(result: BreakAway) -> Facts:
 
 
 def _numbers(result: BreakAway) -> dict[str, Any]:
+    """Return static friction with all ramps, for the document."""
     several = {"static": result.static, "forward": result.forward, "backward": result.backward}
     estimates = {name: estimate_document(estimate) for name, estimate in several.items()}
     ramps = result.ramps
@@ -37,7 +39,7 @@ def _numbers(result: BreakAway) -> dict[str, Any]:
 
 
 def _figures(result: BreakAway, logs: Sequence[Source], name: str) -> list[Figure]:
-    """Break-away force over force rate."""
+    """Draw the break-away force over the force rate."""
     ramps = result.ramps
     if not len(ramps.times):
         return []

@@ -32,6 +32,7 @@ from friso.shown.drawing.figure import (
 
 
 def _facts(result: FrictionAtSpeeds) -> Facts:
+    """List friction over speed by direction, the constant force, and friction along the rail."""
     facts = [(f"Friction {name}", _direction_text(side)) for name, side in result.velocity.directions.items()]
     facts += [
         ("Friction, both directions", _direction_text(result.velocity.both)),
@@ -49,6 +50,7 @@ def _facts(result: FrictionAtSpeeds) -> Facts:
 
 
 def _direction_text(direction: Direction) -> str:
+    """Write the friction of one direction in words."""
     several = (*_friction(direction).values(),)
     visible = [estimate for estimate in several if estimate.determined]
     reasons = {estimate.reason: None for estimate in several if not estimate.determined}
@@ -58,6 +60,7 @@ def _direction_text(direction: Direction) -> str:
 
 
 def _numbers(result: FrictionAtSpeeds) -> dict[str, Any]:
+    """Return friction over speed and over place, for the document."""
     sides = {**result.velocity.directions, "both": result.velocity.both}
     passes = [
         {
@@ -84,16 +87,18 @@ def _numbers(result: FrictionAtSpeeds) -> dict[str, Any]:
 
 
 def _direction_numbers(direction: Direction) -> dict[str, Any]:
+    """Return the friction of one direction, for the document."""
     return {name: estimate_document(estimate) for name, estimate in _friction(direction).items()}
 
 
 def _friction(direction: Direction) -> dict[str, Estimate]:
+    """Return the estimates of one direction by name."""
     names = ("coulomb", "viscous", "static", "stribeck_velocity", "stribeck_exponent")
     return {name: getattr(direction, name) for name in names}
 
 
 def _velocity(friction: FrictionVelocity, name: str) -> list[Figure]:
-    """Friction over velocity with intervals and the fit of each direction."""
+    """Draw friction over velocity with intervals and the fit of each direction."""
     if not len(friction.velocities):
         return []
     series, markers = [], []
@@ -113,7 +118,7 @@ def _velocity(friction: FrictionVelocity, name: str) -> list[Figure]:
 
 
 def _fit(direction: Direction, velocities: Array, word: str) -> list[Series]:
-    """The curve fitted to one direction, over the velocities it was fitted to."""
+    """Draw the curve fitted to one direction, over the velocities it was fitted to."""
     if not (direction.coulomb.determined and direction.viscous.determined):
         return []
     size, curve = np.geomspace(np.abs(velocities).min(), np.abs(velocities).max(), 200), direction.curve
@@ -128,7 +133,7 @@ def _fit(direction: Direction, velocities: Array, word: str) -> list[Series]:
 
 
 def _position(friction: FrictionPosition, name: str) -> list[Figure]:
-    """Force over the place, pass by pass."""
+    """Draw the force over the place, pass by pass."""
     if not friction.passes:
         return []
     colours = cycle((BLUE, ORANGE, GREEN, PINK, SKY, VERMILLION))

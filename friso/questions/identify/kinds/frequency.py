@@ -19,7 +19,7 @@ from friso.shown.drawing.prefixes import range_with_unit
 
 
 def _sentences(bench: Bench) -> tuple[str, ...]:
-    """What the response shows, and whether friction explains its lower end."""
+    """Say what the response shows, and whether friction explains its lower end."""
     sentences = [f"{text[0].upper()}{text[1:]}." for text in (bench.seen.words[-1:] if bench.seen else ())]
     if bench.departs is not None and bench.departs.frequency.determined:
         below = digits(bench.departs.frequency.value, "Hz")
@@ -29,7 +29,7 @@ def _sentences(bench: Bench) -> tuple[str, ...]:
 
 
 def _friction(bench: Bench) -> str:
-    """Whether a simulation with friction explains the departure."""
+    """Say whether a simulation with friction explains the departure."""
     assert bench.explanation is not None
     share = 1 - bench.explanation.left
     verb = "explains" if share > 0.5 else "does not explain"
@@ -38,7 +38,7 @@ def _friction(bench: Bench) -> str:
 
 
 def _facts(bench: Bench) -> Facts:
-    """Lines, modes, masses and joint, friction, and how one log predicts the other."""
+    """List lines, modes, masses and joint, friction, and how one log predicts the other."""
     facts = [("Band of the models", range_with_unit(*bench.band, "Hz"))]
     for line in bench.lines:
         place = _place(line)
@@ -60,11 +60,12 @@ def _facts(bench: Bench) -> Facts:
 
 
 def _place(line: StraightLine) -> str:
+    """Say where a line lies."""
     return f"{line.kind}, {range_with_unit(line.low, line.high, 'Hz')}"
 
 
 def _headline(bench: Bench) -> str:
-    """The masses and modes of a frequency response, and what its units keep from the stage file."""
+    """Say what masses and modes a response shows, and what its units keep from the stage file."""
     sentences = []
     names = ("total mass", "antiresonance frequency", "resonance frequency")
     if bench.two_masses is not None:
@@ -81,7 +82,9 @@ def _headline(bench: Bench) -> str:
 
 
 def _without_units(force: str, motion: str) -> str:
-    """What units, "1" where the log states none, keep masses and stiffness out of the stage file."""
+    """Say what units, "1" where the log states none, keep masses and stiffness out of the stage
+    file.
+    """
     wanted = "masses and stiffness need N and m to enter the stage file"
     silent = " and the ".join(name for name, unit in (("force", force), ("motion", motion)) if unit == "1")
     if silent:
@@ -90,12 +93,13 @@ def _without_units(force: str, motion: str) -> str:
 
 
 def _outputs(errors: Sequence[float]) -> str:
-    """Relative errors of the outputs, the driven mass's first."""
+    """Write the relative errors of the outputs, the driven mass's first."""
     names = ("driven mass", "other mass")
     return ", ".join(f"{percent(error, 3)} ({name})" for name, error in zip(names, errors, strict=False))
 
 
 def _numbers(bench: Bench) -> dict[str, Any]:
+    """Return what a bench shows, for the document."""
     channels = bench.driven.channels
     return {
         "input": {"name": channels.input, "unit": channels.input_unit},
@@ -120,11 +124,13 @@ def _numbers(bench: Bench) -> dict[str, Any]:
 
 
 def _line_numbers(line: StraightLine) -> dict[str, Any]:
+    """Return a straight line, for the document."""
     band = {"kind": line.kind, "low_hz": line.low, "high_hz": line.high, "sign": line.sign}
     return {**band, "level": estimate_document(line.level), "value": estimate_document(line.value)}
 
 
 def _drag_numbers(drag: Drag) -> dict[str, Any]:
+    """Return the friction level at low frequency, for the document."""
     several = {"mass": drag.mass, "damping": drag.damping, "stiffness": drag.stiffness, "coulomb": drag.coulomb}
     return {
         **{name: estimate_document(estimate) for name, estimate in several.items()},

@@ -11,8 +11,8 @@ from friso.axis import axis_shown, unit_shown
 from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog
-from friso.identification.output_error.drawn import DRAWS
 from friso.identification.output_error.profile import Profile
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.quantities import percent
 from friso.questions.identify.estimates import ends_document
 from friso.questions.identify.kind_view import Facts, KindView, PredictionView
@@ -27,7 +27,7 @@ FALLING = "viscous friction below zero: friction falls as the speed rises (Strib
 
 
 def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:
-    """How it was fitted, and what the motion covers."""
+    """Say how a log of moves was fitted, and what its motion covers."""
     low, high = moves.covered.gap
     along = "the machine was simulated along the logged position, and the forces were compared."
     if moves.fit.problem.closed:
@@ -46,7 +46,7 @@ def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:
 
 
 def _facts(moves: IdentifiedMoves) -> Facts:
-    """Both fits of the inverse model, the errors of the output-error fit, and the residual."""
+    """List both fits of the inverse model, the errors of the output-error fit, and the residual."""
     residual = moves.residual
     correlation = (
         "uncorrelated from sample to sample"
@@ -65,7 +65,10 @@ def _facts(moves: IdentifiedMoves) -> Facts:
 
 
 def _errors(moves: IdentifiedMoves) -> str:
-    """The relative errors of the simulated record; along the logged position, that of the force alone is meaningful."""
+    """Write the relative errors of the simulated record.
+
+    Along the logged position, that of the force alone is meaningful.
+    """
     errors = moves.errors
     if moves.loop is None:
         return f"force {percent(errors.force, 3)}"
@@ -76,12 +79,14 @@ def _errors(moves: IdentifiedMoves) -> str:
 
 
 def _inverse_text(model: InverseModel) -> str:
+    """Write the estimates of an inverse model in words."""
     text = f"{estimates_in_words(model.estimates)}; force error {percent(model.error, 3)}"
     falling = any(one.name.startswith("viscous") and one.high < 0 for one in model.estimates)
     return f"{text}; {FALLING}" if falling else text
 
 
 def _numbers(moves: IdentifiedMoves) -> dict[str, Any]:
+    """Return both models of a log of moves, for the document."""
     low, high = moves.covered.gap
     parameters = {
         parameter.name: {"unit": unit_shown(parameter.unit), "value": moves.fit.value(parameter.name)}
@@ -111,6 +116,7 @@ def _numbers(moves: IdentifiedMoves) -> dict[str, Any]:
 
 
 def _inverse_numbers(model: InverseModel) -> dict[str, Any]:
+    """Return an inverse model, for the document."""
     named = {
         f"{estimate.name.replace(' ', '_')}{unit_suffix(estimate.unit)}": ends_document(estimate)
         for estimate in model.estimates
@@ -119,6 +125,7 @@ def _inverse_numbers(model: InverseModel) -> dict[str, Any]:
 
 
 def _residual_numbers(moves: IdentifiedMoves) -> dict[str, Any]:
+    """Return what is left of the force, for the document."""
     residual = moves.residual
     return {
         "rms_n": residual.rms,
@@ -131,12 +138,15 @@ def _residual_numbers(moves: IdentifiedMoves) -> dict[str, Any]:
 
 
 def _profile_numbers(profile: Profile) -> dict[str, Any]:
+    """Return the profile of a parameter, for the document."""
     ends = {"low": profile.low, "high": profile.high, "open_low": profile.open_low, "open_high": profile.open_high}
     return {**ends, "values": profile.values, "mean_squares_n2": profile.cost, "limit_n2": profile.limit}
 
 
 def _headline(moves: IdentifiedMoves) -> str:
-    """Of a force that is not in newtons, what is identified per unit of it, which no stage file takes."""
+    """Say what is identified per unit of a force that is not in newtons, which no stage file
+    takes.
+    """
     if moves.force_unit == "N":
         return ""
     values = "; ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in moves.correlated)
@@ -147,17 +157,22 @@ def _headline(moves: IdentifiedMoves) -> str:
 
 
 def _prediction_sentence(simulated: SimulatedLog) -> str:
+    """Say how well another log is predicted, and how far machines drawn from the estimates go
+    from it.
+    """
+    settings = OutputErrorSettings.current()
     errors, apart = simulated.errors, simulated.apart
     farthest = f"differs from it by {percent(apart)} of the position" if np.isfinite(apart) else "runs away"
     return (
         f"relative errors of position {percent(errors.position, 3)}, velocity {percent(errors.velocity, 3)}, "
-        f"acceleration {percent(errors.acceleration, 3)}, force {percent(errors.force, 3)}; of {DRAWS} machines "
-        f"drawn from the intervals, and from the ranges of what is not identified, the farthest {farthest}."
+        f"acceleration {percent(errors.acceleration, 3)}, force {percent(errors.force, 3)}; of "
+        f"{settings.machines_drawn} machines drawn from the intervals, and from the ranges of what is not identified, "
+        f"the farthest {farthest}."
     )
 
 
 def _prediction_figures(log: Log, simulated: SimulatedLog, number: int) -> list[Figure]:
-    """The log as measured and as simulated."""
+    """Draw another log as measured and as simulated."""
     caption = (
         f"{log.name}: simulated with the values identified from the other logs; relative error of the position "
         f"{percent(simulated.errors.position, 3)}, of the force {percent(simulated.errors.force, 3)}."

@@ -15,6 +15,7 @@ from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, S
 
 
 def _facts(result: Presliding) -> Facts:
+    """List mass and bristles, and how much of the force they explain."""
     facts = [
         ("Stiffness of the bristles", with_interval(result.stiffness)),
         ("Damping of the bristles", with_interval(result.damping)),
@@ -26,6 +27,7 @@ def _facts(result: Presliding) -> Facts:
 
 
 def _numbers(result: Presliding) -> dict[str, Any]:
+    """Return mass and bristles, for the document."""
     several = {"stiffness": result.stiffness, "damping": result.damping, "mass": result.mass}
     return {
         **{name: estimate_document(estimate) for name, estimate in several.items()},
@@ -35,14 +37,14 @@ def _numbers(result: Presliding) -> dict[str, Any]:
 
 
 def _figures(result: Presliding, logs: Sequence[Source], name: str) -> list[Figure]:
-    """Force and model, and the motion, over the last tenth of the record."""
+    """Draw force and model, and the motion, over the last tenth of the record."""
     if not len(result.model):
         return []
     return [Figure(f"{name}_force", "Motion before sliding", presliding_caption(result), presliding_panels(result))]
 
 
 def presliding_caption(result: Presliding) -> str:
-    """What the bristles are, and how much of the force they explain."""
+    """Say what the bristles are, and how much of the force they explain."""
     return (
         f"The last tenth of the record. Stiffness of the bristles: {with_interval(result.stiffness)}; damping: "
         f"{with_interval(result.damping)}. {percent(result.unexplained, 3)} of the friction remains unexplained."
@@ -50,7 +52,7 @@ def presliding_caption(result: Presliding) -> str:
 
 
 def presliding_panels(result: Presliding) -> tuple[Panel, ...]:
-    """Force and model, and the motion, over the last tenth of the record."""
+    """Draw force and model, and the motion, over the last tenth of the record."""
     late = slice(-(len(result.time) // 10), None)
     time, motion = result.time[late], result.position[late] - result.position[late].mean()
     lines = (

@@ -21,6 +21,7 @@ POINTS, CURVE = 5000, 200
 
 
 def _facts(result: SlowSliding) -> Facts:
+    """List friction over speed, and how much of it the model explains."""
     names = ("Coulomb friction", "Static friction", "Stribeck velocity")
     facts = [(name, with_interval(estimate)) for name, estimate in zip(names, result.estimates, strict=True)]
     if len(result.time):
@@ -29,12 +30,15 @@ def _facts(result: SlowSliding) -> Facts:
 
 
 def _numbers(result: SlowSliding) -> dict[str, Any]:
+    """Return friction over speed, for the document."""
     named = {estimate.name.removeprefix("friction."): estimate_document(estimate) for estimate in result.estimates}
     return {**named, "unexplained": result.unexplained, "warnings": list(result.warnings)}
 
 
 def _figures(result: SlowSliding, logs: Sequence[Source], name: str) -> list[Figure]:
-    """Friction over velocity as it was and as the model has it, and both over time at its end."""
+    """Draw friction over velocity as it was and as the model has it, and both over time at its
+    end.
+    """
     if not len(result.model):
         return []
     caption, panels = slow_sliding_caption(result), slow_sliding_panels(result)
@@ -42,7 +46,7 @@ def _figures(result: SlowSliding, logs: Sequence[Source], name: str) -> list[Fig
 
 
 def slow_sliding_caption(result: SlowSliding) -> str:
-    """What the friction is, and how much of it the model explains."""
+    """Say what the friction is, and how much of it the model explains."""
     coulomb, static, stribeck = (with_interval(estimate) for estimate in result.estimates)
     return (
         "Force less inertia, and the friction of LuGre bristles in the measured motion. Coulomb "
@@ -53,7 +57,7 @@ def slow_sliding_caption(result: SlowSliding) -> str:
 
 
 def slow_sliding_panels(result: SlowSliding) -> tuple[Panel, ...]:
-    """Friction over time, and over velocity, as it was and as the model has it."""
+    """Draw friction over time, and over velocity, as it was and as the model has it."""
     friction = Axis("Friction, low-passed", "N")
     thinned = slice(None, None, max(len(result.time) // POINTS, 1))
 
@@ -68,7 +72,7 @@ def slow_sliding_panels(result: SlowSliding) -> tuple[Panel, ...]:
 
 
 def _steady_friction(result: SlowSliding) -> tuple[Series, ...]:
-    """The friction at steady velocities without the viscous, either way."""
+    """Draw the friction at steady velocities without the viscous part, either way."""
     coulomb, static, stribeck = (estimate.value for estimate in result.estimates)
     if not all(estimate.determined for estimate in result.estimates):
         return ()

@@ -16,6 +16,7 @@ from friso.shown.drawing.figure import BLUE, INK, Axis, Band, Figure, Markers, P
 
 
 def _facts(result: StepStiffness) -> Facts:
+    """List the stiffness of all steps, up and down, and the hysteresis."""
     return (
         ("Joint stiffness", with_interval(result.stiffness)),
         ("Steps up", with_interval(result.up)),
@@ -26,12 +27,13 @@ def _facts(result: StepStiffness) -> Facts:
 
 
 def _sentences(result: StepStiffness) -> tuple[str, ...]:
-    """Whether the cart moved, where that was measured."""
+    """Say whether the cart moved, where that was measured."""
     fixed = {True: "The cart stood still.", False: "The cart moved.", None: ""}[result.cart_fixed]
     return (fixed,) if fixed else ()
 
 
 def _numbers(result: StepStiffness) -> dict[str, Any]:
+    """Return the stiffness with its settled windows, for the document."""
     windows = [
         {"start_s": w.start, "end_s": w.end, "deflection_m": w.position, "force_n": w.force} for w in result.windows
     ]
@@ -41,7 +43,7 @@ def _numbers(result: StepStiffness) -> dict[str, Any]:
 
 
 def _figures(result: StepStiffness, logs: Sequence[Source], name: str) -> list[Figure]:
-    """Deflection and force over time with the settled windows, and the one over the other."""
+    """Draw deflection and force over time with the settled windows, and the one over the other."""
     panels = []
     for quantity, unit, values in (("Deflection", "m", result.position), ("Force", "N", result.force)):
         low, high = float(values.min()), float(values.max())

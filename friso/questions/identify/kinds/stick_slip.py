@@ -19,6 +19,7 @@ from friso.shown.drawing.prefixes import range_with_unit
 
 
 def _facts(result: StickSlip) -> Facts:
+    """List static friction, break-away forces and the joint's stiffness."""
     facts = [
         ("Static friction", with_interval(result.static)),
         ("Forward", with_interval(result.forward)),
@@ -35,6 +36,7 @@ def _facts(result: StickSlip) -> Facts:
 
 
 def _numbers(result: StickSlip) -> dict[str, Any]:
+    """Return static friction with all slips, for the document."""
     several = {
         "static": result.static,
         "forward": result.forward,
@@ -49,7 +51,7 @@ def _numbers(result: StickSlip) -> dict[str, Any]:
 
 
 def _figures(result: StickSlip, logs: Sequence[Source], name: str) -> list[Figure]:
-    """Force on the cart with its peaks, and the cart's speed, over time."""
+    """Draw the force on the cart with its peaks, and the cart's speed, over time."""
     (log,) = logs
     assert isinstance(log, Log)
     pull = Series(log.time, _broken(result.pull, log), "force on the cart", GREY, width=1.0)
@@ -72,7 +74,9 @@ def _figures(result: StickSlip, logs: Sequence[Source], name: str) -> list[Figur
 
 
 def _broken(values: np.ndarray, log: Log) -> np.ndarray:
-    """A signal of shape (n,) whose line breaks at the gaps of a log: without the last sample before each."""
+    """Break the line of a signal of shape (n,) at the gaps of a log: without the last sample
+    before each.
+    """
     broken = values.astype(float)
     broken[[part.stop - 1 for part in log.segments[:-1]]] = np.nan
     return broken

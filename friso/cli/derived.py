@@ -1,0 +1,138 @@
+"""Commands made of questions: options from the signature of a function, their help from its docstring."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from importlib import import_module
+from inspect import Parameter, Signature, getdoc
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from friso.cli.asking import Shown, ask, option_of
+from friso.interface.question import Question
+from friso.interface.shared_options import meaning
+from friso.stage.arguments import KINDS, ArgumentKind, alternatives
+
+IN_PYTHON_ALONE = (
+    "Progress",
+    "MappingKeeper",
+    "FileKeeper",
+    "Mapping[str, AxisValues]",
+    "Mapping[str, str]",
+    "Samples",
+)
+"""Kinds of arguments that a command line has no form for."""
+
+OF_THE_CALLER = ("folder", "partly", "beside", "out", "overwrite")
+"""Parameters that say where things are kept: a command sets them by --out and --overwrite."""
+
+
+@dataclass(frozen=True)
+class CommandParameter:
+    """A parameter of a function as its command has it."""
+
+    name: str
+    kind: ArgumentKind
+    default: Any
+    help: str
+
+
+def command_function(question: Question) -> Callable[..., None]:
+    """Return the function that typer calls for a question; its signature and docstring are those of the command."""
+
+    def command(**values: Any) -> None:
+        ask_by_values(question, values)
+
+    parameters = [*_asked(question), *_of_the_shell(question)]
+    command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]  # what inspect.signature reads first
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    command.__doc__ = command_help(question)
+    return command
+
+
+def ask_by_values(question: Question, values: Mapping[str, Any]) -> None:
+    """Ask a question by the values of its command's parameters; those that are None are left out."""
+    shown = Shown(**{name: value for name, value in values.items() if name in Shown.__dataclass_fields__})
+    about = [values[name] for name in question.takes]
+    apart = {*question.takes, *Shown.__dataclass_fields__}
+    options = {name: value for name, value in values.items() if value is not None and name not in apart}
+    run = import_module(question.runner).run if question.runner else ask
+    run(question, about, options, shown)
+
+
+def command_help(question: Question) -> str:
+    """Return the help of a command: the docstring of the function up to its parameters, and the examples."""
+    before, _, _ = (getdoc(question.function) or "").partition("\n\nParameters\n---")
+    first, *more = question.example.splitlines()
+    return "\n\n".join([before, f"Example: friso {first}", *more])
+
+
+def _asked(question: Question) -> Iterator[Parameter]:
+    """The parameters that are asked about: arguments in the order of `takes`, then options."""
+    parameters = question.parameters
+    for name in (*question.takes, *(name for name in parameters if name not in question.takes)):
+        parameter = parameters[name]
+        kind = _kind_of(str(parameter.annotation))
+        if kind is not None and name not in OF_THE_CALLER:
+            default = question.defaults.get(name, parameter.default)
+            kind = replace(kind, metavar=question.metavars.get(name, kind.metavar))
+            shown = CommandParameter(name, kind, default, meaning(question.function, name))
+            yield _argument(shown) if name in question.takes else _option(shown)
+
+
+def _kind_of(annotation: str) -> ArgumentKind | None:
+    """The kind that a command line gives a parameter; None for one that it has no form for."""
+    parts = [part for part in alternatives(annotation) if part not in ("None", *IN_PYTHON_ALONE)]
+    several = [part for part in parts if KINDS[part].several]
+    paths = [part for part in parts if KINDS[part].command_type is Path]
+    return KINDS[(several or paths or parts)[0]] if parts else None
+
+
+def _argument(parameter: CommandParameter) -> Parameter:
+    info = typer.Argument(metavar=parameter.kind.metavar or parameter.name.upper(), help=parameter.help)
+    return _typed(parameter, info, Parameter.empty if parameter.default is Parameter.empty else None)
+
+
+def _option(parameter: CommandParameter) -> Parameter:
+    kind, default = parameter.kind, parameter.default
+    names = [option_of(parameter.name)]
+    needed = default is Parameter.empty
+    if kind.command_type is bool:
+        return _typed(parameter, typer.Option(*names, help=parameter.help), default)
+    metavar = kind.metavar or parameter.name.strip("_").upper()
+    info = typer.Option(*names, metavar=metavar, help=parameter.help)
+    if isinstance(default, float) and kind.command_type is str:
+        default = f"{default:g}".replace("e-0", "e-")
+    return _typed(parameter, info, default if needed or isinstance(default, str | int | float) else None)
+
+
+def _typed(parameter: CommandParameter, info: Any, default: Any) -> Parameter:
+    one: Any = parameter.kind.command_type
+    value = list[one] if parameter.kind.several else one
+    annotation = value if default is not None else value | None
+    return Parameter(parameter.name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[annotation, info])
+
+
+def _of_the_shell(question: Question) -> Iterator[Parameter]:
+    """The options that say where the answer goes."""
+
+    def option(name: str, default: Any, annotation: Any, declared: str, help: str, **more: Any) -> Parameter:
+        info = typer.Option(declared, help=help, **more)
+        return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[annotation, info])
+
+    if question.writes:
+        folder = Path(question.folder) if question.folder else None
+        helps = {
+            "out": "Folder for the files written.",
+            "overwrite": "Write even if the folder holds other files; replace files of the same name.",
+        }
+        helps |= {name: meaning(question.function, name) for name in helps if name in question.parameters}
+        yield option("out", folder, Path | None, "--out", helps["out"], metavar="DIR")
+        yield option("overwrite", False, bool, "--overwrite", helps["overwrite"])
+    if question.document:
+        yield option("as_json", False, bool, "--json", "One JSON document on standard output, nothing else.")
+    if question.details:
+        yield option("details", False, bool, "--details", "Also print what the answer rests on.")

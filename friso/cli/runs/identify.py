@@ -1,0 +1,84 @@
+"""`friso identify`: what was said of logs is kept for the next time, and asked for where it is missing."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping as Keyed
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from friso.axis import speak_of
+from friso.cli.asking import DRAWING, Shown, named_as_options, show, tried
+from friso.cli.common import say
+from friso.cli.progress import ProgressBar
+from friso.errors import InputError
+from friso.escapes import one_line
+from friso.interface.question import Question
+from friso.platform.system import shell_word
+
+if TYPE_CHECKING:
+    from friso.identification.logs.mapping import Mapping
+    from friso.interface.output_folder import OutputFolder
+    from friso.shown.files import Content
+
+
+def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], shown: Shown) -> None:
+    """Ask what logs show, and keep what was said of them. Raises InputError with the command to type where a question
+    about a log is open."""
+    from friso.identification.sources import OpenQuestions
+    from friso.interface.output_folder import OutputFolder
+    from friso.questions.identify.page import STAGE
+    from friso.shown.drawing.images import drawing_beside
+
+    assert shown.out is not None  # it has a default
+    read = [*about[0], *options.get("predict", ()), *([options["stage"]] if "stage" in options else [])]
+    target = OutputFolder(question.name, shown.out, shown.overwrite, read)
+    target.check([STAGE])
+    kept: list[Path] = []
+    with ProgressBar() as progress, named_as_options(question.parameters):
+        try:
+            answer = question.function(
+                *about,
+                **options,
+                folder=target.folder,
+                keep=lambda said: kept.extend(_keep(said, target)),
+                progress=progress,
+            )
+        except OpenQuestions as error:
+            _keep(error.mappings, target)
+            raise InputError(error.key, error.actual, error.expected, _command(error.options), error.origin) from None
+        speak_of(answer.axis_kind)
+        progress(0, 0, DRAWING)
+        with drawing_beside():
+            files, unwritten = tried(lambda: target.write(answer.files(), progress))
+    show(answer, [*files, *kept] if files else [], shown.as_json, shown.details, unwritten)
+
+
+def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> list[Path]:
+    """Keep what was said of logs, by file, for the next time, where it is not kept so already: the files written."""
+    from friso.identification.logs.mapping import load_mapping, mapping_text
+    from friso.identification.sources import kept_at
+    from friso.interface.output_folder import write
+
+    folder = target.folder
+    new = {path: mapping for path, mapping in mappings.items() if mapping != load_mapping(path, folder)}
+    texts: dict[Path, Content] = {
+        place: mapping_text(mapping)
+        for path, mapping in new.items()
+        if (place := kept_at(path, mapping, folder)) is not None
+    }
+    if any(place.parent == folder for place in texts):
+        target.write({}, beside=texts)  # so that the folder is known for its own next time
+    else:
+        write(texts, [*filter(Path.is_file, texts)])  # mappings too, as they could be read
+    if texts:
+        first, *more = texts
+        others = f" and {len(more)} more" if more else ""
+        say(f"kept for the next time, how the log was read (options override it): {one_line(str(first))}{others}")
+    return [*texts]
+
+
+def _command(options: Sequence[str]) -> str:
+    """The command as it was called, with more options: to be copied."""
+    return " ".join(["friso", *map(shell_word, sys.argv[1:]), *options])

@@ -1,0 +1,23 @@
+"""`friso logs`: files that cannot be read are told beside those that can."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from friso.cli.asking import Shown, named_as_options, show, tried
+from friso.cli.progress import ProgressBar
+from friso.interface.question import Question
+
+
+def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
+    """Ask what files hold, and write the page where there is anything to show."""
+    from friso.interface.output_folder import output_folder
+
+    target = output_folder(question.name, shown.out, shown.overwrite, about[0])
+    files, unwritten = [], ""
+    with ProgressBar(question.during) as progress, named_as_options(question.parameters):
+        answer = question.function(*about, **options, folder=shown.out, partly=True, progress=progress)
+        if target is not None and answer.result:
+            files, unwritten = tried(lambda: target.write(answer.files(), progress))
+    show(answer, files, shown.as_json and not answer.errors, unwritten=unwritten)

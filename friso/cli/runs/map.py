@@ -1,0 +1,40 @@
+"""`friso map`: results go into a store beside the stage file, the figure and the page beside the store."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from friso.cli.asking import Shown, named_as_options, show, tried
+from friso.cli.progress import ProgressBar
+from friso.interface.question import Question
+
+
+def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
+    """Run or resume a study, or say whether its store is whole (--check)."""
+    from friso.axis import speak_of
+    from friso.interface.output_folder import output_folder
+    from friso.questions.map.study import write_beside
+    from friso.shown.drawing.images import drawing_beside
+
+    (source,) = about
+    if options.get("check"):
+        with named_as_options(question.parameters):
+            return show(question.function(source, check=True), [], shown.as_json)
+    store, elsewhere = shown.out or Path(f"{source.stem}_map.zarr"), None
+    if source.is_dir():
+        store, elsewhere = None, output_folder(question.name, shown.out, shown.overwrite)
+    options = {**options, "overwrite": shown.overwrite, "out": store}
+    with ProgressBar() as progress, drawing_beside(), named_as_options(question.parameters):
+        answer = question.function(source, **options, beside=elsewhere is None, progress=progress)
+        speak_of(answer.axis_kind)
+        place = answer.store or source
+
+        def written() -> list[Path]:
+            if elsewhere is not None:
+                return [*elsewhere.write(answer.files(progress), progress), *answer.exports]
+            return write_beside(answer.files_beside(progress), place, shown.overwrite, progress)
+
+        files, unwritten = tried(written, f"the runs are in {place}, but no figure was written")
+    show(answer, files, shown.as_json, unwritten=unwritten)

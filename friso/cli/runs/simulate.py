@@ -1,0 +1,16 @@
+"""`friso simulate`: its arguments are a stage file, or the numbers of a cell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from friso.cli.asking import Shown, ask
+from friso.interface.question import Question
+
+
+def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
+    """Ask about a file, or with --cell about a cell."""
+    (words,) = about
+    ask(question, [words if "cell" in options else [Path(word) for word in words]], options, shown)

@@ -1,0 +1,236 @@
+"""What a doubt is: one effect that may be in a log and is not in the model, with the test that notices it.
+
+Each doubt is a file of `friso/identification/doubts/` that declares `DOUBT`, found by its name. It says what it looks
+at, at which moment of an analysis, and what measurement would decide it; its `find` yields findings. A finding is the
+cause in words, with its size, and its consequence: intervals that widen, or values that are refused. The analysis
+applies consequences here, in one place, so that one more effect is one more file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from friso.identification.estimate import Estimate
+from friso.identification.inverse_model import InverseModel
+from friso.identification.kinds import in_order
+from friso.identification.logs.log import Log
+from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.settings import DoubtSettings
+from friso.progress import Progress, silent
+from friso.registry import Registry
+
+if TYPE_CHECKING:
+    from friso.identification.output_error.fit import OutputErrorFit
+    from friso.identification.quality import Quality
+
+Moment = Literal["record", "fault", "cause", "otherwise", "value", "fit", "curve", "key", "response", "stage", "laws"]
+"""When an analysis asks a doubt, and so what `find` is given:
+
+- record: a `RecordCase`, of any log of moves, before anything is said of the fit;
+- fault: a `RecordCase`, where a mass with friction does not describe the log: what is wrong with the log itself;
+- cause: a `RecordCase`, at the same time: effects that would explain what is left unexplained;
+- otherwise: a `RecordCase`, where no such effect explains it;
+- value: a `ValueCase`, what the inverse model's values say of themselves;
+- fit: a `FitCase`, each in turn, with the fit as those before left it;
+- curve: a `KeyCase`, whether fitted parameters are to be believed;
+- key: a `KeyCase`, each in turn, with the estimates as those before left them;
+- response: a `Bench`, the analysis of a frequency response;
+- stage: the identified stage with all estimates; laws: the compared friction laws with that stage.
+"""
+
+
+@dataclass(frozen=True)
+class RecordCase:
+    """A log of moves with its inverse model; `cart_share` is the share of the mass that moves with a measured cart."""
+
+    log: Log
+    inverse: InverseModel
+    cart_share: float = 0.0
+
+    @property
+    def unit(self) -> str:
+        """The unit of the force."""
+        return self.log.unit("force")
+
+
+@dataclass(frozen=True)
+class ValueCase(RecordCase):
+    """A log of moves of which it is decided whether the model `lacks` something and whether the record is `poor`."""
+
+    lacks: bool = False
+    poor: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitCase(RecordCase):
+    """A log of moves with the fit of the whole model, and how good that is. `flat` is the stage as it was given, and
+    `velocity` [m/s], shape (n,), the smooth one of the part of the log that is fitted."""
+
+    flat: Mapping[str, Any]
+    fit: OutputErrorFit
+    quality: Quality
+    velocity: np.ndarray
+    refused: Mapping[str, str] = field(default_factory=dict)
+    progress: Progress = silent
+
+    @property
+    def has_cause(self) -> bool:
+        """Whether a cause of what is left unexplained is named already: it may imitate others."""
+        explaining = any(finding.explains for finding in self.quality.findings)
+        return explaining or self.quality.spoilt or bool(self.quality.without)
+
+    def with_finding(self, finding: RaisedDoubt) -> FitCase:
+        """The case after a finding: its consequences for the fit, and the finding among those of the quality."""
+        quality = replace(
+            self.quality, findings=(*self.quality.findings, finding), spoilt=self.quality.spoilt or finding.spoils
+        )
+        fit, inverse = finding.fit or self.fit, finding.inverse or self.inverse
+        return replace(self, fit=fit, inverse=inverse, quality=quality, refused={**finding.refuses, **self.refused})
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeyCase(FitCase):
+    """A log of moves with estimates by key of the stage file and the `correlation` of those that are determined."""
+
+    estimates: tuple[Estimate, ...]
+    correlation: np.ndarray
+    acceleration: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    unexplained: float = 0.0
+
+    @property
+    def determined(self) -> dict[str, Estimate]:
+        """The estimates that are determined, by key."""
+        return {estimate.name: estimate for estimate in self.estimates if estimate.determined}
+
+    def with_answers(self, finding: RaisedDoubt) -> KeyCase:
+        """The case with the estimates that a finding puts in the place of others, and those left out that it
+        refuses."""
+        answers = {**finding.answers, **refused(self.estimates, finding.refuses)}
+        estimates = tuple(answers.get(estimate.name, estimate) for estimate in self.estimates)
+        pairs = zip(self.estimates, estimates, strict=True)
+        kept = [after.determined for before, after in pairs if before.determined]
+        return replace(self, estimates=estimates, correlation=self.correlation[np.ix_(kept, kept)])
+
+
+@dataclass(frozen=True)
+class RaisedDoubt:
+    """A doubt that was raised: the cause in `words` ("" where estimates say it), and its `size` in a `unit`.
+
+    Consequences: intervals reach to what the inverse model `without` the effect says, and to `reaches`, ends by
+    quantity of the inverse model; the `fit` and the `inverse` model with intervals that allow for the effect;
+    `answers`, estimates in place of others of the same key; keys that it `refuses`, with the reason; and whether it
+    `spoils` the record, so that it passes for friction at low speed. One that `explains` what a fit leaves keeps others
+    that would explain it too from being named. `doubt` is the name of the file that raised it.
+    """
+
+    words: str = ""
+    size: float = np.nan
+    unit: str = ""
+    without: InverseModel | None = None
+    reaches: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    fit: OutputErrorFit | None = None
+    inverse: InverseModel | None = None
+    answers: Mapping[str, Estimate] = field(default_factory=dict)
+    refuses: Mapping[str, str] = field(default_factory=dict)
+    spoils: bool = False
+    explains: bool = False
+    doubt: str = ""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """An effect that may be in a log and is not in the model. Its name is that of its module; see `DOUBTS`.
+
+    `find` yields findings for what it is given at its `moment`; it `looks_at` something, has a `consequence` in words,
+    and is `decided_by` a measurement: these stand in the reference. `after` names doubts that are asked before.
+    """
+
+    moment: Moment
+    find: Callable[[Any], Iterable[RaisedDoubt]]
+    looks_at: str
+    consequence: str
+    decided_by: str
+    after: tuple[str, ...] = ()
+
+
+DOUBTS: Registry[Doubt] = Registry("friso.identification.doubts", "DOUBT")
+"""Every module of `friso/identification/doubts/` declares one."""
+
+
+def raised(moment: Moment, case: Any) -> Iterator[RaisedDoubt]:
+    """Yield the findings of all doubts of a moment, in their order."""
+    for name in _at(moment):
+        yield from _named(name, case)
+
+
+def words_of(moment: Moment, case: Any) -> tuple[str, ...]:
+    """Return the causes in words of all doubts of a moment, in their order."""
+    return tuple(finding.words for finding in raised(moment, case))
+
+
+def causes(case: RecordCase) -> list[RaisedDoubt]:
+    """List what may be wrong with a log that a mass with friction does not describe; [] where nothing explains it.
+
+    Faults of the log come first. Of effects whose inverse model explains much more than the plain one, the best come
+    next, none that leaves much more than the best; what counts only without such an effect comes last.
+    """
+    settings = DoubtSettings.current()
+    every = list(raised("cause", case))
+    enough = settings.error_share_of_a_cause * case.inverse.error
+    better = sorted(
+        (finding for finding in every if finding.without and finding.without.error < enough),
+        key=lambda finding: finding.without.error if finding.without else np.inf,
+    )
+    most = settings.error_ratio_of_rival_causes * min((one.without.error for one in better if one.without), default=0.0)
+    rivals = [one for one in better if one.without and one.without.error <= most]
+    plain = [finding for finding in every if finding.without is None]
+    return [*raised("fault", case), *rivals, *plain, *(() if rivals else raised("otherwise", case))]
+
+
+def judged_fit(case: FitCase) -> FitCase:
+    """Ask all doubts about a fit in turn, each with the fit as those before left it."""
+    for name in _at("fit"):
+        for finding in _named(name, case):
+            case = case.with_finding(finding)
+    return case
+
+
+def judged_keys(case: KeyCase) -> KeyCase:
+    """Ask all doubts about estimates in turn, each with the estimates as those before left them."""
+    for name in _at("key"):
+        for finding in _named(name, case):
+            case = case.with_answers(finding)
+    return case
+
+
+def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[str, Estimate]:
+    """Return the determined estimates for which there are reasons as not determined, by key.
+
+    Where Coulomb friction is refused its interval is one of dry friction at low speed, of which it is a part.
+    """
+    ratio = OutputErrorSettings.current().highest_friction_ratio
+    return {
+        one.name: Estimate.unknown(
+            one.name,
+            one.unit,
+            one.method,
+            reasons[one.name],
+            *((one.low / ratio, one.high) if one.name == "friction.coulomb" else ()),
+        )
+        for one in estimates
+        if one.determined and one.name in reasons
+    }
+
+
+def _at(moment: Moment) -> list[str]:
+    """The names of the doubts of a moment, in their order."""
+    return [name for name in in_order(DOUBTS) if DOUBTS[name].moment == moment]
+
+
+def _named(name: str, case: Any) -> Iterator[RaisedDoubt]:
+    """The findings of one doubt, with its name."""
+    return (replace(finding, doubt=name) for finding in DOUBTS[name].find(case))

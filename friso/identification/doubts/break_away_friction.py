@@ -1,0 +1,74 @@
+"""Motions that begin with more friction than the static friction of a fit, which leaves these moments out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
+from friso.identification.output_error.parameters import CURVE, MASS, is_free
+from friso.identification.readings.common import by_direction, robust, stribeck_curve
+from friso.identification.readings.ramps import Ramps, force_ramps
+from friso.identification.readings.settings import ReadingSettings
+from friso.identification.settings import DoubtSettings
+from friso.intervals import COVERAGE
+
+MEDIAN = 1.25
+"""Deviation of a median over that of a mean, of normal errors: sqrt(pi / 2), to two digits."""
+
+
+def find(case: KeyCase) -> Iterator[RaisedDoubt]:
+    """Read the friction at which motions begin off the log, and compare it with the fitted static friction.
+
+    A stage that follows a log shows friction while it moves, and the Stribeck curve leads from there to standstill: of
+    a body that sticks by another law, or by a curve with another exponent, it leads to a static friction too low.
+    """
+    if is_free(case.flat) or (case.fit.problem.closed and case.fit.explains(case.quality.noise)):
+        return
+    ramps = force_ramps(case.log.per_unit_of_force(), case.fit.value(MASS))
+    more = friction_beyond(case.determined, case.fit.stage, ramps)
+    if more is not None:
+        static = case.determined["friction.static"].value
+        why = (
+            f"motions begin with {more:.3g} {case.unit} of friction, more than the {static:.3g} {case.unit} of the fit"
+        )
+        yield RaisedDoubt("", more - static, case.unit, refuses=dict.fromkeys(CURVE, why))
+
+
+def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramps: Ramps) -> float | None:
+    """Return the friction [N] with which motions begin, where it is beyond the interval of static friction."""
+    static = determined.get("friction.static")
+    sides = [side for _, side in by_direction(ramps.directions)]
+    if static is None or len(ramps.forces) < ReadingSettings.current().fewest_ramps:
+        return None
+    if not all(side.any() for side in sides):
+        return None
+    bias = sum(one.value for name, one in determined.items() if name.startswith("bias."))
+    friction = ramps.forces + ramps.directions * bias - _rises(flat, ramps.speeds)
+    medians = [float(np.median(friction[side])) for side in sides]
+    middle = float(np.mean(medians))
+    apart = robust(friction - np.where(sides[0], *medians))
+    scatter = MEDIAN * apart * np.sqrt(sum(1 / side.sum() for side in sides)) / len(sides)
+    unsure = COVERAGE * scatter + float(np.median(ramps.unsure))
+    return middle if middle - unsure > static.high else None
+
+
+def _rises(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
+    """Return by how much [N] friction at speeds up to these [m/s], shape (n,), exceeds static friction at most."""
+    static, coulomb = flat["friction.static"], flat["friction.coulomb"]
+    up_to = np.linspace(0, 1, DoubtSettings.current().speeds_of_a_start)[:, None] * speeds
+    exponent = flat.get("friction.stribeck_exponent", 2.0)
+    curve = stribeck_curve(up_to, coulomb, static, flat["friction.stribeck_velocity"], exponent)
+    viscous = flat["friction.viscous"] * (1 + abs(flat.get("friction.viscous_asymmetry", 0.0)))
+    return (curve + viscous * up_to).max(axis=0) - static
+
+
+DOUBT = Doubt(
+    "curve",
+    find,
+    "the friction at which motions begin",
+    "static friction and the Stribeck curve are refused",
+    "force ramps from rest (break-away)",
+)

@@ -1,0 +1,137 @@
+"""Friction or a constant force that changes while the record is taken: a machine that warms up, a force that drifts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
+from friso.identification.inverse_model import InverseModel
+from friso.identification.output_error.effects import Explained, explained_by, explained_by_forces, reaching_over
+from friso.identification.output_error.fit import OutputErrorFit
+from friso.identification.settings import DoubtSettings
+
+
+@dataclass(frozen=True)
+class RecordDrift:
+    """How far fitted numbers would move, shape (free,), if constant force and friction could change along the record.
+
+    `friction` and `constant` [N] are the changes over the record; their reaches [N] are how far they come from their
+    means.
+    """
+
+    moved: np.ndarray
+    friction: float
+    constant: float
+    friction_reach: float
+    constant_reach: float
+
+
+def find(case: FitCase) -> Iterator[RaisedDoubt]:
+    """Fit changes of friction and of the constant force to what is left of the force."""
+    inverse, quality = case.inverse, case.quality
+    changes = None
+    if not quality.failed:
+        changes = changes_beside(inverse) if quality.rejected else _changes_of_fit(case.fit, case.velocity)
+    if changes is None:
+        return
+    fit, inverse = (
+        (None, inverse_reaching(inverse, changes)) if quality.rejected else (_reaching(case.fit, changes), None)
+    )
+    yield RaisedDoubt(fit=fit, inverse=inverse)
+    for what, size, cause in (
+        ("Friction", changes.friction, "warming up?"),
+        ("The constant force", changes.constant, "a drift of the force?"),
+    ):
+        if size > DoubtSettings.current().friction_share_of_a_change * case.inverse.value("coulomb"):
+            words = (
+                f"{what} changes by {size:.2g} {case.unit} during the record ({cause}): intervals reach from its least "
+                "to its largest"
+            )
+            yield RaisedDoubt(words, size, case.unit)
+
+
+def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | None:
+    """Return what changes during a record, of the smooth `velocity` [m/s], shape (n,); None where nothing clearly does.
+
+    The changes are fitted together with the parameters, about the fit.
+    """
+    if "friction.coulomb" not in [parameter.name for parameter in fit.problem.parameters]:
+        return None
+    forces, units, bends = changing_forces(fit, velocity)
+    return _drift(explained_by_forces(fit, forces, units), bends)
+
+
+def changing_forces(
+    fit: OutputErrorFit, velocity: np.ndarray
+) -> tuple[list[np.ndarray], list[float], list[np.ndarray]]:
+    """Return forces of friction and of a constant force that change along a record of a velocity [m/s], shape (n,).
+
+    Either may follow a line over each half of the record. Also returns the sizes [N] at which they are tried, and the
+    bends of these lines.
+    """
+    settings = DoubtSettings.current()
+    way = np.clip(velocity / (settings.speed_share_of_creeping * np.abs(velocity).max()), -1.0, 1.0)
+    unit = settings.friction_share_of_a_tried_force * fit.value("friction.coulomb")
+    bends = _bends(np.linspace(0.0, 1.0, len(velocity)), fit.problem.counted)
+    forces = [base * bend for base in (-way, np.ones(len(way))) for bend in bends]
+    return forces, [unit] * len(forces), bends
+
+
+def changes_beside(inverse: InverseModel) -> RecordDrift | None:
+    """Return what changes during the record of an inverse model, of one friction for both directions."""
+    share = (inverse.time - inverse.time[0]) / np.ptp(inverse.time)
+    counted = np.ones(len(share))
+    bends = _bends(share, counted)
+    effects = [-base * bend for base in (inverse.columns[:, 2], counted) for bend in bends]
+    return _drift(explained_by(-inverse.columns, inverse.measured - inverse.fitted, effects, counted), bends)
+
+
+def _bends(share: np.ndarray, counted: np.ndarray) -> list[np.ndarray]:
+    """Return lines with a bend, less their means, at shares of a record's time, shape (n,): up to 1 in its middle and
+    down again, and up to 1 from its middle to its end."""
+    shapes = 1 - np.abs(2 * share - 1), np.maximum(2 * share - 1, 0.0)
+    return [shape - np.average(shape, weights=counted) for shape in shapes]
+
+
+def _drift(explained: Explained | None, bends: Sequence[np.ndarray]) -> RecordDrift | None:
+    """Return the changes along the record from the sizes of their bends."""
+    if explained is None:
+        return None
+    friction, constant = (part @ np.stack(bends) for part in np.split(explained.sizes, 2))
+    reaches = (float(np.abs(line).max()) for line in (friction, constant))
+    return RecordDrift(explained.moved, float(np.ptp(friction)), float(np.ptp(constant)), *reaches)
+
+
+def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
+    """Return the fit with deviations that reach as far as what changes would move it, and over the change itself."""
+    further = np.abs(changes.moved)
+    for i, number in enumerate(fit.free):
+        name = fit.problem.parameters[number].name
+        if name == "friction.coulomb":
+            further[i] += changes.friction_reach / fit.value(name)
+        elif name.startswith("bias."):
+            further[i] += changes.constant_reach
+    return reaching_over(fit, further)
+
+
+def inverse_reaching(inverse: InverseModel, changes: RecordDrift) -> InverseModel:
+    """Return the inverse model with intervals that reach as far as what changes would move it, and over the change."""
+    over = {"coulomb": changes.friction_reach, "offset": changes.constant_reach}
+    answers = []
+    for estimate, moved in zip(inverse.estimates, np.abs(changes.moved), strict=True):
+        further = moved + over.get(estimate.name, 0.0) if estimate.determined else 0.0
+        answers.append(replace(estimate, low=estimate.low - further, high=estimate.high + further))
+    return replace(inverse, estimates=tuple(answers))
+
+
+DOUBT = Doubt(
+    "fit",
+    find,
+    "forces along and against the motion that change with time",
+    "intervals reach over the change",
+    "the same moves again, after the machine has warmed up",
+    after=("delay",),
+)

@@ -1,0 +1,23 @@
+"""A force whose channel clips: many samples lie at its extremes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
+from friso.identification.logs import checks
+from friso.identification.logs.settings import LogSettings
+from friso.quantities import percent
+
+
+def find(case: RecordCase) -> Iterator[RaisedDoubt]:
+    """Count the samples at the largest and the smallest force."""
+    share = checks.clipped_share(case.log["force"])
+    if share > LogSettings.current().share_of_clipped_samples:
+        words = f"{percent(share)} of the force samples lie at its extremes: the channel clips"
+        yield RaisedDoubt(words, share, spoils=True)
+
+
+DOUBT = Doubt(
+    "cause", find, "force samples at the extremes", "friction at low speed is refused", "a wider range of the channel"
+)

@@ -1,0 +1,31 @@
+"""A constant force greater than the friction: gravity, or an offset of the channel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
+from friso.identification.settings import DoubtSettings
+
+
+def find(case: RecordCase) -> Iterator[RaisedDoubt]:
+    """Compare the constant force of the inverse model with its Coulomb friction, and with the force at all."""
+    inverse = case.inverse
+    offset, coulomb = (abs(inverse.value(name)) for name in ("offset", "coulomb"))
+    share = DoubtSettings.current().force_share_of_a_constant_force
+    if offset > max(coulomb, share * float(np.std(inverse.measured))):
+        force = f"{inverse.value('offset'):.3g} {case.unit}"
+        words = f"a constant force of {force} exceeds the friction: gravity, or an offset of the channel"
+        yield RaisedDoubt(words, offset, case.unit)
+
+
+DOUBT = Doubt(
+    "cause",
+    find,
+    "the constant force of the inverse model beside its friction",
+    "reported",
+    "the force at rest, in several orientations",
+    after=("clipped-force",),
+)

@@ -1,0 +1,79 @@
+"""A coupling between force and position: a load that moves on a spring passes for more or less mass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
+from friso.identification.inverse_model import motion
+from friso.identification.output_error.effects import explained_by_forces, reaching_over
+from friso.identification.output_error.parameters import BRISTLES, MASS, is_free
+from friso.identification.settings import DoubtSettings
+from friso.quantities import percent
+
+IMITATED = "what the model lacks would pass for it"
+"""Why bristles are not taken from a record that the model does not describe to its noise."""
+
+
+def find(case: FitCase) -> Iterator[RaisedDoubt]:
+    """Fit a force that goes with the second derivative of the acceleration, beside a rigid mass.
+
+    A load m behind the measured position, on a coupling of natural frequency w, seems to weigh m / (1 + s^2 / w^2) in
+    motion that goes as exp(s t): well below w, its force lacks m / w^2 times the second derivative of the acceleration.
+    Where the position is that of the load, the force that moves a mass M before the coupling is greater by M / w^2
+    times that derivative.
+    """
+    fit, settings, force = case.fit, DoubtSettings.current(), coupling_force(case)
+    if force is None or case.quality.failed or case.quality.rejected or is_free(case.flat):
+        return
+    explained = explained_by_forces(fit, [force], [settings.mass_share_of_a_tried_coupling])
+    if explained is None:
+        return
+    moved, (load,) = explained.moved, explained.sizes
+    names = [fit.problem.parameters[number].name for number in fit.free]
+    share = -float(np.expm1(moved[names.index(MASS)]))
+    further = reaching_over(fit, settings.reach_of_a_coupling * np.abs(moved))
+    if share * load <= 0 or abs(share) < settings.mass_share_of_a_coupling:
+        yield RaisedDoubt(fit=further)
+        return
+    words = "" if case.has_cause else _sentence(share)  # an averaged motion, and others, make such a force too
+    yield RaisedDoubt(words, share, fit=further, refuses=dict.fromkeys(BRISTLES, IMITATED))
+
+
+def coupling_force(case: FitCase) -> np.ndarray | None:
+    """Return the force of a coupling [N], shape (n,), with the standard deviation of the inertia.
+
+    None where no mass is fitted, or the stage does not move.
+    """
+    fit, step = case.fit, case.log.sample_time
+    if MASS not in [fit.problem.parameters[number].name for number in fit.free]:
+        return None
+    cutoff = DoubtSettings.current().bandwidths_of_a_coupling * case.inverse.bandwidth
+    acceleration = motion(case.log["position"][case.log.longest], step, cutoff).acceleration
+    force = np.gradient(np.gradient(acceleration, step), step)
+    size = float(np.std(force))
+    return force * (fit.value(MASS) * float(np.std(acceleration)) / size) if size > 0 else None
+
+
+def _sentence(share: float) -> str:
+    where, way = (
+        ("a part of the load moved on a coupling behind the measured position", "smaller")
+        if share > 0
+        else ("the position were measured behind a coupling", "larger")
+    )
+    return (
+        f"The force goes with the motion as if {where}: the mass may be {percent(abs(share))} {way}, for which the "
+        "intervals allow; a frequency response would show the coupling"
+    )
+
+
+DOUBT = Doubt(
+    "fit",
+    find,
+    "a force that goes with the second derivative of the acceleration",
+    "intervals widen; bristles are refused",
+    "a frequency response",
+    after=("load-friction",),
+)

@@ -1,0 +1,53 @@
+"""A delay between force and motion that is too short to show in the inverse model: it passes for damping."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
+from friso.identification.output_error.effects import explained_by_forces, reaching_over
+from friso.identification.readings.common import low_pass
+from friso.identification.settings import DoubtSettings
+
+
+def find(case: FitCase) -> Iterator[RaisedDoubt]:
+    """Fit a force that goes with the derivative of the log's force, where the stage was held to the log.
+
+    A force that acts later by a short time differs from the log's by that time times its derivative. Bristles pass it
+    on as damping, by their stiffness times the delay, and inertia as viscous friction.
+    """
+    fit, settings, step = case.fit, DoubtSettings.current(), case.log.sample_time
+    force = delay_force(case)
+    if case.quality.failed or case.quality.rejected or fit.problem.closed or not force.any():
+        return
+    explained = explained_by_forces(fit, [force], [settings.samples_of_a_tried_delay * step])
+    if explained is None:
+        return
+    moved, late = explained.moved, -float(explained.sizes[0])
+    words = ""
+    if abs(late) >= settings.samples_of_a_delay * step and not case.has_cause:
+        words = (
+            f"The motion seems to come {abs(late) * 1e3:.2g} ms {'after' if late > 0 else 'before'} the force: a delay "
+            "of the drive or between the channels, which passes for damping and viscous friction; the intervals allow "
+            "for it"
+        )
+    yield RaisedDoubt(words, late, "s", fit=reaching_over(fit, settings.reach_of_a_delay * np.abs(moved)))
+
+
+def delay_force(case: FitCase) -> np.ndarray:
+    """Return the derivative of the log's force [N/s], shape (n,), which a delay multiplies, without its noise."""
+    cutoff = DoubtSettings.current().bandwidths_of_a_delayed_force * case.inverse.bandwidth
+    force = low_pass(case.log["force"][case.log.longest], case.log.sample_time, cutoff)
+    return np.gradient(force, case.log.sample_time)
+
+
+DOUBT = Doubt(
+    "fit",
+    find,
+    "a force that goes with the derivative of the logged force",
+    "intervals widen",
+    "a frequency response, whose phase shows the delay",
+    after=("coupling",),
+)

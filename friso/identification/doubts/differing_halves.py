@@ -1,0 +1,65 @@
+"""Mass or friction that differs between the halves of a record: a load that changes, friction that rises."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, RaisedDoubt, ValueCase
+from friso.identification.inverse_model import InverseModel, least_squares
+from friso.identification.settings import DoubtSettings
+from friso.identification.spread import spread_of
+from friso.intervals import COVERAGE
+
+WORDS = {"mass": "the mass", "viscous": "viscous friction", "coulomb": "Coulomb friction"}
+"""What the inverse model identifies, in sentences."""
+
+
+@dataclass(frozen=True)
+class Half:
+    """A quantity of the inverse model, by name, with its values in both halves and the interval that holds either's."""
+
+    name: str
+    first: float
+    second: float
+    low: float
+    high: float
+
+
+def find(case: ValueCase) -> Iterator[RaisedDoubt]:
+    """Fit either half of the record with the inverse model, where the whole model lacks something."""
+    for one in halves(case.inverse) if case.lacks else ():
+        unit = case.inverse.estimate(one.name).unit
+        values = f"{one.first:.4g} and {one.second:.4g} {unit}"
+        words = f"The halves of the record differ in {WORDS[one.name]}: {values}; its interval holds both"
+        reaches = {one.name: (one.low, one.high)}
+        yield RaisedDoubt("" if case.poor else words, abs(one.first - one.second), unit, reaches=reaches)
+
+
+def halves(inverse: InverseModel) -> list[Half]:
+    """List mass, viscous and Coulomb friction where the halves of a record differ by more than their spreads."""
+    fits = []
+    for part in np.array_split(np.arange(len(inverse.measured)), 2):
+        columns, force = inverse.columns[part], inverse.measured[part]
+        solution, left = least_squares(columns, force)
+        fits.append((solution, np.sqrt(np.diag(spread_of(columns, left)))))
+    values, off = (np.array(rows) for rows in zip(*fits, strict=True))
+    apart = np.abs(values[0] - values[1]) > DoubtSettings.current().deviations_of_differing_halves * np.hypot(*off)
+    low, high = (values - COVERAGE * off).min(axis=0), (values + COVERAGE * off).max(axis=0)
+    return [
+        Half(name, *(float(number) for number in (*values[:, i], low[i], high[i])))
+        for i, name in enumerate(WORDS)
+        if apart[i] and np.isfinite(off[:, i]).all()
+    ]
+
+
+DOUBT = Doubt(
+    "value",
+    find,
+    "mass and friction of either half of the record",
+    "intervals hold both",
+    "the same moves again, after the machine has warmed up",
+    after=("little-friction",),
+)

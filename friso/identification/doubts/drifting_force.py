@@ -1,0 +1,31 @@
+"""A force that drifts along the record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+
+from friso.errors import InputError
+from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
+from friso.identification.inverse_model import inverse_model
+
+
+def find(case: RecordCase) -> Iterator[RaisedDoubt]:
+    """Fit the inverse model with one more column: time."""
+    log = case.log
+    with suppress(InputError):
+        time = {"drift": log.time - log.time.mean()}
+        model = inverse_model(log, case.inverse.bandwidth, False, case.cart_share, extra=time)
+        rate = f"{model.value('drift'):.2g} {case.unit}/s"
+        words = f"a force drifting by {rate} accounts for most of it"
+        yield RaisedDoubt(words, model.value("drift"), f"{case.unit}/s", model, spoils=True)
+
+
+DOUBT = Doubt(
+    "cause",
+    find,
+    "the fit of the inverse model with a force that grows with time",
+    "intervals reach to the values without it; friction at low speed is refused",
+    "the force at rest, before and after",
+    after=("timing",),
+)

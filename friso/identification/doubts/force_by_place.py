@@ -1,0 +1,45 @@
+"""A force that depends on the position: a spring, a cable, cogging, friction that differs by place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
+from friso.identification.inverse_model import inverse_model
+from friso.identification.settings import DoubtSettings
+
+
+def find(case: RecordCase) -> Iterator[RaisedDoubt]:
+    """Fit the inverse model with a force of its own at each of some places along the way."""
+    places = _places(case.log["position"], len(case.inverse.measured))
+    with suppress(InputError):
+        if places:
+            model = inverse_model(case.log, case.inverse.bandwidth, False, case.cart_share, extra=places)
+            size = float(np.ptp([0.0, *(model.value(name) for name in places)]))
+            words = f"a force that varies with position, by {size:.2g} {case.unit}, accounts for most of it"
+            yield RaisedDoubt(words, size, case.unit, model, spoils=True)
+
+
+def _places(position: np.ndarray, rows: int) -> dict[str, np.ndarray]:
+    """Return columns that tell places along the way apart, each of shape (n,), without that of the first place."""
+    settings = DoubtSettings.current()
+    count = min(settings.places_of_a_force, rows // settings.rows_for_each_place)
+    if count < 3:
+        return {}
+    nodes = np.linspace(position.min(), position.max(), count)
+    near = 1 - np.abs(position - nodes[:, None]) / (nodes[1] - nodes[0])
+    return {f"place {i}": np.maximum(row, 0.0) for i, row in enumerate(near) if i}
+
+
+DOUBT = Doubt(
+    "cause",
+    find,
+    "the fit of the inverse model with a force that depends on position",
+    "intervals reach to the values without it; friction at low speed is refused",
+    "slow passes to and fro over the same way",
+    after=("drifting-force",),
+)

@@ -1,0 +1,60 @@
+"""Friction that differs between forward and backward motion by more than its level."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
+from friso.identification.output_error.fit import everywhere, fits
+from friso.identification.settings import DoubtSettings
+from friso.intervals import COVERAGE
+from friso.progress import between
+
+EITHER = ("friction.viscous_asymmetry", "bias.cart", "bias.stage")
+"""What one direction alone does not tell from friction."""
+
+
+def find(case: FitCase) -> Iterator[RaisedDoubt]:
+    """Fit the forward and the backward motion of a record alone, where the fit to both does not explain it.
+
+    The model has one static friction, one Stribeck velocity and one set of bristles for both; where these differ, what
+    a fit to both makes of them need not be between them. Deviations reach there, beyond chance. Where the model lacks
+    something the search begins everywhere, since the fit to both may be an optimum that neither direction has.
+    """
+    both, settings = case.fit, DoubtSettings.current()
+    if both.explains(case.quality.noise):
+        return
+    names = [parameter.name for parameter in both.problem.parameters]
+    free = tuple(i for i in both.free if names[i] not in EITHER)
+    counted = both.problem.counted
+    ways = [counted * (way * case.velocity > 0) for way in (1, -1)]
+    if min(way.sum() for way in ways) < settings.sample_share_of_a_direction * counted.sum():
+        return
+    problems = [replace(both.problem, counted=way, unsettled=()) for way in ways]
+    starts = everywhere(both.problem, free, both.inner) if case.quality.lacks_something else both.inner[None]
+    progress = between(case.progress, 0, 1, "moves: forward and backward motion alone")
+    alone = fits(problems, free, starts, progress)
+    off = np.abs([one.inner - both.inner for one in alone]).max(axis=0)[list(both.free)] / COVERAGE
+    left = sum(one.cost for one in alone) * len(counted) / counted.sum()
+    reaching = both.with_deviations(np.maximum(off, both.deviation))
+    if left >= settings.cost_share_of_either_direction * both.left**2:
+        yield RaisedDoubt(fit=reaching)
+        return
+    less = float(np.sqrt(left))
+    words = (
+        f"Friction differs between forward and backward motion by more than its level: either alone leaves "
+        f"{less:.2g} {case.unit} unexplained, both together {both.left:.2g} {case.unit}"
+    )
+    yield RaisedDoubt(words, less, case.unit, fit=reaching, spoils=True)
+
+
+DOUBT = Doubt(
+    "fit",
+    find,
+    "fits to the forward and to the backward motion alone",
+    "intervals reach to both; friction at low speed is refused",
+    "slow passes to and fro",
+)

@@ -1,0 +1,36 @@
+"""Estimates and intervals with values that their keys cannot have, such as a negative friction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
+from friso.identification.estimate import Estimate
+from friso.quantities import non_negative, positive
+from friso.stage import numeric_keys
+
+NOT_ABOVE_ZERO = "its interval reaches down to zero"
+"""Why there is no value of what cannot be zero."""
+
+NEGATIVE = "it comes out negative, which it cannot be"
+"""Why there is no value of what its interval says is negative."""
+
+
+def find(case: KeyCase) -> Iterator[RaisedDoubt]:
+    """Cut intervals at 0 where a key allows no less; refuse what is negative, and bound what cannot be 0 from above."""
+    bounds = {key: declared.bound for key, declared in numeric_keys(case.flat).items()}
+    answers = {}
+    for key, one in case.determined.items():
+        bound = bounds.get(key)
+        if one.high < 0 and bound in (non_negative, positive):
+            answers[key] = Estimate.unknown(key, one.unit, one.method, NEGATIVE, 0.0)
+        elif one.low < 0 and bound is non_negative:
+            answers[key] = replace(one, value=max(one.value, 0.0), low=0.0)
+        elif one.low <= 0 and bound is positive:
+            answers[key] = Estimate.unknown(key, one.unit, one.method, NOT_ABOVE_ZERO, 0.0, one.high)
+    if answers:
+        yield RaisedDoubt(answers=answers)
+
+
+DOUBT = Doubt("key", find, "the bounds of the keys", "intervals are cut; negative values are refused", "a longer log")

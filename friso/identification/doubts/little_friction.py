@@ -1,0 +1,46 @@
+"""Coulomb friction that is none, or as no bearing can have it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, RaisedDoubt, ValueCase
+from friso.identification.settings import DoubtSettings
+
+
+def find(case: ValueCase) -> Iterator[RaisedDoubt]:
+    """Compare the Coulomb friction of the inverse model with nothing, and with the force at all."""
+    value, unit = case.inverse.value("coulomb"), case.unit
+    least = DoubtSettings.current().force_share_of_no_friction * float(np.std(case.inverse.measured))
+    if value < least:
+        yield RaisedDoubt(_sentence(case, value, least), value, unit)
+
+
+def _sentence(case: ValueCase, value: float, least: float) -> str:
+    """What little friction, or a negative one, may come from."""
+    one, unit = case.inverse.estimate("coulomb"), case.unit
+    if not one.determined:
+        says, does = ("which helps the motion", "exceeds") if value <= -least else ("next to nothing", "may hide")
+        return (
+            f"Coulomb friction and the constant force are {value:.2g} {unit} together, {says}: the log moves in one "
+            f"direction only, and gravity, or an offset of the channel, {does} friction"
+        )
+    if value > -least:
+        return (
+            f"Coulomb friction is estimated as {value:.2g} {unit}, next to nothing: no friction in this force, a wrong "
+            "--scale, or friction that a drive compensates"
+        )
+    interval = f"{value:.3g} {unit} ({one.low:.3g} to {one.high:.3g})"
+    if one.high >= 0:
+        return f"The log does not tell Coulomb friction from none: it is estimated as {interval}"
+    return (
+        f"Coulomb friction is estimated as {interval}, negative, as that of no bearing is: the force leaves out what a "
+        "drive adds against friction, or more, another channel is taken for it, or the stage hardly slides"
+    )
+
+
+DOUBT = Doubt(
+    "value", find, "the Coulomb friction of the inverse model", "reported", "a log of the whole force of the drive"
+)

@@ -1,0 +1,41 @@
+"""A mass whose inertia is lost in what the model does not explain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
+
+
+def find(case: KeyCase) -> Iterator[RaisedDoubt]:
+    """Compare the inertia of the masses with what the model leaves unexplained, noise apart.
+
+    Any of what is left may pass for inertia: a mass whose inertia is less is not shown. What a fit leaves is least like
+    inertia where that is large: a mass is as uncertain as the square of their ratio at least (our choice).
+    """
+    masses = {key: one for key, one in case.determined.items() if key in ("masses.cart", "masses.stage")}
+    inertia = sum(mass.value for mass in masses.values()) * float(np.sqrt(np.mean(case.acceleration**2)))
+    if inertia < case.unexplained:
+        left = f"{case.unexplained:.2g} {case.unit}"
+        why = f"its inertia, {inertia:.2g} {case.unit}, is less than what the model leaves unexplained, {left}"
+        yield RaisedDoubt(size=inertia, unit=case.unit, refuses=dict.fromkeys(masses, why))
+    elif masses and inertia > 0:
+        share = (case.unexplained / inertia) ** 2
+        answers = {
+            key: replace(one, low=min(one.low, (1 - share) * one.value), high=max(one.high, (1 + share) * one.value))
+            for key, one in masses.items()
+        }
+        yield RaisedDoubt(size=inertia, unit=case.unit, answers=answers)
+
+
+DOUBT = Doubt(
+    "key",
+    find,
+    "the inertia beside what the model leaves unexplained",
+    "masses widen, or are refused",
+    "faster moves, or a frequency response",
+    after=("slow-motion",),
+)

@@ -1,0 +1,100 @@
+"""A feedforward of the drive that is not part of the logged force."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
+from friso.identification.inverse_model import InverseModel, inverse_model, least_squares, motion, unit_of
+from friso.identification.logs.log import Log
+from friso.identification.settings import DoubtSettings, IdentificationSettings
+from friso.identification.spread import spread_of
+from friso.intervals import COVERAGE
+
+ACCELERATION, DIRECTION = "reference acceleration", "reference direction"
+"""Names of further columns of the inverse model."""
+
+
+def find(case: RecordCase) -> Iterator[RaisedDoubt]:
+    """Fit what acceleration and direction of the reference add, where they add something while the stage is fast."""
+    fed = fed_forward(case)
+    if fed is None or not lacks_when_fast(case.inverse, fed[1]):
+        return
+    model, mass = fed[0], -fed[0].value(ACCELERATION)
+    kg = unit_of("kg", case.log)
+    coulomb = f"{-model.solution.get(DIRECTION, 0.0):.2g} {case.unit}"
+    also = f" and {coulomb} in its direction" if DIRECTION in model.solution else ""
+    words = (
+        f"the force lacks {mass:.2g} {kg} times the acceleration of the reference{also}, which suggests that a "
+        "feedforward is not part of it"
+    )
+    yield RaisedDoubt(words, mass, kg, model, spoils=True)
+
+
+def fed_forward(case: RecordCase) -> tuple[InverseModel, np.ndarray] | None:
+    """Fit the inverse model with what a feedforward adds to the force, and return its part that goes with acceleration.
+
+    That part has the shape (rows,) [N]. Returns None without a reference, or where nothing is lacking.
+    """
+    log, inverse = case.log, case.inverse
+    columns = _of_reference(log, inverse.bandwidth)
+    if not columns:
+        return None
+    accelerated = {ACCELERATION: columns[ACCELERATION]}
+    with suppress(InputError):
+        alone, both = (
+            inverse_model(log, inverse.bandwidth, False, case.cart_share, extra=extra)
+            for extra in (accelerated, columns)
+        )
+        if alone.value(ACCELERATION) < 0:
+            lacking = max(both.value(ACCELERATION), both.value(DIRECTION)) < 0
+            return both if lacking else alone, inverse.measured - alone.measured
+    return None
+
+
+def lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:
+    """Tell whether a force fed forward, shape (rows,) [N], is lacking in both halves of the rows with a fast stage.
+
+    Where a servo follows well, the reference's acceleration differs from the measured one by what friction at low speed
+    and sticking do: it stands in for them as far as the inverse model lacks them, but not where the stage slides.
+    """
+    settings, speed = DoubtSettings.current(), np.abs(inverse.columns[:, 1])
+    fast = np.flatnonzero(speed > settings.speed_share_of_a_fast_stage * speed.max())
+    if len(fast) < 2 * settings.samples_of_a_reference:
+        return False
+    columns = np.column_stack([inverse.columns, fed])
+    for rows in np.array_split(fast, 2):
+        solution, left = least_squares(columns[rows], inverse.measured[rows])
+        if not solution[-1] > COVERAGE * np.sqrt(spread_of(columns[rows], left)[-1, -1]):
+            return False
+    force = inverse.measured[fast]
+    without, left = (least_squares(some[fast], force)[1] for some in (inverse.columns, columns))
+    return bool(np.linalg.norm(left) < settings.error_share_of_a_cause * np.linalg.norm(without))
+
+
+def _of_reference(log: Log, bandwidth: float) -> dict[str, np.ndarray]:
+    """Return acceleration [m/s^2] and direction of the reference, each of shape (n,); {} without a reference."""
+    settings = IdentificationSettings.current()
+    if "reference" not in log:
+        return {}
+    columns = {name: np.zeros(len(log.time)) for name in (ACCELERATION, DIRECTION)}
+    for part in log.segments:
+        if part.stop - part.start > DoubtSettings.current().samples_of_a_reference:
+            reference = motion(log["reference"][part], log.sample_time, settings.smoothing_bandwidths * bandwidth)
+            columns[ACCELERATION][part] = reference.acceleration
+            columns[DIRECTION][part] = np.sign(np.gradient(log["reference"][part]))
+    return columns
+
+
+DOUBT = Doubt(
+    "cause",
+    find,
+    "the fit of the inverse model with acceleration and direction of the reference",
+    "intervals reach to the values without it; friction at low speed is refused",
+    "a log of the whole force of the drive",
+    after=("force-by-place",),
+)

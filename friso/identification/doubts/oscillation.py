@@ -1,0 +1,39 @@
+"""An oscillation of the residual at one frequency: a mode in the band, or cogging at constant speed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.signal import welch
+
+from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
+from friso.identification.settings import DoubtSettings
+from friso.quantities import percent
+
+
+def find(case: RecordCase) -> Iterator[RaisedDoubt]:
+    """Look for a peak of the residual's spectrum that holds most of its power."""
+    inverse, settings = case.inverse, DoubtSettings.current()
+    left = inverse.measured - inverse.fitted
+    step = float(np.median(np.diff(inverse.time)))
+    rates, power = welch(left, 1 / step, nperseg=min(len(left), settings.samples_of_a_spectrum))
+    peak = int(np.argmax(power))
+    share = power[max(peak - 1, 0) : peak + 2].sum() / power.sum() if power.sum() > 0 else 0.0
+    if share < settings.power_share_of_an_oscillation or peak == 0:
+        return
+    words = (
+        f"{percent(share)} of the power of the residual is near {rates[peak]:.3g} Hz: a mode in the band, or a force "
+        "that repeats along the way, such as cogging"
+    )
+    yield RaisedDoubt(words, float(share))
+
+
+DOUBT = Doubt(
+    "otherwise",
+    find,
+    "the spectrum of the residual",
+    "reported",
+    "a frequency response, or passes at two speeds: cogging moves with the speed, a mode does not",
+    after=("perhaps-feedforward",),
+)

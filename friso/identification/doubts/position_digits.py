@@ -1,0 +1,31 @@
+"""A position in digits that are coarse beside its travel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
+from friso.identification.settings import DoubtSettings
+
+
+def find(case: RecordCase) -> Iterator[RaisedDoubt]:
+    """Count how many of its smallest steps the position travels."""
+    position = case.log["position"][case.log.longest]
+    steps = np.abs(np.diff(position))
+    digit, travel = float(steps[steps > 0].min(initial=np.inf)), float(np.ptp(position))
+    if digit * DoubtSettings.current().digits_of_a_fine_position < travel:
+        return
+    words = f"the position has steps of {digit:.2g} m over a travel of {travel:.3g} m: log it with more digits"
+    yield RaisedDoubt(words, digit, "m")
+
+
+DOUBT = Doubt(
+    "fault",
+    find,
+    "the smallest step of the position beside its travel",
+    "reported",
+    "a log with more digits",
+    after=("position-jump",),
+)

@@ -1,0 +1,43 @@
+"""A record so slow that the Stribeck effect acts throughout: what friction is at higher speeds is left open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
+from friso.identification.output_error.parameters import stribeck_up_to
+from friso.identification.settings import DoubtSettings
+
+SLIDING = ("friction.coulomb", "friction.viscous", "friction.viscous_asymmetry")
+"""What friction is once the Stribeck effect has died away."""
+
+
+def find(case: KeyCase) -> Iterator[RaisedDoubt]:
+    """Compare the highest speed of the record with the speed at which the Stribeck effect has died away.
+
+    A slower record shows the sum of the effect and of Coulomb friction: dry friction there, of which the latter is at
+    least a quarter. Where the Stribeck velocity is not shown it may be the highest of bearings; where it is, what the
+    effect leaves at twice that is small, and hardly depends on the exponent that was assumed.
+    """
+    if "friction.stribeck_velocity" not in case.flat:
+        return
+    stribeck, level = (case.determined.get(f"friction.{name}") for name in ("stribeck_velocity", "coulomb"))
+    enough = DoubtSettings.current().stribeck_velocities_of_sliding
+    top = float(np.abs(case.velocity).max())
+    if top >= (enough * stribeck.high if stribeck else stribeck_up_to(case.flat)):
+        return
+    dry = f": {level.value:.3g} {case.unit} is dry friction there" if level else ""
+    why = f"the log moves at {top * 1e3:.3g} mm/s at most, where the Stribeck effect may still act{dry}"
+    yield RaisedDoubt(size=top, unit="m/s", refuses=dict.fromkeys(SLIDING, why))
+
+
+DOUBT = Doubt(
+    "key",
+    find,
+    "the highest speed of the record",
+    "Coulomb and viscous friction are refused",
+    "faster moves",
+    after=("impossible-value",),
+)

@@ -1,0 +1,23 @@
+"""A frequency response in which the motion goes against the force, as it does with a wrong sign of either."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from friso.identification.doubt import Doubt, RaisedDoubt
+from friso.identification.response.analysis import Bench
+
+
+def find(bench: Bench) -> Iterator[RaisedDoubt]:
+    """Look at the sign of the driven mass."""
+    model = bench.two_masses
+    if not (model.signs[0] < 0 if model is not None else any(line.sign < 0 for line in bench.lines[:1])):
+        return
+    force, motion = bench.driven.channels.input, bench.driven.channels.output
+    yield RaisedDoubt(
+        f"The {motion} goes against the {force}, which no mass does: one of them has the wrong sign; the values are "
+        "those with the sign reversed"
+    )
+
+
+DOUBT = Doubt("response", find, "the phase of the mass line", "reported", "a push by hand with both channels in view")

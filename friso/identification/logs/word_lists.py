@@ -1,0 +1,32 @@
+"""Lists of words by which channels and units are recognised, from the TOML files beside this module."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+
+@cache
+def read_lists(name: str) -> dict[str, Any]:
+    """Return the tables of `NAME.toml`, read once."""
+    return tomllib.loads(files("friso.identification.logs").joinpath(f"{name}.toml").read_text("utf-8"))
+
+
+@cache
+def channel_words() -> dict[str, Any]:
+    """Return the words in names of channels, each table of languages as one set of words."""
+    return _joined(read_lists("names"))
+
+
+def _joined(table: dict[str, Any]) -> dict[str, Any]:
+    """Join the lists of a table whose values are lists, one for each language; tables within it
+    by themselves.
+    """
+    return {
+        key: frozenset(word for words in value.values() for word in words)
+        if all(isinstance(words, list) for words in value.values())
+        else _joined(value)
+        for key, value in table.items()
+    }

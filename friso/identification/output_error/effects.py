@@ -1,0 +1,75 @@
+"""How far a force that the model leaves out would move a fit: one linear step about the fitted numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from friso.identification.output_error.fit import OutputErrorFit
+from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.spread import correlation_length
+from friso.intervals import COVERAGE
+
+
+@dataclass(frozen=True)
+class Explained:
+    """What effects that the model leaves out explain of the residual of a fit.
+
+    `moved` is how far they move the fitted numbers, shape (free,), `sizes` are theirs, and `left` is the share of the
+    residual's power that is left with them.
+    """
+
+    moved: np.ndarray
+    sizes: np.ndarray
+    left: float
+
+
+def explained_by_forces(fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]) -> Explained | None:
+    """Fit further forces to what a fit leaves, with its own numbers free to follow.
+
+    Each force [N], shape (n,), is one of size 1; it is tried at the size `unit`, small enough for its effect to be in
+    proportion. Returns None where the forces clearly explain nothing.
+    """
+    rest, slopes = fit.linearised()
+    effects = [effect_of(unit * force, fit, rest) / unit for force, unit in zip(forces, units, strict=True)]
+    return explained_by(slopes, rest, effects, fit.problem.counted)
+
+
+def explained_by(
+    slopes: np.ndarray, rest: np.ndarray, effects: Sequence[np.ndarray], counted: np.ndarray
+) -> Explained | None:
+    """Fit a residual, shape (n,), by fitted numbers and further effects.
+
+    Derivatives have the shape (n, numbers), effects and weights `counted` the shape (n,). A number that changes
+    nothing, or of which nothing finite is known, does not move. Returns None where the effects clearly explain nothing.
+    """
+    settings = OutputErrorSettings.current()
+    every = np.column_stack([slopes, *effects])
+    size = np.linalg.norm(every, axis=0)
+    usable = np.isfinite(size) & (size > 0)
+    if not (usable[slopes.shape[1] :].all() and np.isfinite(rest).all()):
+        return None
+    solution = np.zeros(len(size))
+    scaled = every[:, usable] / size[usable]
+    solution[usable] = np.linalg.lstsq(scaled, -rest, rcond=settings.smallest_singular_value)[0] / size[usable]
+    left = rest + every[:, usable] @ solution[usable]
+    independent = max(float(counted.sum()), 1.0) / correlation_length(left)
+    chance = chi2.ppf(settings.probability_of_an_effect, len(effects))
+    if rest @ rest <= left @ left * (1 + chance / independent):
+        return None
+    moved, sizes = np.split(solution, [slopes.shape[1]])
+    return Explained(moved, sizes, float(left @ left) / float(rest @ rest))
+
+
+def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:
+    """Return the fit with deviations whose intervals reach `further`, shape (free,), each way."""
+    return fit.with_deviations(fit.deviation + further / COVERAGE)
+
+
+def effect_of(force: np.ndarray, fit: OutputErrorFit, rest: np.ndarray) -> np.ndarray:
+    """Return what a further force [N] on the stage changes of the residual of a fit, `rest`; each of shape (n,)."""
+    inputs = fit.problem.inputs
+    return replace(fit.problem, inputs=replace(inputs, force=inputs.force + force)).residuals(fit.inner[None])[0] - rest

@@ -1,0 +1,165 @@
+"""The kind of a question: what a folder of `friso/questions/` declares, and what is made of it.
+
+A question is a function of friso with a command of the same name. Its folder declares a `QUESTION`; from that, from the
+signature of the function and from its docstring come the command with its options and help, and the entry in
+`friso --help`. Nothing heavy is imported here: the list of commands is printed before arrays and units are.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import import_module
+from importlib.util import find_spec
+from inspect import Parameter, signature
+from typing import Any
+
+from friso.errors import InputError
+from friso.platform.installed import load_declared
+from friso.registry import Registry
+
+GROUP = "friso.questions"
+"""The group of entry points in which installed packages name theirs."""
+
+HUNTS, WHERE, WHY, STOPS, MACHINE, HELP = (
+    "Does it hunt?",
+    "Where does it hunt?",
+    "Why does it hunt?",
+    "What stops it?",
+    "What is my machine?",
+    "Help",
+)
+TOPICS = (HUNTS, WHERE, WHY, STOPS, MACHINE, HELP)
+"""The headings under which `friso --help` lists the commands."""
+
+
+@dataclass(frozen=True)
+class Choices:
+    """A list below the help of a command, read only when the help is asked for: (name, what it is in one line)."""
+
+    title: str
+    rows: Callable[[], Iterable[tuple[str, str]]]
+
+
+@dataclass(frozen=True)
+class Question:
+    """One question: where its function stands, and how its command takes and shows it.
+
+    Raises ValueError for a topic that is not one of TOPICS, TypeError for a place that is no number.
+    """
+
+    package: str
+    """The package whose module `question` holds the function."""
+
+    place: float
+    """Its place below its topic in `friso --help`; lower numbers come first."""
+
+    topic: str
+
+    example: str
+    """Command lines without "friso", one a line, shown below the help; the first one is "Example:"."""
+
+    takes: tuple[str, ...] = ("stage",)
+    """Parameters that the command takes as arguments; every other one is an option."""
+
+    function_name: str = ""
+    """Name of the function; "": that of the package."""
+
+    folder: str = ""
+    """Folder of the files written without --out; "": none are written then."""
+
+    writes: bool = True
+    """Whether the answer has files, and the command --out and --overwrite."""
+
+    document: bool = True
+    """Whether the command has --json."""
+
+    details: bool = False
+    """Whether the answer has details, and the command --details."""
+
+    files: tuple[str, ...] = ()
+    """Files that may not be in the way when the command begins."""
+
+    during: str = ""
+    """What stands beside the progress bar until the work says what it does."""
+
+    answers_interrupted: bool = False
+    """Whether Ctrl-C ends the work with an answer by what was done so far."""
+
+    choices: Choices | None = None
+
+    defaults: Mapping[str, Any] = field(default_factory=dict)
+    """Defaults of the command that differ from those of the function."""
+
+    metavars: Mapping[str, str] = field(default_factory=dict)
+    """What stands for the value of a parameter in the help, where the word of its kind says too little."""
+
+    runner: str = ""
+    """Module of the function `run` that asks on the command line, where that takes more than showing the answer."""
+
+    def __post_init__(self) -> None:
+        if self.topic not in TOPICS:
+            raise ValueError(f"topic {self.topic!r} is none of {', '.join(TOPICS)}")
+        if not isinstance(self.place, int | float):
+            raise TypeError(f"place {self.place!r} is not a number")
+
+    @property
+    def name(self) -> str:
+        """The name of the command: that of the package, with dashes."""
+        return self.package.rpartition(".")[2].replace("_", "-")
+
+    @property
+    def module(self) -> str:
+        """The module that holds the function."""
+        return f"{self.package}.question"
+
+    @property
+    def in_python(self) -> str:
+        """The name of the function in Python: friso.NAME."""
+        return self.function_name or self.package.rpartition(".")[2]
+
+    @cached_property
+    def function(self) -> Callable[..., Any]:
+        """The function; imports what it needs. Raises InputError where another package's module has none."""
+        if self.package.startswith("friso."):
+            return getattr(import_module(self.module), self.in_python)
+        _ = self.summary  # which refuses a function without docstring
+        return load_declared(GROUP, self.name, self.module, self.in_python, Callable)
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """The parameters of the function."""
+        return signature(self.function).parameters
+
+    @cached_property
+    def summary(self) -> str:
+        """The first line of the function's docstring without its full stop, read without importing the module. Raises
+        InputError where there is no such function, or it has no docstring."""
+        text = ""
+        try:
+            spec = find_spec(self.module)
+            source = getattr(spec.loader, "get_source", None) if spec else None
+            for node in ast.parse((source and source(self.module)) or "").body:
+                if isinstance(node, ast.FunctionDef) and node.name == self.in_python:
+                    text = ast.get_docstring(node) or ""
+        except (ImportError, SyntaxError) as error:
+            raise InputError(f"{GROUP}: {self.name}", f"{self.module}, {error}", "a module that can be read") from error
+        if not text:
+            expected = f"a module with the function {self.in_python} and its docstring"
+            raise InputError(f"{GROUP}: {self.name}", self.module, expected)
+        return text.partition("\n")[0].rstrip(".")
+
+
+QUESTIONS = Registry[Question]("friso.questions", "QUESTION", GROUP, Question)
+"""Every folder of `friso/questions/` declares one, and every package that an installed one names."""
+
+
+def function_of(name: str) -> Callable[..., Any]:
+    """Return the function friso.NAME of a question. Raises KeyError where none has that name, InputError where another
+    package's module has none."""
+    own = name.replace("_", "-")
+    if own in QUESTIONS and QUESTIONS[own].in_python == name:
+        return QUESTIONS[own].function
+    return {question.in_python: question for _, question in QUESTIONS.items()}[name].function

@@ -1,0 +1,24 @@
+"""What `friso doctor` says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from friso.interface.answer import AnswerTable
+from friso.studies.doctor import DoctorCheck
+
+
+def sentences(checks: Sequence[DoctorCheck]) -> list[str]:
+    """Whether friso works, in one sentence."""
+    broken = [check.subject for check in checks if not check.works]
+    if not broken:
+        return ["friso works on this machine."]
+    return [f"friso does not work on this machine: see {', '.join(broken)}."]
+
+
+def tables(checks: Sequence[DoctorCheck]) -> list[AnswerTable]:
+    """What was looked at, with remedies where something does not work."""
+    if all(check.works for check in checks):
+        return [AnswerTable("", ["Result"], [(check.subject, [check.text]) for check in checks])]
+    rows = [(check.subject, [check.text, "" if check.works else check.remedy]) for check in checks]
+    return [AnswerTable("", ["Result", "Remedy"], rows)]

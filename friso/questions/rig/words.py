@@ -1,0 +1,29 @@
+"""What an experiment of the rig shows, in words."""
+
+from __future__ import annotations
+
+from friso.questions.rig.outcome_view import view_of
+from friso.studies.rig.outcome import Outcome
+
+
+def sentences(outcome: Outcome) -> list[str]:
+    """The results, the answer first, for the engineer who has to decide with them; before it, what failed."""
+    return [*_failures(outcome), *view_of(outcome.experiment).sentences(outcome)]
+
+
+def _failures(outcome: Outcome) -> list[str]:
+    """The logs that stopped early, in a sentence for each reason: they end where the run stopped."""
+    by_reason: dict[str, list[str]] = {}
+    for log in outcome.logs:
+        if log.failure:
+            when, _, reason = log.failure.partition(": ")
+            by_reason.setdefault(reason or when, []).append(f"{log.name} {when}" if reason else log.name)
+    return [
+        f"{len(names)} of {len(outcome.logs)} logs stopped early: {reason} ({', '.join(names)})."
+        for reason, names in by_reason.items()
+    ]
+
+
+def details(outcome: Outcome) -> list[str]:
+    """What to know of the experiment."""
+    return [f"seed of the noise: {outcome.seed}", *(f"note: {note}" for note in outcome.notes)]

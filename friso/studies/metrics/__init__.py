@@ -1,0 +1,1 @@
+"""Metrics of a map: one module each, called as the metric, with `METRIC`."""

@@ -1,0 +1,15 @@
+"""Peaks of a run that are distinct, counted after the thesis"""
+
+from friso.hunting.criteria import DISTINCT_CRITERION
+from friso.studies.metric import MapFinding, Metric
+
+METRIC = Metric(
+    "Counted peaks, distinct ones",
+    lambda run: run.measures.distinct_peaks,
+    unit="1",
+    usual=True,
+    place=11,
+    criterion=DISTINCT_CRITERION,
+    counts=True,
+    findings=(MapFinding("Peaks are counted"),),
+)
