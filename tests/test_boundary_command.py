@@ -355,6 +355,7 @@ def test_where_curves_meet_and_end_is_told(met: Plane, wording: Wording) -> None
         )
         wording(sentence)
     assert conclusion(met, keys).endswith("Curves meet at 2 more places.")
+    assert "No two of the curves meet." in sentences(replace(met, meetings=()), keys)
 
 
 def test_the_document_lists_where_curves_meet_and_end(met: Plane) -> None:

@@ -103,7 +103,7 @@ def test_the_document_holds_the_margins_of_the_joint_where_details_are_wanted(ri
         "stroke": {"yours_m": stroke, **rest},
         "stiffness": {"yours_n_per_m": stiffness, "below": None, **rest},
     }
-    answer = CheckAnswer(rig, {"given": SimpleNamespace(stage=rig)}, None, None)
+    answer = CheckAnswer({"given": SimpleNamespace(stage=rig)}, stage=rig, draws=None, laws=None)
     vars(answer)["joint_margins"] = margins
     assert answer.document_of_details().keys() == {"joint_margins"}
 

@@ -112,6 +112,7 @@ def _ends_closed(
 def _ends_observed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which motions end in swings that were only observed, and for which that is known."""
     settings = BasinSettings.current()
     after = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
     swing, completed, _ = _last_swing(flat, after, settings.judged_periods * target.period, starts, TIGHT, **options)
@@ -191,6 +192,7 @@ def displacements_that_run_away(stage: Stage) -> Kick:
     end = BasinSettings.current().runaway_periods * float(typical_period(stages)[0])
 
     def runs_away(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which kicks make the stage run away, and for which that is known."""
         options = RunOptions(rtol=RTOL, record_from=np.inf, least_swing=np.inf)
         motions = run_motions({**flat, "motion.displacement": kicks, "motion.duration": end}, len(kicks), options)
         return motions.away, motions.away | motions.completed

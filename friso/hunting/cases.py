@@ -49,6 +49,7 @@ class Solver:
 
     @property
     def done(self) -> bool:
+        """Whether the run came to its end."""
         return self.status == Status.DONE.text
 
 
@@ -139,6 +140,7 @@ def check(
     done = Tally(progress, len(different) * PART_COUNT)
 
     def judged(variant: Stage) -> Case:
+        """Check a stage that differs from the others, with its share of the work."""
         names = [name for name, other in variants.items() if other == variant]
         share = _share(variant) if len(different) > 1 else 1.0
         return _case(
@@ -183,10 +185,12 @@ def _case(
     tell: Callable[[Verdict], None] = lambda verdict: None,
     margins: bool = False,
 ) -> Case:
+    """Check one stage with so much work; `tell` is called with the verdict, `done` counts the parts."""
     survey_settings = SurveySettings.current()
     flat, ended = stage.flat(), 0
 
     def begin(part: CheckPart) -> None:
+        """Count a part of the check as begun, and those before it as ended."""
         nonlocal ended
         ended += (step := int(part != CheckPart.ATTRACTION))
         done.add(step, part.progress_word)

@@ -169,6 +169,7 @@ class _Grid:
                     raise
 
     def _stages(self, numbers: np.ndarray) -> Ensemble:
+        """The stage with its bandwidth multiplied by the factors with these numbers."""
         return Ensemble.held(faster(self.flat, self.factors[numbers]), len(numbers))
 
     def record(self, index: int, survey: Attractors) -> None:
@@ -303,6 +304,7 @@ class _Grid:
                 return windows
 
     def _window(self, first: int, last: int) -> BandwidthWindow:
+        """The window from the first to the last of neighbouring factors, with its ends."""
         return BandwidthWindow(
             self.end(first, -1) if first > self.lowest else None,
             self.end(last, 1) if last + 1 < len(self.factors) else None,

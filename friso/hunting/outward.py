@@ -45,6 +45,7 @@ class AttractionEnd:
 
     @property
     def reserve(self) -> float:
+        """Share of the bandwidth up to which the end is known."""
         return abs(self.outside / self.inside - 1)
 
 
@@ -189,9 +190,11 @@ class EdgeSearch:
         return what_attracts(self._stages(factors), distances=begun, confirm=confirm)
 
     def _stages(self, factors: np.ndarray) -> Ensemble:
+        """The stage with its bandwidth multiplied by factors."""
         return Ensemble.held(faster(self.flat, factors), len(factors))
 
     def _ahead(self, at: float) -> float:
+        """The direction of the search from a factor: 1 up, -1 down."""
         return 1.0 if self.farthest >= at else -1.0
 
     def _still_ahead(self, at: float, outside: float) -> float:

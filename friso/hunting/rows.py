@@ -21,6 +21,7 @@ class ArrayRows:
 
 
 def _rows_of(part: Any, numbers: Any) -> Any:
+    """Rows of an array, or of all arrays that a part holds; anything else as it is."""
     if isinstance(part, np.ndarray):
         return part[numbers]
     if isinstance(part, tuple):

@@ -12,9 +12,7 @@ class ToleranceSettings(Settings):
     """The tolerances of runs and orbits, in one table. A value without a unit is relative."""
 
     cycle_rtol: float = setting(
-        1e-9,
-        "",
-        "Multipliers are derivatives of runs: looser runs scatter them near -1, tighter ones only take longer.",
+        1e-9, "", "Multipliers are derivatives of runs: looser runs scatter them near -1, tighter ones take longer."
     )
     guess_rtol: float = setting(1e-6, "", "Enough for Newton's method to start from; looser runs miss narrow cycles.")
     survey_rtol: float = setting(
@@ -42,9 +40,7 @@ class ToleranceSettings(Settings):
         0.01, "", "What changes at a hundredth of the tolerance tells the error; closer ones do not show it."
     )
     closed_gap: float = setting(
-        1e-8,
-        "of the states",
-        "A larger gap hides in orbits of stiff stages that are none; a smaller one leaves real cycles open.",
+        1e-8, "of the states", "A larger one closes orbits that are none; a smaller one leaves real cycles open."
     )
     closed_gap_chattering: float = setting(
         1e-4, "of the states", "A limiter that chatters moves the end of a run by about as much."
@@ -57,9 +53,7 @@ class ToleranceSettings(Settings):
         0.1, "of the tolerance of runs", "A gap far below the tolerance of its runs gets no better."
     )
     followed_gap: float = setting(
-        1e-6,
-        "of the states",
-        "On the way along a branch stiff stages are not closed better; larger gaps lead to other branches.",
+        1e-6, "of the states", "Along a branch stiff stages close no better; larger gaps lead to others."
     )
 
 
@@ -79,7 +73,7 @@ class BasinSettings(Settings):
     kick_range: tuple[float, float] = setting(
         (1 / 30, 300.0),
         "least attracting motions",
-        "Smaller kicks do not break the stage away; larger ones run into the force limit.",
+        "Smaller kicks do not break away; larger ones meet the force limit.",
     )
     kick_count: int = setting(128, "", "Narrower windows of kicks than a step are missed; more kicks take longer.")
     kick_edge_share: float = setting(0.01, "", "Edges of windows are told in three digits; finer ones take more runs.")
@@ -105,9 +99,7 @@ class EdgeSettings(Settings):
     )
     flip_search_step: float = setting(1e-4, "log of bandwidth", "The edge is told in four digits.")
     fold_search_step: float = setting(
-        1e-3,
-        "along the branch",
-        "At a fold the bandwidth changes with the square of the step, so that a longer one does.",
+        1e-3, "along the branch", "At a fold the bandwidth changes with the square of it, so that a longer one does."
     )
     chattering_edge_step: float = setting(
         2e-3, "log of bandwidth", "A limiter that chatters makes multipliers rough: shorter steps follow the roughness."
@@ -116,23 +108,17 @@ class EdgeSettings(Settings):
         1.0095, "", "Nothing may attract so far beyond an edge: it is known to a hundredth, rounded to four digits."
     )
     narrow_window_share: float = setting(
-        1e-3,
-        "of the bandwidth",
-        "No machine holds its bandwidth as exactly: narrower windows are told with --details alone.",
+        1e-3, "of the bandwidth", "No machine holds its bandwidth as exactly: narrower ones are only in --details."
     )
     most_orbits_followed: int = setting(
         8, "", "Beyond the end of one orbit another may attract; more than eight in a row were not met."
     )
     edge_bracket_share: float = setting(
-        0.02,
-        "of the bandwidth",
-        "Widest range in which an edge is told that no orbit was followed to; narrower takes more surveys.",
+        0.02, "of the bandwidth", "Widest range of an edge that no orbit was followed to; narrower takes more surveys."
     )
     bracket_steps: int = setting(5, "", "More steps per range take more surveys at once, fewer take more rounds.")
     reach_log: float = setting(
-        0.06,
-        "log of bandwidth",
-        "How far beyond a search what attracts is looked for, doubled each time: longer reaches waste surveys.",
+        0.06, "log of bandwidth", "How far on attractors are looked for, doubled each time; longer wastes surveys."
     )
     window_pace: float = setting(
         8.0, "", "Branches of cycles that repel are only followed to where they attract again."
@@ -155,7 +141,7 @@ class EdgeSettings(Settings):
     proved_distances: tuple[float, float] = setting(
         (0.02, 0.06),
         "log of factor",
-        "Where something attracts, and where nothing does: nearer to the edge motions take too long to die out.",
+        "On the hunting side, and on the other: nearer, motions take too long to die out.",
     )
     same_factor_log: float = setting(1e-6, "log of factor", "Values that differ by less are one.")
     widest_factor_step: float = setting(

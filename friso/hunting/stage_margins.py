@@ -56,6 +56,7 @@ def _is_known(judgement: Judgement) -> bool:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _margin(scaled: Scaled, judgement: Judgement, lowest: float) -> ParameterMargin:
+    """The margin in a parameter, where it is known whether something attracts the stage itself."""
     return parameter_margin(scaled, judgement.hunting.target is not None, lowest, SEARCH_LIMITS.most_friction)
 
 

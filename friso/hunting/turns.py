@@ -57,6 +57,7 @@ def scan_turning_points(
 
 @cache
 def _compiled() -> Loops:
+    """The loops over turning points as machine code, built once on a machine."""
     version = code_digest("hunting/turning.py", "hunting/build.py")
     (entry,) = built_entries(
         [CodeRequest(f"turning points {version}", "loops over turning points", "friso.hunting.build")]

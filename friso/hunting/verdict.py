@@ -186,6 +186,7 @@ def _without_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
+    """Judge a stage that nothing attracts: whether its own motion comes to rest, and where hunting begins."""
     with allowance(CheckSettings.current().rest_work_share * work) as spent:
         rest = followed_motions(
             stage.flat(),
@@ -237,6 +238,7 @@ def _with_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
+    """Judge a stage that something attracts: whether its own motion ends in that, and what starts hunting."""
     settings = CheckSettings.current()
     with allowance() as spent:
         own = own_motion(stage, target, settings.rest_work_share * work)

@@ -43,7 +43,9 @@ def entries() -> Mapping[str, GlossaryRow]:
     """
     text = (resources.files("friso.shown") / "templates" / "glossary.md").read_text(encoding="utf-8")
     plain = re.sub(r"[*`]", "", text)
-    rows = [GlossaryRow(tuple(words.split(", ")), meaning) for words, meaning in _ROW.findall(plain) if "(" not in words]
+    rows = [
+        GlossaryRow(tuple(words.split(", ")), meaning) for words, meaning in _ROW.findall(plain) if "(" not in words
+    ]
     return {word.lower(): entry for entry in rows for word in entry.words if word != _HEADING}
 
 

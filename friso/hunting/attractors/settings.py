@@ -12,9 +12,7 @@ class SurveySettings(Settings):
     """Runs from many starts, followed in rounds until all that attracts a stage is told."""
 
     arrival_periods: tuple[float, float] = setting(
-        (60.0, 600.0),
-        "periods",
-        "Fewer, and slow transients pass for attracted; more than the last cost work and change nothing.",
+        (60.0, 600.0), "periods", "Fewer, and slow transients pass for attracted; more cost work and change nothing."
     )
     arrival_time_constants: float = setting(
         8.0, "time constants", "Near a flip transients last: after eight time constants 0.03 % of a deviation is left."
@@ -35,9 +33,7 @@ class SurveySettings(Settings):
         400, "", "Fewer miss where a stage stands still between swings; more take longer."
     )
     still_move_share: float = setting(
-        1e-3,
-        "of peak to peak",
-        "A stage that moves farther from sample to sample does not stick, so that no orbit begins there.",
+        1e-3, "of peak to peak", "A stage that moves farther from sample to sample does not stick there."
     )
     repeated_orbit_share: float = setting(
         1e-3, "", "Orbits that pass through a simpler one several times differ by less; others by more."
@@ -49,9 +45,7 @@ class SurveySettings(Settings):
         12, "swings", "Motions that repeat themselves after more swings look irregular, and cost more to tell."
     )
     repeated_swing_share: float = setting(
-        0.03,
-        "of the largest swing",
-        "Small swings scatter by half of it at usual tolerances; larger differences are no repetition.",
+        0.03, "of the largest swing", "Small swings scatter by half of it; larger differences are no repetition."
     )
     compared_swings: int = setting(
         16, "swings", "With fewer a motion that approaches slowly looks as if it had arrived."
@@ -91,15 +85,13 @@ class SurveySettings(Settings):
     creep_distances: tuple[float, float, int] = setting(
         (0.001, 1.0, 16),
         "deflections at break-away",
-        "First, last and number of distances tried for the one from which a stage breaks away.",
+        "First, last, number of starts tried for where a stage breaks away.",
     )
     least_overshoot_share: float = setting(
         0.05, "of the distance", "A stage that breaks away and swings across by less creeps home."
     )
     rest_waits: float = setting(
-        4.0,
-        "waits",
-        "The integrator has passed from one limit to the other twice: then a stage that stood still rests.",
+        4.0, "waits", "The integrator has passed twice from limit to limit: a stage that stood still rests."
     )
     longest_waits: float = setting(
         24.0, "longest waits", "Swings nearly as slow repeat themselves within half of it; longer runs only take time."
@@ -112,17 +104,15 @@ class SurveySettings(Settings):
     farthest_start: float = setting(
         1e5,
         "deflections at break-away",
-        "A tenth of where a run counts as running away: farther starts would run away at once.",
+        "A tenth of where a run counts as running away: from farther off it would at once.",
     )
     outer_integral_windups: tuple[float, ...] = setting(
-        (-10.0, -1.0, 1.0, 10.0),
-        "loop times",
-        "Both signs, small and large; more values multiply the starts of cascades.",
+        (-10.0, -1.0, 1.0, 10.0), "loop times", "Both signs, small and large; more multiply the starts of cascades."
     )
     bending_travels: tuple[float, float] = setting(
         (1e-3, 10.0),
         "deflections at break-away",
-        "Travels drawn by which bristles are bent: from within presliding to far beyond it.",
+        "From within presliding to far beyond it, by which bristles are bent.",
     )
     least_bend_back_share: float = setting(
         1e-3, "of the travel", "Bending back by less leaves the bristles as they were."
@@ -131,17 +121,13 @@ class SurveySettings(Settings):
         (64, 16, 4, 1), "", "Coarse starts first: most stages are decided by these, and the rest need not be run."
     )
     beside_cycle_shares: tuple[float, ...] = setting(
-        (-0.03, -0.003, 0.003, 0.03),
-        "of the distance",
-        "Motions begin on both sides of a cycle, near enough to show what is beside it.",
+        (-0.03, -0.003, 0.003, 0.03), "of the distance", "Motions on both sides of a cycle show what is beside it."
     )
     most_rounds: int = setting(
         5, "", "The last takes two thousand typical periods; more would use up the steps of a stage."
     )
     thorough_step_limit: int = setting(
-        16_000_000,
-        "steps",
-        "What all runs of a stage may take in a survey that decides; stages with slow transients need most of it.",
+        16_000_000, "steps", "What all runs of a stage may take in a survey that decides: slow transients need most."
     )
     quick_step_limit: int = setting(
         6_000_000, "steps", "What all runs of a stage may take in other surveys: a third decides most stages."
@@ -198,9 +184,7 @@ class SurveySettings(Settings):
         15.0, "time constants", "After 15 a deviation of rounding size has grown to that of the swing."
     )
     longest_leaving_rounds: float = setting(
-        20.0,
-        "of the last round",
-        "Cycles that repel more slowly are left undecided; waiting would take the whole work.",
+        20.0, "of the last round", "Cycles that repel more slowly are left undecided; waiting takes too long."
     )
     steady_swing_share: float = setting(
         0.8, "", "A decay that keeps more of its swing over the last round looks like a cycle."

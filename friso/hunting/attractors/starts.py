@@ -136,6 +136,7 @@ class Starts:
         self._add(np.full(len(states), owner), states)
 
     def _add(self, owners: np.ndarray, states: np.ndarray) -> None:
+        """Add runs of the stages `owners` (runs,) that begin in these states (runs, states)."""
         self.owners.append(owners)
         self.states.append(states)
 
@@ -160,6 +161,7 @@ class Starts:
         return self._begun(which, cycles.states[which])
 
     def _begun(self, owners: np.ndarray, states: np.ndarray) -> Pending:
+        """Make runs ready for their first round: how long it is, and whether mirror images are motions too."""
         settings = SurveySettings.current()
         stages, mirrored = self.stages.take(owners), self.stages.symmetric[owners]
         begins = stages.kernel.with_modes(states, np.zeros(3), stages.values)

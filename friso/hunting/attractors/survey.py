@@ -72,6 +72,7 @@ class _Beside(ArrayRows):
 
     @classmethod
     def nothing(cls, count: int) -> _Beside:
+        """No run is beside a cycle that repels."""
         return cls(np.full(count, -1), np.zeros(count))
 
     @property
@@ -367,6 +368,7 @@ class Survey:
         return (ends.repeats.swings > 0) & (ends.repeats.deviation < settings.exact_repetition_share * offsets)
 
     def _observe(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
+        """Take motions for attracted that were only observed: their repetitions become attractors of their stages."""
         settings = SurveySettings.current()
         repeats = ends.repeats
         begun = (before == 0) & ~(
@@ -410,6 +412,7 @@ def _kinds(
     cycles, leaves_first = beside.cycles, beside.leave_first
 
     def same_kind(k: int, j: int) -> bool:
+        """Whether two runs of a stage repeat themselves in the same time, with the same swing."""
         same = (
             abs(sizes[k] - sizes[j]) <= near[k] * sizes[j]
             and abs(times[k] - times[j]) <= settings.same_motion_share * times[j]

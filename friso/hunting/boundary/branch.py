@@ -50,6 +50,7 @@ class Point:
 
     @property
     def multiplier(self) -> float:
+        """The multiplier that decides whether the cycle attracts."""
         return float(self.cycle.multiplier[0])
 
     @property
@@ -191,6 +192,7 @@ class Tracer:
         return bool(self.sign > 0 and stages.symmetric[0] and leans < 0)
 
     def _stop(self, point: Point) -> str:
+        """Why a branch is not followed beyond a point; "" if it is."""
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
         if point.cycle.amplitude[0] < ContinuationSettings.current().vanished_amplitude * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"

@@ -178,6 +178,7 @@ class CurveTracer:
         return [spot] if spot is not None and inside else []
 
     def _named(self, at: np.ndarray) -> str:
+        """The keys at a place in the box, with their values and units."""
         values = self.space.values(at[None])
         units = [swept.unit for swept in self.space.ranges]
         named = zip(values.items(), units, strict=True)

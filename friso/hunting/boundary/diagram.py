@@ -51,6 +51,7 @@ class Diagram:
 
 
 def _in_doubt(special: Sequence[Sequence[LocatedPoint]], places: np.ndarray) -> np.ndarray:
+    """Which places, (n,), lie within the error of a special point."""
     near = [np.abs(spot.point.place - places) < spot.error for own in special for spot in own]
     return np.any([np.zeros(len(places), bool), *near], axis=0)
 
@@ -70,6 +71,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress
     special: list[tuple[LocatedPoint, ...]] = []
 
     def follow(number: int, cycle: Cycles) -> bool:
+        """Follow the branch through a cycle, unless one that was followed passes it: whether it was followed."""
         start = Point.of(stages.take(np.array([number])), float(places[number]), cycle)
         if any(_passes(branch, start) for branch in branches):
             return False

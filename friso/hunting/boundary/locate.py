@@ -100,6 +100,7 @@ def _enclosed(
     points: dict[float, Point] = {0.0: first, length: second}
 
     def distance(place_along: float) -> float:
+        """How far the multiplier is off at a place along the branch. Raises Unreached."""
         if place_along not in points:
             nearest = min(points, key=lambda place: abs(place - place_along))
             point = tracer.solve(points[nearest], first.vector + place_along * direction, direction)

@@ -46,9 +46,7 @@ class ContinuationSettings(Settings):
     range_stages: int = setting(33, "", "Branches that are narrower than a step are missed; more stages take longer.")
     other_branches: int = setting(6, "", "Where periods double again and again there is no end of branches.")
     same_point_hundredths: float = setting(
-        0.1,
-        "hundredths of the key",
-        "Where a limiter chatters, branches that overlap meet a point within this distance.",
+        0.1, "hundredths of the key", "Where a limiter chatters, overlapping branches meet a point within this."
     )
     special_point_step: float = setting(1e-7, "", "Ends the search for a special point: far below the digits told.")
     special_point_tries: int = setting(30, "", "A search that needs more steps does not converge.")

@@ -93,6 +93,7 @@ class Space:
         """The stages along lines through the box: from origins (count, keys) along directions (count, keys)."""
 
         def family(which: np.ndarray, places: np.ndarray) -> Ensemble:
+            """The stages at places along the lines with these numbers."""
             return self.stages(origins[which] + places[:, None] * directions[which])
 
         return family

@@ -33,6 +33,7 @@ def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: BandName) -> 
 
 
 def _at_stands(flat: Mapping[str, Any], runs: Runs, band: BandName) -> list[np.ndarray]:
+    """Settling times [s] of runs at each place where the reference stands."""
     last, before = runs.statistic(f"{band}_exit"), runs.statistic(f"{band}_before")
     outside = [before, np.where(last < runs.statistic("ended"), last, np.inf)]
     places = stands(flat)

@@ -55,10 +55,12 @@ class Ensemble:
 
     @cached_property
     def structure(self) -> Structure:
+        """The structure of the equations of all these stages."""
         return self.form or shared_structure(self.flat)
 
     @cached_property
     def kernel(self) -> Kernel:
+        """The compiled equations of these stages."""
         return kernel(self.structure)
 
     @property

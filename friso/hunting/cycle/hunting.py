@@ -325,6 +325,7 @@ def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
 
 
 def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
+    """One cycle of a stage as it is shown, with one period in time."""
     slope = cycles.slope if stages.chatters else slopes(stages, cycles.orbits, cycles.direction, rtol)
     return Cycle(
         symmetric=cycles.sign < 0,
@@ -359,6 +360,7 @@ def _growth(stages: Ensemble, cycles: Cycles) -> float:
 
 
 def _signals(stages: Ensemble, cycles: Cycles) -> dict[str, Any]:
+    """Signals of one period of a cycle, by name."""
     settings = OrbitSettings.current()
     period = float(cycles.period[0])
     results = stages.run(cycles.states, cycles.period, COARSE_RTOL / 100, interval=period / settings.trace_samples)

@@ -23,9 +23,7 @@ class OrbitSettings(Settings):
         0.5, "", "An orbit farther from the guess is another one, such as the rest that every stage has."
     )
     guess_returns: int = setting(
-        40,
-        "returns",
-        "Where no orbit could be closed near a guess, so many returns are simulated to find what attracts.",
+        40, "returns", "Where no orbit closes near a guess, so many returns are simulated to find what attracts."
     )
     steady_return_share: float = setting(0.02, "", "Returns that still change by more have not come to a cycle.")
     refined_distances: int = setting(
@@ -71,9 +69,7 @@ class OrbitSettings(Settings):
         (2.0, 6.0), "", "Least and largest ratio of the fall of friction over the speeds of a cycle to its amplitude."
     )
     wide_dead_zone: float = setting(
-        2.0,
-        "deflections at break-away",
-        "Most starts of a survey lie within a wider dead zone, where no integrator winds up.",
+        2.0, "deflections at break-away", "Most starts of a survey lie within a wider one, where nothing winds up."
     )
     friction_stages_at_once: int = setting(64, "", "Hundreds of speeds each: more stages at once take too much memory.")
     trace_samples: int = setting(
@@ -88,9 +84,7 @@ class OrbitSettings(Settings):
         0.25, "of the range", "Returns farther off the others belong to another branch of the map."
     )
     leak_time_constants: float = setting(
-        10.0,
-        "time constants",
-        "By then the integrator of a stage that sticks is 5e-5 off its end, and changes no more.",
+        10.0, "time constants", "By then the integrator of a stuck stage is 5e-5 off its end."
     )
     map_points: int = setting(32, "", "Fixed points closer than a step are missed; the map is refined where it turns.")
     map_range: tuple[float, float] = setting(
@@ -104,9 +98,7 @@ class OrbitSettings(Settings):
         0.1, "", "An older Jacobian serves on while steps shrink the gap at least so much."
     )
     stalled_steps: tuple[int, int, int] = setting(
-        (3, 8, 1),
-        "",
-        "Far off, near, closed: a gap that has not halved in as many steps stays; once closed, it halves by chance.",
+        (3, 8, 1), "", "Far off, near, closed: a gap that has not halved in as many steps stays."
     )
     newton_stride: float = setting(0.3, "", "Longer steps leave the range in which the orbit is the same.")
     followed_stalled_steps: tuple[int, int, int] = setting(

@@ -249,6 +249,7 @@ class _Shooting:
 
     @property
     def orbits(self) -> Orbits:
+        """The best orbits so far, and whether they are closed."""
         closed = self.gaps < self.limit
         return Orbits(self.best_states, self.best_times, self.sign, self.gaps, closed, swings_of_simplest(self.sign))
 
@@ -299,6 +300,7 @@ class _Following(_Shooting):
         return step
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
+        """Keep the Jacobians of the best orbits so far as well."""
         if not self.chatters:
             better = which[gaps < self.gaps[which]]
             self.best_jacobians[better] = self.jacobians[better]
@@ -313,6 +315,7 @@ class _Following(_Shooting):
         self.jacobians[which, -1, -1] = along
 
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
+        """Jacobians by states, time and place; where a limiter chatters, that by place serves while gaps shrink."""
         settings = OrbitSettings.current()
         self.jacobians[which, :-1, :-1] = super()._jacobians(which, stages, shot)
         gaps = np.max(np.abs(shot.ends - self.states[which]) / stages.scales, axis=1)
@@ -337,6 +340,7 @@ class _Following(_Shooting):
         return np.hstack([ends, super()._residual(both, stages)]).reshape(2, len(which), -1)
 
     def _residual(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
+        """What is left of the conditions of orbits, and how far they are from their borders."""
         sizes = (np.abs(self.states[which, stages.sticking]), self.times[which])
         where = np.stack([self.places[which], *np.log(sizes)], axis=1)
         residual = (self.border.normal[which] * where).sum(axis=1) - self.border.level[which]
@@ -344,6 +348,7 @@ class _Following(_Shooting):
 
 
 def _iterated(shooting: _S) -> _S:
+    """Take Newton steps until all orbits are closed or get no closer."""
     for _ in range(OrbitSettings.current().newton_steps):
         if not shooting.advance():
             break

@@ -54,6 +54,7 @@ class Mapped:
         return tuple(self._map(k) for k in range(self.stages.count))
 
     def _map(self, stage: int) -> LandingMap:
+        """The return map of one stage, from its own runs."""
         which = np.flatnonzero(self.owners == stage)
         length, symmetric = float(self.stages.length[stage]), bool(self.stages.symmetric[stage])
         return LandingMap.of(self.landings.take(which), length, symmetric).renumbered(which)

@@ -12,9 +12,7 @@ class ReturnMapSettings(Settings):
     """Where a stage lands after each distance, and what that tells of all further landings."""
 
     hardly_attracting_share: float = setting(
-        0.95,
-        "",
-        "With more of a deviation left per repetition, 51 of 149 sketched attractors of the rig do not attract.",
+        0.95, "", "With more of a deviation left per repetition, 51 of 149 sketched attractors did not attract."
     )
     least_arriving_points: int = setting(
         4, "", "Attractors to which fewer points of a map come are artefacts of its gaps."

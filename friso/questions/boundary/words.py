@@ -312,7 +312,7 @@ def end_sentence(traced: Diagram, key: ShownKey) -> str:
 def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     curves = lines(traced)
     text = [f"{_course(traced, number, keys)} ({_accuracy(line, keys)})." for number, line in enumerate(curves)]
-    text += meeting_sentences(traced, keys)
+    text += meeting_sentences(traced, keys) or ["No two of the curves meet."] * (len(curves) > 1)
     text += [
         f"{kind.capitalize()}: beyond, {MEANINGS[kind]}." for kind in dict.fromkeys(line.kinds[0] for line in curves)
     ]
