@@ -20,7 +20,7 @@ LITERALS = {
     "friso/equations": 27,
     "friso/frequency": 74,
     "friso/hunting": 11,
-    "friso/identification": 26,
+    "friso/identification": 27,
     "friso/interface": 4,
     "friso/leaf_springs": 26,
     "friso/platform": 11,

@@ -9,7 +9,12 @@ import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
 from friso.identification.inverse_model import InverseModel
-from friso.identification.output_error.effects import Explained, explained_by, explained_by_forces, reaching_over
+from friso.identification.output_error.effects import (
+    ExplainedResidual,
+    explained_by,
+    explained_by_forces,
+    reaching_over,
+)
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.settings import DoubtSettings
 
@@ -96,7 +101,7 @@ def _bends(share: np.ndarray, counted: np.ndarray) -> list[np.ndarray]:
     return [shape - np.average(shape, weights=counted) for shape in shapes]
 
 
-def _drift(explained: Explained | None, bends: Sequence[np.ndarray]) -> RecordDrift | None:
+def _drift(explained: ExplainedResidual | None, bends: Sequence[np.ndarray]) -> RecordDrift | None:
     """Return the changes along the record from the sizes of their bends."""
     if explained is None:
         return None

@@ -11,7 +11,11 @@ from friso.quantities import percent
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Count the samples at the largest and the smallest force."""
+    """Count the samples at the largest and the smallest force.
+
+    A force that clips is smaller than the true one just where inertia is large, and friction at low speed stands for
+    the rest.
+    """
     share = checks.clipped_share(case.log["force"])
     if share > LogSettings.current().share_of_clipped_samples:
         words = f"{percent(share)} of the force samples lie at its extremes: the channel clips"

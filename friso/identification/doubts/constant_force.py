@@ -11,7 +11,11 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Compare the constant force of the inverse model with its Coulomb friction, and with the force at all."""
+    """Compare the constant force of the inverse model with its Coulomb friction, and with the
+    force at all.
+
+    Gravity on an axis that is not level does so, and an offset of the force's channel.
+    """
     inverse = case.inverse
     offset, coulomb = (abs(inverse.value(name)) for name in ("offset", "coulomb"))
     share = DoubtSettings.current().force_share_of_a_constant_force

@@ -58,6 +58,7 @@ def coupling_force(case: FitCase) -> np.ndarray | None:
 
 
 def _sentence(share: float) -> str:
+    """Say which way a coupling moves the mass, by a share of it."""
     where, way = (
         ("a part of the load moved on a coupling behind the measured position", "smaller")
         if share > 0

@@ -11,7 +11,10 @@ from friso.identification.inverse_model import inverse_model
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Fit the inverse model with one more column: time."""
+    """Fit the inverse model with one more column: time.
+
+    The force of a channel that warms up, or of a process, may drift while nothing of the machine changes.
+    """
     log = case.log
     with suppress(InputError):
         time = {"drift": log.time - log.time.mean()}

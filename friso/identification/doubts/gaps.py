@@ -9,7 +9,10 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Compare the longest stretch without a gap, which alone is fitted, with the whole record."""
+    """Compare the longest stretch without a gap, which alone is fitted, with the whole record.
+
+    Derivatives and filters do not reach across a gap.
+    """
     part, step, count = case.log.longest, case.log.sample_time, len(case.log.time)
     share = (part.stop - part.start) / count
     if share > DoubtSettings.current().share_of_a_whole_record:

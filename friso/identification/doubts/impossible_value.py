@@ -18,7 +18,11 @@ NEGATIVE = "it comes out negative, which it cannot be"
 
 
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
-    """Cut intervals at 0 where a key allows no less; refuse what is negative, and bound what cannot be 0 from above."""
+    """Cut intervals at 0 where a key allows no less, and refuse what cannot be.
+
+    What is negative by its whole interval is refused; what cannot be 0 is bounded from above where its interval holds
+    0.
+    """
     bounds = {key: declared.bound for key, declared in numeric_keys(case.flat).items()}
     answers = {}
     for key, one in case.determined.items():

@@ -11,7 +11,10 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: ValueCase) -> Iterator[RaisedDoubt]:
-    """Compare the Coulomb friction of the inverse model with nothing, and with the force at all."""
+    """Compare the Coulomb friction of the inverse model with nothing, and with the force at all.
+
+    Where a log moves in one direction only, friction and a constant force cannot be told apart, and may cancel.
+    """
     value, unit = case.inverse.value("coulomb"), case.unit
     least = DoubtSettings.current().force_share_of_no_friction * float(np.std(case.inverse.measured))
     if value < least:

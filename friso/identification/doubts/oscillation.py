@@ -13,7 +13,11 @@ from friso.quantities import percent
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Look for a peak of the residual's spectrum that holds most of its power."""
+    """Look for a peak of the residual's spectrum that holds most of its power.
+
+    A mode of the structure in the band swings at one frequency, and so does a force that repeats along the way of
+    constant speed.
+    """
     inverse, settings = case.inverse, DoubtSettings.current()
     left = inverse.measured - inverse.fitted
     step = float(np.median(np.diff(inverse.time)))

@@ -11,7 +11,10 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Count how many of its smallest steps the position travels."""
+    """Count how many of its smallest steps the position travels.
+
+    Coarse digits make accelerations of noise, and hide how bristles bend.
+    """
     position = case.log["position"][case.log.longest]
     steps = np.abs(np.diff(position))
     digit, travel = float(steps[steps > 0].min(initial=np.inf)), float(np.ptp(position))

@@ -9,7 +9,11 @@ from friso.identification.logs.checks import jumps
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Look for a step between two samples that no motion makes."""
+    """Look for a step between two samples that no motion makes.
+
+    Such a step is many times larger than all steps but a few. The inverse model turns it into a force that no machine
+    has.
+    """
     log = case.log
     size, sample = jumps(log["position"][log.longest])
     if size:

@@ -74,6 +74,7 @@ def _force_moved(log: Log, lag: int, width: int) -> Log:
 
 
 def _sentence(lag: int, width: int, step: float) -> str:
+    """Say which shift and which average improve the fit, and what that suggests."""
     shift = f"{abs(lag) * step * 1e3:.3g} ms {'earlier' if lag < 0 else 'later'}"
     if width == 1:
         return f"shifting the force {shift} improves the fit considerably, which suggests a delay between the channels"

@@ -9,7 +9,10 @@ from friso.identification.response.analysis import Bench
 
 
 def find(bench: Bench) -> Iterator[RaisedDoubt]:
-    """Look at the sign of the driven mass."""
+    """Look at the sign of the driven mass.
+
+    A mass line is at -180 degrees; one at 0 degrees goes against the force.
+    """
     model = bench.two_masses
     if not (model.signs[0] < 0 if model is not None else any(line.sign < 0 for line in bench.lines[:1])):
         return

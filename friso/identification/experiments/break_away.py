@@ -22,7 +22,9 @@ from friso.identification.readings.settings import ReadingSettings
 
 @dataclass(frozen=True)
 class BreakAway:
-    """Static friction [N] in all and per direction, of the break-away forces of `ramps` at rate 0."""
+    """Static friction [N] from the break-away forces of `ramps`, extrapolated to rate 0, in all
+    and per direction.
+    """
 
     static: Estimate
     forward: Estimate
@@ -32,7 +34,8 @@ class BreakAway:
 
 
 def static_from_ramps(log: Log, mass: float = 0.0) -> BreakAway:
-    """Static friction of the break-away forces of the ramps in a log; see `rate_effect`.
+    """Estimate static friction from the break-away forces of the ramps in a log; see
+    `rate_effect`.
 
     Without the `mass` [kg] that moves, the interval allows for the inertia of the heaviest mass that can have moved so
     fast. Raises InputError for a missing channel.
@@ -60,7 +63,7 @@ def static_from_ramps(log: Log, mass: float = 0.0) -> BreakAway:
 
 
 def _claims_together(courses: Sequence[Course]) -> str | None:
-    """Enough ramps of the force in all, and some in each log."""
+    """Claim logs with enough ramps of the force in all, and some in each."""
     ramps = [course.ramps for course in courses]
     enough = all(ramps) and sum(ramps) >= ReadingSettings.current().fewest_ramps
     return f"the force rises evenly from none {sum(ramps)} times until the position moves off" if enough else None
@@ -72,6 +75,7 @@ def _partial(log: Log) -> bool:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> BreakAway:
+    """Analyse a log of force ramps, with the masses that are believed to move."""
     (log,) = logs
     assert isinstance(log, Log)
     return static_from_ramps(log, sum(prior.masses(log)))

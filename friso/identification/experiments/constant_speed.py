@@ -30,6 +30,9 @@ class FrictionAtSpeeds:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> FrictionAtSpeeds:
+    """Analyse a log of constant speeds, with the masses that are believed to move and the loop's
+    crossover.
+    """
     (log,) = logs
     assert isinstance(log, Log)
     mass, crossover = sum(prior.masses(log)), bandwidth(prior.flat(log))
@@ -38,15 +41,20 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _stated_exponent(prior: Prior) -> float | None:
-    """The Stribeck exponent that the user's stage file states, without uncertainty; None where it states none."""
+    """Return the Stribeck exponent that the user's stage file states, without uncertainty; None
+    where it states none.
+    """
     if prior.stage is None or not prior.from_user or EXPONENT in {*prior.made_up, *prior.stage.uncertain()}:
         return None
     return prior.stage.flat().get(EXPONENT)
 
 
 def _estimates(result: FrictionAtSpeeds, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Friction in both directions, in the order of its covariance, and the constant force; an exponent that the stage
-    states is none of them."""
+    """Return friction in both directions, in the order of its covariance, and the constant
+    force.
+
+    An exponent that the stage states is none of them.
+    """
     both, bias = result.velocity.both, "bias.stage" if stage and "masses.cart" not in stage.flat() else "bias.cart"
     friction = [both.coulomb, both.viscous, both.static, both.stribeck_velocity]
     friction += [both.stribeck_exponent] if both.stribeck_exponent.low < both.stribeck_exponent.high else []
@@ -54,7 +62,10 @@ def _estimates(result: FrictionAtSpeeds, stage: Stage | None) -> tuple[Estimate,
 
 
 def _correlated(result: FrictionAtSpeeds, estimates: Sequence[Estimate]) -> Correlated:
-    """By the covariance of the fit, of which the constant force is independent: passes go there and back."""
+    """Return estimates as the covariance of the fit correlates them.
+
+    The constant force is independent of them: passes go there and back.
+    """
     covariance = result.velocity.both.covariance
     if not covariance.size:
         return independent(result, estimates)
@@ -66,14 +77,17 @@ def _correlated(result: FrictionAtSpeeds, estimates: Sequence[Estimate]) -> Corr
 
 
 def _partial(log: Log) -> bool:
-    """Whether a log holds too few speeds for a curve of friction over speed."""
+    """Tell whether a log holds too few speeds for a curve of friction over speed."""
     steady = [abs(stretch.velocity) for stretch in passes(log) if stretch.steady]
     return not steady or distinct(np.array(steady)) < ReadingSettings.current().speeds_of_a_line
 
 
 def _claims_together(courses: Sequence[Course]) -> str | None:
-    """Constant speeds, most of the way of each log, and enough of them for a curve of friction over speed. At the
-    slowest speeds a body may stick and slip: a log that goes one way is one of theirs all the same."""
+    """Claim logs of which most of the way goes at constant speeds, enough for a curve of
+    friction over speed.
+
+    At the slowest speeds a body may stick and slip: a log that goes one way is one of theirs too.
+    """
     settings = ReadingSettings.current()
     speeds = [course.speeds for course in courses]
     fitting = all(len(of_one) or course.one_way for of_one, course in zip(speeds, courses, strict=True))

@@ -21,6 +21,7 @@ from friso.stage import Stage
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Bench:
+    """Analyse logs of one bench together, or a response as somebody measured it."""
     (first, *_) = logs
     if not isinstance(first, Log):
         return analyse((), settings.band, measured=first)
@@ -28,8 +29,10 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _claims(course: Course) -> str | None:
-    """A periodic excitation moves a stage whose reference does not move; it hardly rests, holds many frequencies, and
-    turns often."""
+    """Claim a log in which a periodic excitation moves a stage whose reference does not move.
+
+    It hardly rests, holds many frequencies, and turns often.
+    """
     settings = ExperimentSettings.current()
     repetition = None if course.reference_moves else course.repetition
     if repetition is None or repetition.rests > settings.rests_of_moves:
@@ -40,7 +43,10 @@ def _claims(course: Course) -> str | None:
 
 
 def _estimates(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Masses and joint from a two-mass model in newtons and metres; a mass line alone is the whole mass."""
+    """Return masses and joint from a two-mass model in newtons and metres.
+
+    A mass line alone is the whole mass. A resonance nearer the parasitic mode than the joint's shows no joint.
+    """
     units = (bench.driven.channels.input_unit, bench.driven.channels.output_unit)
     if units != ("N", "m"):
         return ()
@@ -59,8 +65,11 @@ def _estimates(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
 
 
 def _of_stage_alone(mass: float, stage: Stage) -> bool:
-    """Whether a mass line [kg] is rather that of the stage above the mode of a free joint than that of all masses:
-    which of the two it is nearer to as they are believed to be."""
+    """Tell whether a mass line [kg] is rather that of the stage above the mode of a free joint
+    than that of all masses.
+
+    It is that of the two to which it is nearer, as they are believed to be.
+    """
     flat = stage.flat()
     if stage.joint is None or flat["joint.locked"]:
         return False
@@ -69,7 +78,9 @@ def _of_stage_alone(mass: float, stage: Stage) -> bool:
 
 
 def _parasitic(model: TwoMass, stage: Stage) -> float | None:
-    """The resonance [Hz] of a two-mass model that is rather the stage's parasitic mode than its joint's; else None."""
+    """Return the resonance [Hz] of a two-mass model that is rather the stage's parasitic mode
+    than its joint's; else None.
+    """
     flat = stage.flat()
     if "parasitic.frequency" not in flat or "joint.stiffness" not in flat:
         return None
@@ -81,7 +92,7 @@ def _parasitic(model: TwoMass, stage: Stage) -> float | None:
 
 
 def _correlated(result: Bench, estimates: Sequence[Estimate]) -> Correlated:
-    """Masses that are shared out of one move together."""
+    """Return the estimates that are shown; masses that are shared out of one move together."""
     certain = determined(estimates)
     if all(estimate.name.startswith("masses.") for estimate in estimates):
         return certain, np.ones((len(certain), len(certain)))
@@ -89,7 +100,7 @@ def _correlated(result: Bench, estimates: Sequence[Estimate]) -> Correlated:
 
 
 def _predict(result: Bench, log: Log, prior: Prior, settings: AnalysisSettings) -> tuple[float, ...]:
-    """The relative errors of the outputs over the band, the driven mass's first."""
+    """Return the relative errors of the outputs over the band, the driven mass's first."""
     return predicted(result, log, settings.period)
 
 

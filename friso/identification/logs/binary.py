@@ -194,6 +194,7 @@ class _Heard(logging.Handler):
     """What a library logs, kept as lines."""
 
     def __init__(self) -> None:
+        """Begin with no lines."""
         super().__init__(logging.WARNING)
         self.lines: list[str] = []
 

@@ -36,10 +36,13 @@ _INITIALS = {"reference": "rs", "position": "xyqps", "velocity": "v", "force": "
 
 
 class GapsError(LogError):
-    """What logs do not tell: the errors of which any one would stop the reading, each with the option that mends it as
-    its example; and the channels `proposed` for roles, by role."""
+    """What logs do not tell: the errors of which any one would stop the reading.
+
+    Each has the option that mends it as its example. `proposed` are channels for roles, by role.
+    """
 
     def __init__(self, gaps: Sequence[LogError], proposed: Mapping[str, str] | None = None) -> None:
+        """Join the errors to one message, whose example mends them all."""
         self.gaps, self.proposed = tuple(gaps), dict(proposed or {})
         (first, *more) = self.gaps
         if not more:
@@ -63,7 +66,10 @@ class GapsError(LogError):
 
 
 def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> None:
-    """Raises GapsError for all that has to be told before a log can be read as one with the roles that are `needed`."""
+    """Check that all is told before a log can be read as one with the roles that are `needed`.
+
+    Raises GapsError for all that is not, at once.
+    """
     table, origin = reading.table, reading.origin
     named = {id(choice.channel) for role, choice in proposal.chosen.items() if choice.by_user and role != "time"}
     signals = [c for c in table.channels if id(c) in named or (role_of(c.name, c.unit) or ("",))[0] != "time"]
@@ -105,7 +111,7 @@ def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> N
 
 
 def _of_units(units: Mapping[str, LogError | None], chosen: Mapping[str, AssignedRole]) -> list[LogError]:
-    """The gaps of units by role; where an axis turns, a torque needs no scale to newtons."""
+    """Return the gaps of units by role; where an axis turns, a torque needs no scale to newtons."""
     gaps = {role: gap for role, gap in units.items() if gap is not None}
     if any(gap.example == TURNS for gap in gaps.values()):
         turned = ROTARY.unit(FORCE)
@@ -118,8 +124,12 @@ def _of_units(units: Mapping[str, LogError | None], chosen: Mapping[str, Assigne
 
 
 def _likeliest(role: str, table: ChannelTable, taken: Mapping[str, Channel]) -> tuple[Channel | None, str]:
-    """The channel that fits a role best by unit and first letter, of those that change and have no other role, and why
-    where it is one of several alike; None without any. No force follows the position, as a reference does."""
+    """Return the channel that fits a role best, and why where it is one of several alike; None
+    without any.
+
+    It fits by unit and first letter, of those that change and have no other role. No force follows the position, as a
+    reference does.
+    """
     fits = _fitting(role, table, taken.values())
     if role == "force":
         places = [taken[name] for name in ("position", "reference") if name in taken]
@@ -132,8 +142,10 @@ def _likeliest(role: str, table: ChannelTable, taken: Mapping[str, Channel]) -> 
 
 
 def _fitting(role: str, table: ChannelTable, taken: Iterable[Channel]) -> list[tuple[Channel, tuple[int, ...]]]:
-    """The channels that may have a role, and how well they fit it, the best first: of as many samples as most have, and
-    by what they are."""
+    """Return the channels that may have a role, and how well they fit it, the best first.
+
+    They fit by having as many samples as most have, and by what they are.
+    """
     used = {id(channel) for channel in taken}
     usual = Counter(channel.values.size for channel in table.channels).most_common(1)[0][0]
     fits = [
@@ -148,19 +160,25 @@ def _fitting(role: str, table: ChannelTable, taken: Iterable[Channel]) -> list[t
 
 
 def _kinds(role: str) -> tuple[str, ...]:
-    """The units in which a role may stand, those of a rotary axis among them."""
+    """Return the units in which a role may stand, those of a rotary axis among them."""
     return ROLES[role], *OTHERS.get(ROLES[role], ())
 
 
 def _is_of_another(role: str, unit: str) -> bool:
-    """Whether a unit is that of another quantity than the role's, which no scale makes one: rpm of a position."""
+    """Tell whether a unit is that of another quantity than the role's, which no scale makes one:
+    rpm of a position.
+    """
     others = {"Hz", *ROLES.values(), *map(ROTARY.unit, ROLES.values())} - {*_kinds(role)}
     return bool(unit) and any(unit_factor(unit, kind) is not None for kind in others)
 
 
 def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Channel | None, str]:
-    """Of the channels that move as the best for a position does, the only one whose name says that it was measured, or
-    the one with the most noise, as what is measured has, and why; None where that cannot be told."""
+    """Choose among channels that move as the best for a position does the one that was measured,
+    and say why.
+
+    It is the only one whose name says that it was measured, or the one with the most noise, as what is measured has;
+    None where that cannot be told.
+    """
     alike = [channel for channel in channels if channel is best or _are_alike(channel, best)]
     if role != "position" or len(alike) == 1:
         return best, ""
@@ -176,7 +194,7 @@ def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Ch
 
 
 def _are_alike(one: Channel, other: Channel) -> bool:
-    """Whether two channels correlate, as a position does with its reference."""
+    """Tell whether two channels correlate, as a position does with its reference."""
     settings = LogSettings.current()
     if one.values.size != other.values.size:
         return False
@@ -190,15 +208,19 @@ def _are_alike(one: Channel, other: Channel) -> bool:
 
 
 def _noise(channel: Channel) -> float:
-    """The fourth differences of a channel, in which little of a motion is left, relative to its range."""
+    """Return the fourth differences of a channel, in which little of a motion is left, relative
+    to its range.
+    """
     finite = channel.values[np.isfinite(channel.values)]
     with np.errstate(all="ignore"):
         return float(np.std(np.diff(finite, 4)) / np.ptp(finite))
 
 
 def _fit(role: str, channel: Channel) -> tuple[bool, int, bool, bool]:
-    """How well a channel fits a role: whether it changes, and not as a clock does; its unit, whether it is what was
-    wanted, its first letter."""
+    """Return how well a channel fits a role.
+
+    It changes, and not as a clock does; its unit, whether it is what was wanted, and its first letter count.
+    """
     finite = channel.values[np.isfinite(channel.values)]
     changes = bool(finite.size and np.ptp(finite) > 0) and not rises_evenly(finite)
     fits = bool(channel.unit) and any(unit_factor(channel.unit, kind) is not None for kind in _kinds(role))
@@ -208,7 +230,7 @@ def _fit(role: str, channel: Channel) -> tuple[bool, int, bool, bool]:
 
 
 def _of_time(reading: Reading, proposal: Proposal, choices: Sequence[AssignedRole]) -> list[LogError]:
-    """Whether channels have instants."""
+    """Return what has to be told of the instants of channels."""
     if "time" in proposal.rivals:
         return []
     for choice in choices:

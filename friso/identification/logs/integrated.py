@@ -22,8 +22,10 @@ LENGTHS = ("m", "rad")
 
 
 def is_needed(table: ChannelTable, proposal: Proposal, needed: Sequence[str]) -> bool:
-    """Whether the position that is needed has to be the integral of the velocity: no channel has that role or could
-    have it, unless the user assigned the velocity and no position."""
+    """Tell whether the position that is needed has to be the integral of the velocity.
+
+    No channel has that role or could have it, unless the user assigned the velocity and no position.
+    """
     velocity = proposal.chosen.get("velocity")
     if velocity is None or "position" not in needed or "position" in {*proposal.chosen, *proposal.rivals}:
         return False
@@ -33,7 +35,9 @@ def is_needed(table: ChannelTable, proposal: Proposal, needed: Sequence[str]) ->
 
 
 def _may_be_a_position(channel: Channel) -> bool:
-    """Whether a channel without a role has the unit of a position, or none at all, and changes."""
+    """Tell whether a channel without a role has the unit of a position, or none at all, and
+    changes.
+    """
     finite = channel.values[np.isfinite(channel.values)]
     if not finite.size or not np.ptp(finite) > 0 or role_of(channel.name) is not None:
         return False
@@ -41,7 +45,9 @@ def _may_be_a_position(channel: Channel) -> bool:
 
 
 def integrated(velocity: np.ndarray, sample_time: float, segments: Sequence[slice]) -> np.ndarray:
-    """The integral [m] of a velocity [m/s], shape (n,), over each of the segments, by the trapezoidal rule."""
+    """Integrate a velocity [m/s], shape (n,), over each of the segments, by the trapezoidal rule
+    [m].
+    """
     position = np.zeros(len(velocity))
     for part in segments:
         position[part] = cumulative_trapezoid(velocity[part], dx=sample_time, initial=0.0)

@@ -11,14 +11,14 @@ from friso.identification.logs.settings import LogSettings
 
 
 def joinable(one: Log, other: Log) -> bool:
-    """Whether two logs have the same roles in the same units, sample time and set-up."""
+    """Tell whether two logs have the same roles in the same units, sample time and set-up."""
     same = one.signals.keys() == other.signals.keys() and dict(one.units) == dict(other.units)
     same = same and dict(one.setup) == dict(other.setup) and one.axis == other.axis
     return same and abs(one.sample_time / other.sample_time - 1) <= LogSettings.current().sample_time_tolerance
 
 
 def join_logs(logs: Sequence[Log]) -> Log:
-    """Logs that are `joinable` as one, each after a gap of a second behind the one before."""
+    """Join logs that are `joinable`, each after a gap of a second behind the one before."""
     first = logs[0]
     times, segments, start, end = [], [], 0, 0.0
     for log in logs:
@@ -43,7 +43,7 @@ def join_logs(logs: Sequence[Log]) -> Log:
 
 
 def join_alike(logs: Sequence[Log]) -> list[Log]:
-    """The logs, those that are alike joined."""
+    """Return the logs, those that are alike joined."""
     groups: list[list[Log]] = []
     for log in logs:
         alike = next((group for group in groups if joinable(group[0], log)), None)

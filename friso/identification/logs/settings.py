@@ -129,6 +129,3 @@ class LogSettings(Settings):
 
     # Units.
     characters_of_a_unit: int = setting(100, "", "Characters of a unit at most.")
-    largest_length_unit: float = setting(
-        1e5, "", "No log is in megametres, megaseconds or gigaradians: such a text is something else."
-    )

@@ -23,7 +23,10 @@ from friso.quantities import quoted
 
 
 def read_text(path: Path) -> ChannelTable:
-    """The table of a text file. Raises LogError for ragged rows and for a text among the numbers, with its line."""
+    """Read the table of a text file.
+
+    Raises LogError for ragged rows and for a text among the numbers, with its line.
+    """
     form = layout(path)
     if not form.certain and form.delimiter != "," and _has_comma(path, form):
         form = replace(form, decimal=",")
@@ -59,16 +62,19 @@ def read_text(path: Path) -> ChannelTable:
 
 
 def _such_as(cells: Any) -> str:
-    """The first of the texts in a column, where it has digits and may be a number to its reader."""
+    """Return the first of the texts in a column, where it has digits and may be a number to its
+    reader.
+    """
     texts = cells.dropna().astype(str).str.strip()
     first = next(iter(texts[texts != ""]), "")
     return f", but texts such as {quoted(first[:40])}" if re.search(r"\d", first) else ""
 
 
 def read_frame(path: Path, form: TextLayout) -> Any:
-    """All cells from the first row of numbers on; columns without text are floats. Raises LogError.
+    """Read all cells from the first row of numbers on; columns without text are floats.
 
     The lines before are skipped here, not by pandas, which would take a lone quotation mark in them for an open one.
+    Raises LogError.
     """
     options: dict[str, Any] = {
         "header": None, "decimal": form.decimal,
@@ -95,18 +101,24 @@ class _WithoutDosEnd:
     """A text without the mark with which programs of DOS end it."""
 
     def __init__(self, file: TextIO) -> None:
+        """Wrap a text file."""
         self._file = file
 
     def read(self, size: int = -1) -> str:
+        """Read so many characters, without the mark."""
         return self._file.read(size).replace(DOS_END, "")
 
     def __iter__(self) -> Iterator[str]:
+        """Yield lines without the mark."""
         return (line.replace(DOS_END, "") for line in self._file)
 
 
 def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
-    """The error for the first line with more cells than columns, or for a quotation mark that nothing closes; the
-    parser's own words where there is neither."""
+    """The error for the first line with more cells than columns, or for a quotation mark that
+    nothing closes.
+
+    It has the parser's own words where there is neither.
+    """
     with path.open(encoding=form.encoding, errors="replace") as file:
         for number, line in enumerate(file, 1):
             cells = split_line(line.rstrip("\r\n"), form.delimiter) if number > form.first else []
@@ -119,7 +131,10 @@ def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
 
 
 def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
-    """Raises LogError for a row with fewer cells than columns above others that have them all."""
+    """Check that no row has fewer cells than columns above others that have them all.
+
+    Raises LogError.
+    """
     present = frame.iloc[:, -1].notna().to_numpy()
     missing = np.flatnonzero(~present[: int(np.flatnonzero(present)[-1])]) if present.any() else np.empty(0, dtype=int)
     if not missing.size:
@@ -134,7 +149,9 @@ def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
 
 
 def _has_comma(path: Path, form: TextLayout) -> bool:
-    """Whether a comma stands anywhere after the first numbers (the head showed whole numbers only)."""
+    """Tell whether a comma stands anywhere after the first numbers (the head showed whole
+    numbers only).
+    """
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as bytes_:
         at = 0
         for _ in range(form.first):
@@ -143,8 +160,11 @@ def _has_comma(path: Path, form: TextLayout) -> bool:
 
 
 def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.ndarray, str] | None:
-    """Values of a column, with "s" for the unit of time stamps; None for a column of texts.
-    Raises LogError for a text among numbers."""
+    """Return the values of a column, with "s" for the unit of time stamps; None for a column of
+    texts.
+
+    Raises LogError for a text among numbers.
+    """
     if cells.dtype == bool or pd.api.types.is_numeric_dtype(cells.dtype):
         values = cells.to_numpy(dtype=float)
         return None if np.isnan(values).all() else (values, "")
@@ -168,8 +188,10 @@ def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.nd
 
 
 def _ungrouped(texts: Any, present: Any, decimal: str) -> Any:
-    """Texts without the signs that group thousands, where all are numbers written so and one has a decimal sign too:
-    12.345,67."""
+    """Return texts without the signs that group thousands: 12.345,67.
+
+    All have to be numbers written so, and one to have a decimal sign too.
+    """
     group = "." if decimal == "," else ","
     digits = rf"[+-]?(?:\d{{1,3}}(?:\{group}\d{{3}})*|\d+)"
     with_both = rf"[+-]?\d{{1,3}}(?:\{group}\d{{3}})+\{decimal}\d+"
@@ -180,14 +202,17 @@ def _ungrouped(texts: Any, present: Any, decimal: str) -> Any:
 
 
 def as_numbers(texts: Any) -> np.ndarray:
-    """Texts as floats, NaN for what is no number."""
+    """Return texts as floats, NaN for what is no number."""
     numbers: Any = pd.to_numeric(texts, errors="coerce")
     return numbers.to_numpy(dtype=float)
 
 
 def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarray:
-    """Seconds since the first of these time stamps. Of dates that are not as in ISO 8601, which may be of the day or of
-    the month first, only the time of day counts; one that steps back goes on the next day."""
+    """Return the seconds since the first of some time stamps.
+
+    Of dates that are not as in ISO 8601, which may be of the day or of the month first, only the time of day counts;
+    one that steps back goes on the next day.
+    """
     texts = texts.str.replace(",", ".", regex=False)
     try:
         if texts[present].str.fullmatch(ISO.pattern).all():
@@ -203,7 +228,9 @@ def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarr
 
 
 def _time_of_day(texts: Any) -> np.ndarray:
-    """Seconds since midnight of texts that end with a time of day, NaN where there is none."""
+    """Return the seconds since midnight of texts that end with a time of day, NaN where there is
+    none.
+    """
     parts = texts.str.extract(rf"{CLOCK}$")
     hours, minutes, seconds = (as_numbers(parts[i].fillna("0").where(parts[0].notna())) for i in range(3))
     behind_colon = texts.str.count(":") == 3  # they may go without their zeros: 9:05:00:7 is 7 ms before 9:05:00:14
@@ -215,8 +242,10 @@ def _time_of_day(texts: Any) -> np.ndarray:
 
 
 def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any) -> list[Channel]:
-    """The columns without the empty cells below their last value. A cell that is missing at the end of a single row
-    stays and is a NaN, which the checks report."""
+    """Return the columns without the empty cells below their last value.
+
+    A cell that is missing at the end of a single row stays and is a NaN, which the checks report.
+    """
     out = []
     for column in columns:
         last = int(np.flatnonzero(~np.isnan(column.values))[-1]) + 1
@@ -232,9 +261,11 @@ def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any)
 
 
 def with_times(columns: list[Channel]) -> tuple[Channel, ...]:
-    """Each column with the instants of the time column to its left that is as long (a file may have one per channel);
-    where none stands to its left, of the only one there is, which may go on where the column has ended. A time column
-    is one that says so and has its unit."""
+    """Give each column the instants of the time column to its left that is as long.
+
+    A file may have one per channel; where none stands to its left, it is the only one there is, which may go on where
+    the column has ended. A time column is one that says so and has its unit.
+    """
     clocks = [(i, c) for i, c in enumerate(columns) if (role_of(c.name, c.unit) or ("",))[0] == "time"]
     clocks = [(i, c, unit_factor(c.unit, "s")) for i, c in clocks if c.unit]
     out = []

@@ -41,6 +41,8 @@ RESPONSES = tuple(
 """Units of frequency responses: positions and their rates over forces, or what stands for these."""
 _SPELLINGS = {text: unit for unit, texts in _WORDS["spellings"].items() for text in texts} | dict.fromkeys(RMS, "A")
 """Units as friso takes them, by how people write them."""
+_MEGA = 1e5
+"""No log is in megametres, megaseconds or gigaradians: such a text is something else, or written badly."""
 _GLUED = re.compile(
     r"(?P<stem>.*[A-Za-z0-9]?)_(?:(?P<letter>[smNAV])|(?P<unit>"
     r"secs?|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks|hz|khz))"
@@ -99,7 +101,7 @@ def unit_factor(unit: str, si_unit: str) -> float | None:
         factor = Quantity(si_unit, any_sign, "").factor(spelled(unit))
     except InputError:
         return None
-    return None if si_unit in ("m", "s", "rad") and factor > LogSettings.current().largest_length_unit else factor
+    return None if si_unit in ("m", "s", "rad") and factor > _MEGA else factor
 
 
 def is_unit(text: str) -> bool:

@@ -15,7 +15,7 @@ from friso.intervals import COVERAGE
 
 
 @dataclass(frozen=True)
-class Explained:
+class ExplainedResidual:
     """What effects that the model leaves out explain of the residual of a fit.
 
     `moved` is how far they move the fitted numbers, shape (free,), `sizes` are theirs, and `left` is the share of the
@@ -27,7 +27,9 @@ class Explained:
     left: float
 
 
-def explained_by_forces(fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]) -> Explained | None:
+def explained_by_forces(
+    fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]
+) -> ExplainedResidual | None:
     """Fit further forces to what a fit leaves, with its own numbers free to follow.
 
     Each force [N], shape (n,), is one of size 1; it is tried at the size `unit`, small enough for its effect to be in
@@ -40,7 +42,7 @@ def explained_by_forces(fit: OutputErrorFit, forces: Sequence[np.ndarray], units
 
 def explained_by(
     slopes: np.ndarray, rest: np.ndarray, effects: Sequence[np.ndarray], counted: np.ndarray
-) -> Explained | None:
+) -> ExplainedResidual | None:
     """Fit a residual, shape (n,), by fitted numbers and further effects.
 
     Derivatives have the shape (n, numbers), effects and weights `counted` the shape (n,). A number that changes
@@ -61,7 +63,7 @@ def explained_by(
     if rest @ rest <= left @ left * (1 + chance / independent):
         return None
     moved, sizes = np.split(solution, [slopes.shape[1]])
-    return Explained(moved, sizes, float(left @ left) / float(rest @ rest))
+    return ExplainedResidual(moved, sizes, float(left @ left) / float(rest @ rest))
 
 
 def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:

@@ -14,7 +14,10 @@ from friso.identification.logs.units import split_heading
 
 
 def read_lvm(path: Path) -> ChannelTable:
-    """LabVIEW measurement text. Raises LogError."""
+    """Read a LabVIEW measurement text.
+
+    Raises LogError.
+    """
     file = content_by("lvm_read", "LVM", path)
     segments = range(int(file["Segments"]))
     read = [item for k in segments for item in _lvm_segment(file[str(k)], file, f"segment {k + 1}")]
@@ -23,9 +26,12 @@ def read_lvm(path: Path) -> ChannelTable:
 
 
 def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) -> list[tuple[Channel, Any]]:
-    """The channels of a segment, each with the number of samples that the header states, or None: values over an X
-    column in seconds (the first, or one per channel). What the header states of a channel stands above its column, the
-    first column being that of the keys."""
+    """Return the channels of a segment, each with the number of samples that the header states,
+    or None.
+
+    Values stand over an X column in seconds (the first, or one per channel). What the header states of a channel stands
+    above its column, the first column being that of the keys.
+    """
     names, data = segment["Channel names"], np.atleast_2d(np.asarray(segment["data"], dtype=float))
     each_own, none = content.get("X_Columns") == "Multi", content.get("X_Columns") == "No"
     above = 0 if none else -1  # the reader leaves out the empty first column of files without X values
@@ -47,16 +53,18 @@ def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) 
 
 
 def _above(segment: dict[str, Any], key: str, column: int) -> Any:
-    """What the header says of a column, None for nothing."""
+    """Return what the header says of a column, None for nothing."""
     row = segment.get(key, [])
     return row[column] if 0 <= column < len(row) else None
 
 
 def _even(start: float | None, step: float | None, n: int) -> np.ndarray | None:
+    """Return `n` instants from a start on, a step apart; None without a step."""
     return start + step * np.arange(n) if start is not None and step is not None and step > 0 else None
 
 
 def _recognise(head: FileHead) -> bool:
+    """Tell a LabVIEW measurement text by its first bytes."""
     return head.start.lstrip(b"\xef\xbb\xbf").startswith(b"LabVIEW Measurement")
 
 

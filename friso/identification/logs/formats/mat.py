@@ -29,7 +29,10 @@ class _Contents:
 
 
 def read_mat(path: Path) -> ChannelTable:
-    """The channels and single numbers of a MAT file of any version. Raises LogError for a file that holds none."""
+    """Read the channels and single numbers of a MAT file of any version.
+
+    Raises LogError for a file that holds none.
+    """
     with path.open("rb") as file:
         newer = is_hdf5(file.read(520))
     walk = _Contents()
@@ -46,7 +49,9 @@ def read_mat(path: Path) -> ChannelTable:
 
 
 def _plainly_named(channels: list[Channel]) -> tuple[Channel, ...]:
-    """The channels without the name of the variable they stand in, where they differ without it."""
+    """Return the channels without the name of the variable they stand in, where they differ
+    without it.
+    """
     short = [channel.name.rpartition("/")[2] for channel in channels]
     names = [s if short.count(s) == 1 else c.name.replace("/", ".") for s, c in zip(short, channels, strict=True)]
     return tuple(replace(channel, name=name) for channel, name in zip(channels, names, strict=True))
@@ -75,7 +80,7 @@ def _walk(node: Any, name: str, walk: _Contents) -> None:
 
 
 def _array(values: np.ndarray, name: str, walk: _Contents) -> None:
-    """An array as one number, one channel, or one channel per column."""
+    """Take an array as one number, one channel, or one channel per column."""
     values = np.squeeze(values)
     if values.ndim == 0:
         walk.scalars[name] = float(values)
@@ -90,12 +95,12 @@ def _array(values: np.ndarray, name: str, walk: _Contents) -> None:
 
 
 def _structures(node: Any) -> list[dict[str, Any]]:
-    """A structure array as a list of structures, one alone too."""
+    """Return a structure array as a list of structures, one alone too."""
     return [item for item in (node if isinstance(node, list) else [node]) if isinstance(item, dict)]
 
 
 def _dspace(node: dict[str, Any], name: str) -> list[Channel]:
-    """The channels of a dSPACE recording: `Y(i).Data` over `X(XIndex).Data` in seconds."""
+    """Return the channels of a dSPACE recording: `Y(i).Data` over `X(XIndex).Data` in seconds."""
     axes = _structures(node["X"])
     out = []
     for i, curve in enumerate(_structures(node["Y"])):
@@ -111,7 +116,9 @@ def _dspace(node: dict[str, Any], name: str) -> list[Channel]:
 
 
 def _with_time(node: dict[str, Any], name: str, walk: _Contents) -> list[Channel]:
-    """The channels of Simulink's structure with time: `signals(i).values` over `time` in seconds."""
+    """Return the channels of Simulink's structure with time: `signals(i).values` over `time` in
+    seconds.
+    """
     time = np.squeeze(np.asarray(node["time"], dtype=float))
     out = []
     for i, curve in enumerate(_structures(node["signals"])):
@@ -133,12 +140,14 @@ def _with_time(node: dict[str, Any], name: str, walk: _Contents) -> list[Channel
 
 
 def _text(node: Any) -> str:
-    """A text node, "" for anything else."""
+    """Return a text node, "" for anything else."""
     return node.strip() if isinstance(node, str) else ""
 
 
 def _recognise(head: FileHead) -> bool:
-    """By its first bytes, or those behind the block that MATLAB puts before HDF5; or by its name."""
+    """Tell a MAT file by its first bytes, or those behind the block that MATLAB puts before
+    HDF5; or by its name.
+    """
     start = head.start
     return start.startswith(b"MATLAB ") or is_hdf5(start) or head.path.suffix.lower() == ".mat"
 

@@ -13,7 +13,10 @@ from friso.identification.logs.units import split_heading
 
 
 def read_tdms(path: Path) -> ChannelTable:
-    """National Instruments TDMS. Raises LogError."""
+    """Read a file of National Instruments TDMS.
+
+    Raises LogError.
+    """
     file = content_by("nptdms", "TDMS", path)
     channels, notes = [], []
     for item in file["channels"]:

@@ -31,7 +31,7 @@ _MARKS = ("Starttime of export", "StartRecord", "SampleTime[ms]", "SymbolName", 
 
 
 def is_twincat(lines: list[str]) -> bool:
-    """Whether the first lines are those of a Scope export."""
+    """Tell whether the first lines are those of a Scope export."""
     first = lines[0] if lines else ""
     if first[:4] != "Name" or not (delimiter := first[4:5]) or delimiter not in DELIMITERS:
         return False
@@ -44,7 +44,10 @@ def is_twincat(lines: list[str]) -> bool:
 
 
 def read_twincat(path: Path) -> ChannelTable:
-    """Channels with their own times. Raises LogError."""
+    """Read the channels of a Scope export with their own times.
+
+    Raises LogError.
+    """
     encoding, lines = decoded_head(path)
     delimiter = lines[0][4]
     rows = [_cells(line, delimiter) for line in lines]
@@ -67,17 +70,20 @@ def read_twincat(path: Path) -> ChannelTable:
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
-    """The cells of a line: several spaces between two are empty cells, those of groups that have ended."""
+    """Split a line into cells: several spaces between two are empty cells, those of groups that
+    have ended.
+    """
     return [cell.strip() for cell in csv_cells(line, delimiter)]
 
 
 def _is_data(cells: list[str]) -> bool:
+    """Tell whether all cells of a row that are filled are numbers."""
     filled = [cell for cell in cells if cell]
     return bool(filled) and all(is_number(cell, ",") or is_number(cell, ".") for cell in filled)
 
 
 def _without_end(frame: Any) -> Any:
-    """Without a last row "EOF" and empty rows below."""
+    """Return a table without a last row "EOF" and empty rows below."""
     marked = frame.iloc[:, 0].astype(str).str.strip().eq("EOF").to_numpy()
     return frame[~marked] if marked.any() else frame
 
@@ -85,7 +91,10 @@ def _without_end(frame: Any) -> Any:
 def _channels(
     path: Path, form: TextLayout, table: dict[str, list[str]], frame: Any
 ) -> tuple[tuple[Channel, ...], list[str]]:
-    """The channels of all groups, and lines that tell of them. Raises LogError."""
+    """Return the channels of all groups, and lines that tell of them.
+
+    Raises LogError.
+    """
     labels, notes, out = table["Name"], [], []
     clocks = [i for i, cell in enumerate(labels) if cell == "Name"]
     times = [_floats(path, form, frame, start) for start in clocks]
@@ -111,8 +120,11 @@ def _channels(
 
 
 def _no_shifted_rows(path: Path, form: TextLayout, frame: Any, times: list[np.ndarray]) -> None:
-    """Raises LogError where, in the row in which a group ends, the clock of another one jumps: the cells of the first
-    are missing, with their delimiters, and those behind them have moved to the left."""
+    """Check that no row lacks cells in the middle.
+
+    In the row in which a group ends, the clock of another one would jump: the cells of the first are missing, with
+    their delimiters, and those behind them have moved to the left. Raises LogError.
+    """
     ends = np.array(sorted({time.size for time in times} - {0}))
     for time in times:
         rows = ends[(ends > 2) & (ends < time.size)]
@@ -131,12 +143,15 @@ def _no_shifted_rows(path: Path, form: TextLayout, frame: Any, times: list[np.nd
 
 
 def _source(column: int, info: dict[str, str]) -> str:
+    """Say where a channel stands in the file."""
     texts = [info[key] for key in ("SymbolName", "Data-Type") if info.get(key)]
     return ", ".join([f"column {column + 1}", *texts])
 
 
 def _scaled(table: dict[str, list[str]]) -> list[str]:
-    """A line for the channels with an offset or a scale, which the exported values contain."""
+    """Write a line for the channels with an offset or a scale, which the exported values
+    contain.
+    """
     scaled = []
     for i, name in enumerate(table["Name"]):
         offset, scale = (table.get(key, [])[i : i + 1] for key in ("Offset", "ScaleFactor"))
@@ -146,7 +161,10 @@ def _scaled(table: dict[str, list[str]]) -> list[str]:
 
 
 def _floats(path: Path, form: TextLayout, frame: Any, column: int) -> np.ndarray:
-    """A column as floats. Raises LogError with the line of a text among the numbers."""
+    """Return a column as floats.
+
+    Raises LogError with the line of a text among the numbers.
+    """
     cells = frame.iloc[:, column]
     if pd.api.types.is_numeric_dtype(cells.dtype):
         return cells.to_numpy(dtype=float)

@@ -32,13 +32,19 @@ _KINDS = {8: "{0}", 11: "{0}/s", 12: "{0}/s^2", 9: "{1}", 13: "{1}"}
 
 
 def is_uff(head: bytes) -> bool:
-    """Whether the first bytes are a universal file: a line with -1 alone, then the number of a dataset."""
+    """Tell whether the first bytes are a universal file: a line with -1 alone, then the number
+    of a dataset.
+    """
     lines = [line.strip() for line in head[:400].splitlines() if line.strip()]
     return len(lines) > 1 and lines[0] == b"-1" and lines[1][:4].rstrip(b"bB ").isdigit()
 
 
 def sets_58(path: Path) -> list[dict[str, Any]]:
-    """The datasets 58 of a universal file, the code of its units (`units_code`) with each. Raises LogError for none."""
+    """Return the datasets 58 of a universal file, the code of its units (`units_code`) with
+    each.
+
+    Raises LogError for none.
+    """
     file = content_by("pyuff", "UFF", path)
     sets, systems = file["sets"], {*file["units"]}
     if not sets:
@@ -48,13 +54,16 @@ def sets_58(path: Path) -> list[dict[str, Any]]:
 
 
 def label(data: dict[str, Any], key: str) -> str:
-    """A text of a dataset, "" for NONE."""
+    """Return a text of a dataset, "" for NONE."""
     text = str(data.get(key, "") or "").strip()
     return "" if text.upper() == "NONE" else text
 
 
 def read_uff(path: Path) -> ChannelTable:
-    """The time histories of a universal file. Raises LogError."""
+    """Read the time histories of a universal file.
+
+    Raises LogError.
+    """
     times = [data for data in sets_58(path) if data["func_type"] == TIME_RESPONSE]
     if not times:
         raise LogError("log", "a UFF file without time histories", "function type 1 in a dataset 58", "", str(path))
@@ -70,19 +79,21 @@ def read_uff(path: Path) -> ChannelTable:
 
 
 def _unit(data: dict[str, Any]) -> str:
-    """The unit of time histories: that of their label, else by the kind of their data in the units of the file."""
+    """Return the unit of time histories: that of their label, else by the kind of their data in
+    the units of the file.
+    """
     system = _SYSTEMS.get(data["units_code"])
     kind = _KINDS.get(int(data.get("ordinate_spec_data_type") or 0))
     return label(data, "ordinate_axis_units_lab") or (kind.format(*system) if system and kind else "")
 
 
 def _seconds(data: dict[str, Any]) -> np.ndarray:
-    """The instants; in seconds unless their label states another unit of time."""
+    """Return the instants; in seconds unless their label states another unit of time."""
     return _axis(data) * (unit_factor(label(data, "abscissa_axis_units_lab"), "s") or 1.0)
 
 
 def _axis(data: dict[str, Any]) -> np.ndarray:
-    """The abscissa: stored, or from its start and step."""
+    """Return the abscissa: stored, or from its start and step."""
     stored = np.asarray(data.get("x", ()), dtype=float)
     if stored.size == np.size(data["data"]):
         return stored
@@ -90,8 +101,11 @@ def _axis(data: dict[str, Any]) -> np.ndarray:
 
 
 def frequency_sets(path: Path) -> tuple[dict[str, Any], np.ndarray, np.ndarray | None]:
-    """The frequency response of a universal file, its frequencies, and its coherence or None. Raises LogError for
-    none and for several."""
+    """Return the frequency response of a universal file, its frequencies, and its coherence or
+    None.
+
+    Raises LogError for none and for several.
+    """
     sets = sets_58(path)
     responses = [data for data in sets if data["func_type"] == FREQUENCY_RESPONSE]
     if len(responses) != 1:
@@ -104,7 +118,10 @@ def frequency_sets(path: Path) -> tuple[dict[str, Any], np.ndarray, np.ndarray |
 
 
 def read_response_uff(path: Path) -> MeasuredResponse:
-    """The response in a universal file. Raises LogError."""
+    """Read the response in a universal file.
+
+    Raises LogError.
+    """
     data, frequency, coherence = frequency_sets(path)
     above, below = label(data, "ordinate_axis_units_lab"), label(data, "orddenom_axis_units_lab")
     scale, unit, unit_in_words = response_unit(f"{above}/({below})" if above and below else above)
