@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field, fields
+from functools import cache
 from importlib import import_module
 from pkgutil import walk_packages
 from typing import Any, ClassVar, Self
@@ -56,7 +57,7 @@ class Settings:
     @classmethod
     def current(cls) -> Self:
         """Return the settings in use: those of the innermost `in_use` block, or the default values."""
-        return cls._in_use.get(None) or cls()
+        return cls._in_use.get(None) or _defaults(cls)
 
     @contextmanager
     def in_use(self) -> Iterator[Self]:
@@ -79,6 +80,12 @@ class Settings:
                 raise TypeError(f"{cls.__name__}.{item.name} is not declared with setting(value, unit, reason)")
             rows.append(SettingRow(item.name, item.default, item.metadata["unit"], item.metadata["reason"]))
         return rows
+
+
+@cache
+def _defaults(settings: type[Any]) -> Any:
+    """Return the default values, the same object at every call: making one costs as much as many a function."""
+    return settings()
 
 
 def settings_classes() -> list[type[Settings]]:
