@@ -14,8 +14,9 @@ import numpy as np
 import friso
 from benchmarks.report import Goal, clock, print_goals, print_table, spread
 from friso.frequency.bode import bode
-from friso.frequency.family import DENSITY, frequency_grid, scan_stability
+from friso.frequency.family import frequency_grid, scan_stability
 from friso.frequency.members import Members, family
+from friso.frequency.settings import FrequencySettings
 from friso.stage import Stage
 from friso_thesis.studies.thesis.studies import thesis_rig
 
@@ -47,7 +48,8 @@ def run(repetitions: int) -> list[Goal]:
         goals.append(Goal(about, "< 1 s", f"{min(times):.2f} s", min(times) < 1))
         if name == "continuous":
             few = members[np.linspace(0, len(members) - 1, ONE_BY_ONE).astype(int)]
-            slow = clock(lambda: one_by_one(stage, few, frequency_grid(flat, DENSITY))) / ONE_BY_ONE * len(members)  # noqa: B023
+            grid = frequency_grid(flat, FrequencySettings.current().family_density)
+            slow = clock(lambda: one_by_one(stage, few, grid)) / ONE_BY_ONE * len(members)  # noqa: B023
             ratio = f"{slow / min(times):.0f} times"
             goals.append(Goal("against python-control, state after state", "", ratio, None))
     print_table(("drive", "states", "scan min / median [s]", "friso.bode min / median [s]"), rows)

@@ -18,7 +18,8 @@ from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.stage import Stage, load
 from friso.studies.rig.moves_on_rails import INTERVAL, move, with_joint
-from friso.virtual_rig.run import RTOL, run
+from friso.virtual_rig.run import run
+from friso.virtual_rig.settings import RigSettings
 
 FILE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 RUNS = 32
@@ -34,7 +35,10 @@ def sampled(stage: Stage) -> Callable[[], object]:
 
 def continuous(stage: Stage) -> Callable[[], object]:
     """As many runs of the stage's own motion without a drive."""
-    shape, options = kernel(structure(stage.flat())), RunOptions(rtol=RTOL, interval=INTERVAL, threads=1)
+    shape, options = (
+        kernel(structure(stage.flat())),
+        RunOptions(rtol=RigSettings.current().rig_rtol, interval=INTERVAL, threads=1),
+    )
     return lambda: list(run_chunks(shape, stage.flat(), RUNS, options))
 
 

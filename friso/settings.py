@@ -6,23 +6,28 @@ with `current()`. Other values are given for a block of code, as NumPy's `errsta
     with SearchSettings(candidate_work=2.0).in_use():
         friso.check("stage.toml")
 
+The reason for a value is the text below its field: what fails when it is smaller, what it costs when it is larger.
+
 Numbers of physics or mathematics are no settings: they stand where they are used, with their source.
 """
 
 from __future__ import annotations
 
+import ast
+import inspect
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field, fields
 from functools import cache
 from importlib import import_module
+from itertools import pairwise
 from pkgutil import walk_packages
 from typing import Any, ClassVar, Self
 
 
-def setting(value: Any, unit: str, reason: str) -> Any:
-    """Declare a field of a Settings class.
+def setting(value: Any, unit: str) -> Any:
+    """Declare a field of a Settings class; the text below the field is the reason for its value.
 
     Parameters
     ----------
@@ -30,10 +35,8 @@ def setting(value: Any, unit: str, reason: str) -> Any:
         The value that friso uses.
     unit : str
         Its unit, "s" or "N/m"; "" for a number without one.
-    reason : str
-        Why it has this value, in one sentence or two: what fails when it is smaller, what it costs when it is larger.
     """
-    return field(default=value, metadata={"unit": unit, "reason": reason})
+    return field(default=value, metadata={"unit": unit})
 
 
 @dataclass(frozen=True)
@@ -70,21 +73,30 @@ class Settings:
 
     @classmethod
     def rows(cls) -> list[SettingRow]:
-        """List the settings with their default values, units and reasons.
+        """List the settings with their default values, units and reasons, which are read from the source.
 
-        Raises TypeError for a field that is not declared with `setting`.
+        Raises TypeError for a field that is not declared with `setting`, or has no text below it.
         """
+        (declared,) = ast.parse(inspect.getsource(cls)).body
+        assert isinstance(declared, ast.ClassDef)
+        reasons = {
+            field.target.id: below.value.value
+            for field, below in pairwise(declared.body)
+            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+            if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
+        }
         rows = []
         for item in fields(cls):  # type: ignore[arg-type]  # every subclass is a dataclass
-            if {*item.metadata} != {"unit", "reason"}:
-                raise TypeError(f"{cls.__name__}.{item.name} is not declared with setting(value, unit, reason)")
-            rows.append(SettingRow(item.name, item.default, item.metadata["unit"], item.metadata["reason"]))
+            if {*item.metadata} != {"unit"} or item.name not in reasons:
+                raise TypeError(f"{cls.__name__}.{item.name} is no setting(value, unit) with a reason below it")
+            reason = " ".join(str(reasons[item.name]).split())
+            rows.append(SettingRow(item.name, item.default, item.metadata["unit"], reason))
         return rows
 
 
 @cache
 def _defaults(settings: type[Any]) -> Any:
-    """Make the default values of a room once: code asks for them often."""
+    """Return the default values of a room, made once: code asks for them often."""
     return settings()
 
 

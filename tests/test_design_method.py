@@ -9,9 +9,7 @@ import pytest
 from beyond_flip import CREEPING
 
 import friso
-from friso.design_method import front as front_module
 from friso.design_method import method as method_module
-from friso.design_method import relax as relax_module
 from friso.design_method.choice import chosen, confirmed
 from friso.design_method.controller import choose_controller, comfortable_below, dampings
 from friso.design_method.edges import Corners, edges_over, rigid
@@ -22,9 +20,10 @@ from friso.design_method.modal import Modal
 from friso.design_method.population import Population, corners
 from friso.design_method.prepare import prepared, with_leaves
 from friso.design_method.relax import relaxed_requirements
-from friso.design_method.requirements import PARASITIC, RESERVE, LeafTask, requirements
+from friso.design_method.requirements import PARASITIC, LeafTask, requirements
+from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Spec, load_spec
-from friso.design_method.verification import RTOL, MachineOutcomes, move_machines, verification
+from friso.design_method.verification import MachineOutcomes, move_machines, verification
 from friso.equations.breakaway import least_breakaway
 from friso.frequency.crossover import limits, settled_margin
 from friso.frequency.tuning import Tuning
@@ -118,7 +117,9 @@ def test_requirements_by_the_evaluation(task: LeafTask) -> None:
     assert excess["friction.static"] == pytest.approx(1.1 * 1.1 * result.forces[-1])
     bent, twisted = 195e9 * 20e-3 * 0.3e-3**3 / 12, 75e9 * 20e-3 * 0.3e-3**3 / 3
     across = 1 / (2 * 9.23 * np.sqrt(bent * twisted) / 60e-3**2)  # J of a strip; 1 % less for its finite width
-    assert excess["safety.buckling"] == pytest.approx(RESERVE * 3 * ((5 + weight) / result.buckling + across), rel=0.01)
+    assert excess["safety.buckling"] == pytest.approx(
+        DesignSettings.current().model_reserve * 3 * ((5 + weight) / result.buckling + across), rel=0.01
+    )
     assert result.interfering is not None
     assert excess["safety.parasitic"] == pytest.approx(480 / result.interfering.frequency, rel=1e-6)
     # a force across the leaf ends turns the stage about z: each leaf is a cantilever (by the stiffness of the stage)
@@ -126,8 +127,12 @@ def test_requirements_by_the_evaluation(task: LeafTask) -> None:
     root = -(closed_forms.stage_stiffness(replace_leaves(item)) @ moved)[5] + 60e-3 * 0.5
     assert root == pytest.approx(0.5 * 60e-3, rel=1e-6)
     stress = 1.5 * (root * 10e-3 / (0.3e-3 * 20e-3**3 / 12) + (5 + weight) / 2 / (20e-3 * 0.3e-3))
-    assert excess["safety.fatigue"] == pytest.approx(RESERVE * 1.3 * (1 / result.fatigue_margin + stress / 1.3e9))
-    assert excess["safety.strength"] == pytest.approx(RESERVE * 1.5 * (result.clamp_stress + stress) / 1.3e9)
+    assert excess["safety.fatigue"] == pytest.approx(
+        DesignSettings.current().model_reserve * 1.3 * (1 / result.fatigue_margin + stress / 1.3e9)
+    )
+    assert excess["safety.strength"] == pytest.approx(
+        DesignSettings.current().model_reserve * 1.5 * (result.clamp_stress + stress) / 1.3e9
+    )
 
 
 def replace_leaves(mechanism: Mechanism) -> Mechanism:
@@ -162,23 +167,21 @@ def test_a_geometry_at_which_beams_fail_is_marked(
 @pytest.mark.thorough
 def test_relaxed_alone_a_requirement_lets_leaves_do(base: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is said to be enough is enough, and a tenth less is not."""
-    monkeypatch.setattr(front_module, "GENERATIONS", 60)
-    monkeypatch.setattr(relax_module, "GENERATIONS", 60)
-    task = LeafTask(loaded(force_x="200 N"), 1e-3, 0.0, 1.0, base.flat())
-    assert not front(task)
-    result = {relaxation.key: relaxation for relaxation in relaxed_requirements(task)}
-    assert {"load.force_x", "friction.static"} <= result.keys()
-    for share, enough in ((1.02, True), (0.9, False)):
-        friction = 1 + (result["friction.static"].needed - 1) * share
-        assert bool(front(replace(task, friction=friction))) == enough
-    lighter = result["load.force_x"].needed
-    assert front(replace(task, spec=loaded(force_x=f"{lighter * 0.97:.6g} N")))
-    assert not front(replace(task, spec=loaded(force_x=f"{lighter * 1.1:.6g} N")))
+    with DesignSettings(front_generations=60, relaxed_generations=60).in_use():
+        task = LeafTask(loaded(force_x="200 N"), 1e-3, 0.0, 1.0, base.flat())
+        assert not front(task)
+        result = {relaxation.key: relaxation for relaxation in relaxed_requirements(task)}
+        assert {"load.force_x", "friction.static"} <= result.keys()
+        for share, enough in ((1.02, True), (0.9, False)):
+            friction = 1 + (result["friction.static"].needed - 1) * share
+            assert bool(front(replace(task, friction=friction))) == enough
+        lighter = result["load.force_x"].needed
+        assert front(replace(task, spec=loaded(force_x=f"{lighter * 0.97:.6g} N")))
+        assert not front(replace(task, spec=loaded(force_x=f"{lighter * 1.1:.6g} N")))
 
 
 def test_no_leaves_no_design(base: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(relax_module, "GENERATIONS", 5)
-    with pytest.raises(NoDesign, match="no leaf springs"):
+    with DesignSettings(relaxed_generations=5).in_use(), pytest.raises(NoDesign, match="no leaf springs"):
         leaves(loaded(force_x="500 N"), base.flat(), 1.0)
 
 
@@ -342,34 +345,33 @@ def test_tried_moves_agree_with_runs_of_their_own(base: Stage) -> None:
         result = move_machines({**flat, "joint.locked": held}, 1, 1e-6)
         assert result.tried == 1
         assert (result.words[0] == "swings") == hunts
-    within, _ = measured_run(rig.replace({"joint.locked": False}), RTOL).settling_time
+    within, _ = measured_run(rig.replace({"joint.locked": False}), DesignSettings.current().verified_rtol).settling_time
     assert result.settling[0] == pytest.approx(within[0], rel=1e-4)
 
 
 def test_verification_counts_and_its_worst_is_reproduced(base: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    from friso.design_method import verification as module
 
-    monkeypatch.setattr(module, "MACHINES", 200)
-    stage = with_leaves(base, Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310")), 1e-3)
-    reported: list[tuple[int, int]] = []
-    outcomes = verification(
-        stage.replace({"controller.crossover": "9 Hz"}),
-        SPEC,
-        0.3,
-        lambda done, total, label: reported.append((done, total)),
-    )
-    ends = [total for done, total in reported if done == total]
-    assert ends[0] == 200
-    assert outcomes.locked.missed <= ends[-1] < 200  # the long runs of those that are not at rest report, too
-    assert outcomes.free.tried == outcomes.locked.tried == 200
-    assert outcomes.free.missed == 0
-    assert outcomes.locked.missed >= outcomes.locked.swinging > 20
-    low, high = outcomes.free.interval
-    assert low == 0
-    assert high == pytest.approx(1 - 0.025 ** (1 / 200), rel=1e-6)  # Clopper and Pearson for none of 200
-    worst = outcomes.free.worst
-    again = move_machines({**outcomes.worst.flat(), "joint.locked": False}, 1, float(SPEC.position.window))
-    assert again.settling[0] == pytest.approx(outcomes.free.settling[worst], rel=1e-3)
+    with DesignSettings(verified_moves=200).in_use():
+        stage = with_leaves(base, Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310")), 1e-3)
+        reported: list[tuple[int, int]] = []
+        outcomes = verification(
+            stage.replace({"controller.crossover": "9 Hz"}),
+            SPEC,
+            0.3,
+            lambda done, total, label: reported.append((done, total)),
+        )
+        ends = [total for done, total in reported if done == total]
+        assert ends[0] == 200
+        assert outcomes.locked.missed <= ends[-1] < 200  # the long runs of those that are not at rest report, too
+        assert outcomes.free.tried == outcomes.locked.tried == 200
+        assert outcomes.free.missed == 0
+        assert outcomes.locked.missed >= outcomes.locked.swinging > 20
+        low, high = outcomes.free.interval
+        assert low == 0
+        assert high == pytest.approx(1 - 0.025 ** (1 / 200), rel=1e-6)  # Clopper and Pearson for none of 200
+        worst = outcomes.free.worst
+        again = move_machines({**outcomes.worst.flat(), "joint.locked": False}, 1, float(SPEC.position.window))
+        assert again.settling[0] == pytest.approx(outcomes.free.settling[worst], rel=1e-3)
 
 
 def test_an_outcome_ranks_what_does_not_rest_before_slow_settling() -> None:

@@ -16,6 +16,7 @@ from friso.frequency.describing.function import dynamic_stiffness
 from friso.frequency.describing.loop import receptance
 from friso.frequency.describing.multi import DONE, OPEN, REST, HarmonicSeries, balanced
 from friso.frequency.describing.waveform import OneStateLaw, friction_answer
+from friso.frequency.settings import FrequencySettings
 from friso.hunting import Ensemble, find_cycles
 from friso.stage import Stage
 from friso.studies.harmonic_balance import harmonic_balance
@@ -84,11 +85,11 @@ def test_a_turn_without_a_solution_is_told(monkeypatch: pytest.MonkeyPatch) -> N
     """Newton's method that ends nowhere, or in a cell far away, has found no cycle."""
     amplitude, omega = near_sine()
     grid = (amplitude * np.geomspace(0.1, 10, 12), omega / (2 * np.pi) * np.geomspace(0.1, 10, 12))
-    monkeypatch.setattr(balance, "STEPS", 0)
-    harmonic = single_harmonic(unstable("1e8 N/m"), *grid)
-    assert (harmonic.amplitudes.size, harmonic.unsolved) == (0, 1)
-    cells, axes = np.array([[2, 2], [2, 2]]), (np.arange(9.0), np.arange(9.0))
-    assert balance._near(axes, cells, np.array([[3.9, 2.5], [1.1, 4.1]])).tolist() == [True, False]
+    with FrequencySettings(balance_newton_steps=0).in_use():
+        harmonic = single_harmonic(unstable("1e8 N/m"), *grid)
+        assert (harmonic.amplitudes.size, harmonic.unsolved) == (0, 1)
+        cells, axes = np.array([[2, 2], [2, 2]]), (np.arange(9.0), np.arange(9.0))
+        assert balance._near(axes, cells, np.array([[3.9, 2.5], [1.1, 4.1]])).tolist() == [True, False]
 
 
 def test_singular_step_stays(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,24 +65,16 @@ from friso.remedies.change import ChangeSize, change_size
 from friso.remedies.goal import Goal
 from friso.remedies.least import LEAST, candidates, change_costs, least_changes, least_remedy
 from friso.remedies.machines import Fleet, draw_fleet
-from friso.remedies.method import UNSEEN, Advice, _not_seen, _Session, pairs, tune
-from friso.remedies.relax import WIDER, _tolerances, relaxations
-from friso.remedies.search import WORST, Budget, Search, TriedPoints, _evolve
-from friso.remedies.sensitivities import SMOOTH, Sensitivities, _is_smooth, _of_settling, sensitivity
+from friso.remedies.method import Advice, _not_seen, _Session, pairs, tune
+from friso.remedies.relax import _tolerances, relaxations
+from friso.remedies.search import Budget, Search, TriedPoints, _evolve
+from friso.remedies.sensitivities import Sensitivities, _is_smooth, _of_settling, sensitivity
+from friso.remedies.settings import RemedySettings
 from friso.remedies.suggestion import suggestion
-from friso.remedies.trials import (
-    LOOSER,
-    RTOL,
-    Attraction,
-    Moves,
-    attraction,
-    modulus_margins,
-    moves_of_points,
-    quantile,
-)
+from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.remedies.variables import BANDWIDTH, of_key
 from friso.remedies.verified import ONE, Performance, RemedyOutcome, _stiffness, performance_of, unmet_goals
-from friso.remedies.window import HALVINGS, POINTS, windows
+from friso.remedies.window import windows
 from friso.shown.drawing import matplotlib_renderer
 from friso.shown.drawing.prefixes import NOTHING, with_unit
 from friso.stage.controllers import as_tuned, controller_of
@@ -156,7 +148,9 @@ def moved_there(stage: Stage, within: float) -> float:
 
 def test_moves_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Fleet, goal: Goal) -> None:
     fast = rigid.replace({"controller.crossover": "20 Hz"})
-    moves = moves_of_points(Remedy.settled_on("", fast), np.zeros((1, 0)), machines, goal, rtol=RTOL)
+    moves = moves_of_points(
+        Remedy.settled_on("", fast), np.zeros((1, 0)), machines, goal, rtol=RemedySettings.current().move_rtol
+    )
     alone = measured_run(fast)
     there = moved_there(fast, goal.within)
     assert moves.settling[0, 0] == pytest.approx(max(alone.in_the_end[0][0], there), abs=2e-4)
@@ -540,13 +534,15 @@ def test_looking_further_ends_where_it_takes_too_much_work(
 
     with allowance() as once:
         next(points())
-    monkeypatch.setattr(search_module, "WORK", 5 * once.used / search_module.LOOKING)
-    assert len([*search.looked_at(points())]) == 5
-    assert search.cut  # and where it is already, as its settings took too much work, they are looked at all the same
-    assert len([*search.looked_at(points())]) == 5
-    search.cut = False
-    (_,) = search.looked_at(iter([np.zeros(0)]))
-    assert not search.cut
+    with RemedySettings(search_work=5 * once.used / RemedySettings().looking_work).in_use():
+        assert len([*search.looked_at(points())]) == 5
+        assert (
+            search.cut
+        )  # and where it is already, as its settings took too much work, they are looked at all the same
+        assert len([*search.looked_at(points())]) == 5
+        search.cut = False
+        (_,) = search.looked_at(iter([np.zeros(0)]))
+        assert not search.cut
 
 
 def test_the_answer_names_what_to_change(tuning: Advice) -> None:
@@ -641,13 +637,13 @@ def test_a_search_that_is_cut_says_so_and_not_that_nothing_works(
     rigid: Stage, machines: Fleet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     goal = Goal(margin=0.9, joint=False)
-    for work, certainty in ((search_module.WORK, "does not work"), (1e5, "given up")):
-        monkeypatch.setattr(search_module, "WORK", work)
-        search = Search(remedies(rigid, goal)[0], goal, machines, machines, rigid, TINY, lambda label: None)
-        search.optimise()
-        tried = search.points if search.tried else None
-        outcome = RemedyOutcome(search.remedy, None, None, None, (), (), tried, cut=search.cut)
-        assert outcome.certainty == certainty
+    for work, certainty in ((RemedySettings().search_work, "does not work"), (1e5, "given up")):
+        with RemedySettings(search_work=work).in_use():
+            search = Search(remedies(rigid, goal)[0], goal, machines, machines, rigid, TINY, lambda label: None)
+            search.optimise()
+            tried = search.points if search.tried else None
+            outcome = RemedyOutcome(search.remedy, None, None, None, (), (), tried, cut=search.cut)
+            assert outcome.certainty == certainty
 
 
 def test_a_cut_search_is_told_with_what_it_tried(tuning: Advice, wording: Wording) -> None:
@@ -704,8 +700,8 @@ def test_a_tolerance_is_relaxed_no_more_than_needed(rigid: Stage, machines: Flee
     goal, remedy = Goal(settle=0.3, joint=False), remedies(rigid, Goal(joint=False))[0]
     shares = np.linspace(0.3, 1.0, 12)[:, None]
     factors = _tolerances(remedy, shares, goal, machines)
-    assert {1.5, 5.0, LOOSER} == {*factors}
-    for factor in WIDER:
+    assert {1.5, 5.0, RemedySettings.current().looser_tolerance} == {*factors}
+    for factor in RemedySettings.current().wider_tolerances:
         moves = moves_of_points(remedy, shares, machines, replace(goal, within=factor * goal.within))
         in_time = moves.slowest(goal.share) <= 0.3
         assert in_time[factors == factor].all()
@@ -748,14 +744,15 @@ def test_no_limit_of_the_bandwidth_is_relaxed_beyond_reason(rigid: Stage, machin
 
 def test_what_changes_nothing_costs_nothing(tuning: Advice) -> None:
     """The stage as it is, is measured on the machines on which what works is."""
-    unseen = _not_seen(tuning.stage, Correlations(), TINY.fresh, tuning.seed + UNSEEN)
+    unseen = _not_seen(tuning.stage, Correlations(), TINY.fresh, tuning.seed + RemedySettings.current().unseen_seed)
     assert (
-        tuning.present.moves.force == moves_of_points(AS_IS(tuning.stage), ONE, unseen, tuning.goal, rtol=RTOL).force
+        tuning.present.moves.force
+        == moves_of_points(AS_IS(tuning.stage), ONE, unseen, tuning.goal, rtol=RemedySettings.current().move_rtol).force
     ).all()
     (works,) = tuning.working
     assert works.measured is not None
     assert works.stage is not None
-    on_the_same = moves_of_points(AS_IS(works.stage), ONE, unseen, tuning.goal, rtol=RTOL)
+    on_the_same = moves_of_points(AS_IS(works.stage), ONE, unseen, tuning.goal, rtol=RemedySettings.current().move_rtol)
     assert np.array_equal(works.measured.moves.settling, on_the_same.settling)
 
 
@@ -780,7 +777,8 @@ def test_the_least_change_of_few_keys_is_sought_among_these_alone(
 
 
 @pytest.mark.parametrize(
-    ("doubt", "work", "verified"), [("given up", 1e9, 1), ("distance", 1e9, method.TRIES), ("distance", 1.0, 1)]
+    ("doubt", "work", "verified"),
+    [("given up", 1e9, 1), ("distance", 1e9, RemedySettings().most_tries), ("distance", 1.0, 1)],
 )
 def test_no_other_point_is_verified_once_one_took_too_long(
     rigid: Stage,
@@ -803,11 +801,11 @@ def test_no_other_point_is_verified_once_one_took_too_long(
         return unsure
 
     monkeypatch.setattr(session, "_verified", verify)
-    monkeypatch.setattr(method, "VERIFYING", work)
-    search = Search(AS_IS(rigid), tuning.goal, machines, machines, rigid, TINY, lambda label: None)
-    session._ended(search, iter([np.zeros(0)] * 9))
-    assert len(measured) == verified
-    assert session.outcomes == [unsure]
+    with RemedySettings(verifying_work=work).in_use():
+        search = Search(AS_IS(rigid), tuning.goal, machines, machines, rigid, TINY, lambda label: None)
+        session._ended(search, iter([np.zeros(0)] * 9))
+        assert len(measured) == verified
+        assert session.outcomes == [unsure]
 
 
 def test_machines_not_seen_are_drawn_alone(rigid: Stage) -> None:
@@ -1066,7 +1064,7 @@ def test_windows_end_where_settings_no_longer_meet_the_goal(monkeypatch: pytest.
     attracted_above(2.0)
     first, second = windows(search, np.array([0.5, 0.4]))
     ends = np.log([first.low, first.high, second.low, second.high])
-    near = 1 / (POINTS - 1) / 2**HALVINGS
+    near = 1 / (RemedySettings.current().window_points - 1) / 2 ** RemedySettings.current().window_halvings
     assert ends == pytest.approx([0.49, 0.51, 0.21, 1.0], abs=near)
     assert 0.49 < ends[0] < ends[1] < 0.51
     assert ends[2] > 0.21
@@ -1077,7 +1075,7 @@ def test_windows_end_where_settings_no_longer_meet_the_goal(monkeypatch: pytest.
     assert again == first
     assert closer.low == second.low
     assert not closer.open_above
-    assert 0.7 - 1.01 * 0.6 / 2**HALVINGS < np.log(closer.high) < 0.7
+    assert 0.7 - 1.01 * 0.6 / 2 ** RemedySettings.current().window_halvings < np.log(closer.high) < 0.7
 
 
 def test_that_there_is_no_window_is_said() -> None:
@@ -1195,7 +1193,15 @@ def test_a_settling_time_may_be_off_by_a_share_of_itself(stepping: dict[str, Any
     assert exact is not None
     slack, column = exact.time / 10 / stepping[KEYS[0]], STATISTICS.index("inner_exit")
     follows = [
-        _is_smooth(stepping, KEYS[:1], column, exact.time, exact.time / 10, exact.by + off * SMOOTH * slack, 1e-6)
+        _is_smooth(
+            stepping,
+            KEYS[:1],
+            column,
+            exact.time,
+            exact.time / 10,
+            exact.by + off * RemedySettings.current().smooth_share * slack,
+            1e-6,
+        )
         for off in (0.5, 2.0)
     ]
     assert follows == [True, False]
@@ -1358,7 +1364,7 @@ def test_points_given_up_early_are_those_that_no_search_would_have_kept(
 def test_a_search_goes_on_while_all_points_are_as_bad() -> None:
     """Where no point of a generation settled, all cost the same, and the search was taken to have converged."""
     counts = []
-    for costs in (np.full(10, WORST), np.full(10, 0.5)):
+    for costs in (np.full(10, RemedySettings.current().worst_time), np.full(10, 0.5)):
         tried: list[int] = []
 
         def cost(
@@ -1391,6 +1397,6 @@ def test_a_rare_machine_does_not_stand_for_a_twentieth(
         return np.array([margins if machines.count == drawn.count else [0.5] * machines.count])
 
     monkeypatch.setattr(method, "modulus_margins", of)
-    monkeypatch.setattr(method, "MORE", 1)
-    machines = method.machines_of_search(rigid, Correlations(), Budget(machines=3), 1, Goal(), rigid)
-    assert np.array_equal(machines.travel, drawn.travel[kept])
+    with RemedySettings(machine_factor=1).in_use():
+        machines = method.machines_of_search(rigid, Correlations(), Budget(machines=3), 1, Goal(), rigid)
+        assert np.array_equal(machines.travel, drawn.travel[kept])

@@ -10,15 +10,10 @@ import numpy as np
 from friso.design_method.front import Candidate, evaluate_geometries
 from friso.design_method.geometry import Geometry, mechanisms, round_geometries, sizes_of
 from friso.design_method.requirements import LeafTask, Requirement, buckling_share, load_stress, requirements
+from friso.design_method.settings import DesignSettings
 from friso.leaf_springs.beams import BeamFailure, beams
 from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.joint import first_interfering
-
-STEP = 1e-4
-"""Sizes are whole multiples of this [m]."""
-
-SHOWN = 24
-"""Candidates of the front that the beam model confirms, at most."""
 
 
 @dataclass(frozen=True)
@@ -85,9 +80,12 @@ def _in_order(
     task: LeafTask, needs: list[Requirement], candidates: Sequence[Candidate]
 ) -> Iterator[tuple[Geometry, np.ndarray]]:
     """Geometries in whole sizes that meet the requirements by closed forms, the softest first."""
+    settings = DesignSettings.current()
     enough = task.spec.safety.parasitic * task.crossover
     near = [candidate.geometry for candidate in candidates if candidate.frequency >= 0.98 * enough]
-    sizes = list({geometry: None for start in near for geometry in round_geometries(task.spec, start, STEP)})
+    sizes = list(
+        {geometry: None for start in near for geometry in round_geometries(task.spec, start, settings.size_step)}
+    )
     if not sizes:
         return
     judgement = evaluate_geometries(task, needs, sizes_of(sizes), [geometry.sheet for geometry in sizes])
@@ -103,7 +101,8 @@ def evaluated(task: LeafTask, geometry: Geometry) -> Evaluation:
 
 def confirmed(task: LeafTask, candidates: Sequence[Candidate]) -> Iterable[Confirmed]:
     """Some of the front, evenly, by the beam model; where that fails, why."""
-    for k in np.unique(np.linspace(0, len(candidates) - 1, SHOWN).astype(int)):
+    settings = DesignSettings.current()
+    for k in np.unique(np.linspace(0, len(candidates) - 1, settings.confirmed_candidates).astype(int)):
         candidate = candidates[k]
         try:
             evaluation = evaluated(task, candidate.geometry)

@@ -10,6 +10,7 @@ import numpy as np
 
 from friso.design_method.modal import Modal
 from friso.design_method.population import Population
+from friso.design_method.settings import DesignSettings
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.frequency.ranges import Range, shared
 from friso.frequency.tuning import Tuning, tuning
@@ -18,9 +19,6 @@ from friso.stage import Stage
 
 RATIOS = np.geomspace(0.02, 0.7, 9)
 """Joint damping that is tried, as a damping ratio of the stage on the joint."""
-
-ENOUGH = 0.95
-"""Share of the best modulus margin that damping reaches, from which more is not worth its trouble."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +31,8 @@ class Damping:
     @property
     def worth(self) -> int:
         """The number of the least damping that does nearly all that damping can do; 0 where the stage's own does."""
-        return int(np.flatnonzero(self.margins >= ENOUGH * self.margins.max())[0])
+        settings = DesignSettings.current()
+        return int(np.flatnonzero(self.margins >= settings.enough_margin * self.margins.max())[0])
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,10 @@ from typing import Any
 import numpy as np
 
 from friso.design_method.population import Population
+from friso.design_method.settings import DesignSettings
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.hunting import find_attractors
 from friso.progress import Progress, silent
-
-ROUNDS = 3
-"""Bisections of the step that holds an edge: to 1 or 2 % of it on the grids here."""
-
-RTOL = 1e-7
-"""Relative tolerance to which orbits are closed: their multipliers are needed to a percent."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +58,7 @@ def edges_over(
     """The edges of the stage `flat` in all corners, tuned by van Dijk's rules: on a grid of so many `steps` from `high`
     down to `low` [Hz], as far as to the first point at which anything attracts, and between that and the one above.
     `label` names the search to the progress."""
+    settings = DesignSettings.current()
     corners = population.over({**flat, CROSSOVER: np.nan, "motion.kind": "release"})  # whatever the stage's motion
     grid, count = np.log(np.geomspace(low, high, steps)), population.count
     inside, outside, unsure = np.full(count, -np.inf), np.full(count, np.inf), np.zeros((2, count), bool)
@@ -73,12 +69,12 @@ def edges_over(
         unsure[attract.astype(int), which] = ~certain
 
     for k, point in enumerate(grid[::-1]):
-        progress(k, steps + ROUNDS, label)
+        progress(k, steps + settings.edge_bisections, label)
         if (left := np.flatnonzero(np.isneginf(inside))).size:
             survey(left, np.full(left.size, point))
     between = np.flatnonzero(np.isfinite(inside) & np.isfinite(outside))
-    for k in range(ROUNDS if between.size else 0):
-        progress(steps + k, steps + ROUNDS, label)
+    for k in range(settings.edge_bisections if between.size else 0):
+        progress(steps + k, steps + settings.edge_bisections, label)
         survey(between, (inside[between] + outside[between]) / 2)
     edges = np.where(np.isneginf(inside), 0.0, np.exp((inside + outside) / 2))
     return Corners(population, edges, (low, high), int(unsure.any(axis=0).sum()))
@@ -109,8 +105,9 @@ def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str,
 def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Whether anything attracts, or may for all that simulations show, in corners at logarithms of crossovers; and
     whether that is certain."""
+    settings = DesignSettings.current()
     some = {key: value[which] if np.ndim(value) else value for key, value in corners.items()}
-    attracted = find_attractors({**some, CROSSOVER: np.exp(crossover)}, len(which), RTOL)
+    attracted = find_attractors({**some, CROSSOVER: np.exp(crossover)}, len(which), settings.orbit_rtol)
     return attracted.attracts | ~attracted.decided, attracted.certain
 
 

@@ -10,17 +10,9 @@ from scipy.optimize import differential_evolution
 
 from friso.design_method.geometry import Geometry, Sheet, box, mechanisms, sheets
 from friso.design_method.requirements import PARASITIC, LeafTask, Requirement, requirements
+from friso.design_method.settings import DesignSettings
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.joint import first_interfering
-
-POPULATION, GENERATIONS = 160, 120
-"""Geometries of the genetic algorithm, and how often they are renewed."""
-
-SEARCHED = 60
-"""Generations of the search for a geometry to start from."""
-
-SEED = 34
-"""Seed of the random numbers: the same front for the same specification."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +27,7 @@ class Candidate:
 def front(task: LeafTask) -> list[Candidate]:
     """The front, by rising stiffness (NSGA-II, doi:10.1109/4235.996017); empty where no geometry meets the requirements
     except the one on the frequency, which is an objective here."""
+    settings = DesignSettings.current()
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.operators.crossover.sbx import SBX
     from pymoo.operators.mutation.pm import PM
@@ -45,12 +38,20 @@ def front(task: LeafTask) -> list[Candidate]:
     if start is None:
         return []
     low, high = _ends(task)
-    first = low + (high - low) * np.random.default_rng(SEED).random((POPULATION, len(low)))
+    first = low + (high - low) * np.random.default_rng(settings.front_seed).random(
+        (settings.front_population, len(low))
+    )
     first[: len(first) // 4] = start  # from where the others are reached, however little room there is
     variation = {"sampling": first, "crossover": SBX(prob=0.9, eta=10), "mutation": PM(eta=10)}
-    algorithm = NSGA2(pop_size=POPULATION, **variation)
+    algorithm = NSGA2(pop_size=settings.front_population, **variation)
     with np.errstate(invalid="ignore"):  # pymoo's distances within a front of a single geometry
-        result = minimize(_problem(task, needs), algorithm, ("n_gen", GENERATIONS), seed=SEED, verbose=False)
+        result = minimize(
+            _problem(task, needs),
+            algorithm,
+            ("n_gen", settings.front_generations),
+            seed=settings.front_seed,
+            verbose=False,
+        )
     if result.X is None or result.F is None:
         return []
     bought = sheets(task.spec)
@@ -87,6 +88,7 @@ def _problem(task: LeafTask, needs: list[Requirement]) -> Any:
 def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
     """A geometry, as the logarithms of its sizes and the number of its sheet (4,), that meets the requirements with the
     most to spare, by differential evolution; None if none meets them."""
+    settings = DesignSettings.current()
     bought = sheets(task.spec)
 
     def objective(x: np.ndarray) -> np.ndarray:
@@ -96,7 +98,13 @@ def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
     low, high = _ends(task)
     bounds = [*zip(low, high + 1e-12 * (high == low), strict=True)]
     minimum = differential_evolution(
-        objective, bounds, vectorized=True, updating="deferred", maxiter=SEARCHED, rng=SEED, polish=False
+        objective,
+        bounds,
+        vectorized=True,
+        updating="deferred",
+        maxiter=settings.start_generations,
+        rng=settings.front_seed,
+        polish=False,
     )
     return minimum.x if minimum.fun <= 0 else None
 

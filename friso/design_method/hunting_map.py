@@ -7,16 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.design_method.population import Population, typical_move
+from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Spec
 from friso.design_method.verification import move_machines
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.stage import Stage
-
-CROSSOVERS, STROKES = 24, 16
-"""Points of the map."""
-
-REACH = (1 / 30, 2.0), (1 / 30, 3.0)
-"""The ranges of crossover and stroke, in units of the design's."""
 
 
 @dataclass(frozen=True)
@@ -31,12 +26,18 @@ class HuntingMap:
 
 def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
     """The map about a design, at its own drive stiffness."""
+    settings = DesignSettings.current()
     flat = stage.flat()
     crossovers, strokes = (
         np.geomspace(low * flat[key], high * flat[key], count)
-        for key, (low, high), count in zip((CROSSOVER, "joint.stroke"), REACH, (CROSSOVERS, STROKES), strict=True)
+        for key, (low, high), count in zip(
+            (CROSSOVER, "joint.stroke"),
+            settings.map_reach,
+            (settings.map_crossovers, settings.map_strokes),
+            strict=True,
+        )
     )
-    shape = (STROKES, CROSSOVERS, population.count)
+    shape = (settings.map_strokes, settings.map_crossovers, population.count)
     stroke, crossover, number = (
         axis.ravel() for axis in np.meshgrid(strokes, crossovers, np.arange(population.count), indexing="ij")
     )

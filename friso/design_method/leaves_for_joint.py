@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import differential_evolution
 
-from friso.design_method.choice import STEP, bears, evaluated
+from friso.design_method.choice import bears, evaluated
 from friso.design_method.front import evaluate_geometries
 from friso.design_method.geometry import SIZES, Geometry, Sheet, box, mechanisms, moved_along, sheets
 from friso.design_method.outline import outline
 from friso.design_method.requirements import BREAKAWAY, PARASITIC, LeafTask, requirements
+from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import read_spec
 from friso.equations.breakaway import least_breakaway
 from friso.errors import InputError
@@ -24,23 +25,8 @@ from friso.leaf_springs.joint import first_interfering
 from friso.quantities import exactly
 from friso.stage import Stage
 
-SEED, GENERATIONS, POINTS = 36, 60, 20
-"""Of the search: the same leaves for the same joint; its generations, and points for each of three variables."""
-
-HIGHEST = 1e6
-"""What counts as the interfering frequency [Hz] of leaves none of whose modes actuator and sensor see."""
-
-WORST = 1e3
-"""Cost from which on leaves break a requirement."""
-
-WIDTHS = 5
-"""Steps to the width that gives the stiffness, which rises nearly as the width, whatever the load takes off."""
-
 OF_LEAVES = (*SIZES, "leaves", "thickness", "material", "young", "poisson", "density", "yield", "fatigue")
 """Keys of [flexure] that are of the leaves; the others are of what they guide."""
-
-NEAR = 0.01
-"""Share by which the stiffness of leaves in whole sizes may be off."""
 
 
 def leaves_for_joint(stage: Stage, present: Stage) -> Stage | None:
@@ -90,6 +76,7 @@ class _Search:
 
     def best(self) -> np.ndarray:
         """Logarithms of length and spacing [m], and the number of the sheet (3,)."""
+        settings = DesignSettings.current()
         ends = [*np.log([self.low[[0, 2]], self.high[[0, 2]]]).T, (0.0, len(self.bought) - 1e-9)]
         bounds = [(low, high + 1e-12 * (high == low)) for low, high in ends]
         minimum = differential_evolution(
@@ -97,9 +84,9 @@ class _Search:
             bounds,
             vectorized=True,
             updating="deferred",
-            maxiter=GENERATIONS,
-            popsize=POINTS,
-            rng=SEED,
+            maxiter=settings.leaves_generations,
+            popsize=settings.leaves_points,
+            rng=settings.leaves_seed,
             polish=False,
         )
         return np.asarray(minimum.x)
@@ -107,15 +94,17 @@ class _Search:
     def cost(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:
         """What is minimised over lengths and spacings [m], (count, 2): how far leaves break a requirement, or else the
         frequency at which they interfere, the other way round."""
+        settings = DesignSettings.current()
         sizes = self.with_width(spans, bought)
         worst = self.broken(sizes, bought)
-        frequency = np.minimum(first_interfering(mechanisms(self.task.flat, sizes, bought)), HIGHEST)
-        return np.where(worst > 0, WORST + worst, -np.log(frequency))
+        frequency = np.minimum(first_interfering(mechanisms(self.task.flat, sizes, bought)), settings.highest_mode)
+        return np.where(worst > 0, settings.worst_cost + worst, -np.log(frequency))
 
     def with_width(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:
         """Lengths, widths and spacings [m], (count, 3), of the stiffness wanted."""
+        settings = DesignSettings.current()
         sizes = np.insert(spans, 1, self.high[1], axis=1)
-        for _ in range(WIDTHS):
+        for _ in range(settings.width_steps):
             built = mechanisms(self.task.flat, sizes, bought)
             sizes[:, 1] *= 1 + (self.stiffness - loaded_drive_stiffness(built)) / drive_stiffness(built)
         return sizes
@@ -123,23 +112,31 @@ class _Search:
     def broken(self, sizes: np.ndarray, bought: list[Sheet]) -> np.ndarray:
         """The logarithm of the factor by which leaves break a requirement, the space for their width being one: 0 or
         less where they break none."""
+        settings = DesignSettings.current()
         scores = evaluate_geometries(self.task, self.needs, sizes, bought)
         space = np.stack([self.low[1] / sizes[:, 1], sizes[:, 1] / self.high[1]], axis=1)
         worst = np.log(np.concatenate([scores.excess, space], axis=1)).max(axis=1)
-        return np.where(np.isfinite(worst), worst, WORST)
+        return np.where(np.isfinite(worst), worst, settings.worst_cost)
 
     def whole_sizes(self, best: np.ndarray) -> list[Geometry]:
         """The geometries in sizes that can be made next to one, (3,), that break no requirement and have the
         stiffness, those that interfere at the highest frequency first."""
+        settings = DesignSettings.current()
         sheet = self.bought[int(best[2])]
-        near = [np.round(np.exp(size) / STEP + side) * STEP for side in (-1, 0, 1) for size in best[:2]]
+        near = [
+            np.round(np.exp(size) / settings.size_step + side) * settings.size_step
+            for side in (-1, 0, 1)
+            for size in best[:2]
+        ]
         spans = np.array([*product(near[::2], near[1::2])])
         bought = [sheet] * len(spans)
         sizes = self.with_width(spans, bought)
-        sizes[:, 1] = np.round(sizes[:, 1] / STEP) * STEP
+        sizes[:, 1] = np.round(sizes[:, 1] / settings.size_step) * settings.size_step
         built = mechanisms(self.task.flat, sizes, bought)
-        inside = np.all((sizes > self.low - STEP / 2) & (sizes < self.high + STEP / 2), axis=1)
-        right = np.abs(loaded_drive_stiffness(built) / self.stiffness - 1) < NEAR
-        fits = inside & right & (self.broken(sizes, bought) <= np.log(1 + STEP))
+        inside = np.all(
+            (sizes > self.low - settings.size_step / 2) & (sizes < self.high + settings.size_step / 2), axis=1
+        )
+        right = np.abs(loaded_drive_stiffness(built) / self.stiffness - 1) < settings.stiffness_error
+        fits = inside & right & (self.broken(sizes, bought) <= np.log(1 + settings.size_step))
         order = np.argsort(-np.asarray(first_interfering(built)))
         return [Geometry.of(sizes[k], sheet) for k in order if fits[k]]

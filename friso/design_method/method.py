@@ -25,6 +25,7 @@ from friso.design_method.population import Population, corners
 from friso.design_method.prepare import prepared, with_leaves
 from friso.design_method.relax import Relaxation, relaxed_requirements
 from friso.design_method.requirements import LeafTask
+from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Spec
 from friso.design_method.verification import Verification, verification
 from friso.engine.side_by_side import both
@@ -34,25 +35,6 @@ from friso.frequency.ranges import Range
 from friso.progress import Progress, silent
 from friso.quantities import percent
 from friso.stage import Stage
-
-STROKES = 4
-"""Strokes that are tried where the specification leaves a range, the largest first."""
-
-FIRST, BEYOND, STEPS = 1 / 40, 3.0, 24
-"""Where edges are searched, in units of the machine's limit: from there to there, in so many steps."""
-
-ABOVE = 2.0
-"""End of the search with an isolator, in units of the crossover chosen."""
-
-SLOW = 0.05
-"""Share of the moves that may take longer than the settling time specified."""
-
-ROUNDS, LOWER = 12, 0.97
-"""How often leaves and crossover are chosen anew, and the factor on a crossover for which beams confirm no leaves."""
-
-ALIKE = 0.98
-"""Share of the requested crossover from which a crossover is accepted, instead of choosing softer leaves for it."""
-
 
 Frictions = Callable[[Sequence[Stage]], OtherLaws]
 """The friction of stages that differ in its numbers, under other laws."""
@@ -136,18 +118,20 @@ class Design:
     def unmet(self) -> tuple[Relaxation, ...]:
         """What the verification found not to be met: the settling time, with that which would be; moves that do not
         come to rest are reported by the verification itself."""
-        limit, settling = self.spec.position.settling_time, self.verification.free.slower_than(SLOW)
+        settings = DesignSettings.current()
+        limit, settling = self.spec.position.settling_time, self.verification.free.slower_than(settings.slow_share)
         if limit is None or settling <= limit or not np.isfinite(settling):
             return ()
-        name = f"{percent(1 - SLOW)} of the moves settle in time"
+        name = f"{percent(1 - settings.slow_share)} of the moves settle in time"
         later = Relaxation(name, "position.settling_time", float(limit), settling, "s")
         return (self.damped, later) if self.damped else (later,)
 
     @property
     def meets(self) -> bool:
         """Whether all moves come to rest, and settle in the time specified."""
+        settings = DesignSettings.current()
         limit, free = self.spec.position.settling_time, self.verification.free
-        return not free.missed and (limit is None or free.slower_than(SLOW) <= limit)
+        return not free.missed and (limit is None or free.slower_than(settings.slow_share) <= limit)
 
     @property
     def need(self) -> Need:
@@ -163,6 +147,7 @@ class Design:
 def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Frictions = own_law) -> Design:
     """Carry the method out; edges of hunting are the worst over the stage's own friction and other `laws`. Raises
     InputError for input that cannot be used, NoDesign if nothing meets the specification."""
+    settings = DesignSettings.current()
     base = prepared(stage, spec)
     flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit
     friction = float(np.min(least_breakaway(population.over(flat))))
@@ -181,7 +166,9 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
             return failure
 
     label = "hunting without isolator"
-    without, outcome = both(partial(over, rigid(flat), FIRST * limit, BEYOND * limit, label), fitted)
+    without, outcome = both(
+        partial(over, rigid(flat), settings.lowest_edge * limit, settings.highest_edge * limit, label), fitted
+    )
     need = Need(worst_edges(without), spec)
     if isinstance(outcome, NoDesign):
         raise outcome.of(need)
@@ -196,7 +183,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
 
     label = "hunting with isolator"
     isolated, (by_beams, control, edges_map) = both(
-        partial(over, worst, FIRST * crossover, ABOVE * crossover, label), examined
+        partial(over, worst, settings.lowest_edge * crossover, settings.above_crossover * crossover, label), examined
     )
     edges = worst_edges(isolated)
     _does_not_hunt(fit, edges, need)
@@ -223,24 +210,28 @@ def _by_law(
     progress: Progress,
 ) -> dict[str, Corners]:
     """The edges of a stage over the corners under each law, between crossovers [Hz]."""
+    settings = DesignSettings.current()
     edges = {}
     for law, friction in laws.items():
         there = under_law(flat, friction) if friction else flat
-        edges[law] = edges_over(there, population, low, high, STEPS, progress, f"{label}, {law}" if friction else label)
+        edges[law] = edges_over(
+            there, population, low, high, settings.edge_steps, progress, f"{label}, {law}" if friction else label
+        )
     return edges
 
 
 def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
     """The least joint damping of those tried with which the crossover could be what leaves and machine allow, and that
     crossover [Hz]; none where it is already, or where damping does not help."""
+    settings = DesignSettings.current()
     flat, spec = fit.stage.flat(), fit.task.spec
     target = min(spec.limit, fit.choice.frequency / spec.safety.parasitic)
-    if flat[CROSSOVER] >= ALIKE * target:
+    if flat[CROSSOVER] >= settings.accepted_crossover * target:
         return None, target
     for damping in dampings(flat)[1::2]:
         ranges = Modal.of({**flat, "joint.damping": damping}, fit.choice.beams).comfortable
         best = comfortable_below(ranges, target)
-        if best is not None and best >= ALIKE * target:
+        if best is not None and best >= settings.accepted_crossover * target:
             name = f"crossover of up to {best:.3g} Hz with a modulus margin of 0.5"
             return Relaxation(name, "joint.damping", flat["joint.damping"], float(damping), "N*s/m"), best
     return None, target
@@ -249,9 +240,10 @@ def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
 def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTask, list[Candidate]]:
     """The front for the largest stroke that allows the machine's limit; else that which allows the highest crossover.
     Raises NoDesign where no leaf springs meet the requirements."""
+    settings = DesignSettings.current()
     stroke, choices = spec.leaves.stroke, []
     several = stroke.high > stroke.low
-    strokes = np.geomspace(stroke.high, stroke.low, STROKES).tolist() if several else [stroke.high]
+    strokes = np.geomspace(stroke.high, stroke.low, settings.tried_strokes).tolist() if several else [stroke.high]
     for size in strokes:
         task = LeafTask(spec, size, spec.limit, friction, flat)
         if candidates := front(task):
@@ -273,19 +265,20 @@ def allowed_crossover(task: LeafTask, candidates: list[Candidate]) -> float:
 
 def fit_leaves(base: Stage, task: LeafTask, candidates: list[Candidate], population: Population) -> LeavesAndCrossover:
     """Leaves as soft as the crossover allows, that as high as leaves and margins allow. Raises NoDesign."""
+    settings = DesignSettings.current()
     target = min(task.spec.limit, allowed_crossover(task, candidates))
-    for _ in range(ROUNDS):
+    for _ in range(settings.design_rounds):
         task = replace(task, crossover=target)
         choice = chosen(task, candidates)
         if choice is None:
-            target *= LOWER
+            target *= settings.lower_crossover
             continue
         stage = with_leaves(base, choice.geometry, task.stroke)
         ranges = comfortable(stage, choice.beams, population)
         best = comfortable_below(ranges, target)
         if best is None:
             raise NoDesign(f"up to {target:.3g} Hz there is no crossover with a modulus margin of 0.5")
-        if best >= ALIKE * target:
+        if best >= settings.accepted_crossover * target:
             return LeavesAndCrossover(task, choice, stage.replace({CROSSOVER: f"{_down(best):.6g} Hz"}), ranges)
         target = best
     raise NoDesign(

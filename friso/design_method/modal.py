@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import bandwidth, faster
-from friso.frequency.crossover import DENSITY, STEPS, WANTED, searched_crossovers, settled_members
+from friso.frequency.crossover import WANTED, searched_crossovers, settled_members
 from friso.frequency.drive import DriveTiming
 from friso.frequency.family import controller_response, distance_to_lines, frequency_grid, plants, stability_by_poles
 from friso.frequency.members import Members
 from friso.frequency.ranges import Range, ranges_below
+from friso.frequency.settings import FrequencySettings
 from friso.leaf_springs.evaluation import Evaluation
 
 AROUND = np.sinh(np.linspace(-7.0, 7.0, 71))
@@ -61,7 +62,10 @@ class Modal:
     @property
     def comfortable(self) -> tuple[Range, ...]:
         """The crossovers [Hz] with a modulus margin of 0.5."""
-        return ranges_below(np.geomspace(*searched_crossovers(self.flat), STEPS), lambda at: WANTED - self.margin(at))
+        settings = FrequencySettings.current()
+        return ranges_below(
+            np.geomspace(*searched_crossovers(self.flat), settings.crossover_steps), lambda at: WANTED - self.margin(at)
+        )
 
 
 def _turns(ratio: np.ndarray) -> np.ndarray:
@@ -83,7 +87,11 @@ def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
 
 def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: DriveTiming) -> np.ndarray:
     """Angular frequencies that show the loop at all crossovers, and every mode."""
-    ends = [frequency_grid(faster(flat, np.array(end / bandwidth(flat))), DENSITY) for end in searched_crossovers(flat)]
+    settings = FrequencySettings.current()
+    ends = [
+        frequency_grid(faster(flat, np.array(end / bandwidth(flat))), settings.search_density)
+        for end in searched_crossovers(flat)
+    ]
     zeta = float(leaves.mechanism.damping_ratio)
     about = [2 * np.pi * mode.frequency * (1 + zeta * AROUND) for mode in leaves.modes[1:]]
     frequencies = np.unique(np.concatenate([*ends, *about]))

@@ -5,17 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from friso.design_method.prepare import by_rules, check_designable
+from friso.design_method.settings import DesignSettings
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.equations.motion import size
 from friso.quantities import as_toml, percent
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
-
-FRICTION, MASS = 0.3, 0.05
-"""Shares by which friction and masses are taken to differ from the stage file's, where that tells nothing."""
-
-TRAVELS = 0.1
-"""The shortest move, as a share of the stage file's travel."""
 
 STATIC, COULOMB = "friction.static", "friction.coulomb"
 
@@ -29,11 +24,16 @@ def outline(stage: Stage) -> str:
     """The text of a specification with comments: the present crossover as the machine's limit, ranges from what is
     uncertain in the stage file (else assumed ones), moves up to its travel, and spring steel in usual gauges. Raises
     InputError for a stage that `friso design` cannot design for."""
+    settings = DesignSettings.current()
     check_designable(stage)
     flat = stage.flat()
     limit = f"{by_rules(stage).flat()[CROSSOVER]:.4g}"
-    friction = [_line(stage, f"friction.{name}", FRICTION) for name in SPREAD if flat.get(f"friction.{name}")]
-    masses = [_line(stage, f"masses.{name}", MASS) for name in ("cart", "stage") if f"masses.{name}" in flat]
+    friction = [
+        _line(stage, f"friction.{name}", settings.friction_spread) for name in SPREAD if flat.get(f"friction.{name}")
+    ]
+    masses = [
+        _line(stage, f"masses.{name}", settings.mass_spread) for name in ("cart", "stage") if f"masses.{name}" in flat
+    ]
     both = masses if len(masses) == 2 else [f"# {line}; to be divided, unless both are given" for line in masses]
     travel, acceleration = _move(stage)
     own = flat.get("joint.stroke")
@@ -51,8 +51,8 @@ def outline(stage: Stage) -> str:
             *both,
             "",
             "[moves]",
-            f'travel = "{TRAVELS * travel:g} m .. {travel:g} m"',
-            f'acceleration = "{TRAVELS * acceleration:g} m/s^2 .. {acceleration:g} m/s^2"',
+            f'travel = "{settings.shortest_move * travel:g} m .. {travel:g} m"',
+            f'acceleration = "{settings.shortest_move * acceleration:g} m/s^2 .. {acceleration:g} m/s^2"',
             "",
             "[position]",
             'window = "1 um"   # in position: stays this close to the reference',

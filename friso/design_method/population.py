@@ -10,18 +10,10 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
+from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Spec
 from friso.errors import InputError
 from friso.intervals import Interval
-
-LEVELS = (0.0, 0.5, 1.0)
-"""Shares of each range of static friction and gap that the corners take: hunting is not monotonous in them."""
-
-SEED = 6
-"""Seed of the scrambled Sobol sequence: the same machines for the same specification."""
-
-DISTANT = 5.0
-"""Time [s] from the start of a move to that of the way back, at least, as in the thesis's path."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +39,7 @@ def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
     the friction goes together, viscous friction against it, since it is what damps. Raises InputError where friction
     never falls.
     """
+    settings = DesignSettings.current()
     friction, masses = _friction(spec, flat), _masses(spec)
     main = [name for name in ("static", "coulomb", "gap") if name in friction]
     rest = [name for name in friction if name not in main]
@@ -55,7 +48,7 @@ def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
         [{name: 1 - share if name == "viscous" else share for name in rest} for share in (0.0, 1.0)] if rest else [{}]
     )
     ranges = friction | masses
-    levels = product(*(LEVELS if ranges[name].high > ranges[name].low else (0.0,) for name in main))
+    levels = product(*(settings.corner_levels if ranges[name].high > ranges[name].low else (0.0,) for name in main))
     rows = [
         {**dict(zip(main, level, strict=True)), **side, **mass} for level, side, mass in product(levels, turned, groups)
     ]
@@ -77,9 +70,10 @@ def _falls(population: Population, flat: Mapping[str, Any]) -> None:
 def random_machines(spec: Spec, flat: Mapping[str, Any], count: int, softening: float) -> Population:
     """Machines and moves drawn evenly from all ranges: friction, masses, stiffness (its tolerance either way, and down
     by the share of it that the load may take, `softening`), travel and acceleration (evenly in the logarithm)."""
+    settings = DesignSettings.current()
     ranges = _friction(spec, flat) | _masses(spec)
     names = [*ranges, "stiffness", "travel", "acceleration"]
-    sequence = qmc.Sobol(len(names), rng=SEED).random_base2(int(np.ceil(np.log2(count))))[:count]
+    sequence = qmc.Sobol(len(names), rng=settings.population_seed).random_base2(int(np.ceil(np.log2(count))))[:count]
     shares = dict(zip(names, sequence.T, strict=True))
     population = _population(ranges, {name: shares[name] for name in ranges}, flat, count)
     moves = _moves(spec, shares["travel"], shares["acceleration"])
@@ -97,12 +91,13 @@ def typical_move(spec: Spec) -> dict[str, Any]:
 
 def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str, np.ndarray]:
     """There and back, at shares of the ranges."""
+    settings = DesignSettings.current()
     distance, rate = (
         interval.low * (interval.high / interval.low) ** share
         for interval, share in ((spec.moves.travel, travel), (spec.moves.acceleration, acceleration))
     )
     time = np.sqrt(distance / rate)
-    back = np.maximum(DISTANT, 2 * time + DISTANT / 2)
+    back = np.maximum(settings.return_after, 2 * time + settings.return_after / 2)
     return {
         "motion.acceleration": rate,
         "motion.acceleration_time": time,

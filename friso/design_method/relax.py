@@ -11,20 +11,8 @@ from scipy.optimize import differential_evolution
 
 from friso.design_method.geometry import SIZES, Geometry, Sheet, box, mechanisms
 from friso.design_method.requirements import LeafTask, Requirement, less, more, requirements
+from friso.design_method.settings import DesignSettings
 from friso.leaf_springs.mechanism import Mechanism
-
-BEYOND = 3.0
-"""Factor by which space and sheets are looked at beyond what the specification allows."""
-
-POPULATION, GENERATIONS, SEED = 16, 80, 5
-"""Population, generations and seed of differential evolution (doi:10.1023/A:1008202821328)."""
-
-UNMET = 10.0
-"""Added to the objective where another requirement is not met: the logarithm of a factor beyond all relaxation."""
-
-SPARE, MORE = 0.01, 1.03
-"""Logarithm of the factor by which the others have to be kept, and the factor by which more is asked of the one that is
-relaxed: sizes are made in whole tenths, and beams have to confirm them."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +82,11 @@ class _Trials:
 
     @property
     def bounds(self) -> list[tuple[float, float]]:
+        settings = DesignSettings.current()
         low, high = box(self.task.spec)
-        ends = np.log([[*low, self.gauges[0]], [*high, self.gauges[-1]]]).T + np.log(BEYOND) * np.array([-1, 1])
+        ends = np.log([[*low, self.gauges[0]], [*high, self.gauges[-1]]]).T + np.log(
+            settings.relaxed_beyond
+        ) * np.array([-1, 1])
         return [*map(tuple, ends), (0, len(self.kinds) - 1e-9)]
 
     def built(self, x: np.ndarray) -> tuple[np.ndarray, list[Sheet]]:
@@ -109,24 +100,30 @@ class _Trials:
 
 def _alone(task: LeafTask, needs: list[Requirement], k: int) -> Iterator[Relaxation]:
     """The least relaxation of requirement `k` with which the others can be met."""
+    settings = DesignSettings.current()
     of_sheets = np.array([requirement.keys[0].key == "leaves.thickness" for requirement in needs])
     trials = _Trials(task, free=bool(of_sheets[k]))
-    spare = np.where(of_sheets, 0.0, SPARE)  # what may be bought is met exactly
+    spare = np.where(of_sheets, 0.0, settings.relaxed_reserve)  # what may be bought is met exactly
 
     def objective(x: np.ndarray) -> np.ndarray:
         many = mechanisms(task.flat, *trials.built(x))
         excess = np.log([np.broadcast_to(requirement.excess(many), x.shape[1]) for requirement in needs])
         others = np.delete(excess + spare[:, None], k, axis=0).max(axis=0)
-        return np.where(others <= 1e-9, excess[k], UNMET + others)
+        return np.where(others <= 1e-9, excess[k], settings.unmet_penalty + others)
 
-    search = {"popsize": POPULATION, "maxiter": GENERATIONS, "rng": SEED, "polish": False}
+    search = {
+        "popsize": settings.relaxed_population,
+        "maxiter": settings.relaxed_generations,
+        "rng": settings.relaxed_seed,
+        "polish": False,
+    }
     with np.errstate(divide="ignore"):  # a requirement that asks for nothing
         minimum = differential_evolution(objective, trials.bounds, vectorized=True, updating="deferred", **search)
-    if minimum.fun >= UNMET:
+    if minimum.fun >= settings.unmet_penalty:
         return
     (sizes,), (sheet,) = trials.built(minimum.x[:, None])
     for relaxable in needs[k].keys:
-        needed = relaxable.needed(MORE * float(np.exp(max(minimum.fun, 0.0))))
+        needed = relaxable.needed(settings.relaxed_more * float(np.exp(max(minimum.fun, 0.0))))
         if needed is not None and not np.isclose(needed, relaxable.value, rtol=1e-6):
             yield Relaxation(
                 needs[k].name, relaxable.key, relaxable.value, needed, relaxable.unit, Geometry.of(sizes, sheet)

@@ -8,14 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Spec
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import GRAVITY, Mechanism
-
-RESERVE = 1.015
-"""By how much closed forms may be off in stress and buckling load (docs/flexure.md): geometries keep this distance, so
-that the beam model confirms them."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +76,7 @@ BREAKAWAY, PARASITIC = "the cart must not break away inside the stroke", "first 
 
 def requirements(task: LeafTask) -> list[Requirement]:
     """All requirements except those on space and sheets."""
+    settings = DesignSettings.current()
     spec, safety, stroke = task.spec, task.spec.safety, task.stroke
     shorter = less("leaves.stroke", stroke, "m")
     stiffest = safety.breakaway * (1 + safety.stiffness_tolerance)
@@ -86,7 +84,9 @@ def requirements(task: LeafTask) -> list[Requirement]:
     def fatigue(mechanism: Mechanism) -> Any:
         strength = np.where(np.isnan(mechanism.fatigue), np.inf, mechanism.fatigue)
         swing = mechanism.stress_concentration * closed_forms.max_stress(mechanism, stroke) / strength
-        return RESERVE * safety.fatigue * (swing + load_stress(mechanism, task) / mechanism.yield_strength)
+        return (
+            settings.model_reserve * safety.fatigue * (swing + load_stress(mechanism, task) / mechanism.yield_strength)
+        )
 
     return [
         Requirement(
@@ -100,13 +100,17 @@ def requirements(task: LeafTask) -> list[Requirement]:
         Requirement(
             "yield strength under stroke and load",
             (safety_factor("safety.strength", safety.strength),),
-            lambda mechanism: RESERVE * safety.strength * static_stress(mechanism, task) / mechanism.yield_strength,
+            lambda mechanism: (
+                settings.model_reserve * safety.strength * static_stress(mechanism, task) / mechanism.yield_strength
+            ),
         ),
         Requirement(
             "buckling under load",
             (safety_factor("safety.buckling", safety.buckling), *_lighter(task)),
             lambda mechanism: (
-                RESERVE * safety.buckling * buckling_share(mechanism, task, closed_forms.buckling_load(mechanism))
+                settings.model_reserve
+                * safety.buckling
+                * buckling_share(mechanism, task, closed_forms.buckling_load(mechanism))
             ),
         ),
         Requirement(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from friso.design_method.population import Population, random_machines
+from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Spec
 from friso.engine.batch import CAPACITY, RunOptions, run_chunks
 from friso.engine.kernel import kernel
@@ -20,16 +21,6 @@ from friso.progress import Progress, silent
 from friso.shares import share_interval
 from friso.stage import Stage
 
-MACHINES = 10_000
-"""Machines and moves that are drawn."""
-
-FOLLOWED, LONGER = 15.0, 10.0
-"""Time [s] for which a machine is followed after its move, as in the thesis's path; and how many times longer one that
-is not in position in the last quarter of it."""
-
-LAST = 0.25
-"""Share of the run, at its end, in which a machine has to stay in position."""
-
 THERE_AND_BACK = {
     "kind": "there_and_back",
     "acceleration": "1 m/s^2",
@@ -38,12 +29,6 @@ THERE_AND_BACK = {
     "duration": "20 s",
 }
 """A motion whose numbers are replaced by those of a machine."""
-
-RTOL = 1e-5
-"""Relative tolerance of these runs."""
-
-CHUNK = 512
-"""Runs between two reports of progress."""
 
 
 @dataclass(frozen=True)
@@ -95,8 +80,9 @@ class MachineOutcomes:
 
     def followed(self, number: int) -> float:
         """For how long [s] a machine was followed after its move."""
-        soon = self.settling[number] <= (1 - LAST) * FOLLOWED
-        return FOLLOWED if soon else LONGER * FOLLOWED
+        settings = DesignSettings.current()
+        soon = self.settling[number] <= (1 - settings.last_share) * settings.followed_time
+        return settings.followed_time if soon else settings.longer_factor * settings.followed_time
 
     @property
     def worst(self) -> int:
@@ -119,8 +105,9 @@ class Verification:
 def verification(stage: Stage, spec: Spec, softening: float, progress: Progress) -> Verification:
     """Try the design in all that the specification allows; its load takes a share of the drive stiffness, `softening`,
     or none of it."""
+    settings = DesignSettings.current()
     flat = stage.flat()
-    machines = random_machines(spec, flat, MACHINES, softening)
+    machines = random_machines(spec, flat, settings.verified_moves, softening)
     window = float(spec.position.window)
     outcomes: list[MachineOutcomes] = []
     for name, held in (("joint free", False), ("joint locked", True)):
@@ -140,12 +127,18 @@ def move_machines(
 ) -> MachineOutcomes:
     """The moves of stages given as flat keys, arrays of shape (count,); if `patient`, those that are not in position
     again, for longer."""
-    first = _followed_moves(flat, count, window, FOLLOWED, progress, label)
+    settings = DesignSettings.current()
+    first = _followed_moves(flat, count, window, settings.followed_time, progress, label)
     again = np.flatnonzero(first.restless & patient)
     if again.size:
         keys = {key: value[again] if np.ndim(value) else value for key, value in flat.items()}
         longer = _followed_moves(
-            keys, again.size, window, LONGER * FOLLOWED, progress, f"{label}, those not at rest for longer"
+            keys,
+            again.size,
+            window,
+            settings.longer_factor * settings.followed_time,
+            progress,
+            f"{label}, those not at rest for longer",
         )
         better = np.flatnonzero(longer.completed)  # where the long run fails, the first word stays
         for name in ("words", "settling", "swing"):
@@ -157,22 +150,23 @@ def _followed_moves(
     flat: dict[str, Any], count: int, window: float, time: float, progress: Progress, label: str
 ) -> MachineOutcomes:
     """The moves, each followed for a time [s] after its last corner."""
+    settings = DesignSettings.current()
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
     keys = {**flat, "motion.duration": corner + time}
     options = RunOptions(
-        rtol=RTOL,
+        rtol=settings.verified_rtol,
         bands=(window, 10 * window),
-        window=1 - LAST,
+        window=1 - settings.last_share,
         record_from=np.inf,
         least_swing=window / 4,
-        room=round(CAPACITY * time / FOLLOWED),
-        chunk=CHUNK,
+        room=round(CAPACITY * time / settings.followed_time),
+        chunk=settings.runs_per_report,
     )
     outcome = MachineOutcomes(np.full(count, FAILED, dtype=object), np.full(count, np.nan), np.full(count, np.nan))
     done = 0
     for runs in run_chunks(kernel(shared_structure(keys)), keys, count, options):
         numbers, end = runs.numbers, run_ends(runs, turns_of(runs), "inner")
-        words = outcomes(end, window, hold=LAST * end.ended)
+        words = outcomes(end, window, hold=settings.last_share * end.ended)
         outcome.words[numbers] = words
         outcome.settling[numbers] = np.where(words == RESTS, np.maximum(end.outside - corner[numbers], 0.0), np.nan)
         outcome.swing[numbers] = end.swing

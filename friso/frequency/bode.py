@@ -21,15 +21,10 @@ from friso.frequency.margins import Margins, margins, with_resonances
 from friso.frequency.members import Members, concatenate_families, family, limit_cases, member
 from friso.frequency.parts import FORCE, STAGE, plant
 from friso.frequency.ranges import Range, ranges_below
+from friso.frequency.settings import FrequencySettings
 from friso.frequency.stiffness import limiter_in_series
 from friso.frequency.system import Complex
 from friso.stage import Stage
-
-AROUND = 5.0
-"""Factor by which the frequencies shown reach beyond all crossovers and resonances."""
-
-POINTS = 1200
-"""Frequencies of a curve, besides those about resonances."""
 
 PRESCRIBED = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 """Speeds of the cart [m/s] at which the open loop is shown, from stuck to sliding fast (thesis, Fig. 8)."""
@@ -132,6 +127,7 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
     """The linear analysis of a stage, its curves over frequencies `band` [Hz] (default: those that matter); with
     `series`, the thesis's formula for a touched limiter is added. Raises InputError for frequencies that are not
     usable, a controller that exerts no force, and a delay that is too long (see `DriveTiming`)."""
+    settings = FrequencySettings.current()
     if band is not None and not 0 < band[0] < band[1] < np.inf:
         raise InputError("band", repr(band), "two rising frequencies [Hz]", "friso.bode(stage, (0.1, 1000.0))")
     flat = stage.flat()
@@ -142,7 +138,7 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
         closed_loop_poles(keys, concatenate_families([*limit_cases(keys).values()]))
     together = concatenate_families([*limit_cases(flat).values()])
     resonant = [closed_loop_poles(flat, together), plant_poles(flat, together)]
-    omega = with_resonances(np.geomspace(low, high, POINTS) * 2 * np.pi, resonant)
+    omega = with_resonances(np.geomspace(low, high, settings.curve_points) * 2 * np.pi, resonant)
     return Bode(
         stage=stage,
         omega=omega,
@@ -178,13 +174,16 @@ def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Me
 
 def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range:
     """Frequencies [Hz] that show all crossovers and resonances."""
+    settings = FrequencySettings.current()
     poles = plant_poles(flat, concatenate_families([*limit_cases(flat).values()]))
     resonances = np.abs(poles[np.abs(poles.imag) > np.abs(poles.real)]) / (2 * np.pi)
     places = np.array(
         [*(f for case_margins in all_margins for f in case_margins.crossovers), *resonances[resonances > 1e-3]]
     )
     places = places if places.size else np.ones(1)
-    return float(places.min()) / AROUND, min(float(places.max()) * AROUND, DriveTiming.of(flat).highest / (2 * np.pi))
+    return float(places.min()) / settings.shown_beyond, min(
+        float(places.max()) * settings.shown_beyond, DriveTiming.of(flat).highest / (2 * np.pi)
+    )
 
 
 def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed, ...]:

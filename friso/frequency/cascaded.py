@@ -21,16 +21,13 @@ from friso.frequency.margins import Margins, margins_of
 from friso.frequency.members import Members
 from friso.frequency.parts import FORCE, STAGE, VELOCITY, plant
 from friso.frequency.rates import locus_of
+from friso.frequency.settings import FrequencySettings
 from friso.frequency.system import Complex
 from friso.stage.controllers import controller_of
 
 POSITION_TIME = "drive.position_sample_time"
 
 CascadeLoop = Literal["velocity", "position"]
-
-UNSEEN = 1e-7
-"""Share of the fastest pole below which a pole of the velocity loop is a position, or the integral of one, that it does
-not see."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +67,9 @@ def cascade_loops(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -
 
 def _seen(rates: Complex) -> np.ndarray:
     """Which of the poles [rad/s] of a velocity loop (1, n) it sees, shape (n,)."""
+    settings = FrequencySettings.current()
     sizes = np.abs(rates[0])
-    return sizes > UNSEEN * sizes[np.isfinite(sizes)].max(initial=0.0)
+    return sizes > settings.unseen_pole * sizes[np.isfinite(sizes)].max(initial=0.0)
 
 
 def _position_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming) -> Callable[[np.ndarray], Complex]:

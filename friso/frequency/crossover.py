@@ -21,26 +21,11 @@ from friso.frequency.family import (
 )
 from friso.frequency.members import Members, concatenate_families, family, limit_cases
 from friso.frequency.ranges import Range, ranges_below, shared
+from friso.frequency.settings import FrequencySettings
 from friso.frequency.system import Complex
 
 WANTED = 0.5
 """Modulus margin that is called comfortable: a peak sensitivity of 2, 6 dB."""
-
-LOWEST, HIGHEST = 0.1, 1e4
-"""Crossovers [Hz] that are searched."""
-
-STEPS = 161
-"""Crossovers of the search."""
-
-DENSITY = 60
-"""Frequencies per decade at which they are, besides those about resonances."""
-
-BIASES = 9
-"""Bias forces under which a stuck stage is looked at for each state of its limiter."""
-
-
-JUST = 1e-5
-"""Share by which a crossover is changed to be just above or below the end of a range."""
 
 
 @dataclass(frozen=True)
@@ -71,13 +56,14 @@ class Limits:
 
 def limits(flat: Mapping[str, Any]) -> Limits:
     """The crossovers at which a stage is stable, and comfortably so."""
+    settings = FrequencySettings.current()
     search = _Search(flat, settled_members(flat))
     ends, crossover = search.ends, _stated(flat)
     stable = search.stable()
     close = ranges_below(search.at, lambda f: WANTED - search.distance(f).min(axis=1))
     comfortable = shared(close, stable)
     highest, calm = (range_end(ranges, crossover) for ranges in (stable, comfortable))
-    above, beyond = (np.array([end * (1 + JUST) if end else crossover]) for end in (highest, calm))
+    above, beyond = (np.array([end * (1 + settings.crossover_nudge) if end else crossover]) for end in (highest, calm))
     return Limits(
         ends,
         stable,
@@ -103,10 +89,11 @@ def range_end(ranges: Sequence[Range], crossover: float) -> float | None:
 
 def searched_crossovers(flat: Mapping[str, Any]) -> Range:
     """The crossovers that are searched; those of a sampled drive end below half the sampling frequency."""
+    settings = FrequencySettings.current()
     drive = DriveTiming.of(flat)
     if bandwidth(flat) is None:
         return 1 / 100.0, 1000.0
-    return LOWEST, min(HIGHEST, 0.999 * drive.highest / (2 * np.pi))
+    return settings.lowest_crossover, min(settings.highest_crossover, 0.999 * drive.highest / (2 * np.pi))
 
 
 def settled_margin(flat: Mapping[str, Any]) -> float:
@@ -118,7 +105,8 @@ def settled_margin(flat: Mapping[str, Any]) -> float:
 def settled_members(flat: Mapping[str, Any]) -> Members:
     """Limit cases, and those that are stuck under a bias force: what a stage is in unless it creeps or just broke away,
     when its friction falls with the speed."""
-    members = family(flat, BIASES, 2)
+    settings = FrequencySettings.current()
+    members = family(flat, settings.search_biases, 2)
     return concatenate_families([*limit_cases(flat).values(), members[members.stuck]])
 
 
@@ -147,7 +135,8 @@ class _Search:
     @cached_property
     def at(self) -> np.ndarray:
         """The crossovers between which ends of ranges are looked for."""
-        return np.geomspace(*self.ends, STEPS)
+        settings = FrequencySettings.current()
+        return np.geomspace(*self.ends, settings.crossover_steps)
 
     def stable(self) -> tuple[Range, ...]:
         """The crossovers at which all members are stable."""
@@ -168,7 +157,8 @@ class _Search:
     def _loops(self) -> tuple[np.ndarray, Callable[[Mapping[str, Any]], Complex]]:
         """Frequencies [rad/s] that show the loop at all crossovers searched, always the same, so that the distance is a
         smooth function; and the loops there for the keys of any controller."""
-        grids = [frequency_grid(_at(self.flat, np.array(end)), DENSITY) for end in self.ends]
+        settings = FrequencySettings.current()
+        grids = [frequency_grid(_at(self.flat, np.array(end)), settings.search_density) for end in self.ends]
         omega = np.unique(np.concatenate(grids))
         return omega, bare_loops(self.flat, self.members, omega)
 

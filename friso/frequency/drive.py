@@ -10,22 +10,9 @@ from typing import Any
 import numpy as np
 
 from friso.errors import InputError
+from friso.frequency.settings import FrequencySettings
 from friso.frequency.system import Complex, System
 from friso.stage.rig import LOOPS
-
-LIGHT = 0.3
-"""Damping ratio below which a pole is a resonance."""
-
-PADE, TURN = 4, 2.5
-"""A delay in continuous time is, where poles are wanted, a row of rational functions of this order, each for at most so
-much phase [rad] at the fastest resonance: wrong by 2e-4 rad then."""
-
-LEAST_TURN, MOST_TURN = 5.0, 20.0
-"""Phase [rad] for which they are made at least, and at most for a loop's own resonances: one that turns farther within
-its delay is unstable anyway."""
-
-MOST_SECTIONS, MOST_SAMPLES = 24, 64
-"""Longest row of these, and longest delay of a sampled drive in samples."""
 
 SLOW_LOOPS = tuple(f"drive.{name}_sample_time" for name in LOOPS)
 """Keys of the sample times of loops that are carried out more slowly."""
@@ -51,18 +38,21 @@ class DriveTiming:
     def of(cls, flat: Mapping[str, Any]) -> DriveTiming:
         """The drive of a stage. Raises InputError for a delay of more samples than are followed, and for a loop that is
         due as rarely."""
+        settings = FrequencySettings.current()
         sample_time = flat.get("drive.sample_time", 0.0)
         slow = {key: flat[key] for key in SLOW_LOOPS if key in flat}
         key = max(slow, key=lambda key: slow[key], default="")
         period = round(slow[key] / sample_time) if slow else 1
-        if period > MOST_SAMPLES:
+        if period > settings.most_delay_samples:
             text = f"{slow[key]:g} s, {period} samples of {sample_time:g} s"
-            raise InputError(key, text, f"at most {MOST_SAMPLES} samples", 'position_sample_time = "1 ms"')
+            raise InputError(
+                key, text, f"at most {settings.most_delay_samples} samples", 'position_sample_time = "1 ms"'
+            )
         lag = 1 / (2 * np.pi * flat["drive.current_bandwidth"]) if "drive.current_bandwidth" in flat else 0.0
         drive = cls(sample_time, flat.get("drive.delay", 0.0), period, lag)
-        if drive.sample_time and drive.delay > MOST_SAMPLES * drive.sample_time * (1 + 1e-9):
+        if drive.sample_time and drive.delay > settings.most_delay_samples * drive.sample_time * (1 + 1e-9):
             text = f"{drive.delay:g} s, {drive.delay / drive.sample_time:.3g} samples of {drive.sample_time:g} s"
-            raise InputError("drive.delay", text, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
+            raise InputError("drive.delay", text, f"at most {settings.most_delay_samples} samples", 'delay = "100 us"')
         return drive
 
     @property
@@ -93,7 +83,8 @@ class DriveTiming:
 
 def resonances(poles: Complex) -> Complex:
     """Those of the poles [rad/s] that are lightly damped."""
-    return poles[np.abs(poles.real) < LIGHT * np.abs(poles.imag)]
+    settings = FrequencySettings.current()
+    return poles[np.abs(poles.real) < settings.light_damping * np.abs(poles.imag)]
 
 
 def behind_current_loop(machine: System, lag: float) -> System:
@@ -132,17 +123,23 @@ def waited(machine: System, samples: int) -> System:
 def delayed(machine: System, delay: float, loop: float) -> System:
     """A plant with one input behind a delay [s], as a row of rational functions (Pade), whose closed loop without delay
     has resonances of up to `loop` [rad/s]. Raises InputError where the plant's own turn too often in the delay."""
+    settings = FrequencySettings.current()
     turn = fastest(np.linalg.eigvals(machine.a).astype(complex)) * delay
-    sections = int(np.ceil(max(LEAST_TURN, turn, min(loop * delay, MOST_TURN)) / TURN))
-    if sections > MOST_SECTIONS:
-        expected = f"at most {MOST_SECTIONS * TURN / (2 * np.pi):.3g} periods, or a drive.sample_time"
+    sections = int(
+        np.ceil(
+            max(settings.least_delay_phase, turn, min(loop * delay, settings.most_delay_phase)) / settings.pade_phase
+        )
+    )
+    if sections > settings.most_delay_sections:
+        most = settings.most_delay_sections * settings.pade_phase / (2 * np.pi)
+        expected = f"at most {most:.3g} periods, or a drive.sample_time"
         text = f"{delay:g} s, {turn / (2 * np.pi):.3g} periods of the fastest mode"
         raise InputError("drive.delay", text, expected, 'delay = "100 us"')
     from control import pade
     from scipy.signal import tf2ss  # 0.8 s to import
 
     for k in range(sections):
-        machine = _behind(machine, tf2ss(*pade(delay / sections, PADE)), f"delay_{k}")
+        machine = _behind(machine, tf2ss(*pade(delay / sections, settings.pade_order)), f"delay_{k}")
     return machine
 
 

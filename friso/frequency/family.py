@@ -16,7 +16,7 @@ import numpy as np
 
 from friso.engine.side_by_side import side_by_side
 from friso.equations.structure import shared_structure
-from friso.frequency.drive import LIGHT, DriveTiming
+from friso.frequency.drive import DriveTiming
 from friso.frequency.friction import law_of
 from friso.frequency.loops import Poles, poles
 from friso.frequency.margins import frequencies, margins
@@ -24,24 +24,14 @@ from friso.frequency.members import Members, concatenate_families, limit_cases
 from friso.frequency.operating_point import operating_point
 from friso.frequency.parts import FORCE, RATED, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
 from friso.frequency.rates import controller_over_period, samples_controller
+from friso.frequency.settings import FrequencySettings
 from friso.frequency.system import Complex, System
 
 _T = TypeVar("_T")
 
-CHUNK = 256
-"""Members that are computed together: their arrays then stay in the cache."""
-
-DENSITY = 35
-"""Frequencies per decade at which all members are looked at, besides those about resonances of the limit cases."""
-
-FEW = 16
-"""Members whose whole plants are solved together, at all frequencies."""
 
 NEAR = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 """Where a member is looked at about its own closed-loop resonances, in units of their half widths."""
-
-CLOSEST = 16
-"""Members whose margin is computed exactly."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +56,8 @@ class Scan:
     def distance(self) -> np.ndarray:
         """Least distance of the loop from -1: on frequencies that all share and about a member's own closed-loop
         resonances, and exactly for those that come closest to -1 there."""
-        omega = frequency_grid(self.flat, DENSITY)
+        settings = FrequencySettings.current()
+        omega = frequency_grid(self.flat, settings.family_density)
 
         def shared(which: np.ndarray) -> np.ndarray:
             return distance_to_lines(loops(self.flat, self.members[which], omega))
@@ -74,7 +65,7 @@ class Scan:
         parts = _split(np.arange(len(self.members)))
         distance = np.concatenate(side_by_side([partial(shared, part) for part in parts]))
         distance = np.minimum(distance, self.by_poles.resonant)
-        for k in np.argsort(np.where(self.stable, distance, np.inf))[:CLOSEST]:
+        for k in np.argsort(np.where(self.stable, distance, np.inf))[: settings.closest_members]:
             exact = margins(self.flat, self.members[k]).modulus_margin
             distance[k] = distance[k] if np.isnan(exact) else exact
         return distance
@@ -137,10 +128,11 @@ def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
 def about_resonances(system: Poles) -> np.ndarray:
     """Angular frequencies [rad/s] about the lightly damped closed-loop poles of each member, shape (members, k), NaN
     where there are fewer."""
+    settings = FrequencySettings.current()
     if system.drive.period > 1:  # its poles do not tell which alias resonates
         return np.full((len(system.closed), 1), np.nan)
     closed = system.in_s
-    light = (closed.imag > 0) & (np.abs(closed.real) < LIGHT * closed.imag)
+    light = (closed.imag > 0) & (np.abs(closed.real) < settings.light_damping * closed.imag)
     omega = np.where(light, closed.imag, np.nan)[:, :, None] + NEAR * np.where(light, closed.real, np.nan)[:, :, None]
     return np.clip(omega, 0, system.drive.highest).reshape(len(closed), -1)
 
@@ -215,10 +207,11 @@ def bare_loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> 
 def _measured_compliance(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
     """Position measured over the force [m/N], and velocity [m/(N s)] or, sampled, the position that it is of, shape
     (members, k, 2): by the whole plant, whose encoders may be on different sides of a transmission."""
+    settings = FrequencySettings.current()
     second = RATED if DriveTiming.of(flat).sample_time else VELOCITY
     answers = np.empty((len(members), len(omega), 2), complex)
     for mask in (members.stuck, ~members.stuck):
-        for part in np.array_split(np.flatnonzero(mask), -(-int(mask.sum()) // FEW) or 1):
+        for part in np.array_split(np.flatnonzero(mask), -(-int(mask.sum()) // settings.members_solved_whole) or 1):
             machine = plant(flat, members[part]).take((FORCE,), (STAGE, second)) if len(part) else None
             if machine is not None:
                 answers[part] = machine.at(1j * omega)[..., 0]
@@ -261,4 +254,5 @@ def impedance(flat: Mapping[str, Any], members: Members, s: np.ndarray) -> Compl
 
 
 def _split(numbers: np.ndarray) -> list[np.ndarray]:
-    return np.array_split(numbers, -(-len(numbers) // CHUNK)) if len(numbers) else []
+    settings = FrequencySettings.current()
+    return np.array_split(numbers, -(-len(numbers) // settings.members_together)) if len(numbers) else []

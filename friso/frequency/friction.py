@@ -14,6 +14,7 @@ from friso.equations.component import Switch, state
 from friso.equations.friction.common import direction, solve_linear
 from friso.equations.structure import shared_structure
 from friso.frequency.declared import Declared, sine
+from friso.frequency.settings import FrequencySettings
 from friso.stage.stage import declared_keys
 from friso.stage.tables import friction_law
 from friso.stage.transmission import STATE_PREFIX, leading_friction
@@ -24,15 +25,6 @@ if TYPE_CHECKING:
 VELOCITY, BIAS = state("velocity"), sp.Symbol("bias", real=True)
 FORWARD = str(direction(VELOCITY).beyond)
 """Name of the symbol for the direction of the motion."""
-
-SLOWEST, FASTEST = 1e-3, 1e3
-"""Speeds of the family, in units of the slowest and of the fastest speed that the law names."""
-
-SLOW, FAST = 0.1, 1e5
-"""Rates [1/s] at which bristles give way at the least and the greatest speed, of a law that names no speed."""
-
-BRISTLES = 1e-6
-"""Length [m] for that of the bristles of a law that has none: its force is the same at all speeds."""
 
 
 @dataclass(frozen=True)
@@ -134,11 +126,16 @@ def steady_force(flat: Mapping[str, Any], speeds: np.ndarray, forward: bool) -> 
 
 def speeds(flat: Mapping[str, Any], count: int) -> np.ndarray:
     """Speeds [m/s] from creeping to so fast that friction hardly depends on it, shape (count,)."""
+    settings = FrequencySettings.current()
     flat = leading_friction(flat)
     units = {key: quantity.unit for key, quantity in declared_keys(flat).items() if key.startswith("friction.")}
     named = [flat[key] for key, unit in units.items() if unit == "m/s" and key in flat]
     if named:
-        return np.geomspace(SLOWEST * min(named), FASTEST * max(named), count)
+        return np.geomspace(
+            settings.slowest_speed_share * min(named), settings.fastest_speed_factor * max(named), count
+        )
     law = law_of(flat)
-    bristles = (law.lengths(flat) if law else []) or [BRISTLES]
-    return np.geomspace(SLOW * min(bristles), FAST * max(bristles), count)
+    bristles = (law.lengths(flat) if law else []) or [settings.bristle_length]
+    return np.geomspace(
+        settings.slowest_bristle_rate * min(bristles), settings.fastest_bristle_rate * max(bristles), count
+    )

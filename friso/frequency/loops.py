@@ -23,16 +23,11 @@ from friso.frequency.parts import (
     reference_derivatives,
 )
 from friso.frequency.rates import Lifted, closed_over_period, cut_over_period, samples_controller, unseen
+from friso.frequency.settings import FrequencySettings
 from friso.frequency.system import Complex, System
 
 ROUNDING = 50 * float(np.finfo(float).eps)
 """Share of the fastest pole by which rounding may move a slow one."""
-
-UNDAMPED = 1e-9
-"""Damping ratio below which a pole is on the imaginary axis."""
-
-SLOW = 1e-6
-"""Share of the sampling frequency, or of 1 over the delay, below which these do not change a pole."""
 
 
 def open_loop(flat: Mapping[str, Any], members: Members) -> System:
@@ -92,12 +87,13 @@ class Poles:
     def abscissa(self) -> np.ndarray:
         """Real part [1/s] of the rightmost closed-loop pole, shape (members,): 0 where it is on the imaginary axis as
         far as rounding can tell. Slow poles are those in continuous time without delay, which rounding spares."""
+        settings = FrequencySettings.current()
         step = self.drive.sample_time or self.drive.delay
         if not step:
             return _real_parts(self.closed).max(axis=1)
         closed, bare = self.in_s, self.continuous
-        fast = np.where(np.abs(closed) > SLOW / step, _real_parts(closed), -np.inf)
-        slow = np.where(np.abs(bare) <= SLOW / step, _real_parts(bare), -np.inf)
+        fast = np.where(np.abs(closed) > settings.slow_pole_share / step, _real_parts(closed), -np.inf)
+        slow = np.where(np.abs(bare) <= settings.slow_pole_share / step, _real_parts(bare), -np.inf)
         return np.maximum(fast.max(axis=1), slow.max(axis=1))
 
     def distance(self, omega: np.ndarray) -> np.ndarray:
@@ -207,7 +203,8 @@ def _shut(loop: System) -> Complex:
 
 def _real_parts(poles: Complex) -> np.ndarray:
     """Real parts of poles, shape (members, n), 0 for those on the imaginary axis within rounding."""
+    settings = FrequencySettings.current()
     size = np.abs(poles)
     fastest = np.where(np.isfinite(size), size, 0.0).max(axis=1, keepdims=True)
-    edge = np.where(poles.imag != 0, UNDAMPED * size, 0.0) + ROUNDING * fastest
+    edge = np.where(poles.imag != 0, settings.undamped_ratio * size, 0.0) + ROUNDING * fastest
     return np.where(np.abs(poles.real) <= edge, 0.0, poles.real)

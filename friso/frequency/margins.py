@@ -15,35 +15,12 @@ from scipy.optimize import brentq, minimize_scalar
 from friso.frequency.drive import DriveTiming, resonances
 from friso.frequency.loops import Poles, poles, response
 from friso.frequency.members import Members
+from friso.frequency.settings import FrequencySettings
 from friso.frequency.system import Complex
-
-DENSITY = 250
-"""Frequencies per decade at which a loop is looked at before anything is located, besides those about resonances."""
-
-BEYOND = 100.0
-"""Factor by which these reach beyond the slowest and the fastest pole."""
-
-NEGLIGIBLE = 1e-12
-"""Share of the fastest pole below which one is taken to be 0."""
 
 AROUND = np.tan(np.linspace(-1.5, 1.5, 15))
 """Where a resonance is looked at, in units of its half width."""
 
-REST = 1e-6
-"""Frequency, in units of the lowest that is looked at, at which a finite loop is as at rest, and the share of its
-magnitude by which it may still change, or be off the real axis."""
-
-REAL = 1e-9
-"""Share of the real part below which the imaginary one may be rounding."""
-
-VANISHING = 1e-8
-"""Size of a loop that is nothing but rounding: a mass behind a hold does not answer at half the sampling frequency."""
-
-OF_ALIAS = 1e-3
-"""Share of the rate of the slowest loop within which the aliases of rest drown a locus in rounding."""
-
-JUMP = 1e-3
-"""Share of the values on both sides that a function still has where it jumps through zero."""
 
 LoopResponse = Callable[[np.ndarray], Complex]
 
@@ -93,12 +70,16 @@ def margins(flat: Mapping[str, Any], member: Members) -> Margins:
 
 def margins_of(at: LoopResponse, flat: Mapping[str, Any], member: Members, loop_poles: Poles) -> Margins:
     """The margins of one loop of a stage from its response and its poles."""
+    settings = FrequencySettings.current()
     drive, closed = loop_poles.drive, loop_poles.in_s[0]
     resonant = [closed, drive.to_s(loop_poles.cut[0]), *([loop_poles.continuous] if drive.period > 1 else [])]
-    omega, aside = frequencies(flat, member, drive, DENSITY, resonant), 1.0
+    omega, aside = frequencies(flat, member, drive, settings.margin_density, resonant), 1.0
     if drive.period > 1:
         apart = 2 * np.pi / (drive.sample_time * drive.period)
-        omega, aside = omega[np.abs(omega / apart - np.maximum(np.round(omega / apart), 1)) > OF_ALIAS], 1 - OF_ALIAS
+        omega, aside = (
+            omega[np.abs(omega / apart - np.maximum(np.round(omega / apart), 1)) > settings.alias_share],
+            1 - settings.alias_share,
+        )
     ends = [*_at_rest(at, omega[0]), *([at(np.array([drive.highest * aside]))[0]] if drive.sample_time else [])]
     return of_loop(at, closed[np.isfinite(closed)], float(loop_poles.abscissa[0]), omega, np.array(ends, complex))
 
@@ -108,9 +89,10 @@ def frequencies(
 ) -> np.ndarray:
     """Angular frequencies [rad/s] that show all that loops of these states do, up to the highest the drive knows: so
     many per decade, and more about the resonances among the poles `resonant`."""
+    settings = FrequencySettings.current()
     size = np.concatenate([np.abs(poles(flat, kind, DriveTiming(0.0, 0.0)).closed).ravel() for kind in members.kinds])
-    size = size[size > NEGLIGIBLE * size.max(initial=0.0)] if size.any() else np.ones(1)
-    low, high = size.min() / BEYOND, min(size.max() * BEYOND, drive.highest)
+    size = size[size > settings.negligible_pole * size.max(initial=0.0)] if size.any() else np.ones(1)
+    low, high = size.min() / settings.frequencies_beyond, min(size.max() * settings.frequencies_beyond, drive.highest)
     return with_resonances(np.geomspace(low, high, int(density * np.log10(high / low)) + 2), resonant)
 
 
@@ -123,8 +105,11 @@ def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray
 
 def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
     """The loop at rest, if it is finite there: real, and the same on the way there."""
-    low, lower = at(np.array([2 * REST, REST]) * slow)
-    flat = np.abs(low - lower) < REST * np.abs(lower) and np.abs(lower.imag) < REST * np.abs(lower.real)
+    settings = FrequencySettings.current()
+    low, lower = at(np.array([2 * settings.rest_frequency, settings.rest_frequency]) * slow)
+    flat = np.abs(low - lower) < settings.rest_frequency * np.abs(lower) and np.abs(
+        lower.imag
+    ) < settings.rest_frequency * np.abs(lower.real)
     return [complex(lower.real)] if flat else []
 
 
@@ -164,22 +149,24 @@ def _decades(loop: Complex) -> np.ndarray:
 def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Where a function of the frequency, known at some, passes zero; not where it jumps, as a locus does that goes over
     to an alias."""
+    settings = FrequencySettings.current()
     with np.errstate(invalid="ignore"):
         passes = np.flatnonzero(values[:-1] * values[1:] < 0)
     zeros: list[Any] = [
         brentq(function, omega[k], omega[k + 1], xtol=1e-14 * omega[k], rtol=np.float64(1e-13)) for k in passes
     ]
     sizes = np.maximum(np.abs(values[passes]), np.abs(values[passes + 1]))
-    crossings = {at for at, size in zip(zeros, sizes, strict=True) if abs(function(at)) <= JUMP * size}
+    crossings = {at for at, size in zip(zeros, sizes, strict=True) if abs(function(at)) <= settings.jump_share * size}
     return np.array(sorted({*crossings, *omega[values == 0].tolist()}))
 
 
 def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Complex) -> np.ndarray:
     """Factors by which the gain takes the loop through -1: where L is real and negative."""
-    clear = np.where(np.abs(gains.imag) > REAL * np.abs(gains.real), gains.imag, np.nan)  # not rounding
+    settings = FrequencySettings.current()
+    clear = np.where(np.abs(gains.imag) > settings.real_share * np.abs(gains.real), gains.imag, np.nan)  # not rounding
     real = _roots(lambda w: response(np.array([w]))[0].imag, omega, clear)
     at = np.concatenate([response(real) if real.size else np.empty(0), ends])
-    return -1 / at.real[at.real < -VANISHING]
+    return -1 / at.real[at.real < -settings.vanishing_loop]
 
 
 def _closest(response: LoopResponse, omega: np.ndarray, distance: np.ndarray) -> tuple[float, float]:

@@ -11,14 +11,12 @@ import numpy as np
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency.friction import level, speeds
+from friso.frequency.settings import FrequencySettings
 from friso.stage.arguments import check_arguments
 from friso.stage.transmission import leading_friction
 
 BIASES, SPEEDS = 65, 257
 """Bias forces and speeds of the family, of each state of the limiter."""
-
-NEARLY = 0.999
-"""Share of the break-away force up to which a stuck stage is biased."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +111,7 @@ def limit_cases(flat: Mapping[str, Any]) -> dict[str, Members]:
 def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS) -> Members:
     """Every limit case's neighbours: stuck under bias forces up to nearly the break-away force, for and against the
     motion, and sliding at all speeds, in both directions if friction differs between them."""
+    settings = FrequencySettings.current()
     flat = leading_friction(flat)
     if flat["friction.model"] == "none":
         return concatenate_families([*limit_cases(flat).values()])
@@ -120,7 +119,10 @@ def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS)
     differs = any(flat.get(f"friction.{name}", 0.0) != 0 for name in ("asymmetry", "viscous_asymmetry"))
     for touched in limiter_states(flat):
         for forward in (True, False) if differs else (True,):
-            least, most = (-NEARLY * level(flat, not forward), NEARLY * level(flat, forward))
+            least, most = (
+                -settings.greatest_bias_share * level(flat, not forward),
+                settings.greatest_bias_share * level(flat, forward),
+            )
             bias = np.unique(np.linspace(least, most, biases))  # a law that creeps instead of sticking bears none
             speed = np.concatenate([np.zeros(len(bias)), speeds(flat, speeds_)])
             bias = np.concatenate([bias, np.zeros(speeds_)])

@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-PRECISE = 4e-6
-"""Share of a step of the places, in its logarithm, up to which an end is located."""
+from friso.frequency.settings import FrequencySettings
 
 EVENLY, NEAR = np.linspace(0, 1, 6)[1:-1], np.array([-0.002, 0.0, 0.002])
 """Where a step with an end is divided: evenly, and about the zero of a straight line, as shares of it."""
@@ -33,7 +32,8 @@ def shared(first: tuple[Range, ...], second: tuple[Range, ...]) -> tuple[Range, 
 
 def _end(at: np.ndarray, values: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> float:
     """The zero of the function between two places, at which it has these values."""
-    precise = PRECISE * np.log(at[-1] / at[0])
+    settings = FrequencySettings.current()
+    precise = settings.end_precision * np.log(at[-1] / at[0])
     while np.log(at[-1] / at[0]) > precise:
         with np.errstate(invalid="ignore"):
             zero = np.nan_to_num(values[0] / (values[0] - values[-1]), nan=0.5)

@@ -18,12 +18,7 @@ from friso.leaf_springs.closed_forms import axial, body_mass
 from friso.leaf_springs.evaluation import Mode, peak_of
 from friso.leaf_springs.mechanism import Mechanism, along_motion
 from friso.leaf_springs.naming import mode_name
-
-MODES = 12
-"""Modes reported, the lowest; and those of the stage above them."""
-
-OF_STAGE = 0.1
-"""Share of the energy of a mode from which it is one of the stage."""
+from friso.leaf_springs.settings import LeafSpringSettings
 
 KINDS = (((2, 4), 8), ((1, 5), 4), ((3,), 5), ((0,), 2))
 """Coordinates of a node that go together while the leaf is straight, and how many modes between held ends are kept:
@@ -99,6 +94,7 @@ def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
 
 def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
     """The lowest modes and all of the stage, the drive mode first, the others by frequency."""
+    settings = LeafSpringSettings.current()
     ends, rows = end_motions(mechanism.offsets), _rows(mechanism.offsets)
     count = len(leaf.squares)
     size = COORDINATES + count * len(rows)
@@ -114,7 +110,10 @@ def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
     squares, vectors = eigh(stiffness, mass)
     lowest = []
     for square, vector in zip(squares, vectors.T, strict=True):
-        if len(lowest) >= MODES and not vector[stage] @ body @ vector[stage] > OF_STAGE:
+        if (
+            len(lowest) >= settings.reported_modes
+            and not vector[stage] @ body @ vector[stage] > settings.stage_energy_share
+        ):
             continue
         amplitudes = rows.T @ vector[COORDINATES:].reshape(len(rows), count)
         moved = np.einsum("nce,les,s->lnc", leaf.static[:, :3], ends, vector[stage])

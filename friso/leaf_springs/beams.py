@@ -16,19 +16,7 @@ from friso.leaf_springs.beam_modes import Reduced, buckling_load, modes
 from friso.leaf_springs.beam_system import ELEMENTS, BeamFailure, Condensed, Configuration, LeafBeams
 from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.mechanism import Mechanism
-
-POINTS = 5
-"""Deflections, evenly from 0 to the stroke."""
-
-ITERATIONS, HALVINGS = 8, 5
-"""Newton iterations of a step before it is halved, and how often it may be."""
-
-CLOSE = 1e-7
-"""Energy of the last correction over that of the stroke, per (thickness/deflection)^2: an axial force of a leaf in
-error by 4e-4 of its buckling load, before that correction."""
-
-FOLDED = 1.3
-"""Angle [rad] of a node from which the mechanism is folded rather than deflected."""
+from friso.leaf_springs.settings import LeafSpringSettings
 
 PLANE, ACROSS = slice(0, None, 2), slice(1, None, 2)
 """Among the six coordinates of the stage, those that move with the stroke, and the others."""
@@ -68,7 +56,8 @@ def _check(mechanism: Mechanism, stroke: float) -> None:
 
 
 def _evaluate(mechanism: Mechanism, stroke: float, leaves: LeafBeams) -> Evaluation:
-    deflections = np.linspace(0, stroke, POINTS)
+    settings = LeafSpringSettings.current()
+    deflections = np.linspace(0, stroke, settings.beam_deflections)
     rest = Configuration.rest(leaves)
     straight = np.repeat(leaves.stiffness(rest.state(mechanism.offsets)[:1]), leaves.count, axis=0)
     unloaded = np.zeros((leaves.count, leaves.nodes, 6))
@@ -96,9 +85,10 @@ def _evaluate(mechanism: Mechanism, stroke: float, leaves: LeafBeams) -> Evaluat
 
 def _pushed(mechanism: Mechanism, leaves: LeafBeams, held: list[HeldEquilibrium], z: float) -> HeldEquilibrium:
     """The next equilibrium, in as few steps as it can be reached."""
+    settings = LeafSpringSettings.current()
     nearest = held[-2:]
     start = nearest[-1].place.stage[1]
-    for halving in range(HALVINGS):
+    for halving in range(settings.most_step_halvings):
         steps = 2**halving
         try:
             reached = nearest
@@ -129,10 +119,16 @@ def _predicted(reached: list[HeldEquilibrium], z: float) -> Configuration:
 
 def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) -> HeldEquilibrium:
     """The equilibrium at the z of this place by Newton's method."""
+    settings = LeafSpringSettings.current()
     z = place.stage[1]
-    close = CLOSE * (float(mechanism.thickness) / z) ** 2 * float(closed_forms.drive_stiffness(mechanism)) * z**2
-    for _ in range(ITERATIONS):
-        if not np.max(np.abs(place.inner[:, :, 2]), initial=abs(place.stage[2])) < FOLDED:
+    close = (
+        settings.newton_energy_share
+        * (float(mechanism.thickness) / z) ** 2
+        * float(closed_forms.drive_stiffness(mechanism))
+        * z**2
+    )
+    for _ in range(settings.step_newton_iterations):
+        if not np.max(np.abs(place.inner[:, :, 2]), initial=abs(place.stage[2])) < settings.folding_angle:
             break
         state = place.state(mechanism.offsets)
         forces, stiffness = leaves.forces(state), leaves.stiffness(state)

@@ -12,18 +12,14 @@ from friso.leaf_springs.curved import stage_stiffness_at
 from friso.leaf_springs.evaluation import Evaluation, Mode, peak_of
 from friso.leaf_springs.mechanism import Mechanism, along_motion
 from friso.leaf_springs.naming import mode_name
-
-POINTS = 17
-"""Points along a leaf at which its mode shapes are given."""
-
-STEPS = 5
-"""Deflections from 0 to the stroke."""
+from friso.leaf_springs.settings import LeafSpringSettings
 
 
 def closed_form_model(mechanism: Mechanism, stroke: float) -> Evaluation:
     """The mechanism by closed forms over its stroke [m]: its drive stiffness is the same at any deflection."""
-    deflections = np.linspace(0.0, stroke, STEPS)
-    drive = closed_forms.drive_stiffness(mechanism) * np.ones(STEPS)
+    settings = LeafSpringSettings.current()
+    deflections = np.linspace(0.0, stroke, settings.closed_deflections)
+    drive = closed_forms.drive_stiffness(mechanism) * np.ones(settings.closed_deflections)
     return Evaluation(
         model="closed forms",
         mechanism=mechanism,
@@ -63,7 +59,8 @@ def _mode(mechanism: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
 
 def following(mechanism: Mechanism, stage: np.ndarray) -> np.ndarray:
     """How the middle lines of the leaves move with the stage (6,), statically, shape (leaves, POINTS, 3)."""
-    s = np.linspace(0.0, 1.0, POINTS)
+    settings = LeafSpringSettings.current()
+    s = np.linspace(0.0, 1.0, settings.mode_shape_points)
     by_place, by_slope = 3 * s**2 - 2 * s**3, mechanism.length * (s**3 - s**2)
     x, y, z, turn_x, turn_y, turn_z = stage
     return np.array(
@@ -83,11 +80,12 @@ def following(mechanism: Mechanism, stage: np.ndarray) -> np.ndarray:
 
 def _unlike(mechanism: Mechanism) -> list[Mode]:
     """The first bending mode of the leaves against each other, the stage at rest."""
+    settings = LeafSpringSettings.current()
     count, leaf_mass = int(mechanism.leaves), float(mechanism.leaf_mass)
     modes = []
     for k in range(1, count):
         wave = np.cos(np.pi * k * (np.arange(count) + 0.5) / count)  # orthogonal patterns
-        leaves = np.zeros((count, POINTS, 3))
+        leaves = np.zeros((count, settings.mode_shape_points, 3))
         leaves[:, :, 2] = wave[:, None] * _clamped_shape() / np.sqrt(leaf_mass * np.sum(wave**2))
         frequency = float(closed_forms.leaf_bending(mechanism))
         modes.append(Mode("leaf bending, out of phase", frequency, 0.0, 0.0, 0.0, np.zeros(6), leaves))
@@ -96,12 +94,14 @@ def _unlike(mechanism: Mechanism) -> list[Mode]:
 
 def _clamped_shape() -> np.ndarray:
     """First bending mode of a beam between clamps at even places, its mean square 1."""
-    x = CLAMPED * np.linspace(0.0, 1.0, POINTS)
+    settings = LeafSpringSettings.current()
+    x = CLAMPED * np.linspace(0.0, 1.0, settings.mode_shape_points)
     ratio = (np.cosh(CLAMPED) - np.cos(CLAMPED)) / (np.sinh(CLAMPED) - np.sin(CLAMPED))
     return np.cosh(x) - np.cos(x) - ratio * (np.sinh(x) - np.sin(x))
 
 
 def _torsion_mode(mechanism: Mechanism) -> Mode:
     """The first torsion of the leaves, whose middle lines stay at rest."""
-    leaves = np.zeros((int(mechanism.leaves), POINTS, 3))
+    settings = LeafSpringSettings.current()
+    leaves = np.zeros((int(mechanism.leaves), settings.mode_shape_points, 3))
     return Mode("leaf torsion", float(closed_forms.leaf_torsion(mechanism)), 0.0, 0.0, 0.0, np.zeros(6), leaves)

@@ -7,9 +7,7 @@ import numpy as np
 from friso.leaf_springs import plate
 from friso.leaf_springs.closed_forms import SHEAR, axial, edgewise_shear
 from friso.leaf_springs.mechanism import Mechanism
-
-POINTS = 48
-"""Gauss points along a leaf."""
+from friso.leaf_springs.settings import LeafSpringSettings
 
 
 def stage_stiffness_at(mechanism: Mechanism, deflection: float) -> np.ndarray:
@@ -29,7 +27,8 @@ def stage_stiffness_at(mechanism: Mechanism, deflection: float) -> np.ndarray:
 
 def leaf_stiffness(mechanism: Mechanism, deflection: float) -> np.ndarray:
     """Stiffness of one leaf at its end, deflected [m] to 3 s^2 - 2 s^3, (6, 6)."""
-    nodes, weights = np.polynomial.legendre.leggauss(POINTS)
+    settings = LeafSpringSettings.current()
+    nodes, weights = np.polynomial.legendre.leggauss(settings.gauss_points)
     x, weight = (nodes + 1) / 2 * mechanism.length, weights / 2 * mechanism.length
     share = x / mechanism.length
     height, slope = deflection * (3 * share**2 - 2 * share**3), 6 * deflection / mechanism.length * (share - share**2)

@@ -9,9 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.leaf_springs.mechanism import Mechanism
-
-VISIBLE = 0.01
-"""Height of a resonance over the line of the stage's mass from which actuator and sensor count as seeing it."""
+from friso.leaf_springs.settings import LeafSpringSettings
 
 
 @dataclass(frozen=True)
@@ -35,7 +33,8 @@ class Mode:
     @property
     def interferes(self) -> bool:
         """Whether actuator and sensor both see it well enough to disturb control."""
-        return self.peak > VISIBLE
+        settings = LeafSpringSettings.current()
+        return self.peak > settings.visible_peak
 
 
 @dataclass(frozen=True)

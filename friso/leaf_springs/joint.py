@@ -10,12 +10,9 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.leaf_springs import closed_forms
-from friso.leaf_springs.evaluation import VISIBLE
 from friso.leaf_springs.mechanism import Mechanism, along_motion
+from friso.leaf_springs.settings import LeafSpringSettings
 from friso.stage.flexure import register_derivation
-
-LEAST = 1e-9
-"""Residue, times the stage's mass, below which it makes no difference: the equations need a parasitic mass."""
 
 
 @register_derivation("flexure")
@@ -52,13 +49,15 @@ class VisibleModes:
     @classmethod
     def of(cls, mechanism: Mechanism) -> VisibleModes:
         """The modes of mechanisms by closed forms."""
+        settings = LeafSpringSettings.current()
         frequency, shapes = closed_forms.modes(mechanism)
         motion = along_motion(mechanism, mechanism.actuation, shapes) * along_motion(
             mechanism, mechanism.sensor, shapes
         )
         internal = np.arange(7) != closed_forms.drive_mode(frequency, shapes)[..., None]
         residue = np.where(internal, motion * np.asarray(mechanism.body.mass)[..., None], 0.0)
-        return cls(frequency, residue, np.abs(residue) > VISIBLE * 2 * np.asarray(mechanism.damping_ratio)[..., None])
+        least = settings.visible_peak * 2 * np.asarray(mechanism.damping_ratio)[..., None]
+        return cls(frequency, residue, np.abs(residue) > least)
 
     def at(self, mode: np.ndarray) -> tuple[Any, Any]:
         """Frequency [Hz] and residue, each (...), of one mode each; infinite and 0 where none is visible."""
@@ -83,8 +82,10 @@ def parasitic_mode(mechanism: Mechanism) -> tuple[Any, Any]:
     The model of the equations, a part m_p of the stage's mass m on a spring, has the residue m_p/(m (m - m_p)); it
     knows none below 0, of modes in which actuator and sensor move against each other, of which the size counts here.
     """
+    settings = LeafSpringSettings.current()
     visible = VisibleModes.of(mechanism)
     height = np.where(visible.visible, np.abs(visible.residue), 0.0) / np.maximum(visible.frequency, 1e-9) ** 2
     frequency, residue = visible.at(np.argmax(height, axis=-1))
     leaves = closed_forms.leaf_bending(mechanism)
-    return np.where(np.isfinite(frequency), frequency, leaves)[()], np.maximum(np.abs(residue), LEAST)[()]
+    size = np.maximum(np.abs(residue), settings.least_residue)
+    return np.where(np.isfinite(frequency), frequency, leaves)[()], size[()]

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from friso.leaf_springs.settings import LeafSpringSettings
+
 STAGE = ("stage along x", "stage along y", "drive", "stage about x", "stage about y", "stage about z")
 """Names by the motion of the stage."""
-
-RIPPLE = 0.05
-"""Share of the largest displacement below which the sign of a shape does not count."""
 
 
 def mode_name(
@@ -63,7 +62,8 @@ def _dynamic_part(shapes: np.ndarray) -> np.ndarray:
 
 def _number(shapes: np.ndarray) -> str:
     """What is added for a shape of two waves or more, counted on the leaf that moves most."""
+    settings = LeafSpringSettings.current()
     shape = shapes[np.argmax(np.sum(shapes**2, axis=1))]
-    signs = np.sign(shape[np.abs(shape) > RIPPLE * np.max(np.abs(shape))])
+    signs = np.sign(shape[np.abs(shape) > settings.shape_ripple * np.max(np.abs(shape))])
     waves = 1 + int(np.sum(signs[1:] != signs[:-1]))
     return "" if waves == 1 else f" {waves}"

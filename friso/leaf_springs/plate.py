@@ -18,13 +18,12 @@ from typing import Any
 
 import numpy as np
 
+from friso.leaf_springs.settings import LeafSpringSettings
+
 CONVERGED, PEAK = 0.878, 0.63
 """What more functions across the width leave of the stiffening (0.866 to 0.895 at a Poisson's ratio of 0.3, 0.854 to
 0.909 from 0.05 to 0.45), and of the excess of the stress (0.60, for square leaves 0.65), of leaves from 1 to 6 times as
 long as wide (tests/ritz.py)."""
-
-TILTS = 8
-"""Newton iterations for the tilt of the torsional compliance, from 0; four are enough."""
 
 
 @dataclass(frozen=True)
@@ -149,8 +148,9 @@ def cubic_twist(s: Any, length: Any, width: Any, poisson: Any) -> Any:
 def tilted(shares: np.ndarray, torques: np.ndarray, places: np.ndarray, weighted_sum: float) -> np.ndarray:
     """Compliances in torsion along a leaf (n,), changed by exp(tilt place^2) such that their sum stays (an even torque
     twists the leaf as before) and that weighted by the square of the `torques` (n,) is `weighted_sum`."""
+    settings = LeafSpringSettings.current()
     tilt, total = 0.0, shares.sum()
-    for _ in range(TILTS):
+    for _ in range(settings.tilt_iterations):
         now = shares * np.exp(tilt * places**2)
         now *= total / now.sum()
         met = now @ torques**2

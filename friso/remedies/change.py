@@ -8,14 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from friso.remedies.settings import RemedySettings
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 
 PARTS = ("joint.", "flexure.")
 """Keys of what has to be bought."""
-
-ALIKE = 1e-6
-"""Share by which a number may differ that has not changed."""
 
 
 @dataclass(frozen=True, order=True)
@@ -53,6 +51,7 @@ def _octaves(old: Mapping[str, Any], new: Mapping[str, Any], key: str) -> float:
 
 
 def _differ(before: Any, after: Any) -> bool:
+    settings = RemedySettings.current()
     if before is None or after is None or isinstance(before, str) or isinstance(after, str):
         return bool(before != after)
-    return abs(after - before) > ALIKE * max(abs(before), abs(after))
+    return abs(after - before) > settings.unchanged_share * max(abs(before), abs(after))

@@ -10,7 +10,8 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.remedies.catalogue import Remedy
-from friso.remedies.search import BATCH, WIDE, Search
+from friso.remedies.search import Search
+from friso.remedies.settings import RemedySettings
 from friso.remedies.variables import Variable, of_key
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
@@ -18,26 +19,10 @@ from friso.stage.controllers import CONTROLLER
 LEAST = ": the least change"
 """What is added to the name of a remedy."""
 
-BEYOND, AWAY = 4.0, 2.0
-"""Factors by which keys may go further than in the settings that the search begins with, and the other way."""
 
 STEPS = np.append(np.linspace(1.0, 1.5, 26), np.geomspace(1.6, 8.0, 14))
 """Powers of the factors of the least change that are looked at, one after the other: the least of all is the one that
 just works on the machines of the search, which is not to say on others."""
-
-OTHERS = 24
-"""Other settings tried that break nothing which are looked at among these, those of the least changes."""
-
-ALONE, FINER = 24, 8
-"""Values of each key either way that are tried with the others as they were, evenly in the logarithm; and steps between
-one that does and the one before."""
-
-PARTS = (0.15, 0.3, 0.5, 0.7)
-"""How far from the least change to the settings that work points are tried that change more keys."""
-
-MORE = 2
-"""Factor of machines in the moves that are tried, against a search for the settings that settle soonest: the least
-change is at the edge of what works."""
 
 
 def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
@@ -58,7 +43,12 @@ def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
 def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
     """A key between two values, beyond the one that works, and a little the other way, as far as a stage may have
     that."""
-    towards, away = (new * BEYOND, old / AWAY) if new > old else (new / BEYOND, old * AWAY)
+    settings = RemedySettings.current()
+    towards, away = (
+        (new * settings.factor_beyond, old / settings.factor_away)
+        if new > old
+        else (new / settings.factor_beyond, old * settings.factor_away)
+    )
     ends = _possible(tuned, key, towards, new), _possible(tuned, key, away, old)
     return of_key(key, min(ends), max(ends), old)
 
@@ -83,19 +73,20 @@ def least_changes(search: Search) -> Iterator[np.ndarray]:
 def _of_one_key(search: Search) -> Iterator[np.ndarray]:
     """Changes of one key, the least first, as far as it goes either way: those that break nothing, with which enough of
     the fresh machines meet the goal by their moves and margins, and nothing attracts the machines."""
+    settings = RemedySettings.current()
     wanted = partial(change_costs, search.remedy)
     home, _ = _ends(search.remedy).T
-    ways = np.concatenate([np.diag(end - home) for end in (1.0, 0.0)]) / ALONE
+    ways = np.concatenate([np.diag(end - home) for end in (1.0, 0.0)]) / settings.values_alone
 
     def changed(points: np.ndarray) -> np.ndarray:
         points = points[wanted(points) >= 1]
         return points[np.argsort(wanted(points), kind="stable")]
 
-    alone = changed(np.concatenate([home + step * ways for step in range(1, ALONE + 1)]))
+    alone = changed(np.concatenate([home + step * ways for step in range(1, settings.values_alone + 1)]))
     for few in search.tries(alone):
         for one in _robust(search, few):
             way = ways[(ways @ (one - home)).argmax()]
-            finer = changed(one - way * np.linspace(0, 1, FINER + 1)[1:-1, None])
+            finer = changed(one - way * np.linspace(0, 1, settings.finer_values + 1)[1:-1, None])
             for some in search.tries(finer) if len(finer) else ():
                 yield from _robust(search, some)
             yield one
@@ -104,8 +95,9 @@ def _of_one_key(search: Search) -> Iterator[np.ndarray]:
 def _robust(search: Search, points: np.ndarray) -> Iterator[np.ndarray]:
     """Those of points (points, variables) with which enough of the fresh machines meet the goal by their moves and
     margins, and nothing attracts the machines."""
+    settings = RemedySettings.current()
     robust = points[search.share(points) >= search.goal.surely(search.fresh.count)] if len(points) else points
-    for few in np.array_split(robust, -(-len(robust) // BATCH)) if len(robust) else ():
+    for few in np.array_split(robust, -(-len(robust) // settings.survey_batch)) if len(robust) else ():
         yield from few[search.clear(few)]
 
 
@@ -141,18 +133,19 @@ def candidates(search: Search) -> Iterator[np.ndarray]:
     points on the way from it to the settings that work, and others that were tried, all of them the least change first:
     those with which enough of the fresh machines meet the goal by their moves and margins, and nothing attracts the
     machines; last all that were tried."""
+    settings = RemedySettings.current()
     wanted, points = partial(change_costs, search.remedy), search.points
     free = points.shares[points.meets(search.goal)]
     free = free[wanted(free) >= min(2, len(search.remedy.variables))]
     if not len(free):
         return
-    others = free[np.argsort(wanted(free), kind="stable")][:OTHERS]
+    others = free[np.argsort(wanted(free), kind="stable")][: settings.other_settings]
     least, (home, works) = others[0], _ends(search.remedy).T
     further = [home + step * (least - home) for step in STEPS]
-    towards = [least + part * (works - least) for part in PARTS]
+    towards = [least + part * (works - least) for part in settings.change_parts]
     tried = np.unique(np.clip([*further, *towards, *others], 0, 1), axis=0)
     kept = tried[search.measured(tried).meets(search.goal)]
     kept = kept[np.argsort(wanted(kept), kind="stable")]
-    for few in np.array_split(kept, -(-len(kept) // WIDE)) if len(kept) else ():
+    for few in np.array_split(kept, -(-len(kept) // settings.points_looked_at)) if len(kept) else ():
         yield from _robust(search, few)
     yield from search.surveyed(wanted)

@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from friso.remedies.settings import RemedySettings
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
 from friso.studies.compare.machines import LEAST, SPREADS, draw_machines
-
-SHORTEST = 0.25
-"""Travel of the shortest move, as a share of that of the stage file."""
 
 TRAVEL = {"there_and_back": ("motion.acceleration_time", 0.5), "step": ("motion.size", 1.0)}
 TRAVEL |= {"release": ("motion.displacement", 1.0)}
@@ -82,6 +80,7 @@ class Fleet:
 def draw_fleet(stage: Stage, correlations: Correlations, count: int, seed: int) -> Fleet:
     """Machines drawn as `friso compare` draws them; the first is that of the stage file, with its own move. Joints that
     the file does not have vary by the default spreads. Raises InputError."""
+    settings = RemedySettings.current()
     sample, flat = draw_machines(stage, correlations, max(count, LEAST), seed), stage.flat()
     keys = {key: values[:count] for key, values in sample.keys.items() if key in flat and not key.startswith("rail.")}
     ratios = {key: values / flat[key] for key, values in keys.items() if flat[key]}
@@ -90,7 +89,7 @@ def draw_fleet(stage: Stage, correlations: Correlations, count: int, seed: int) 
     for key in ADDED_KEYS:
         spread = SPREADS[key] / 100 / HALF_WIDTHS * random.standard_normal(count)
         ratios.setdefault(key, np.maximum(1 + spread, 1 - SPREADS[key] / 100))
-    travel = SHORTEST ** random.random(count)
+    travel = settings.shortest_travel ** random.random(count)
     for values in (*ratios.values(), travel):
         values[0] = 1.0
     for values in shifts.values():

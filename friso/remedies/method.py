@@ -24,11 +24,12 @@ from friso.progress import Progress, silent
 from friso.remedies.catalogue import Remedy, remedies, with_bandwidth
 from friso.remedies.change import ChangeSize, change_size
 from friso.remedies.goal import Goal
-from friso.remedies.least import MORE, least_changes, least_remedy
+from friso.remedies.least import least_changes, least_remedy
 from friso.remedies.machines import TRAVEL, Fleet, draw_fleet
 from friso.remedies.relax import RelaxedGoal, relaxations
-from friso.remedies.search import NEAR, Budget, Search
+from friso.remedies.search import Budget, Search
 from friso.remedies.sensitivities import Sensitivities, edge_sensitivities
+from friso.remedies.settings import RemedySettings
 from friso.remedies.trials import modulus_margins
 from friso.remedies.verified import (
     Performance,
@@ -44,37 +45,6 @@ from friso.stage import Stage
 from friso.stage.correlations import Correlations
 from friso.stage.rig import AS_BUILT
 from friso.studies.compare.options import linear_flat
-
-TRIES, LOOKS = 3, 12
-"""Points of a remedy whose cycles are verified at most, and that are measured on fresh machines: the next best ones
-where the best are not sure to work."""
-
-VERIFYING = 1.2e9
-"""Work on the points of a remedy (see `friso.engine.allowance`) after which no other one is measured and verified."""
-
-CYCLES = 20
-"""For how many steps of progress the cycles of a point count, of which a generation of points is one."""
-
-PAIRS = 2
-"""Settings against friction that are tried together with the bandwidth."""
-
-FRESH = 1000
-"""What is added to the seed for the machines, not seen by the optimiser, among which its best points are chosen."""
-
-UNSEEN = 2000
-"""The same for those on which what was chosen has to meet the goal, and on which it is measured: one that fails
-there is given up for the next."""
-
-FURTHER = 4000
-"""The same for those on which it is measured too where the ones before are too few to say."""
-
-USUAL, MANY = 3000, 200
-"""The same for those that tell how robust machines usually are, and how many of these."""
-
-FAR, FEW = 0.5, 0.2
-"""A machine is far less robust with less than this share of the modulus margin of others; and how many are a few, as a
-share of those that may miss the goal."""
-
 
 Unmade = Literal["rotary", "mode", "extra", "none"]
 """Why no leaf springs make a joint: the axis turns; the machine has a parasitic mode of its own, beside which the stage
@@ -159,18 +129,23 @@ def tune(
 ) -> Advice:
     """The best points of every remedy that the goal allows, or of those with the names `chosen`; `begins` is called
     before the first of the work. Raises InputError for a motion after which nothing has to settle."""
+    settings = RemedySettings.current()
     goal, budget, correlations = goal or Goal(), budget or Budget(), correlations or Correlations()
     _moves(stage)
     begins()
     ideal = stage.replace({table: None for table in AS_BUILT if getattr(stage, table)})
     listed = [remedy for remedy in remedies(ideal, goal) if chosen is None or remedy.name in chosen]
-    later = (PAIRS + 2) * (_generations(budget) + 4 + CYCLES)  # pairs and the least change, about
+    later = (settings.setting_pairs + 2) * (
+        _generations(budget) + 4 + settings.progress_steps
+    )  # pairs and the least change, about
     report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later)
     progress(0, 0, "compiling")
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
     of_ideal = correlations.among(ideal.uncertain())
-    fresh, unseen = (_not_seen(ideal, of_ideal, budget.fresh, seed + added) for added in (FRESH, UNSEEN))
-    further = _not_seen(ideal, of_ideal, budget.further, seed + FURTHER)
+    fresh, unseen = (
+        _not_seen(ideal, of_ideal, budget.fresh, seed + added) for added in (settings.fresh_seed, settings.unseen_seed)
+    )
+    further = _not_seen(ideal, of_ideal, budget.further, seed + settings.further_seed)
     machines = machines_of_search(ideal, of_ideal, budget, seed, goal, stage)
     progress(0, 0, "the stage as it is")
     case, present = verified(ideal), performance_of(ideal, unseen, goal, stage)
@@ -227,13 +202,16 @@ def machines_of_search(
     """The machines that searches see: for settings that settle soonest the first of them. One that is far less robust
     than all but a few of the share that may miss the goal would stand for many among so few: it is left out, and
     another taken twice. The sampling and delay are those of the stage `drive`."""
-    machines = draw_fleet(stage, correlations, MORE * budget.machines, seed)
-    many = draw_fleet(stage, correlations, MANY, seed + USUAL)
+    settings = RemedySettings.current()
+    machines = draw_fleet(stage, correlations, settings.machine_factor * budget.machines, seed)
+    many = draw_fleet(stage, correlations, settings.usual_machines, seed + settings.usual_seed)
     own, flat = Remedy.settled_on("", stage), drive.flat()
     robust = limits(linear_flat(drive, flat)).highest_comfortable
     slower = max(1.0, (bandwidth(flat) or 1.0) / robust) if robust else 1.0
     seen, usual = (modulus_margins(own, np.zeros((1, 0)), fleet, drive, slower)[0] for fleet in (machines, many))
-    common = np.flatnonzero(seen >= FAR * np.quantile(usual, FEW * (1 - goal.share)))
+    common = np.flatnonzero(
+        seen >= settings.far_margin_share * np.quantile(usual, settings.few_share * (1 - goal.share))
+    )
     return machines.take(np.resize(common, machines.count)) if common.size else machines
 
 
@@ -304,11 +282,12 @@ class _Session:
 
     def _tries_less_than(self, outcome: RemedyOutcome) -> bool:
         """The least change of the keys that a remedy which works changes; whether it has such keys."""
+        settings = RemedySettings.current()
         assert outcome.stage is not None
         less = least_remedy(self.stage, outcome.stage, outcome.remedy)
         if less is None:
             return False
-        search = self._begun(less, MORE * self.budget.machines)
+        search = self._begun(less, settings.machine_factor * self.budget.machines)
         self._ended(search, least_changes(search))
         return True
 
@@ -332,9 +311,10 @@ class _Session:
 
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
         """The first of a few points that is verified, or else the first that is not sure to work."""
+        settings = RemedySettings.current()
         unsure: RemedyOutcome | None = None
         tries, worked = 0, 0.0
-        looks = LOOKS if search.remedy.verifiable else 1
+        looks = settings.most_looks if search.remedy.verifiable else 1
         for shares in islice(search.looked_at(points), looks):
             with allowance() as spent:
                 outcome = self._verified(search, shares)
@@ -345,7 +325,7 @@ class _Session:
             unsure = unsure or outcome
             self.outcomes[-1] = unsure
             # what friso check gave up takes it as long with others
-            if tries == TRIES or worked > VERIFYING or "given up" in outcome.doubts:
+            if tries == settings.most_tries or worked > settings.verifying_work or "given up" in outcome.doubts:
                 break
         tried = search.points if search.tried else None
         none = RemedyOutcome(search.remedy, None, None, None, (), (), tried, search.attracted, cut=search.cut)
@@ -358,6 +338,7 @@ class _Session:
         """A point on machines that were not seen before and, where these meet the goal, by its cycles. The interval of
         the share of all machines that meet it has to lie at the share wanted or above: further ones are measured as
         long as it does not say."""
+        settings = RemedySettings.current()
         remedy, goal = search.remedy, search.goal
         tuned = remedy.tuned(shares)
         self.report(f"{remedy.name}: verified on machines not tuned for")
@@ -368,7 +349,7 @@ class _Session:
             case = verified(tuned)
             doubted = unsettled_parts(case, measured, goal)
         if not doubted:
-            self.report(f"{remedy.name}: verified on more machines", CYCLES)
+            self.report(f"{remedy.name}: verified on more machines", settings.progress_steps)
             for part in np.split(np.arange(self.further.count), [self.further.count // 3]):
                 if measured.decides(goal) is None:
                     measured = measured.with_further(tuned, self.further.take(part), goal, self.drive)
@@ -381,12 +362,13 @@ class _Session:
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
     """The settings against friction that came closest to the goal, each together with the bandwidth: only where nothing
     works that changes the controller alone. They change more than the bandwidth, and bring less than the gains do."""
+    settings = RemedySettings.current()
     if any(outcome.certainty == "works" and not outcome.remedy.buys_joint for outcome in outcomes):
         return []
     several = (outcome for outcome in outcomes if outcome.remedy.of_setting and outcome.remedy.verifiable)
     tried = [outcome for outcome in several if outcome.points]
     closest = sorted(tried, key=lambda outcome: outcome.least_cost(goal))
-    return [with_bandwidth(outcome.remedy) for outcome in closest[:PAIRS]]
+    return [with_bandwidth(outcome.remedy) for outcome in closest[: settings.setting_pairs]]
 
 
 def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
@@ -413,12 +395,14 @@ def _moves(stage: Stage) -> None:
 
 def _steps(remedy: Remedy, budget: Budget) -> int:
     """How many steps a remedy takes, about."""
-    return (2 if len(remedy.variables) < 2 else _generations(budget)) + 4 + CYCLES
+    settings = RemedySettings.current()
+    return (2 if len(remedy.variables) < 2 else _generations(budget)) + 4 + settings.progress_steps
 
 
 def _generations(budget: Budget) -> int:
     """How many generations a search has at most."""
-    return budget.generations + len(NEAR) * budget.refined
+    settings = RemedySettings.current()
+    return budget.generations + len(settings.near_ranges) * budget.refined
 
 
 class _Report:

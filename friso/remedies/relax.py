@@ -13,20 +13,10 @@ from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
 from friso.remedies.search import TriedPoints
-from friso.remedies.trials import LOOSER, attraction, moves_of_points
+from friso.remedies.settings import RemedySettings
+from friso.remedies.trials import attraction, moves_of_points
 from friso.remedies.verified import RemedyOutcome
 from friso.stage import Stage
-
-TRIED, SURVEYED = 3, 8
-"""Points whose machines are surveyed, at most, for one relaxation, and how many machines: those of the search."""
-
-REASONABLE = 3.0
-"""Factor by which one part of the goal is relaxed at most, but for the tolerance, of which the looser one is tried;
-only where nothing helps with that, others than the limit of the bandwidth are relaxed further."""
-
-WIDER, MOST = (1.5, 2.0, 3.0, 5.0), 64
-"""Factors of the tolerance that are tried where the moves settle within ten times as much (`LOOSER`), of so many
-points at most, those that settle so soonest."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +48,9 @@ def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) 
 
 def _of_remedy(remedy: Remedy, points: TriedPoints, goal: Goal, machines: Fleet) -> Iterator[RelaxedGoal]:
     """The cheapest relaxations of a remedy: those of one part each, or else of two, or of three."""
+    settings = RemedySettings.current()
     needed = _needed(points, goal)
-    far = [name for name, values in needed.items() if name != "within" and (values > REASONABLE).any()]
+    far = [name for name, values in needed.items() if name != "within" and (values > settings.reasonable_factor).any()]
     listed = [*_within(remedy, points, goal, machines, needed, far)]
     yield from listed or _within(remedy, points, goal, machines, needed, [n for n in far if n == "bandwidth_limit"])
 
@@ -73,13 +64,14 @@ def _within(
     limited: Sequence[str],
 ) -> Iterator[RelaxedGoal]:
     """The same, some parts being `limited` in how far they may be relaxed."""
+    settings = RemedySettings.current()
     needed = {name: values.copy() for name, values in needed.items()}
     count = np.sum([values > 1 for values in needed.values()], axis=0)
     factor = np.prod([np.maximum(values, 1.0) for values in needed.values()], axis=0)
     possible = np.isfinite(factor) & np.isfinite(points.slower)
     for name in limited:
-        possible &= needed[name] <= REASONABLE
-    few = machines.take(np.arange(min(SURVEYED, machines.count)))
+        possible &= needed[name] <= settings.reasonable_factor
+    few = machines.take(np.arange(min(settings.relaxed_machines, machines.count)))
     for parts in (1, 2, 3):
         tried: dict[tuple[str, ...], int] = {}
         enough = False
@@ -92,10 +84,10 @@ def _within(
         for number in which[np.argsort(factor[which], kind="stable")]:
             names = tuple(name for name, values in needed.items() if values[number] > 1)
             tried[names] = tried.get(names, 0) + 1
-            if tried[names] > TRIED:
+            if tried[names] > settings.relaxed_points:
                 continue
             if attraction(remedy, points.shares[[number]], few, goal).clear.all():
-                tried[names], enough = TRIED, True
+                tried[names], enough = settings.relaxed_points, True
                 within = float(needed["within"][number])
                 yield _relaxed_goal(remedy, points.take(np.array([number])), names, goal, within)
         if enough:
@@ -123,10 +115,11 @@ def _relaxed_goal(remedy: Remedy, point: TriedPoints, names: tuple[str, ...], go
 def _tolerances(remedy: Remedy, shares: np.ndarray, goal: Goal, machines: Fleet) -> np.ndarray:
     """By how much the tolerance has to be wider for points, shape (points,): the first of a few factors with which the
     machines settle, in the time of the goal if it has one."""
-    factors = np.full(len(shares), LOOSER)
-    open_still = np.arange(min(len(shares), MOST))
+    settings = RemedySettings.current()
+    factors = np.full(len(shares), settings.looser_tolerance)
+    open_still = np.arange(min(len(shares), settings.most_relaxed))
     latest = np.inf if goal.settle is None else goal.settle
-    for factor in WIDER:
+    for factor in settings.wider_tolerances:
         if not open_still.size:
             break
         moves = moves_of_points(remedy, shares[open_still], machines, replace(goal, within=factor * goal.within))
@@ -139,11 +132,14 @@ def _tolerances(remedy: Remedy, shares: np.ndarray, goal: Goal, machines: Fleet)
 
 def _needed(points: TriedPoints, goal: Goal) -> dict[str, np.ndarray]:
     """The factors by which parts of the goal would have to be relaxed for each point."""
+    settings = RemedySettings.current()
     none = np.zeros(len(points.margin))
     limit = goal.bandwidth_limit
     return {
         "margin": goal.margin / np.maximum(points.margin, 1e-9) * np.where(points.margin > 0, 1, np.inf),
-        "within": np.where(np.isfinite(points.settling), 1.0, np.where(np.isfinite(points.looser), LOOSER, np.inf)),
+        "within": np.where(
+            np.isfinite(points.settling), 1.0, np.where(np.isfinite(points.looser), settings.looser_tolerance, np.inf)
+        ),
         "settle": none if goal.settle is None else _time(points) / goal.settle,
         "force_limit": none if goal.force_limit is None else points.force / goal.force_limit,
         "bandwidth_limit": none if limit is None else np.nan_to_num(points.bandwidth / limit, nan=np.inf),

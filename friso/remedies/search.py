@@ -20,58 +20,9 @@ from friso.frequency.bandwidth import loop_bandwidths
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
+from friso.remedies.settings import RemedySettings
 from friso.remedies.trials import Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.stage import Stage
-
-SEED = 27
-"""Of the optimiser: the same answer for the same input."""
-
-WORST = 1e3
-"""What a point is worth at best that breaks a constraint [s]."""
-
-BATCH, MOST = 3, 8
-"""Points whose machines are surveyed at once, and how often at most until the remedy is given up."""
-
-MOST_POINTS = 40
-"""Points of a generation at most."""
-
-WORK = 4e8
-"""Work of a search (see `friso.engine.allowance`): about 5 s on one core. Moves that chatter take most of it."""
-
-LOOKING = 4.0
-"""What looking at its points further may take, in units of that: on fresh machines, and at what attracts these."""
-
-OF_SETTING = 1 / 3
-"""Share of that for a setting against friction alone: with gains with which a stage hunts, most runs of a setting that
-does not work go on to the end."""
-
-FAR_ABOVE = 1.5
-"""Factor of the limit of the bandwidth above which it is far above."""
-
-NEAR = (0.12, 0.12, 0.03)
-"""Shares of the ranges about the best point, to both sides, in which a search goes on, one after the other."""
-
-AGREED = 0.01
-"""Share of their mean by which the costs of a generation differ with which a search ends."""
-
-SPARE = 1e-3
-"""Share by which a bandwidth stays below its limit: numbers are rounded, and bandwidths taken from a grid."""
-
-APART, ALIKE = 0.03, 0.01
-"""Least distance of points that are surveyed from those with which something attracts machines, and of points that are
-looked at on fresh machines, as a share of a range."""
-
-FIRST = 3
-"""Machines on which the moves of a search are run before those of the others."""
-
-WIDE = 12
-"""Points that are looked at on fresh machines at once."""
-
-AROUND, CLOSE, CLOSER = 64, 0.02, 4
-"""Points that are drawn around one beyond the edge of what works, within what share of the ranges, and how often."""
-
-WIDENED = 1.5
-"""By what factor the next points are farther away after a batch with all of which something attracts machines."""
 
 
 @dataclass(frozen=True)
@@ -128,6 +79,7 @@ class TriedPoints:
 
     def cost(self, goal: Goal, wanted: np.ndarray | None = None) -> np.ndarray:
         """What is minimised: the settling time, or what is `wanted` small instead; or how far it breaks constraints."""
+        settings = RemedySettings.current()
         excess = np.maximum(0, goal.margin - self.margin)
         excess += np.where(np.isfinite(self.force), _excess(np.nan_to_num(self.force), goal.force_limit), 3.0)
         excess += np.nan_to_num(_excess(self.bandwidth, goal.bandwidth_limit), nan=3.0)
@@ -135,7 +87,7 @@ class TriedPoints:
         time = np.where(np.isfinite(self.settling), self.settling, 100.0)
         excess += _excess(time, goal.settle)
         minimised = time if wanted is None else wanted
-        return np.asarray(np.where(self.meets(goal), minimised, WORST * (1 + excess) + time))
+        return np.asarray(np.where(self.meets(goal), minimised, settings.worst_time * (1 + excess) + time))
 
 
 def _most(limit: float | None) -> float:
@@ -190,7 +142,8 @@ class Search:
 
     def tries(self, points: np.ndarray) -> Iterator[np.ndarray]:
         """Try points (points, variables), a few at a time: those of them that break nothing."""
-        for few in np.array_split(points, -(-len(points) // WIDE)):
+        tuning = RemedySettings.current()
+        for few in np.array_split(points, -(-len(points) // tuning.points_looked_at)):
             self.report(f"{self.remedy.name}: trying settings")
             with self._allowed(self._work):
                 self.tried.append(self.measured(few))
@@ -200,7 +153,8 @@ class Search:
 
     def looked_at(self, points: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
         """Points (variables,) that are looked at further, until finding the next one takes too much work (`cut`)."""
-        left = LOOKING * self._work
+        settings = RemedySettings.current()
+        left = settings.looking_work * self._work
         while True:
             point = None
             with self._allowed(left) as spent:
@@ -213,7 +167,8 @@ class Search:
     @property
     def _work(self) -> float:
         """What a search may take."""
-        return WORK * (OF_SETTING if self.remedy.of_setting else 1.0)
+        settings = RemedySettings.current()
+        return settings.search_work * (settings.setting_work_share if self.remedy.of_setting else 1.0)
 
     @contextmanager
     def _allowed(self, work: float) -> Iterator[Allowance]:
@@ -225,6 +180,7 @@ class Search:
                 self.cut = True
 
     def _optimise(self, wanted: Callable[[np.ndarray], np.ndarray] | None, start: np.ndarray | None) -> None:
+        tuning = RemedySettings.current()
         variables = len(self.remedy.variables)
         if variables == 0:
             self.tried.append(self.measured(np.zeros((1, 0))))
@@ -246,13 +202,13 @@ class Search:
             at = points.shares[int(best), 0]
             cost(np.clip(np.linspace(at - 1 / count, at + 1 / count, self.budget.points * 2), 0, 1)[None])
             return
-        size = max(5, min(self.budget.points * variables, MOST_POINTS))
-        drawn = np.random.default_rng(SEED).random((size, variables))
+        size = max(5, min(self.budget.points * variables, tuning.generation_points))
+        drawn = np.random.default_rng(tuning.optimiser_seed).random((size, variables))
         if start is not None:
             few = start[: size // 2]
             drawn[: len(few)] = few
         _evolve(cost, drawn, [(0.0, 1.0)] * variables, self.budget.generations)
-        for away in NEAR:
+        for away in tuning.near_ranges:
             points = self.points
             costs = points.cost(self.goal, None if wanted is None else wanted(points.shares))
             best = points.shares[int(costs.argmin())]
@@ -264,12 +220,13 @@ class Search:
 
     def _at_the_limit(self, grid: np.ndarray) -> list[float]:
         """Where between shares of its range a remedy of one variable comes to the limit of the bandwidth from below."""
+        settings = RemedySettings.current()
         limit = self.goal.bandwidth_limit
         if limit is None:
             return []
 
         def above(shares: np.ndarray) -> np.ndarray:
-            return np.log(self._bandwidth(shares[:, None]) / (limit * (1 - SPARE)))
+            return np.log(self._bandwidth(shares[:, None]) / (limit * (1 - settings.bandwidth_reserve)))
 
         over = above(grid)
         passed = np.flatnonzero((over[:-1] < 0) & (over[1:] >= 0))
@@ -289,10 +246,11 @@ class Search:
         one, and that at the lower bandwidth: where none is in position, the search sees where a few are. A point is
         given up as soon as it costs more than `most` whatever the moves bring that are left; those machines that are
         the slowest most often are tried first."""
+        settings = RemedySettings.current()
         goal, count, machines = self.goal, len(shares), self.machines.count
         margin = quantile(-modulus_margins(self.remedy, shares, self.machines, self.drive), goal.share) * -1
         bandwidth = self._bandwidth(shares)
-        far = bandwidth > FAR_ABOVE * _most(goal.bandwidth_limit)
+        far = bandwidth > settings.far_above_limit * _most(goal.bandwidth_limit)
         stable = np.flatnonzero((margin > goal.margin / 2) & ~(far & (len(self.remedy.variables) > 1)))
         settling, looser, slower, force = columns = [np.full((count, machines), np.inf) for _ in range(4)]
         for column in columns:
@@ -313,7 +271,7 @@ class Search:
             self.slowest = np.zeros(machines)
         order = np.argsort(-self.slowest, kind="stable")
         left = worth_it(stable)
-        for part in (order[:FIRST], order[FIRST:]):
+        for part in (order[: settings.first_machines], order[settings.first_machines :]):
             if left.size and part.size:
                 moves: Moves = moves_of_points(self.remedy, shares[left], self.machines.take(part), goal)
                 at = np.ix_(left, part)
@@ -322,7 +280,7 @@ class Search:
         rests = np.isfinite(looser[left]).any(axis=1)
         slower[left[~rests]] = np.inf  # those that settle nowhere are not asked whether they do at a lower bandwidth
         left = left[rests]
-        for part in (order[:FIRST], order[FIRST:]):
+        for part in (order[: settings.first_machines], order[settings.first_machines :]):
             if left.size and part.size:
                 some = self.machines.take(part)
                 moves = moves_of_points(self.remedy, shares[left], some, goal, slower=goal.distance)
@@ -369,21 +327,25 @@ class Search:
         are alike are taken for one. After each batch without any, the next one is taken from farther away, as far as
         there are as many: the best points are often at the edge of what works. Where there are none at all, the one
         with which most of the fresh machines do."""
+        settings = RemedySettings.current()
         if not self.tried:
             return
         points = self.begun
         free = np.flatnonzero(points.meets(self.goal))
-        left, apart = points.shares[free[np.argsort(_order(points, wanted)[free], kind="stable")]], ALIKE
+        left, apart = points.shares[free[np.argsort(_order(points, wanted)[free], kind="stable")]], settings.alike_share
         away = np.full(len(left), np.inf)  # from those that were looked at
         enough, any_clear = self.goal.surely(self.fresh.count), False
         best, most = np.zeros((0, points.shares.shape[1])), 0.0
         soonest = left[:1]
-        for _ in range(MOST):
-            left, away = left[away > ALIKE], away[away > ALIKE]
+        for _ in range(settings.most_batches):
+            left, away = left[away > settings.alike_share], away[away > settings.alike_share]
             if not len(left):
                 break
-            while len(batch := _apart(left[away > apart], WIDE, apart)) < WIDE and apart > ALIKE:
-                apart = max(ALIKE, apart / WIDENED)
+            while (
+                len(batch := _apart(left[away > apart], settings.points_looked_at, apart)) < settings.points_looked_at
+                and apart > settings.alike_share
+            ):
+                apart = max(settings.alike_share, apart / settings.widened_factor)
             looked_at, batch = batch, self._whole(batch, wanted)
             away = np.minimum(away, _distance(left, looked_at[~_same(looked_at, batch).any(axis=1)]))
             if not len(batch):
@@ -391,15 +353,19 @@ class Search:
             share = self.share(batch)
             if share.max() > most:
                 best, most = batch[[share.argmax()]], share.max()
-            few = _apart(batch[share >= enough], BATCH, APART)
+            few = _apart(batch[share >= enough], settings.survey_batch, settings.apart_share)
             clear = self.clear(few) if len(few) else np.zeros(0, bool)
             any_clear |= bool(clear.any())
             if clear.any() and not _same(few[clear][:1], soonest).any():
                 yield from self._closer(few[clear][0], wanted)
             yield from few[clear]
-            apart = ALIKE if clear.any() else WIDENED * max(apart, APART if len(few) else ALIKE)
+            apart = (
+                settings.alike_share
+                if clear.any()
+                else settings.widened_factor * max(apart, settings.apart_share if len(few) else settings.alike_share)
+            )
             away = np.minimum(away, _distance(left, np.concatenate([batch[share < enough], few])))
-            away[_distance(left, few[~clear]) <= APART] = 0.0
+            away[_distance(left, few[~clear]) <= settings.apart_share] = 0.0
         if not any_clear and len(best) and most < enough:
             yield from best[self.clear(best)]
 
@@ -407,15 +373,22 @@ class Search:
         """Better points than one, (variables,), that was taken since something attracts with those that are better, or
         too few machines meet the goal with them: of those drawn around it, and then around the one that is taken
         instead, the best first."""
+        settings = RemedySettings.current()
         goal, closer = self.goal, list[np.ndarray]()
         cost = self.measured(point[None]).cost(goal, None if wanted is None else wanted(point[None]))[0]
-        for number in range(CLOSER):
-            low, high = np.clip(point - CLOSE, 0, 1), np.clip(point + CLOSE, 0, 1)
-            drawn = low + (high - low) * qmc.Sobol(point.size, rng=SEED + number).random(AROUND)
+        for number in range(settings.most_closer):
+            low, high = np.clip(point - settings.around_share, 0, 1), np.clip(point + settings.around_share, 0, 1)
+            drawn = low + (high - low) * qmc.Sobol(point.size, rng=settings.optimiser_seed + number).random(
+                settings.points_around
+            )
             small = None if wanted is None else wanted(drawn)
             self.tried.append(tried := self.measured(drawn, cost, small))
             costs = np.where(tried.whole, tried.cost(goal, small), np.inf)
-            better = _apart(drawn[np.argsort(costs, kind="stable")[: np.count_nonzero(costs < cost)]], WIDE, ALIKE)
+            better = _apart(
+                drawn[np.argsort(costs, kind="stable")[: np.count_nonzero(costs < cost)]],
+                settings.points_looked_at,
+                settings.alike_share,
+            )
             robust = better[self.share(better) >= goal.surely(self.fresh.count)] if len(better) else better
             taken = next((one for one in robust if self.clear(one[None])[0]), None)
             if taken is None:
@@ -448,6 +421,7 @@ def _evolve(
 ) -> None:
     """Differential evolution from points (points, variables) between `ends`. A point takes the place of the one that it
     is tried against only if it costs less than that, so `cost` is told how much that may be."""
+    settings = RemedySettings.current()
     most: np.ndarray | float = np.inf
 
     def bounded(points: np.ndarray) -> np.ndarray:
@@ -470,7 +444,7 @@ def _evolve(
         tol=0.0,
         atol=-1,  # never by itself, not even where all costs are the same
         callback=ended,
-        rng=SEED,
+        rng=settings.optimiser_seed,
         polish=False,
         vectorized=True,
         updating="deferred",
@@ -480,8 +454,9 @@ def _evolve(
 def _agree(intermediate_result: Any) -> bool:
     """Whether the points of a generation break no constraint and are as good as each other: before that, they may all
     be as bad."""
+    settings = RemedySettings.current()
     costs = intermediate_result.population_energies
-    return bool(costs.max() < WORST and costs.std() <= AGREED * costs.mean())
+    return bool(costs.max() < settings.worst_time and costs.std() <= settings.agreed_cost * costs.mean())
 
 
 def _apart(shares: np.ndarray, most: int, apart: float) -> np.ndarray:

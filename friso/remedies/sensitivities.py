@@ -31,6 +31,7 @@ from friso.hunting import (
     edge_derivatives,
     flow_derivatives,
 )
+from friso.remedies.settings import RemedySettings
 from friso.stage import Stage, numeric_keys
 from friso.stage.arguments import check_arguments
 from friso.stage.controllers import as_tuned, controller_of
@@ -38,12 +39,6 @@ from friso.stage.controllers import as_tuned, controller_of
 RTOL = 1e-11
 """Relative tolerance of the runs: derivatives are needed to six digits."""
 
-SMALL = 1e-5
-"""Share by which keys are changed to see how the loop changes at one frequency, which is smooth."""
-
-SMOOTH = 1e-2
-"""By how much, as a share of itself and for a change of a key by all of it, a settling time may move otherwise than its
-derivative says."""
 
 NOISE = 100 * RTOL
 """Share of the time since a run began by which runs with that tolerance may be off."""
@@ -266,7 +261,8 @@ def _is_smooth(
     """Whether the stage, which `entered` the band at a time [s] (a `column` of its statistics), after `settling` [s],
     enters it when the derivatives say it does with each key a little larger and smaller: not where it bounces on its
     limiter so often that neighbouring motions part."""
-    step = SMALL * np.array([flat[name] for name in keys])
+    settings = RemedySettings.current()
+    step = settings.loop_change * np.array([flat[name] for name in keys])
     changes = np.concatenate([-np.diag(step), np.diag(step)])
     beside = {name: flat[name] + values for name, values in zip(keys, changes.T, strict=True)}
     stages = Ensemble({**flat, **beside}, len(changes))
@@ -274,7 +270,7 @@ def _is_smooth(
     results = stages.run(_starts(stages, stages.flat, len(changes)), durations, RTOL, bands=(within, within))
     moved = results.statistics[:, column] - entered
     expected = np.concatenate([-step * by, step * by])
-    allowed = SMOOTH * SMALL * settling + NOISE * entered
+    allowed = settings.smooth_share * settings.loop_change * settling + NOISE * entered
     return bool(_all_done(results) and np.all(np.abs(moved - expected) <= allowed))
 
 
@@ -287,14 +283,18 @@ def _starts(stages: Ensemble, flat: Mapping[str, Any], count: int) -> np.ndarray
 
 def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...]) -> np.ndarray:
     """Their derivatives to the keys, shape (states, keys), by central differences: they are settled states."""
+    settings = RemedySettings.current()
     columns = []
     for name in keys:
-        low, high = _starts(stages, {**flat, name: flat[name] * np.array([1 - SMALL, 1 + SMALL])}, 2)
-        columns.append((high - low) / (2 * SMALL * flat[name]))
+        low, high = _starts(
+            stages, {**flat, name: flat[name] * np.array([1 - settings.loop_change, 1 + settings.loop_change])}, 2
+        )
+        columns.append((high - low) / (2 * settings.loop_change * flat[name]))
     return np.stack(columns, axis=1)
 
 
 def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivatives | None:
+    settings = RemedySettings.current()
     members = settled_members(flat)
     loops = scan_stability(flat, members)
     if not loops.stable.all():
@@ -308,8 +308,11 @@ def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivati
         return float(np.abs(1 + response(nearby, worst, DriveTiming.of(nearby))(omega))[0])
 
     by = [
-        (distance({name: flat[name] * (1 + SMALL)}) - distance({name: flat[name] * (1 - SMALL)}))
-        / (2 * SMALL * flat[name])
+        (
+            distance({name: flat[name] * (1 + settings.loop_change)})
+            - distance({name: flat[name] * (1 - settings.loop_change)})
+        )
+        / (2 * settings.loop_change * flat[name])
         for name in keys
     ]
     return MarginDerivatives(closest.modulus_margin, np.array(by))

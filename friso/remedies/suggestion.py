@@ -14,13 +14,11 @@ from friso.frequency.crossover import settled_margin
 from friso.hunting import find_attractors
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
+from friso.remedies.settings import RemedySettings
 from friso.remedies.variables import DAMPING_RATIOS, joint_variables
 from friso.stage import Stage
 
-STROKES = (1e-4, 3e-4, 1e-3, 3e-3)
-"""Strokes that are tried [m], the shortest that does being the answer."""
-
-FORCE, DAMPING = 0.6, (0.05, DAMPING_RATIOS[1])
+DAMPING = (0.05, DAMPING_RATIOS[1])
 """Force of the joints at their strokes, as a share of the static friction, and their damping ratios."""
 
 
@@ -39,6 +37,7 @@ class Suggestion:
 def suggestion(stage: Stage) -> Suggestion | None:
     """The shortest stroke of a few with which an isolator settles a stage, with the softest joint that does not move
     the cart; None for a stage that has a joint already, or can have none."""
+    settings = RemedySettings.current()
     if stage.joint:
         return None
     friction = float(least_breakaway(stage.flat()))
@@ -50,7 +49,7 @@ def suggestion(stage: Stage) -> Suggestion | None:
         return None
     remedy, tried = (
         Remedy("", free, joint_variables(friction), True),
-        [(stroke, d) for stroke in STROKES for d in DAMPING],
+        [(stroke, d) for stroke in settings.suggested_strokes for d in DAMPING],
     )
     shares = np.array([_shares(remedy, stroke, damping) for stroke, damping in tried])
     numbers = remedy.changes(shares)
@@ -69,7 +68,8 @@ def suggestion(stage: Stage) -> Suggestion | None:
 
 def _shares(remedy: Remedy, stroke: float, damping: float) -> list[float]:
     """The shares of the ranges of a joint at which it has a stroke [m] and a damping ratio."""
-    wanted = (stroke, FORCE, damping)
+    settings = RemedySettings.current()
+    wanted = (stroke, settings.suggested_force, damping)
     return [
         float(np.log(value / variable.low) / np.log(variable.high / variable.low))
         for value, variable in zip(wanted, remedy.variables, strict=True)

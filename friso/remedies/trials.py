@@ -17,17 +17,15 @@ from friso.hunting.criteria import settling_of_runs
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
+from friso.remedies.settings import RemedySettings
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
 from friso.studies.compare.measures import linear_loops
 from friso.studies.compare.options import linear_flat
 
-RTOL, RANKING = 1e-6, 1e-5
+RANKING = 1e-5
 """Relative tolerance of the moves that are told, and of those by which settings are compared: half the steps, and a
 settling time that a thousandth is wrong, as a rule a tenth of that."""
-
-LOOSER = 10.0
-"""The other tolerance, in units of that of the goal, in which moves are measured: what a looser one would bring."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +55,11 @@ def moves_of_points(
 ) -> Moves:
     """The moves of points, as shares of the ranges of a remedy (points, variables), with a bandwidth lower by a factor
     `slower`, to a relative tolerance `rtol`."""
+    settings = RemedySettings.current()
     count = len(shares) * machines.count
     flat = faster(machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), 1 / slower)
     settling, looser, force = (np.full(count, np.inf) for _ in range(3))
-    options = RunOptions(rtol=rtol, bands=(goal.within, LOOSER * goal.within), record_from=np.inf)
+    options = RunOptions(rtol=rtol, bands=(goal.within, settings.looser_tolerance * goal.within), record_from=np.inf)
     most = np.broadcast_to(flat.get(FORCE_LIMIT, np.inf), (count,))  # what is above is rounding
     for runs in run_chunks(kernel(shared_structure(flat)), flat, count, options):
         done = np.equal(runs.results.statuses, Status.DONE)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import sped_up
+from friso.remedies.settings import RemedySettings
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
 
@@ -18,25 +19,9 @@ KeyChanges = Callable[[Mapping[str, Any], np.ndarray], dict[str, Any]]
 BANDWIDTH = "bandwidth"
 """Name of the variable that makes a controller faster as a whole."""
 
-WIDE = 4.0
-"""Factor by which a gain may change against the others."""
-
-FASTEST, SLOWEST = 10.0, 0.3
-"""Factors up to and down to which the bandwidth is changed."""
-
-FORCE_SHARE = (0.2, 0.8)
-"""Force of the joint at its stroke, as a share of the least static friction: above it the cart moves before the joint
-touches its limiter on the weakest machines."""
-
-STROKES = (1e-5, 3e-3)
-"""Strokes of a joint that are tried [m]."""
 
 DAMPING_RATIOS = (0.01, 0.3)
 """Damping ratios of the stage on its joint that are tried."""
-
-
-SNAP = 0.02
-"""Share of the range within which a number is taken to be the present one, where there is one: it is not changed."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +37,9 @@ class Variable:
 
     def at(self, share: np.ndarray) -> np.ndarray:
         """Its values at shares of the range."""
+        settings = RemedySettings.current()
         value = np.asarray(self.low * (self.high / self.low) ** share)
-        return np.where(np.abs(share - self.share(self.present)) < SNAP, self.present, value)
+        return np.where(np.abs(share - self.share(self.present)) < settings.snap_share, self.present, value)
 
     def share(self, value: float) -> float:
         """The share of the range at which it has a value."""
@@ -67,20 +53,24 @@ def of_key(key: str, low: float, high: float, present: float = float("nan")) -> 
 
 def bandwidth_factor() -> Variable:
     """How fast the controller is as a whole, as a factor of what it is."""
-    return Variable(BANDWIDTH, SLOWEST, FASTEST, sped_up)
+    settings = RemedySettings.current()
+    return Variable(BANDWIDTH, settings.slowest_factor, settings.fastest_factor, sped_up)
 
 
 def gains(stage: Stage) -> tuple[Variable, ...]:
     """The gains of a controller against each other, then its bandwidth."""
+    settings = RemedySettings.current()
     flat, controller = stage.flat(), controller_of(stage.flat())
     shape = [of_key(controller.key(name), low, high) for name, (low, high) in controller.shaped_by.items()]
     keys = [controller.key(name) for name in controller.speeds_up if flat.get(controller.key(name))]
-    against = [of_key(key, flat[key] / WIDE, flat[key] * WIDE) for key in keys[1:]]
+    against = [of_key(key, flat[key] / settings.gain_factor, flat[key] * settings.gain_factor) for key in keys[1:]]
     return (*shape, *against, bandwidth_factor())
 
 
 def joint_variables(friction: float) -> tuple[Variable, ...]:
     """Stroke, stiffness and damping of an isolator for the least static friction [N]."""
+
+    settings = RemedySettings.current()
 
     def stiffness(flat: Mapping[str, Any], share: np.ndarray) -> dict[str, Any]:
         return {"joint.stiffness": share * friction / flat["joint.stroke"]}
@@ -89,7 +79,7 @@ def joint_variables(friction: float) -> tuple[Variable, ...]:
         return {"joint.damping": 2 * ratio * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])}
 
     return (
-        of_key("joint.stroke", *STROKES),
-        Variable("force of the joint at its stroke", *FORCE_SHARE, stiffness),
+        of_key("joint.stroke", *settings.joint_strokes),
+        Variable("force of the joint at its stroke", *settings.joint_force_share, stiffness),
         Variable("damping ratio of the joint", *DAMPING_RATIOS, damping),
     )

@@ -18,16 +18,8 @@ from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
 from friso.remedies.search import TriedPoints
-from friso.remedies.trials import (
-    RTOL,
-    Attraction,
-    Moves,
-    attraction,
-    modulus_margins,
-    moves_of_points,
-    quantile,
-    timing,
-)
+from friso.remedies.settings import RemedySettings
+from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile, timing
 from friso.remedies.window import VariableWindow
 from friso.shares import Share, share
 from friso.stage import Stage
@@ -147,10 +139,11 @@ class RemedyOutcome:
 def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
     """A stage on machines, with the sampling and delay of the stage `drive` for its margins. What attracts them is
     surveyed only of those that meet the rest of the goal: of others nothing is said to."""
+    settings = RemedySettings.current()
     remedy = Remedy.settled_on("", stage)
     flat = stage.flat()
     measured = Performance(
-        moves_of_points(remedy, ONE, machines, goal, rtol=RTOL),
+        moves_of_points(remedy, ONE, machines, goal, rtol=settings.move_rtol),
         modulus_margins(remedy, ONE, machines, drive),
         Attraction.none(machines.count),
         min(settled_margin(linear_flat(drive, state)) for state in gain_states({**flat, **timing(drive)})),
@@ -185,6 +178,7 @@ def unmet_goals(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...
 
 def unsettled_parts(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
     """What the verdict on the stage itself, its bandwidth and its margin leave open."""
+    settings = RemedySettings.current()
     judgement, edge = case.judgement, case.judgement.margin
     listed: list[str] = []
     if judgement.verdict != "settles":
@@ -195,11 +189,13 @@ def unsettled_parts(case: Case, measured: Performance, goal: Goal) -> tuple[str,
         listed.append("given up")
     if edge is not None and edge.quiet * goal.distance > 1 and edge.factor < 1:
         listed.append("distance")
-    if goal.bandwidth_limit is not None and not loop_bandwidth(case.stage) <= goal.bandwidth_limit * (1 + ROUNDED):
+    if goal.bandwidth_limit is not None and not loop_bandwidth(case.stage) <= goal.bandwidth_limit * (
+        1 + settings.rounded_share
+    ):
         listed.append("bandwidth")
     if any(_near(window.low, window.high, goal.distance) for window in judgement.windows if not window.narrow):
         listed.append("window")
-    if case.unstable or measured.own_margin < goal.margin * (1 - ROUNDED):
+    if case.unstable or measured.own_margin < goal.margin * (1 - settings.rounded_share):
         listed.append("own margin")
     return tuple(listed)
 
@@ -211,11 +207,6 @@ def missed_parts(measured: Performance, goal: Goal) -> tuple[str, ...]:
     if not listed and np.mean(np.all([*parts.values()], axis=0)) < goal.surely(measured.count):
         listed.append("together")
     return tuple(listed)
-
-
-ROUNDED = 2e-3
-"""Share by which a margin may be below its goal, and a bandwidth above its limit, because the tuned numbers are
-rounded."""
 
 
 def _near(low: object, high: object, distance: float) -> bool:

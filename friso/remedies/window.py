@@ -9,14 +9,9 @@ from functools import partial
 import numpy as np
 
 from friso.engine.allowance import Exhausted, allowance
-from friso.remedies.search import WORK, Search
+from friso.remedies.search import Search
+from friso.remedies.settings import RemedySettings
 from friso.remedies.trials import attraction
-
-POINTS = 16
-"""Values of each number that are tried."""
-
-HALVINGS = 4
-"""How often the gap between the last value that does and the next, which does not, is halved."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +31,8 @@ def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
     their ends by halving what lies between them and the next value that was tried; and then as far as nothing attracts
     these machines at the ends. None where the points themselves do not meet the goal on these machines, or where that
     takes too much work."""
-    variables, grid = search.remedy.variables, np.linspace(0, 1, POINTS)
+    settings = RemedySettings.current()
+    variables, grid = search.remedy.variables, np.linspace(0, 1, settings.window_points)
     inside, outside = np.empty((len(variables), 2)), np.full((len(variables), 2), np.nan)
     for number in range(len(variables)):
         places = np.union1d(grid, shares[[number]])
@@ -54,7 +50,7 @@ def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
             outside[number, 1] = places[last + 1]
     _halve(inside, outside, np.argwhere(np.isfinite(outside)), partial(_meets, search, shares))
     try:
-        with allowance(WORK):
+        with allowance(settings.search_work):
             ends = np.argwhere(inside != shares[:, None])
             attracted = ends[~_clear(search, shares, ends[:, 0], inside[*ends.T])]
             outside[*attracted.T], inside[*attracted.T] = inside[*attracted.T], shares[attracted[:, 0]]
@@ -73,8 +69,9 @@ def _halve(
 ) -> None:
     """Halve what lies between the last places that do and the next, which do not, (variables, 2), at some of the ends:
     `ends` are numbers of variables and sides (n, 2)."""
+    settings = RemedySettings.current()
     rows, sides = ends.T
-    for _ in range(HALVINGS if len(ends) else 0):
+    for _ in range(settings.window_halvings if len(ends) else 0):
         middle = (inside[rows, sides] + outside[rows, sides]) / 2
         good = does(rows, middle)
         inside[rows[good], sides[good]], outside[rows[~good], sides[~good]] = middle[good], middle[~good]

@@ -16,20 +16,13 @@ from friso.equations.conditions import LEVELS, anywhere
 from friso.equations.roles import Role, Steady
 from friso.errors import InputError
 from friso.stage import Stage
-from friso.virtual_rig.surroundings import MARGIN, tables
+from friso.virtual_rig.settings import RigSettings
+from friso.virtual_rig.surroundings import tables
 from friso.virtual_rig.task import SAMPLE_TIME, MoveTask
 
-RTOL, METHOD = 1e-4, "Rodas4"
+METHOD = "Rodas4"
 """Relative tolerance and method: a step is at most a sample long."""
 
-BUDGET = 200
-"""Steps that a run may take per sample on average."""
-
-MOST_SAMPLES = 64
-"""Longest delay, in samples."""
-
-MEMORY = 2.5e8
-"""Bytes that the samples of the runs at hand may take."""
 
 SENSOR = int.from_bytes(b"sensor")
 """Which of a seed's random numbers the sensor between cart and stage takes."""
@@ -81,12 +74,13 @@ def run(
     The runs come chunk by chunk; they are the same for any number of threads. Raises InputError for an interval that
     does not fit the samples, and for a [rail] along which this law does not vary.
     """
+    settings = RigSettings.current()
     flat = as_built_keys(stage, changes)
     _check(flat, interval)
     first_run = {key: value[0] if np.ndim(value) else value for key, value in flat.items()}
     shape = kernel(AsBuilt.of(first_run), method=METHOD)
     count = int(np.ceil(task.duration / interval * (1 - 1e-12)))
-    chunk = max(8, int(MEMORY / (8 * count * len(shape.full_state))))
+    chunk = max(8, int(settings.sample_memory / (8 * count * len(shape.full_state))))
     for first in range(0, len(seeds), chunk):
         numbers = np.arange(first, min(first + chunk, len(seeds)))
         part = {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
@@ -96,6 +90,7 @@ def run(
 def _check(flat: Mapping[str, Any], interval: float) -> None:
     """Raises InputError for an interval that is no whole number of samples, for a delay of too many, and for a rail
     along which nothing of the friction law varies."""
+    settings = RigSettings.current()
     if (
         "rail.seed" in flat
         and flat["friction.model"] != "none"
@@ -103,9 +98,9 @@ def _check(flat: Mapping[str, Any], interval: float) -> None:
     ):
         actual = f'a [rail], but friction "{flat["friction.model"]}" without a static or Coulomb level to vary along it'
         raise InputError("rail", actual, "no [rail], or a law with such a level", 'model = "lugre"')
-    if whole_samples(flat) > MOST_SAMPLES:
+    if whole_samples(flat) > settings.most_delay_samples:
         actual = f"{flat['drive.delay']:g} s, {whole_samples(flat)} samples of {flat['drive.sample_time']:g} s"
-        raise InputError("drive.delay", actual, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
+        raise InputError("drive.delay", actual, f"at most {settings.most_delay_samples} samples", 'delay = "100 us"')
     samples = interval / flat["drive.sample_time"]
     if samples < 1 - 1e-9 or abs(samples - round(samples)) > 1e-6:
         expected = f"a whole number of samples of the drive, {flat['drive.sample_time']:g} s each"
@@ -123,13 +118,18 @@ def _recorded(
     numbers: np.ndarray,
     timing: tuple[float, int, int | None],
 ) -> RecordedRuns:
+    settings = RigSettings.current()
     interval, count, threads = timing
     flat = {**flat, "drive.seed": seeds.astype(float)}
     low, high = task.span
-    motion = {"motion.kind": "step", "motion.size": (high - low) or MARGIN, "motion.duration": task.duration}
+    motion = {
+        "motion.kind": "step",
+        "motion.size": (high - low) or settings.table_margin,
+        "motion.duration": task.duration,
+    }
     options = RunOptions(
-        rtol=RTOL, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, interval=interval,
-        budget=int(BUDGET * task.duration / flat["drive.sample_time"]),
+        rtol=settings.rig_rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, interval=interval,
+        budget=int(settings.steps_per_sample * task.duration / flat["drive.sample_time"]),
     )  # fmt: skip
     at_rest = Steady(-task.displacement, float(task.pieces[0, 1]) + task.displacement)
     starts = shape.unwound_at(shape.values(flat | motion, len(seeds)), at_rest, len(seeds))

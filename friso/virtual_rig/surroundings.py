@@ -11,18 +11,8 @@ from friso.engine.arrays import Tables
 from friso.equations.rail import friction_factors
 from friso.stage.rig import Floor
 from friso.virtual_rig.floor import floor_acceleration
+from friso.virtual_rig.settings import RigSettings
 from friso.virtual_rig.task import MoveTask
-
-PER_LENGTH, PER_WAVE = 12, 40
-"""Points of the tables per correlation length, and per shortest wave of rolling elements or ripple."""
-
-MARGIN = 0.01
-"""How far beyond the reference [m] the tables reach at least; a share `BEYOND` of its way where that is more."""
-
-BEYOND = 0.5
-
-PER_PERIOD = 10
-"""Points of the floor's acceleration per period of its highest frequency."""
 
 
 def tables(flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> Tables:
@@ -43,13 +33,17 @@ def _of_run(flat: Mapping[str, Any], run: int) -> dict[str, Any]:
 
 def _places(flat: Mapping[str, Any], task: MoveTask) -> tuple[np.ndarray, np.ndarray]:
     """The places [m] of the tables, evenly spaced, and their grid, shape (1, 2): first place, points per metre."""
+    settings = RigSettings.current()
     low, high = task.span
-    margin = max(MARGIN, BEYOND * (high - low))
+    margin = max(settings.table_margin, settings.table_share * (high - low))
     lengths = [np.inf]
-    for key, points in (("rail.correlation_length", PER_LENGTH), ("drive.ripple_pitch", PER_WAVE)):
+    for key, points in (
+        ("rail.correlation_length", settings.points_per_length),
+        ("drive.ripple_pitch", settings.points_per_wave),
+    ):
         lengths += [float(np.min(flat[key])) / points] if key in flat else []
     if "rail.rolling_pitch" in flat:
-        lengths.append(float(np.min(flat["rail.rolling_pitch"])) / (3 * PER_WAVE))
+        lengths.append(float(np.min(flat["rail.rolling_pitch"])) / (3 * settings.points_per_wave))
     step = min(lengths)
     count = 2 if step == np.inf else int(np.ceil((high - low + 2 * margin) / step)) + 2
     step = (high - low + 2 * margin) / (count - 1)
@@ -64,11 +58,12 @@ def _over_places(flat: Mapping[str, Any], places: np.ndarray) -> np.ndarray:
 
 def _over_time(floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> tuple[np.ndarray, float]:
     """Injected force and floor's acceleration, shape (runs or 1, 2, points), and their points per second."""
+    settings = RigSettings.current()
     injected = len(task.injected) > 0
     if floor is None and not injected:
         return np.zeros((1, 2, 2)), 0.0
     fine = [task.injected_each] if injected else []
-    fine += [1 / (PER_PERIOD * floor.frequency[-1])] if floor else []
+    fine += [1 / (settings.points_per_period * floor.frequency[-1])] if floor else []
     interval = min(fine)
     count = int(np.ceil(task.duration / interval)) + 2
     inputs = np.zeros((len(seeds) if floor else 1, 2, count))

@@ -20,6 +20,7 @@ from friso.engine.tolerance import checked_rtol
 from friso.frequency.describing.function import checked_positive, dynamic_stiffness
 from friso.frequency.describing.loop import receptance
 from friso.frequency.describing.steady import RTOL
+from friso.frequency.settings import FrequencySettings
 from friso.stage import Stage
 
 AMPLITUDES = np.geomspace(1e-9, 1.0, 181)
@@ -28,19 +29,8 @@ AMPLITUDES = np.geomspace(1e-9, 1.0, 181)
 FREQUENCIES = np.geomspace(1e-4, 1e3, 281)
 """Default frequencies [Hz] of the grid."""
 
-NUDGE = 1e-5
-"""Change of the logarithms over which derivatives are taken."""
 
-STEPS = 20
-"""Newton steps to a solution."""
-
-LONGEST = 1.0
-"""Newton step of the logarithms at most."""
-
-SOLVED = 1e-6
-"""Residual at which a solution counts as one."""
-
-TURN, WITHIN, HALVINGS = np.pi / 2, 16, 12
+TURN, WITHIN = np.pi / 2, 16
 """Angle [rad] by which the loop may turn from one frequency to the next, at how many places between two it is looked
 at, and how often the grid is halved for it at most."""
 
@@ -78,6 +68,7 @@ def single_harmonic(
     each in ascending order; more frequencies are put between those from one to the next of which the loop turns by a
     right angle or more. Two solutions in one cell escape it. Raises InputError for a stage without friction and for a
     grid that is not usable."""
+    settings = FrequencySettings.current()
     loop = _Loop(stage, checked_rtol(rtol))
     sizes = checked_positive("amplitudes", amplitudes, "1e-5 m, 1e-4 m")
     rates = loop.refined(checked_positive("frequencies", frequencies, "0.1 Hz, 1 Hz"))
@@ -89,7 +80,7 @@ def single_harmonic(
     middles = np.stack([(axis[cell] + axis[cell + 1]) / 2 for axis, cell in zip(axes, cells.T, strict=True)])
     solutions = loop.polished(middles)
     error = loop.left(solutions)[1]
-    good = (error < SOLVED) & _near(axes, cells, solutions)
+    good = (error < settings.balance_residual) & _near(axes, cells, solutions)
     i, j = np.unravel_index(np.argmin(np.where(np.isnan(residual), np.inf, residual)), shape)
     least = (float(residual[i, j]), float(sizes[i]), float(rates[j]))
     solutions, error = solutions[:, good], error[good]
@@ -132,7 +123,8 @@ class _Loop:
 
     def refined(self, frequencies: np.ndarray) -> np.ndarray:
         """Frequencies [Hz] with more between them, from one to the next of which the loop turns by less than TURN."""
-        for _ in range(HALVINGS):
+        settings = FrequencySettings.current()
+        for _ in range(settings.grid_halvings):
             logs, share = np.log(frequencies), np.linspace(0, 1, WITHIN + 1)
             dense = np.exp(logs[:-1, None] + np.diff(logs)[:, None] * share)
             answer = receptance(self.stage.flat(), dense.ravel())[0].reshape(dense.shape)
@@ -145,9 +137,13 @@ class _Loop:
 
     def polished(self, logs: np.ndarray) -> np.ndarray:
         """Solutions by Newton's method from near them, which stays where it has no step."""
-        for _ in range(STEPS if logs.size else 0):
-            sides = [self.left(logs + NUDGE * step[:, None])[0] for step in np.vstack([np.eye(2), -np.eye(2)])]
-            slopes = np.array([(sides[k] - sides[k + 2]) / (2 * NUDGE) for k in range(2)])
+        settings = FrequencySettings.current()
+        for _ in range(settings.balance_newton_steps if logs.size else 0):
+            sides = [
+                self.left(logs + settings.logarithm_nudge * step[:, None])[0]
+                for step in np.vstack([np.eye(2), -np.eye(2)])
+            ]
+            slopes = np.array([(sides[k] - sides[k + 2]) / (2 * settings.logarithm_nudge) for k in range(2)])
             matrix = np.moveaxis(np.array([np.real(slopes), np.imag(slopes)]), 2, 0)
             left = self.left(logs)[0]
             usable = np.isfinite(left) & np.all(np.isfinite(slopes), axis=0)
@@ -155,5 +151,5 @@ class _Loop:
             usable &= np.linalg.det(matrix) != 0
             matrix[~usable] = np.eye(2)
             step = np.linalg.solve(matrix, np.stack([np.real(left), np.imag(left)], axis=1)[:, :, None])[:, :, 0].T
-            logs = logs - np.where(usable, np.clip(step, -LONGEST, LONGEST), 0.0)
+            logs = logs - np.where(usable, np.clip(step, -settings.longest_log_step, settings.longest_log_step), 0.0)
         return logs

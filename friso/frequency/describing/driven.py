@@ -17,30 +17,10 @@ import numpy as np
 from friso.frequency.describing.function import dynamic_stiffness
 from friso.frequency.describing.steady import RTOL, Imposition
 from friso.frequency.parts import mechanics
-
-PER_DECADE = 32
-"""Amplitudes per decade between which roots are looked for, at the same places whatever else is asked for."""
-
-BEYOND = 30.0
-"""How far these reach beyond the amplitudes of a cart that is stuck and of one that is free."""
-
-STUCK, STATELESS = 1e-3, 1e-12
-"""Amplitude at which a cart counts as stuck, in units of the scale of the law's own state; without one, in metres."""
-
-FREE = 10.0
-"""Amplitude in units of that of a cart without friction at which it counts as free."""
-
-DECADES = 8
-"""Decades at most by which the amplitudes are extended until their forces lie on both sides of the one asked for."""
+from friso.frequency.settings import FrequencySettings
 
 LIMITS = (1e-18, 1e18)
 """Amplitudes [m] beyond which nothing is looked for."""
-
-CLOSE = 1e-10
-"""Relative error of the force at which an amplitude counts as found."""
-
-STEPS = 60
-"""Steps to a root at most."""
 
 
 @dataclass(frozen=True)
@@ -72,27 +52,40 @@ class DrivenPlant:
     @cached_property
     def stuck(self) -> float:
         """An amplitude [m] at which bristles do not slip."""
+        settings = FrequencySettings.current()
         friction = Imposition.of(self.flat, np.ones(1), np.ones(1), self.rtol)
-        return float(np.min(STUCK * friction.scales[0, friction.inner], initial=STATELESS if not friction.inner else 1))
+        return float(
+            np.min(
+                settings.stuck_amplitude * friction.scales[0, friction.inner],
+                initial=settings.stateless_amplitude if not friction.inner else 1,
+            )
+        )
 
     def ends(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Amplitudes [m] that need less than each of `forces` at each frequency, and more, shape (forces, frequencies):
         well beyond those of a stuck and of a free cart, whatever the other forces are."""
+        settings = FrequencySettings.current()
         rows, shape = np.arange(len(self.frequencies)), (len(forces), len(self.frequencies))
         with np.errstate(over="ignore"):
             bare = np.clip(np.abs(self.compliances[:, 1, 0]) * forces[:, None], *LIMITS)
         stuck = np.abs(self.answer(np.full(shape[1], self.stuck), rows)[1][:, 1])
-        slid = np.abs(self.answer((FREE * bare).ravel(), np.tile(rows, shape[0]))[1][:, 1]).reshape(shape)
+        slid = np.abs(self.answer((settings.free_amplitude * bare).ravel(), np.tile(rows, shape[0]))[1][:, 1]).reshape(
+            shape
+        )
         with np.errstate(over="ignore"):
             states = np.stack([bare, stuck * forces[:, None], slid * forces[:, None]])
-        low, high = np.fmin.reduce(states) / BEYOND, np.fmax.reduce(states) * BEYOND
+        low, high = (
+            np.fmin.reduce(states) / settings.amplitudes_beyond,
+            np.fmax.reduce(states) * settings.amplitudes_beyond,
+        )
         return self._extended(low, forces, -1), self._extended(high, forces, 1)
 
     def _extended(self, amplitudes: np.ndarray, forces: np.ndarray, side: int) -> np.ndarray:
         """Amplitudes moved down (side -1) or up (1) until their forces lie on that side of the ones asked for."""
+        settings = FrequencySettings.current()
         amplitudes = np.clip(amplitudes, *LIMITS)
         force, frequency = (indices.ravel() for indices in np.indices(amplitudes.shape))
-        for _ in range(DECADES):
+        for _ in range(settings.most_decades):
             reached = self.answer(amplitudes[force, frequency], frequency)[0]
             missed = ~(side * (reached - forces[force]) > 0)
             force, frequency = force[missed], frequency[missed]
@@ -104,12 +97,13 @@ class DrivenPlant:
     def grid(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Amplitudes [m] with their forces [N], both of shape (frequencies, points), and whether roots for a force are
         looked for in the cell behind each of them, shape (forces, frequencies, points - 1)."""
+        settings = FrequencySettings.current()
         low, high = self.ends(forces)
-        first = np.floor(PER_DECADE * np.log10(low)).astype(int)
-        last = np.ceil(PER_DECADE * np.log10(high)).astype(int)
+        first = np.floor(settings.amplitudes_per_decade * np.log10(low)).astype(int)
+        last = np.ceil(settings.amplitudes_per_decade * np.log10(high)).astype(int)
         points = int(np.max(last.max(axis=0) - first.min(axis=0))) + 1
         numbers = first.min(axis=0)[:, None] + np.arange(points)
-        amplitudes = 10.0 ** (numbers / PER_DECADE)
+        amplitudes = 10.0 ** (numbers / settings.amplitudes_per_decade)
         pending = numbers <= last.max(axis=0)[:, None]
         reached = np.full(amplitudes.shape, np.nan)
         reached[pending], _, _ = self.answer(amplitudes[pending], np.nonzero(pending)[0])
@@ -151,10 +145,11 @@ def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
 def _illinois(function: Any, ends: tuple[np.ndarray, ...], values: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
     """Zeros of many functions between ends at which they have these values of opposite sign, and what is left there:
     the secant of the bracket, with the value of an end that stays halved (Illinois)."""
+    settings = FrequencySettings.current()
     (low, high), (f_low, f_high) = (end.copy() for end in ends), (value.copy() for value in values)
     best, left = low.copy(), np.full(len(low), np.inf)
     open_ = np.arange(len(low))
-    for _ in range(STEPS):
+    for _ in range(settings.most_root_steps):
         if not open_.size:
             break
         a, b, f_a, f_b = low[open_], high[open_], f_low[open_], f_high[open_]
@@ -164,5 +159,5 @@ def _illinois(function: Any, ends: tuple[np.ndarray, ...], values: tuple[np.ndar
         upper = np.sign(f) == np.sign(f_b)
         f_low[open_], f_high[open_] = np.where(upper, f_a / 2, f), np.where(upper, f, f_b / 2)
         low[open_], high[open_] = np.where(upper, a, x), np.where(upper, x, b)
-        open_ = open_[np.abs(f) > CLOSE]
+        open_ = open_[np.abs(f) > settings.force_error]
     return best, left

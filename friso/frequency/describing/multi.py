@@ -16,27 +16,7 @@ import numpy as np
 
 from friso.frequency.describing.loop import TOUCHES, beyond_stroke, receptance
 from friso.frequency.describing.waveform import FrictionAnswer, OneStateLaw, friction_answer
-
-OVERSAMPLED = 32
-"""Time intervals per period and harmonic at least."""
-
-FINEST = 4096
-"""Time intervals per period at least."""
-
-STEPS = 40
-"""Newton steps at most."""
-
-CLOSED = 1e-9
-"""Step, as a share of the amplitude, at which the series counts as found."""
-
-LONGEST = 0.5
-"""Longest step, as a share of the known amplitude or of the frequency."""
-
-HALVINGS = 6
-"""How often a step is halved that leads away."""
-
-RESTING = 1e-3
-"""Amplitude, as a share of the known one, below which what was found is the rest at the reference."""
+from friso.frequency.settings import FrequencySettings
 
 DONE, REST, OPEN = "done", "only the rest at the reference was found", "no series was found near the known motion"
 
@@ -66,7 +46,13 @@ class HarmonicSeries:
 
     def over_period(self, harmonics: np.ndarray) -> np.ndarray:
         """The signal with these harmonics at many times of a period."""
-        angles = np.linspace(0, 2 * np.pi, max(FINEST, OVERSAMPLED * int(self.orders[-1])), endpoint=False)
+        settings = FrequencySettings.current()
+        angles = np.linspace(
+            0,
+            2 * np.pi,
+            max(settings.least_intervals, settings.samples_per_harmonic * int(self.orders[-1])),
+            endpoint=False,
+        )
         return np.real(np.exp(1j * np.outer(angles, self.orders)) @ harmonics)
 
 
@@ -113,7 +99,11 @@ def balanced(
     interval before the first comes again. A `mirrored` motion is its own mirror image after half a period. Raises
     InputError for a stage without friction or for a law with more than one state of its own.
     """
-    law, size = OneStateLaw.of(flat), intervals or max(FINEST, OVERSAMPLED * harmonics)
+    settings = FrequencySettings.current()
+    law, size = (
+        OneStateLaw.of(flat),
+        intervals or max(settings.least_intervals, settings.samples_per_harmonic * harmonics),
+    )
     basis = Basis.of(harmonics, mirrored, 2 * (size // 2))
     spectrum = np.fft.rfft(position)[basis.orders] / len(position) * np.where(basis.orders == 0, 1, 2)
     length = float(np.ptp(position) / 2)
@@ -130,9 +120,10 @@ def balanced(
 
 def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> str:
     """What became of a series that was to be found near a motion of this amplitude [m]."""
-    if series.amplitude < RESTING * length:
+    settings = FrequencySettings.current()
+    if series.amplitude < settings.resting_share * length:
         return REST
-    if series.step > CLOSED:
+    if series.step > settings.series_step:
         return OPEN
     deflection = np.max(np.abs(series.over_period(series.stage - series.cart)))
     return TOUCHES if beyond_stroke(flat, deflection) else DONE
@@ -196,20 +187,22 @@ class _Problem:
 
     def solve(self) -> tuple[np.ndarray, float]:
         """The state that solves the equations, and the last step."""
+        settings = FrequencySettings.current()
         state, size = np.append(self.start, 0.0), np.inf
-        for _ in range(STEPS):
+        for _ in range(settings.series_newton_steps):
             left = self.residual(state)
             step = np.linalg.lstsq(self.jacobian(state), -left, rcond=None)[0]
-            step /= max(1.0, float(np.max(np.abs(step))) / LONGEST)
+            step /= max(1.0, float(np.max(np.abs(step))) / settings.longest_step_share)
             state = state + step * self._share(state, step, float(np.linalg.norm(left)))
             size = float(np.max(np.abs(step)))
-            if size <= CLOSED:
+            if size <= settings.series_step:
                 break
         return state, size
 
     def _share(self, state: np.ndarray, step: np.ndarray, left: float) -> float:
         """The share of a step that leads closer."""
-        shares = [0.5**halving for halving in range(HALVINGS)]
+        settings = FrequencySettings.current()
+        shares = [0.5**halving for halving in range(settings.series_halvings)]
         return next((s for s in shares if np.linalg.norm(self.residual(state + s * step)) < left), shares[-1])
 
 

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.engine.tolerance import checked_rtol
-from friso.frequency.describing.driven import CLOSE, DrivenPlant, Roots, driven_amplitudes
+from friso.frequency.describing.driven import DrivenPlant, Roots, driven_amplitudes
 from friso.frequency.describing.function import checked_positive
 from friso.frequency.describing.loop import TOUCHES, beyond_stroke
 from friso.frequency.describing.steady import RTOL
+from friso.frequency.settings import FrequencySettings
 from friso.stage import Stage
 from friso.stage.arguments import check_arguments
 
@@ -136,11 +137,12 @@ def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.nda
 
 def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray, unknown: np.ndarray) -> np.ndarray:
     """What is wrong with the answers to every force at every frequency, or "done"."""
+    settings = FrequencySettings.current()
     present, lasting = ~np.isnan(branches["amplitude"]), branches["lasting"]
     count = np.sum(present, axis=2)
     last = np.take_along_axis(lasting, np.maximum(count - 1, 0)[:, :, None], axis=2)[:, :, 0]
     missing = unknown | (lasting[:, :, 0] != 1) | (last != 1)
-    unfound = (count == 0) | np.any(present & ~(branches["error"] <= 100 * CLOSE), axis=2)
+    unfound = (count == 0) | np.any(present & ~(branches["error"] <= 100 * settings.force_error), axis=2)
     deflection = np.abs(branches["response"] - branches["cart_response"]) * forces[:, None, None]
     status = np.where(missing, MISSING, "done").astype(object)
     status[np.any(beyond_stroke(stage.flat(), deflection), axis=2)] = TOUCHES

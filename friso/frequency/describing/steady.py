@@ -20,21 +20,10 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.imposed import FREQUENCY, imposed_form
 from friso.equations.roles import Role
+from friso.frequency.settings import FrequencySettings
 
 RTOL = 1e-9
 """Default relative tolerance of the runs."""
-
-CLOSED, WIDEST = 1e3, 1e-4
-"""Gap up to which a state counts as periodic: so many relative tolerances, but never more than the second."""
-
-ROUNDS = 12
-"""Secant steps at most."""
-
-FINEST = 1e-4
-"""Least distance of the two points of a secant, as a share of the state's scale."""
-
-ROOM = 1 << 20
-"""Samples that are kept at a time."""
 
 
 @dataclass(frozen=True)
@@ -100,11 +89,12 @@ class Imposition:
 
     def run(self, inner: np.ndarray, share: float, samples: int = 0) -> Iterator[tuple[np.ndarray, Results]]:
         """Follow a share of a period from the law's own states (count, inner), with so many samples per period."""
+        settings = FrequencySettings.current()
         starts = np.zeros((self.count, len(self.kernel.states)))
         starts[:, self.kernel.position] = self.flat["motion.displacement"]
         starts[:, self.inner] = inner
         interval = 1 / samples if samples else None
-        chunk = max(8, min(2048, ROOM // max(samples, 1)))
+        chunk = max(8, min(2048, settings.most_samples // max(samples, 1)))
         options = RunOptions(rtol=self.rtol, interval=interval, chunk=chunk)
         for part in run_chunks(self.kernel, {**self.flat, "motion.duration": share}, self.count, options, starts):
             yield part.numbers, part.results
@@ -116,7 +106,8 @@ def _rows(rows: list[Any], count: int) -> np.ndarray:
 
 def periodic_gap(rtol: float) -> float:
     """Gap up to which a state counts as periodic."""
-    return min(CLOSED * rtol, WIDEST)
+    settings = FrequencySettings.current()
+    return min(settings.gap_tolerances * rtol, settings.widest_gap)
 
 
 @dataclass(frozen=True)
@@ -131,11 +122,12 @@ class PeriodicStates:
 
 def steady(friction: Imposition) -> PeriodicStates:
     """The periodic steady states; half a period does where the law is symmetric."""
+    settings = FrequencySettings.current()
     count, size = friction.count, len(friction.inner)
     inner, gap, done = np.zeros((count, size)), np.zeros(count), np.ones(count, bool)
     width = friction.scales[:, friction.inner].copy()
     open_ = np.arange(count) if size else np.empty(0, np.int64)
-    for _ in range(ROUNDS):
+    for _ in range(settings.secant_steps):
         if not open_.size:
             break
         chosen_friction, scales = friction.take(open_), friction.scales[open_][:, friction.inner]
@@ -143,7 +135,7 @@ def steady(friction: Imposition) -> PeriodicStates:
         gap[open_], done[open_] = np.max(np.abs(missed) / scales, axis=1), fine
         far = fine & (gap[open_] > periodic_gap(friction.rtol))
         inner[open_[far]] += step[far]
-        width[open_[far]] = np.clip(np.abs(step[far]), FINEST * scales[far], scales[far])
+        width[open_[far]] = np.clip(np.abs(step[far]), settings.least_secant * scales[far], scales[far])
         open_ = open_[far]
     return PeriodicStates(inner, gap, done)
 

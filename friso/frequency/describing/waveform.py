@@ -21,10 +21,8 @@ from friso.equations.component import Switch, state
 from friso.equations.friction.common import DIRECTION, direction
 from friso.equations.imposed import Imposed, imposed_form
 from friso.errors import InputError
+from friso.frequency.settings import FrequencySettings
 from friso.stage.tables import friction_law
-
-STEPS, CLOSE = 30, 1e-12
-"""Newton steps of the law's own state at most, and the change of it, as a share of its largest value, that is none."""
 
 
 @dataclass(frozen=True)
@@ -120,15 +118,16 @@ def _middles(z: np.ndarray) -> np.ndarray:
 def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> FrictionAnswer:
     """The friction on a motion with these velocities [m/s] at the middles (M,) of intervals [s], after which it comes
     back (sign 1) or comes to its mirror image (-1)."""
+    settings = FrequencySettings.current()
     z = np.zeros(len(velocity) + 1)
     chain, pushed = None, np.zeros(0)
-    for _ in range(STEPS if law.remembers else 0):
+    for _ in range(settings.state_newton_steps if law.remembers else 0):
         rate, by_z, by_velocity, *_ = law.at(velocity, _middles(z))
         chain = Chain(1 - interval * by_z / 2, 1 + interval * by_z / 2, sign)
         missed = interval * rate - np.diff(z)
         step = chain.solve(missed[:, None])[:, 0]
         z, pushed = z + step, interval * by_velocity
-        if np.max(np.abs(step)) <= CLOSE * np.max(np.abs(z)):
+        if np.max(np.abs(step)) <= settings.state_error * np.max(np.abs(z)):
             break
     _, _, _, force, by_state, by_velocity = law.at(velocity, _middles(z))
     return FrictionAnswer(force, by_velocity, by_state, chain, pushed)

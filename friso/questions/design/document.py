@@ -11,8 +11,9 @@ from friso.design_method.choice import Confirmed
 from friso.design_method.edges import Corners
 from friso.design_method.front import Candidate
 from friso.design_method.geometry import Geometry
-from friso.design_method.method import SLOW, Design, NoDesign
+from friso.design_method.method import Design, NoDesign
 from friso.design_method.relax import Relaxation
+from friso.design_method.settings import DesignSettings
 from friso.design_method.verification import MachineOutcomes
 from friso.questions.design.window import lower, upper
 from friso.questions.design.words import need_words, refusal
@@ -165,8 +166,9 @@ def _controller(design: Design) -> dict[str, Any]:
 
 
 def _verification(design: Design) -> dict[str, Any]:
+    settings = DesignSettings.current()
     verification, limit = design.verification, design.spec.position.settling_time
-    met = None if limit is None else verification.free.slower_than(SLOW) <= limit
+    met = None if limit is None else verification.free.slower_than(settings.slow_share) <= limit
     return {**_outcome(verification.free), "settling_time_met": met, "locked": _outcome(verification.locked)}
 
 

@@ -23,9 +23,9 @@ from friso.remedies.change import ChangeSize
 from friso.remedies.goal import Goal
 from friso.remedies.least import LEAST
 from friso.remedies.method import Advice
-from friso.remedies.relax import REASONABLE, RelaxedGoal
+from friso.remedies.relax import RelaxedGoal
 from friso.remedies.search import TriedPoints
-from friso.remedies.trials import LOOSER
+from friso.remedies.settings import RemedySettings
 from friso.remedies.variables import BANDWIDTH
 from friso.remedies.verified import Performance, RemedyOutcome
 from friso.remedies.window import VariableWindow
@@ -347,11 +347,13 @@ def _nothing(tuning: Advice) -> list[str]:
 
 def _no_relaxation(tuning: Advice) -> str:
     """That no relaxation was found, or that none was sought."""
+    settings = RemedySettings.current()
     if tuning.outcomes and not any(outcome.remedy.verifiable for outcome in tuning.outcomes):
         return "Relaxations of the goal were not sought: no cycle verifies a stage with dither."
     return (
         "No relaxation of up to three parts of the goal was found with which an option meets it (of the limit of "
-        f"the bandwidth up to {REASONABLE:g} times, of the tolerance up to {LOOSER:g})."
+        f"the bandwidth up to {settings.reasonable_factor:g} times, of the tolerance up to "
+        f"{settings.looser_tolerance:g})."
     )
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.frequency.crossover import HIGHEST, WANTED
+from friso.frequency.crossover import WANTED
 from friso.frequency.margins import Margins
 from friso.frequency.ranges import Range
+from friso.frequency.settings import FrequencySettings
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text
 from friso_thesis.studies.thesis.experiments import BUILT
 from friso_thesis.studies.thesis.judges.rig_loops import RAIL, measured_free, measured_locked, on_the_rig
@@ -58,11 +59,13 @@ def _beyond(locked: CrossoverLoops) -> str:
 
 
 def _stable_at_speeds(speeds: Speeds) -> Part:
+    settings = FrequencySettings.current()
     unstable = {"limiter free": speeds.unstable, "touched": speeds.unstable_touched}
     where = [f"{name} {_speeds(ranges)}" for name, ranges in unstable.items() if ranges]
     why = "There friction falls as the speed rises (Stribeck effect)"
     if speeds.incurable:
-        why += f", and in the middle of that range no faster controller up to {HIGHEST / 1e3:g} kHz is stable"
+        highest = f"{settings.highest_crossover / 1e3:g} kHz"
+        why += f", and in the middle of that range no faster controller up to {highest} is stable"
     if not speeds.undeflected:
         why += (
             ". Linearised about an initial speed with the bristles not yet deflected (z = 0), which leaves this out, "
@@ -195,7 +198,12 @@ def _frequencies(frequencies: tuple[float, ...]) -> str:
 
 
 def _hertz(crossover: float | None) -> str:
-    return f"{HIGHEST / 1e3:g} kHz, the end of the search" if crossover is None else f"{crossover:.4g} Hz"
+    settings = FrequencySettings.current()
+    return (
+        f"{settings.highest_crossover / 1e3:g} kHz, the end of the search"
+        if crossover is None
+        else f"{crossover:.4g} Hz"
+    )
 
 
 def _sampled(analysis: Linear) -> FindingTable:

@@ -10,12 +10,13 @@ import numpy as np
 
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.frequency.crossover import HIGHEST, range_end, searched_crossovers, stable_crossovers
+from friso.frequency.crossover import range_end, searched_crossovers, stable_crossovers
 from friso.frequency.drive import DriveTiming
 from friso.frequency.family import controller_response, loops, plant_poles, plants
-from friso.frequency.margins import DENSITY, Margins, frequencies, margins, with_resonances
+from friso.frequency.margins import Margins, frequencies, margins, with_resonances
 from friso.frequency.members import concatenate_families, limit_cases
 from friso.frequency.ranges import ranges_below
+from friso.frequency.settings import FrequencySettings
 from friso.stage import Stage
 from friso.studies.rig.experiments.frf import SETTINGS as MEASURED_SETTINGS
 
@@ -91,16 +92,17 @@ def _tuned(flat: Mapping[str, Any], crossover: Any) -> dict[str, Any]:
 def _single(flat: Mapping[str, Any]) -> float | None:
     """See `CrossoverLoops`; the free joint's limiter is touched, since the controller is tuned for all the mass. None
     where the end of the search comes first, 0 without any such crossover."""
+    settings = FrequencySettings.current()
     cases = limit_cases(flat)
     member = cases.get("sliding-touched", cases["sliding"])
-    omega = frequencies(flat, member, DriveTiming.of(flat), DENSITY, [plant_poles(flat, member)])
+    omega = frequencies(flat, member, DriveTiming.of(flat), settings.margin_density, [plant_poles(flat, member)])
     bare = plants(flat, member, omega)[0]
 
     def more(crossover: np.ndarray) -> np.ndarray:
         above = np.array([np.abs(bare * controller_response(_tuned(flat, f), omega)) > 1 for f in crossover])
         return (above[:, 1:] != above[:, :-1]).sum(axis=1) - 1.5
 
-    at = np.geomspace(LOWEST, 0.999 * HIGHEST, STEPS)
+    at = np.geomspace(LOWEST, 0.999 * settings.highest_crossover, STEPS)
     end = next((high for _, high in ranges_below(at, more)), 0.0)
     return None if end >= at[-1] else end
 

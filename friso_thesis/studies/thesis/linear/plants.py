@@ -11,9 +11,10 @@ from scipy.signal import find_peaks
 
 from friso.frequency.drive import DriveTiming
 from friso.frequency.family import plant_poles, plants
-from friso.frequency.margins import DENSITY, frequencies
+from friso.frequency.margins import frequencies
 from friso.frequency.members import Members, limit_cases
 from friso.frequency.parts import FORCE, STAGE, plant
+from friso.frequency.settings import FrequencySettings
 from friso.frequency.stiffness import limiter_in_series
 from friso.stage.tables import friction_law
 
@@ -81,7 +82,8 @@ def limit_cases_of(flat: Mapping[str, Any]) -> dict[str, LimitCase]:
 
 
 def _limit_case(flat: Mapping[str, Any], member: Members) -> LimitCase:
-    omega = frequencies(flat, member, DriveTiming.of(flat), DENSITY, [plant_poles(flat, member)])
+    settings = FrequencySettings.current()
+    omega = frequencies(flat, member, DriveTiming.of(flat), settings.margin_density, [plant_poles(flat, member)])
     resonances, antiresonances = (_peaks(flat, member, omega, sign) for sign in (1, -1))
     at = _mass_line(LimitCase(resonances, antiresonances, np.nan, np.nan))
     omega_at = np.array([2 * np.pi * at])

@@ -11,7 +11,6 @@ import numpy as np
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.bode import PRESCRIBED
-from friso.frequency.crossover import HIGHEST
 from friso.frequency.family import loops, spectral_abscissa
 from friso.frequency.friction import law_of, speeds
 from friso.frequency.loops import closed_loop
@@ -19,6 +18,7 @@ from friso.frequency.members import Members, member
 from friso.frequency.operating_point import operating_point
 from friso.frequency.parts import DISTURBANCE, cart_states
 from friso.frequency.ranges import Range, ranges_below
+from friso.frequency.settings import FrequencySettings
 
 SPEEDS = 257
 """Speeds at which stability is looked at before the ends of its ranges are located."""
@@ -74,7 +74,8 @@ def _sliding(speed: np.ndarray, touched: bool = False) -> Members:
 
 def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
     """Whether in the middle of some of the ranges no faster controller is stable."""
-    crossover = np.geomspace(flat[CROSSOVER], HIGHEST, CROSSOVERS)
+    settings = FrequencySettings.current()
+    crossover = np.geomspace(flat[CROSSOVER], settings.highest_crossover, CROSSOVERS)
     many = faster(flat, crossover / flat[CROSSOVER])
     middles = [np.full(CROSSOVERS, np.sqrt(low * high)) for low, high in unstable]
     return any(bool((spectral_abscissa(many, _sliding(speed)) > 0).all()) for speed in middles)

@@ -1,0 +1,39 @@
+"""Tuning numbers of `friso.virtual_rig`, with the reason for each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from friso.settings import Settings, setting
+
+
+@dataclass(frozen=True)
+class RigSettings(Settings):
+    """Settings of the machine as built."""
+
+    rig_rtol: float = setting(1e-4, "")
+    """A step is at most a sample long: looser shows in the third digit, tighter takes twice as long."""
+
+    steps_per_sample: int = setting(200, "")
+    """Runs that need more on average chatter, and would never end."""
+
+    most_delay_samples: int = setting(64, "")
+    """Longer delays take memory for every sample of every run."""
+
+    sample_memory: float = setting(2.5e8, "B")
+    """What the samples of the runs at hand may take; larger machines gain nothing from more."""
+
+    points_per_length: int = setting(12, "")
+    """Fewer points show corners in the rail's friction; tables grow in proportion."""
+
+    points_per_wave: int = setting(40, "")
+    """Fewer points flatten the ripple by a percent; tables grow in proportion."""
+
+    table_margin: float = setting(0.01, "m")
+    """Stages that overshoot further leave the rail."""
+
+    table_share: float = setting(0.5, "")
+    """The same for long moves, as a share of their way."""
+
+    points_per_period: int = setting(10, "")
+    """Fewer points flatten the highest frequency of the floor by some percent."""
