@@ -20,6 +20,7 @@ from friso.stage import Stage
 from friso.studies import distribute
 from friso.studies.distribute import connected
 from friso.studies.request import Request
+from friso.studies.settings import StudySettings
 from friso.studies.store import Store
 from friso.studies.sweep import run_in_memory, run_in_store, sweep
 
@@ -67,16 +68,16 @@ def test_a_scheduler_with_tls_is_reached_by_dask_s_configuration_alone(
     ) as cluster:
         address = cluster.scheduler_address
         assert address.startswith("tls://")
-        monkeypatch.setattr(distribute, "PATIENCE", 2.0)
-        with refused(), connected(address):
-            pass
-        settings = {"ca-file": names["tls_ca_file"], "client.cert": names["tls_client_cert"]}
-        settings["client.key"] = names["tls_client_key"]
-        with (
-            dask.config.set({f"distributed.comm.tls.{name}": file for name, file in settings.items()}),
-            connected(address) as crew,
-        ):
-            assert crew.size == 1
+        with StudySettings(scheduler_timeout=2.0).in_use():
+            with refused(), connected(address):
+                pass
+            settings = {"ca-file": names["tls_ca_file"], "client.cert": names["tls_client_cert"]}
+            settings["client.key"] = names["tls_client_key"]
+            with (
+                dask.config.set({f"distributed.comm.tls.{name}": file for name, file in settings.items()}),
+                connected(address) as crew,
+            ):
+                assert crew.size == 1
     assert not [record for record in caplog.records if record.name == "friso"]
 
 
@@ -189,10 +190,10 @@ def test_kernels_are_compiled_once_per_worker(rig: Stage, cluster: LocalCluster)
 
 
 def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch, refused: Refused) -> None:
-    monkeypatch.setattr(distribute, "PATIENCE", 0.3)
-    for address in ("tcp://127.0.0.1:9", "nonsense", "tcp://no.such.host.invalid:8786"):
-        with refused(), connected(address):
-            pass
+    with StudySettings(scheduler_timeout=0.3).in_use():
+        for address in ("tcp://127.0.0.1:9", "nonsense", "tcp://no.such.host.invalid:8786"):
+            with refused(), connected(address):
+                pass
 
 
 def test_a_scheduler_without_workers(refused: Refused) -> None:

@@ -9,6 +9,7 @@ from inside import friso_inside
 
 from friso.cli.common import print_table
 from friso.studies import doctor
+from friso.studies.settings import StudySettings
 
 
 def test_this_machine_works(tmp_path: Path) -> None:
@@ -97,12 +98,12 @@ def test_a_wrong_result_and_what_cannot_be_loaded_are_told(
     def no_compiler() -> str:
         raise ImportError("libstdc++.so.6: cannot open shared object file")
 
-    monkeypatch.setattr(doctor, "SWING", 2e-3)
-    monkeypatch.setattr(doctor, "_processor", no_compiler)
-    broken = {finding.subject: finding for finding in doctor.checks() if not finding.works}
-    assert set(broken) == {"processor", "running"}
-    assert all(finding.remedy for finding in broken.values())
-    done = friso_inside(tmp_path, "doctor")
-    assert done.returncode == 1
-    assert all(f" {subject} " in done.stdout for subject in ("packages", "processor", "running"))  # none is cut
-    assert "libstdc++" in done.stdout
+    with StudySettings(expected_swing=2e-3).in_use():
+        monkeypatch.setattr(doctor, "_processor", no_compiler)
+        broken = {finding.subject: finding for finding in doctor.checks() if not finding.works}
+        assert set(broken) == {"processor", "running"}
+        assert all(finding.remedy for finding in broken.values())
+        done = friso_inside(tmp_path, "doctor")
+        assert done.returncode == 1
+        assert all(f" {subject} " in done.stdout for subject in ("packages", "processor", "running"))  # none is cut
+        assert "libstdc++" in done.stdout

@@ -19,6 +19,7 @@ from friso.stage import Stage
 from friso.studies import execute
 from friso.studies.processes import processes
 from friso.studies.request import Request
+from friso.studies.settings import StudySettings
 from friso.studies.store import Store
 from friso.studies.study import cells_of
 from friso.studies.sweep import run_in_memory, run_in_store, sweep
@@ -93,7 +94,7 @@ def test_the_loss_of_a_worker_is_not_waited_for(rig: Stage, monkeypatch: pytest.
         workers[0].kill()
         with pytest.raises(RuntimeError, match="lost a block"):
             list(crew.compute(crew.jobs([study])))
-    assert execute.PATIENCE not in waited
+    assert StudySettings.current().block_timeout not in waited
     for worker in workers:
         worker.join(30)
         assert not worker.is_alive()

@@ -28,7 +28,7 @@ LITERALS = {
     "friso/remedies": 7,
     "friso/shown": 36,
     "friso/stage": 15,
-    "friso/studies": 142,
+    "friso/studies": 90,
     "friso/virtual_rig": 1,
     "friso": 11,
     "friso_thesis/questions": 19,

@@ -39,6 +39,7 @@ from friso.studies.metric import is_text
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.sealed_store import SealedStore
+from friso.studies.settings import StudySettings
 from friso.studies.store import Store, check_store, read_store
 from friso.studies.store_files import keep_arrays, kept_arrays
 from friso.studies.store_folder import LOCK, make
@@ -236,12 +237,12 @@ def test_answers_to_other_questions_are_not_taken(rig: Stage, tmp_path: Path, mo
         if len(asked) == 3:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(refine, "LATTICE", 6)
-    with pytest.raises(KeyboardInterrupt), local_crew(2) as crew:
-        run_in_store(study, path, crew, 0.0, stop)
-    monkeypatch.undo()
-    assert (path / ".answers" / "0.npz").exists()
-    same(sweep(rig, AXES, refine=True, store=path), sweep(rig, AXES, refine=True))
+    with StudySettings(lattice_step=6).in_use():
+        with pytest.raises(KeyboardInterrupt), local_crew(2) as crew:
+            run_in_store(study, path, crew, 0.0, stop)
+        monkeypatch.undo()
+        assert (path / ".answers" / "0.npz").exists()
+        same(sweep(rig, AXES, refine=True, store=path), sweep(rig, AXES, refine=True))
 
 
 def unreadable_archive(stream: BinaryIO) -> None:

@@ -22,9 +22,10 @@ from friso.stage import Stage
 from friso.studies.metric import usual_metrics
 from friso.studies.request import Request
 from friso.studies.samples import Samples
+from friso.studies.settings import StudySettings
 from friso.studies.study import study_of
 from friso.studies.sweep import sweep
-from friso.studies.traces import BINS, IN_BIN, traces
+from friso.studies.traces import traces
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 MASS = {"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass", "parasitic.mass": "0.15 * mass"}
@@ -48,11 +49,12 @@ def test_a_run_that_is_drawn_has_the_extremes_of_the_run_alone(rig: Stage) -> No
     skipped = traces(study, np.array([False, True, False, False]))
     assert np.isnan(skipped.deviations).all(axis=1).tolist() == [True, True, True, False]
     assert np.isnan(drawn.deviations).all(axis=1).tolist() == [True, False, True, False]
-    cell, interval = 3, drawn.duration / (BINS * IN_BIN)
+    bins, in_bin = StudySettings().trace_bins, StudySettings().samples_per_bin
+    cell, interval = 3, drawn.duration / (bins * in_bin)
     alone = friso.simulate(study.cell_stage((1, 1)), study.rtol, interval).data
-    deviation = (alone["position"] - alone["reference"]).values[: BINS * IN_BIN].reshape(BINS, IN_BIN)
+    deviation = (alone["position"] - alone["reference"]).values[: bins * in_bin].reshape(bins, in_bin)
     for pick in (np.min, np.max):
-        extremes = pick(drawn.deviations[cell].reshape(BINS, 2), axis=1)
+        extremes = pick(drawn.deviations[cell].reshape(bins, 2), axis=1)
         assert extremes == pytest.approx(pick(deviation, axis=1), abs=1e-12)
 
 

@@ -16,8 +16,9 @@ from friso.studies import verify
 from friso.studies.cells import Columns
 from friso.studies.execute import local_crew
 from friso.studies.metric import every_variable, is_text, usual_metrics
-from friso.studies.refine import FINER, SHARE, finer, refine_cells
+from friso.studies.refine import finer, refine_cells
 from friso.studies.request import Request
+from friso.studies.settings import StudySettings
 from friso.studies.study import Study
 from friso.studies.sweep import sweep
 from friso.studies.verify import loosest_rtol, random_cells
@@ -155,11 +156,11 @@ def asked(study: Study, outcome: np.ndarray, settling: np.ndarray | None = None)
 def test_a_smooth_boundary_is_found_as_on_the_full_grid(rig: Stage) -> None:
     study = finer(Request(rig, {"controller.crossover": "1 Hz..40 Hz:41", "joint.stroke": "0 m..1 mm:41"}).study())
     assert study.shape == (161, 161)
-    assert study.axes[0].values[::FINER] == pytest.approx(np.linspace(1, 40, 41))
+    assert study.axes[0].values[:: StudySettings.current().finer_factor] == pytest.approx(np.linspace(1, 40, 41))
     x, y = np.meshgrid(np.linspace(0, 1, 161), np.linspace(0, 1, 161), indexing="ij")
     hunts = (x - 0.3) ** 2 + (y - 0.4) ** 2 < 0.06 + 0.02 * np.sin(9 * x)
     result, count = asked(study, np.where(hunts, "swings", "rests"))
-    assert count <= SHARE * study.cells
+    assert count <= StudySettings.current().refined_share * study.cells
     assert np.array_equal(result["outcome"].reshape(study.shape) == "swings", hunts)
     guessed = np.char.startswith(result["status"].astype(str), "inferred")
     assert guessed.sum() == study.cells - count

@@ -14,12 +14,11 @@ from friso.errors import InputError
 from friso.quantities import Number, Quantity, any_sign, quoted
 from friso.stage import Stage, parse_set
 from friso.studies.scalings import SCALINGS
+from friso.studies.settings import StudySettings
 
 AxisValues = str | Sequence[Any] | np.ndarray | tuple[Any, str]
 Scale = Literal["linear", "log"]
 
-MOST_POINTS = 1_000_000_000
-"""Points of an axis at most, 8 GB of them."""
 
 RANGE_EXAMPLE = '"1 Hz..40 Hz:41", "10 um..1 cm:41:log" or "4 Hz, 8 Hz, 16 Hz"'
 
@@ -154,11 +153,12 @@ def _range(name: str, text: str, reader: _Reader, log: bool) -> SweptRange:
 
 
 def _count(text: str, digits: str | None) -> int | None:
+    settings = StudySettings.current()
     if digits is None:
         return None
     count = int(digits) if digits.strip().isascii() and digits.strip().isdigit() and len(digits) < 20 else 0
-    if not 2 <= count <= MOST_POINTS:
-        expected = f"2 points or more, at most {MOST_POINTS:,}"
+    if not 2 <= count <= settings.most_axis_points:
+        expected = f"2 points or more, at most {settings.most_axis_points:,}"
         raise InputError("", quoted(text, f"{digits.strip()} points"), expected, RANGE_EXAMPLE)
     return count
 

@@ -14,12 +14,7 @@ from friso.stage import Stage, violations
 from friso.studies.axes import SweptAxis, read_axis
 from friso.studies.cells import flat_cells
 from friso.studies.links import check_links, names
-
-LOOSEST = 1e-6
-"""Relative tolerance from which on cycles are not followed."""
-
-TRIED = 9
-"""Values of each range that are tried for a stage that may be."""
+from friso.studies.settings import StudySettings
 
 
 def boundary(
@@ -40,6 +35,7 @@ def boundary(
     the input is wrong, `progress` as cycles are followed. Raises InputError for a wrong range, link, tolerance or stage
     (one that cannot hunt).
     """
+    settings = StudySettings.current()
     checked_rtol(rtol)
     followers, example = dict(links or {}), range_example(stage.flat())
     ranges = tuple(_range(stage, name, text, names(followers), log) for name, text in axes.items())
@@ -54,8 +50,10 @@ def boundary(
         if swept.key.startswith("motion."):
             problem = "a key of the motion, which plays no part"
             raise InputError(swept.key, problem, "a key of the stage or its controller", example)
-    if rtol > LOOSEST:
-        raise InputError("rtol", f"{rtol:g}", f"at most {LOOSEST:g}, since multipliers are derivatives", "1e-9")
+    if rtol > settings.loosest_rtol:
+        raise InputError(
+            "rtol", f"{rtol:g}", f"at most {settings.loosest_rtol:g}, since multipliers are derivatives", "1e-9"
+        )
     space = Space(ranges, lambda values: flat_cells(stage, followers, values))
     _refuse_impossible(space, example)
     kernels([KernelRequest(space.form, variational) for variational in (False, True)])
@@ -65,7 +63,8 @@ def boundary(
 
 def _refuse_impossible(space: Space, example: str) -> None:
     """Raises InputError if no stage may have the values of the ranges."""
-    points = space.grid(TRIED)
+    settings = StudySettings.current()
+    points = space.grid(settings.tried_values)
     if not space.allowed(points).any():
         key, why = space.ranges[0].key, violations(space.flat(space.values(points)))[0][1]
         raise InputError(key, "ranges that no stage may have", why, example)

@@ -15,12 +15,10 @@ from friso.errors import InputError
 from friso.stage import Stage
 from friso.studies.cells import Columns, run_cells
 from friso.studies.execute import Crew
+from friso.studies.settings import StudySettings
 from friso.studies.study import equations_version
 
 logger = logging.getLogger("friso")
-
-PATIENCE = 10.0
-"""How long a scheduler may take to answer [s]."""
 
 
 @contextmanager
@@ -31,12 +29,13 @@ def connected(scheduler: str) -> Iterator[Crew]:
     configuration (distributed.comm.tls). Without TLS, whoever reaches the address can run code: that is logged. Raises
     InputError if the scheduler does not answer, has no workers, or one with another version of friso.
     """
+    settings = StudySettings.current()
     from distributed import Client, KilledWorker
     from distributed.comm.core import CommClosedError
 
     try:
         asyncio.run(_answers(scheduler))
-        client: Any = Client(scheduler, timeout=PATIENCE, set_as_default=False)
+        client: Any = Client(scheduler, timeout=settings.scheduler_timeout, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:  # TypeError: TLS without a certificate
         expected = f"the address of a Dask scheduler that answers ({error})"
         raise InputError("--scheduler", scheduler, expected, "--scheduler tls://10.0.0.1:8786") from None
@@ -52,10 +51,11 @@ def connected(scheduler: str) -> Iterator[Crew]:
 
 async def _answers(scheduler: str) -> None:
     """Raises OSError or ValueError if there is nothing at the address: a client that fails lingers for long."""
+    settings = StudySettings.current()
     from distributed.comm.core import connect
     from distributed.security import Security
 
-    comm = await connect(scheduler, timeout=PATIENCE, **Security().get_connection_args("client"))
+    comm = await connect(scheduler, timeout=settings.scheduler_timeout, **Security().get_connection_args("client"))
     await comm.close()
 
 

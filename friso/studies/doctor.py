@@ -21,16 +21,8 @@ from friso.platform.leftovers import temporary_folder
 from friso.platform.system import LIBRARIES, MODES_TELL, is_open_to_others, usable_cores
 from friso.stage import Stage
 from friso.stage.files import loads
+from friso.studies.settings import StudySettings
 from friso.version import VERSION
-
-RUNS = 64
-"""Runs of the stage that are timed, on one core."""
-
-SWING = 1.03e-3
-"""Peak to peak [m] of the hunting of the template's stage with its joint locked (docs/hunting.md)."""
-
-WITHIN = 0.02
-"""Share by which the swing may differ."""
 
 
 @dataclass(frozen=True)
@@ -134,6 +126,7 @@ def _compiling() -> str:
 
 def _running() -> str:
     """Run the stage of the template, which hunts with its joint locked. Raises RuntimeError for another result."""
+    tuning = StudySettings.current()
     from friso.engine.batch import run_chunks
     from friso.engine.kernel import kernel
     from friso.equations.structure import structure
@@ -143,11 +136,13 @@ def _running() -> str:
     settings = measuring_options(1e-6, threads=1)
     shape = kernel(structure(flat))
     begin = time.perf_counter()
-    (runs,) = run_chunks(shape, flat, RUNS, settings)
+    (runs,) = run_chunks(shape, flat, tuning.timed_runs, settings)
     seconds, steps = time.perf_counter() - begin, runs.statistic("attempted").sum()
     swings = measure_runs(flat, runs).peak_to_peak
-    if not abs(swings / SWING - 1).max() < WITHIN:
-        raise RuntimeError(f"the template's stage swings by {swings.min():g} to {swings.max():g} m, not by {SWING:g} m")
+    if not abs(swings / tuning.expected_swing - 1).max() < tuning.swing_error:
+        raise RuntimeError(
+            f"the template's stage swings by {swings.min():g} to {swings.max():g} m, not by {tuning.expected_swing:g} m"
+        )
     return f"{steps / seconds / 1e6:.2g} million steps of the solver per second on one core; the result is right"
 
 

@@ -16,16 +16,7 @@ from friso.progress import Progress, Tally, silent
 from friso.shares import Share, share
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, Sample, draw, laid_over
-
-CHUNK = 256
-"""Stages whose verdicts are found at once: between chunks progress is reported."""
-
-TRIAL, AT_MOST, WORK = 16, 256, 3e8
-"""Draws that tell what a draw takes; and, for a check for which no number was asked, the most draws and their work (see
-`friso.engine.allowance`)."""
-
-MOST = 100_000
-"""Draws at most: at the edge of hunting one takes some 50 ms."""
+from friso.studies.settings import StudySettings
 
 
 @dataclass(frozen=True)
@@ -80,10 +71,11 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
 
 def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float) -> int:
     """How many stages may be drawn for a fixed work, a power of two (Sobol' points are even then)."""
+    settings = StudySettings.current()
     with allowance() as spent:
-        fates(stage, draw(stage, correlations, TRIAL, seed), rtol)
-    most = min(TRIAL * WORK / max(spent.used, 1.0), AT_MOST)
-    return 1 << max(TRIAL.bit_length() - 1, int(np.log2(most)))
+        fates(stage, draw(stage, correlations, settings.trial_draws, seed), rtol)
+    most = min(settings.trial_draws * settings.usual_work / max(spent.used, 1.0), settings.usual_draws)
+    return 1 << max(settings.trial_draws.bit_length() - 1, int(np.log2(most)))
 
 
 @dataclass(frozen=True)
@@ -110,9 +102,10 @@ def different(stage: Stage) -> dict[str, Stage]:
 
 
 def _fates(stage: Stage, sample: Sample, rtol: float, tally: Tally) -> Fates:
+    settings = StudySettings.current()
     words, lost = np.full(sample.count, "failed", dtype=object), np.zeros(sample.count, bool)
-    for first in range(0, sample.count, CHUNK):
-        chunk = slice(first, min(first + CHUNK, sample.count))
+    for first in range(0, sample.count, settings.stages_together):
+        chunk = slice(first, min(first + settings.stages_together, sample.count))
         keys = {key: values[chunk] for key, values in sample.keys.items()}
         flat, count = laid_over(stage, keys), chunk.stop - first
         words[chunk] = judge_many(flat, count, rtol)

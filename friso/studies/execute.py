@@ -14,21 +14,10 @@ import numpy as np
 
 from friso.engine.overtaken import go_on
 from friso.studies.cells import Columns, run_cells
+from friso.studies.settings import StudySettings
 from friso.studies.study import CellBlock, Study
 
 _T = TypeVar("_T")
-
-LARGEST_BLOCK = 2048
-"""Cells of a block in memory: enough that all lanes are busy nearly to its end."""
-
-CYCLES_BLOCK = 256
-"""Cells of a block where cycles are wanted, for each of which a hundred runs are needed."""
-
-LOOK = 0.05
-"""How often [s] it is looked whether anybody still waits for blocks in flight."""
-
-PATIENCE = 10.0
-"""How long [s] blocks in flight are waited for that have been told to end."""
 
 
 @dataclass
@@ -58,6 +47,7 @@ class Crew:
         No more blocks are in flight than keep the crew busy, so that a study of any length streams. Whatever ends
         this early (Ctrl-C among it) cancels the blocks in flight. Raises Overtaken once nobody waits for them.
         """
+        settings = StudySettings.current()
         self.cancel[0] = 0
         upcoming = iter(jobs)
         flying: dict[Future[Columns], tuple[Study, CellBlock]] = {}
@@ -68,19 +58,20 @@ class Crew:
                     flying[self._submit(*job)] = job
                 if not flying:
                     return
-                for future in wait(flying, LOOK, FIRST_COMPLETED).done:
+                for future in wait(flying, settings.look_interval, FIRST_COMPLETED).done:
                     yield *flying.pop(future), self._result(future)
         finally:
             self.cancel[0] = 1
             if not self.broken:  # cancelled meanwhile, futures would have it stumble and leave processes behind
                 for future in flying:
                     future.cancel()
-                wait(flying, timeout=PATIENCE)
+                wait(flying, timeout=settings.block_timeout)
 
     def jobs(self, studies: Sequence[Study]) -> Iterator[tuple[Study, CellBlock]]:
         """The blocks of studies, as large as memory allows, but enough of them for the whole crew."""
+        settings = StudySettings.current()
         for study in studies:
-            largest = CYCLES_BLOCK if study.cycles else LARGEST_BLOCK
+            largest = settings.largest_survey_block if study.cycles else settings.largest_memory_block
             shape = study.block_shape(max(1, min(largest, study.cells // self.shares)))
             yield from ((study, block) for block in study.blocks(shape))
 

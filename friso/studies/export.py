@@ -9,12 +9,10 @@ import numpy as np
 
 from friso.escapes import table_cell
 from friso.studies.metric import every_variable, is_text
+from friso.studies.settings import StudySettings
 
 if TYPE_CHECKING:
     import xarray as xr
-
-ROWS = 100_000
-"""Cells that are written to a CSV file at a time."""
 
 
 def export(runs: xr.Dataset, path: Path) -> None:
@@ -41,11 +39,12 @@ def _bytes(texts: np.ndarray) -> np.ndarray:
 
 
 def _write_csv(runs: xr.Dataset, path: Path) -> None:
+    settings = StudySettings.current()
     import pandas as pd
 
     dims = [str(dim) for dim in runs["outcome"].dims]
     shape = runs["outcome"].shape
-    rows = max(1, ROWS // max(1, int(np.prod(shape[1:]))))
+    rows = max(1, settings.rows_together // max(1, int(np.prod(shape[1:]))))
     with path.open("w", encoding="utf-8", newline="") as file:
         for first in range(0, shape[0], rows):
             part = runs.isel({dims[0]: slice(first, first + rows)})

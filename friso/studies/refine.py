@@ -22,23 +22,8 @@ from friso.studies.axes import SweptAxis
 from friso.studies.cells import INFERRED, Columns, unfilled
 from friso.studies.metric import in_order, usual_metrics, worded
 from friso.studies.samples import SAMPLE
+from friso.studies.settings import StudySettings
 from friso.studies.study import Dimension, Study
-
-FINER = 4
-"""Cells of the fine grid per cell of the given one, along each axis."""
-
-SHARE = 0.2
-"""Share of the fine grid's cells that are run at most; of a small grid as many as it has, and half as many more."""
-
-LATTICE = 8
-"""Every how manieth cell of the fine grid is run first. Every second cell of the given grid and more runs left for
-where they are informative found three times as much of the thesis's map as every cell of it and fewer left."""
-
-BATCHES = 100
-"""Into how many batches the runs are split: each is chosen after the last one's results."""
-
-LATE = 10.0
-"""Time of settling [s] from which on a run counts as much as one that swings: the thesis counts peaks after it."""
 
 Ask = Callable[[np.ndarray], Columns]
 """Gives the measures of the cells with these numbers."""
@@ -55,15 +40,16 @@ def finer(study: Study) -> Study:
 
 def _finer(axis: SweptAxis) -> SweptAxis:
     """The axis with cells between its own: those of a range as if it had been given so many points."""
+    settings = StudySettings.current()
     log = axis.scale == "log"
     space, ends = np.geomspace if log else np.linspace, (axis.values[0], axis.values[-1])
     if np.array_equal(space(*ends, len(axis.values)), axis.values):
-        return replace(axis, values=space(*ends, FINER * (len(axis.values) - 1) + 1))
+        return replace(axis, values=space(*ends, settings.finer_factor * (len(axis.values) - 1) + 1))
     values = np.log(axis.values) if log else axis.values
-    places = np.arange(FINER * (len(values) - 1) + 1) / FINER
+    places = np.arange(settings.finer_factor * (len(values) - 1) + 1) / settings.finer_factor
     between = np.interp(places, np.arange(len(values)), values)
     between = np.exp(between) if log else between
-    between[::FINER] = axis.values
+    between[:: settings.finer_factor] = axis.values
     return replace(axis, values=between)
 
 
@@ -78,12 +64,13 @@ def refine_cells(study: Study, ask: Ask) -> Columns:
     A cell that was not computed has the outcome (and the verdict) of the nearest one that was, a status that says so,
     and no numbers.
     """
+    settings = StudySettings.current()
     grid = _Grid(study)
     grid.learn(_lattice(study.shape), ask)
     while (left := grid.budget - grid.runs) > 0:
         cells = grid.unseen_changes()
         if not cells.size:
-            batch = max(1, grid.budget // BATCHES)
+            batch = max(1, grid.budget // settings.refine_batches)
             cells = grid.likely_surprises(min(left - batch, batch))  # one batch is kept to follow what it finds
         if not cells.size:
             break
@@ -93,7 +80,8 @@ def refine_cells(study: Study, ask: Ask) -> Columns:
 
 def _lattice(shape: tuple[int, ...]) -> np.ndarray:
     """Numbers of the cells of the coarse lattice, the ends of the axes among them."""
-    lines = [np.unique(np.append(np.arange(0, size, LATTICE), size - 1)) for size in shape]
+    settings = StudySettings.current()
+    lines = [np.unique(np.append(np.arange(0, size, settings.lattice_step), size - 1)) for size in shape]
     return np.ravel_multi_index(np.meshgrid(*lines, indexing="ij"), shape).ravel()
 
 
@@ -101,9 +89,10 @@ class _Grid:
     """What is known of the cells of a study."""
 
     def __init__(self, study: Study) -> None:
+        settings = StudySettings.current()
         self.shape = study.shape
-        coarse = math.prod(size // FINER + 1 for size in study.shape)
-        self.budget = max(int(SHARE * study.cells), min(3 * coarse // 2, study.cells))
+        coarse = math.prod(size // settings.finer_factor + 1 for size in study.shape)
+        self.budget = max(int(settings.refined_share * study.cells), min(3 * coarse // 2, study.cells))
         self.columns: Columns = {}
         self.words = tuple(name for name in worded(verdicts=True) if name in study.metrics)
         self.computed = np.zeros(study.shape, bool)
@@ -144,13 +133,14 @@ class _Grid:
 
     def likely_surprises(self, count: int) -> np.ndarray:
         """Numbers of up to `count` cells that are most worth a run."""
+        settings = StudySettings.current()
         from scipy.ndimage import distance_transform_edt
 
         distance, nearest = self._nearest()
         changes = self._changes(nearest)
         from_change: Any = distance_transform_edt(~changes) if changes.any() else np.ones(self.shape)
-        settling = np.nan_to_num(self.columns["settling_time_10um"], nan=LATE)
-        late = np.where(self.columns["outcome"] == SWINGS, 1.0, np.minimum(settling / LATE, 1.0))
+        settling = np.nan_to_num(self.columns["settling_time_10um"], nan=settings.late_settling)
+        late = np.where(self.columns["outcome"] == SWINGS, 1.0, np.minimum(settling / settings.late_settling, 1.0))
         worth = np.where(self.computed, 0.0, distance * late[nearest] / np.cbrt(np.maximum(from_change, 1.0)))
         best = np.argsort(-worth, axis=None, kind="stable")[: max(count, 0)]
         return best[worth.flat[best] > 0]

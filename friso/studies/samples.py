@@ -11,7 +11,8 @@ import numpy as np
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage import Stage
-from friso.studies.axes import MOST_POINTS, AxisValues, SweptAxis, SweptRange, read_axes
+from friso.studies.axes import AxisValues, SweptAxis, SweptRange, read_axes
+from friso.studies.settings import StudySettings
 
 SAMPLE = "sample"
 """Name of the dimension along which samples lie."""
@@ -40,14 +41,19 @@ class Samples:
 
     def __post_init__(self) -> None:
         """Raises InputError for fields of other types."""
+        settings = StudySettings.current()
         if not isinstance(self.ranges, Mapping):
             raise InputError(
                 "ranges", quoted(self.ranges), "a dictionary of keys to ranges", 'ranges={"joint.stroke": "0 m..1 mm"}'
             )
         for name, number, least in (("samples", self.count, 2), ("seed", self.seed, 0)):
-            whole = isinstance(number, Integral) and not isinstance(number, bool) and least <= number <= MOST_POINTS
+            whole = (
+                isinstance(number, Integral)
+                and not isinstance(number, bool)
+                and least <= number <= settings.most_axis_points
+            )
             if not (whole or (number is None and name == "samples")):
-                expected = f"a whole number from {least} to {MOST_POINTS:,}"
+                expected = f"a whole number from {least} to {settings.most_axis_points:,}"
                 raise InputError(name, quoted(number), expected, f"{name}=1024")
         if self.method not in METHODS:
             raise InputError("method", quoted(self.method), f"one of {', '.join(METHODS)}", 'method="sobol"')

@@ -31,6 +31,7 @@ from friso.studies.kept_cells import KeptCells
 from friso.studies.ledger import Ledger
 from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
 from friso.studies.metric import attributes_of, every_variable, form_of, is_text
+from friso.studies.settings import StudySettings
 from friso.studies.store_files import ANSWERS, refuse_foreign
 from friso.studies.store_folder import (
     exchange,
@@ -47,14 +48,6 @@ from friso.studies.verify import check_verified
 if TYPE_CHECKING:
     import xarray as xr
 
-LEAST_BLOCKS, BLOCKS, LARGEST_BLOCK = 8, 250, 16384
-"""A study has at least `LEAST_BLOCKS` blocks, so that an interruption loses a part of it only, and up to
-`LARGEST_BLOCK` cells in each from `BLOCKS` blocks on, so that writing does not hold up the workers. A store has the
-same blocks on every machine."""
-
-BLOCK, SURVEYED_BLOCK = 1024, 32
-"""Cells of a block of a study that has no more than `BLOCKS` of them; fewer where what attracts is surveyed, which
-takes a hundred runs of a cell, so that an interruption costs seconds there too."""
 
 logger = logging.getLogger("friso")
 
@@ -69,9 +62,14 @@ class Store:
     """The results of a study in a folder, locked by this process while it is open."""
 
     def __init__(self, path: Path, study: Study) -> None:
+        settings = StudySettings.current()
         self.path, self.study = path, study
-        usual = min(SURVEYED_BLOCK if study.cycles else BLOCK, study.cells // LEAST_BLOCKS)
-        self.blocks = study.block_shape(max(16, usual, min(LARGEST_BLOCK, study.cells // BLOCKS)))
+        usual = min(
+            settings.surveyed_block if study.cycles else settings.stored_block, study.cells // settings.least_blocks
+        )
+        self.blocks = study.block_shape(
+            max(16, usual, min(settings.largest_stored_block, study.cells // settings.usual_blocks))
+        )
 
     @classmethod
     @contextmanager
@@ -324,11 +322,12 @@ def in_memory(runs: xr.Dataset) -> xr.Dataset:
 
 def _shared(texts: xr.DataArray) -> np.ndarray:
     """The texts as objects, equal ones being one object."""
+    settings = StudySettings.current()
     import pandas as pd
 
     words_once: dict[str, str] = {}
     decoded = np.empty(texts.shape, dtype=object)
-    rows = max(1, LARGEST_BLOCK // max(1, int(np.prod(texts.shape[1:]))))
+    rows = max(1, settings.largest_stored_block // max(1, int(np.prod(texts.shape[1:]))))
     for first in range(0, texts.shape[0], rows):
         codes, words = pd.factorize(texts[first : first + rows].values.ravel())
         once = np.array([words_once.setdefault(str(word), str(word)) for word in words], dtype=object)

@@ -191,7 +191,7 @@ def cells_of(block: CellBlock) -> int:
     return math.prod(part.stop - part.start for part in block)
 
 
-_STUDIES = ("axes", "cells", "links", "metric", "refine", "request", "samples", "scalings")
+_STUDIES = ("axes", "cells", "links", "metric", "refine", "request", "samples", "scalings", "settings")
 _DECISIVE = (
     *("quantities.py", "stage", "equations", "engine", "hunting", "studies/metrics"),
     *(f"studies/{name}.py" for name in _STUDIES),

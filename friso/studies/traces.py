@@ -14,19 +14,11 @@ from friso.equations import motion
 from friso.hunting.measures import measuring_options
 from friso.progress import Progress, Tally, silent
 from friso.studies.cells import allowed_cells, by_equations, by_words
+from friso.studies.settings import StudySettings
 from friso.studies.study import Study
-
-BINS = 150
-"""Pieces of a run of which the extremes are kept: a drawn line of as many points is a few hundred pixels wide."""
-
-IN_BIN = 20
-"""Samples of each of them."""
 
 DRAWING = "drawing runs"
 """What a progress is told."""
-
-CHUNK = 256
-"""Runs whose samples are held at once."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +35,7 @@ class Traces:
 def traces(study: Study, skipped: np.ndarray | None = None, progress: Progress = silent) -> Traces:
     """The runs of all cells of a study once more, at its tolerance. Cells that no stage may have, and those `skipped`,
     shape (cells,), are NaN throughout."""
+    settings = StudySettings.current()
     columns = study.columns(np.arange(study.cells))
     parts = list(by_words(study.stage, study.links, columns))
     allowed = allowed_cells(study.stage, study.links, columns)
@@ -50,10 +43,10 @@ def traces(study: Study, skipped: np.ndarray | None = None, progress: Progress =
     tally = Tally(progress, int(np.count_nonzero(allowed)))
     tally.add(0, DRAWING)
     duration = max(float(np.max(flat["motion.duration"])) for flat, _ in parts)
-    interval = duration / (BINS * IN_BIN)
-    options = replace(measuring_options(study.rtol), interval=interval, chunk=CHUNK)
-    time = np.arange(BINS * IN_BIN) * interval
-    drawn = Traces(np.full((study.cells, 2 * BINS), np.nan), np.zeros(study.cells), duration)
+    interval = duration / (settings.trace_bins * settings.samples_per_bin)
+    options = replace(measuring_options(study.rtol), interval=interval, chunk=settings.traces_together)
+    time = np.arange(settings.trace_bins * settings.samples_per_bin) * interval
+    drawn = Traces(np.full((study.cells, 2 * settings.trace_bins), np.nan), np.zeros(study.cells), duration)
     for flat, cells, shape in by_equations(parts, allowed):
         form, references = kernel(shape), _references(flat, time)
         end, corner = flat["motion.duration"], motion.last_corner(flat)
@@ -84,6 +77,7 @@ def _deviation(position: np.ndarray, reference: np.ndarray) -> np.ndarray:
 
 def _extremes(values: np.ndarray) -> np.ndarray:
     """The least and the largest value of each piece, as they follow each other; NaN where a piece is not complete."""
-    pieces = values.reshape(BINS, IN_BIN)
+    settings = StudySettings.current()
+    pieces = values.reshape(settings.trace_bins, settings.samples_per_bin)
     places = np.sort(np.stack([pieces.argmin(axis=1), pieces.argmax(axis=1)], axis=1), axis=1)
     return np.take_along_axis(pieces, places, axis=1).ravel()

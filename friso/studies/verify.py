@@ -14,22 +14,12 @@ from friso.errors import InputError
 from friso.studies.cells import INFERRED, allowed_cells
 from friso.studies.execute import Crew, run_scattered
 from friso.studies.metric import in_order
+from friso.studies.settings import StudySettings
 from friso.studies.study import Study
 
 if TYPE_CHECKING:
     import xarray as xr
 
-TIGHTER = 100.0
-"""By how much the tolerance of the second run is tighter."""
-
-LEAST = 50
-"""Least number of cells checked, if there are as many: fewer give no meaningful share."""
-
-WANTED = 0.99
-"""Share of the outcomes that shall survive at an automatic tolerance."""
-
-CANDIDATES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
-"""Tolerances among which the automatic one is chosen, the loosest first."""
 
 TRIED = 400
 """Cells on which a tolerance is chosen: 1 % of them are four."""
@@ -49,11 +39,15 @@ def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> di
     (inferred_checked, inferred_confirmed). Invalid and failed cells have no outcome that could survive; nothing is
     stated where there are no others, no share was asked for, or the attributes of the runs state it.
     """
+    settings = StudySettings.current()
     if (
         share in (0, runs.attrs.get("verified_share")) or study.rtol < 10 * TIGHTEST
     ):  # there is no tolerance to check it with
         return {}
-    count, rtol = max(LEAST, round(share * study.cells)), max(study.rtol / TIGHTER, TIGHTEST)
+    count, rtol = (
+        max(settings.least_verified, round(share * study.cells)),
+        max(study.rtol / settings.tighter_factor, TIGHTEST),
+    )
     tighter = replace(study, rtol=rtol, metrics=in_order(()))
 
     def same(kind: str) -> tuple[int, int]:
@@ -87,9 +81,10 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
 
     If no tolerance is good enough it is the one at which most survive.
     """
+    settings = StudySettings.current()
     picked = random_cells(study, TRIED, lambda cells: allowed_cells(study.stage, study.links, study.columns(cells)))
     if not picked.size:
-        return CANDIDATES[-1], {}, 0
+        return settings.candidate_rtols[-1], {}, 0
     outcomes: dict[float, np.ndarray] = {}
 
     def at(rtol: float) -> np.ndarray:
@@ -98,10 +93,10 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
         return outcomes[rtol]
 
     shares: dict[float, float] = {}
-    for rtol in CANDIDATES:
-        loose, tight = at(rtol), at(float(f"{rtol / TIGHTER:.0e}"))
+    for rtol in settings.candidate_rtols:
+        loose, tight = at(rtol), at(float(f"{rtol / settings.tighter_factor:.0e}"))
         shares[rtol] = float(np.mean((loose == tight) & (loose != "failed")))
-        if shares[rtol] >= WANTED:
+        if shares[rtol] >= settings.wanted_survival:
             break
     return max(shares, key=lambda rtol: shares[rtol]), shares, len(picked)
 

@@ -28,7 +28,8 @@ from friso.interface.inputs import (
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, draw
-from friso.studies.draws import MOST, Draws
+from friso.studies.draws import Draws
+from friso.studies.settings import StudySettings
 
 if TYPE_CHECKING:
     from friso.hunting import ParameterMargin
@@ -193,11 +194,12 @@ def check(
     >>> print(answer.data["peak_to_peak"].attrs["units"])
     m
     """
+    settings = StudySettings.current()
     chosen, tolerance = read_stage(stage, set, uncertain_too=True), tolerance_of(rtol)
     loose = max(tolerance, LONG_RUN_RTOL)
     sample = uncertain = None
     if draws is not None:
-        whole_number(draws, "draws", 1, MOST, "1000")
+        whole_number(draws, "draws", 1, settings.most_draws, "1000")
         try:
             sample = draw(chosen, correlations_of(stage, chosen), draws, seed)
         except InputError as error:
@@ -238,10 +240,10 @@ def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
 def _drawable(stage: Stage, correlations: Correlations, seed: int) -> Correlations | None:
     """The correlations of a stage that is uncertain, if stages can be drawn from it; None if hardly any draw is
     allowed, which is mentioned."""
-    from friso.studies.draws import TRIAL
+    settings = StudySettings.current()
 
     try:
-        draw(stage, correlations, TRIAL, seed)
+        draw(stage, correlations, settings.trial_draws, seed)
     except InputError as error:
         LOGGER.warning(f"no machines were drawn from the uncertain keys ({error.actual}); their centres are used")
         return None

@@ -51,11 +51,12 @@ from friso.stage import Stage
 from friso.studies.axes import AxisValues
 from friso.studies.execute import Crew, local_crew
 from friso.studies.samples import Samples
+from friso.studies.settings import StudySettings
 from friso.studies.store import Store, check_store, holds_all, in_memory, read_store
 from friso.studies.store_folder import ReadOnlyStoreError
 from friso.studies.study import Study
 from friso.studies.sweep import fill, run_in_memory
-from friso.studies.verify import WANTED, checked_share, loosest_rtol, verify_cells
+from friso.studies.verify import checked_share, loosest_rtol, verify_cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -327,18 +328,18 @@ def _another_study(store: Path) -> InputError:
 
 def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
     """The tolerance asked for; "auto" is chosen on a sample of the cells, and said."""
+    settings = StudySettings.current()
     if entry != "auto":
         return tolerance_of(entry)
     rtol, shares, cells = loosest_rtol(study, crew)
     surviving = f"of {cells} cells, " + ", ".join(
         f"{percent(share, 3)} at {rtol_:g}" for rtol_, share in shares.items()
     )
-    if shares.get(rtol, 0.0) >= WANTED:
-        LOGGER.warning(f"rtol {rtol:g} is the loosest at which {percent(WANTED)} of the outcomes survive ({surviving})")
+    wanted = percent(settings.wanted_survival)
+    if shares.get(rtol, 0.0) >= settings.wanted_survival:
+        LOGGER.warning(f"rtol {rtol:g} is the loosest at which {wanted} of the outcomes survive ({surviving})")
     else:
-        LOGGER.warning(
-            f"at no tolerance do {percent(WANTED)} of the outcomes survive ({surviving}); rtol {rtol:g} is used"
-        )
+        LOGGER.warning(f"at no tolerance do {wanted} of the outcomes survive ({surviving}); rtol {rtol:g} is used")
     return rtol
 
 

@@ -24,9 +24,10 @@ from friso.studies.axes import AxisValues
 from friso.studies.cells import INFERRED
 from friso.studies.execute import Crew
 from friso.studies.metric import METRICS, metrics, with_usual
-from friso.studies.refine import FINER, SHARE, finer
+from friso.studies.refine import finer
 from friso.studies.request import Request
 from friso.studies.samples import Samples
+from friso.studies.settings import StudySettings
 from friso.studies.study import Study, study_of
 
 if TYPE_CHECKING:
@@ -75,6 +76,7 @@ class Varied:
 
 def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int | None, crew: Crew) -> Study:
     """The study asked for. Raises InputError, also if it has more than `most` cells: then with what it would cost."""
+    settings = StudySettings.current()
     axes, links, samples = varied.axes, varied.links, varied.samples
     if not axes and not isinstance(samples, Samples):
         raise InputError("x", "no axis", "one axis or more", f"x={AXIS_EXAMPLE}")
@@ -86,7 +88,7 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
         raise InputError("latin", "no --samples beside it", "how many samples", "--samples 1024 --latin")
     METRICS.checked(metric, "metric", "metric={}")
     request = Request(stage, axes, samples, links, varied.log)
-    runs = int(request.size() * (SHARE * FINER ** len(axes) if refine else 1))
+    runs = int(request.size() * (settings.refined_share * settings.finer_factor ** len(axes) if refine else 1))
     if most is not None and runs > most:
         raise _too_large(runs, request.trial(), crew)
     study = request.study(with_usual(metric))

@@ -10,23 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-KNOTS, NEAR = 40, 1e-6
-"""Knots at most, and how far they are apart at least and the first is from rest, as a share of the last."""
-
-ROUNDED = 1e-6
-"""Share of the end by which points that are written in files are off."""
-
-SURE = 1e4
-"""Weight of the end of a curve, which it has to reach, in weights of all points together."""
-
-BLURRED = 10.0
-"""Scatters of x, as its steps back show it, from 0 up to which no curve is told to bend."""
-
-LEAST_NOISE = 0.01
-"""Share of the end by which points are taken to be off, at least, where they are too few to show it."""
-
-STEPS, HOPELESS = 10_000, 100.0
-"""Steps of the fit at most; and how much worse Akaike's criterion becomes before no knots are left out any more."""
+from friso.studies.settings import StudySettings
 
 
 @dataclass(frozen=True)
@@ -74,12 +58,17 @@ def _shapes(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
 def knots_of(x: np.ndarray) -> np.ndarray:
     """Where points, of shape (m,), let a curve bend: at each of them but 0, or at some, the closer the nearer to 0, but
     not as near as x itself scatters."""
+    settings = StudySettings.current()
     back = np.minimum(np.diff(x), 0.0)
-    places = np.unique(x[x > BLURRED * np.sqrt(np.mean(back**2))])
-    places = places[np.append(places[0] >= NEAR * places[-1], np.diff(places) > NEAR * places[-1])]
-    if len(places) <= KNOTS:
+    places = np.unique(x[x > settings.blurred_scatters * np.sqrt(np.mean(back**2))])
+    places = places[
+        np.append(
+            places[0] >= settings.knot_distance * places[-1], np.diff(places) > settings.knot_distance * places[-1]
+        )
+    ]
+    if len(places) <= settings.most_knots:
         return places
-    wanted = np.geomspace(places[0], places[-1], KNOTS)
+    wanted = np.geomspace(places[0], places[-1], settings.most_knots)
     return places[np.unique(np.searchsorted(places, wanted).clip(max=len(places) - 1))]
 
 
@@ -87,21 +76,22 @@ def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFi
     """The nearest curves to points x and y, both of shape (m,), that reach `end`: straight between their knots, or
     bent too if there are many, and with the first few knots left out. Beyond the points they go on as these end, as far
     again at most."""
+    settings = StudySettings.current()
     knots = knots_of(x)
     rows = _rows(x, y, knots)
-    straight, _ = nnls(rows[:, : len(knots)], rows[:, -1], maxiter=STEPS)
+    straight, _ = nnls(rows[:, : len(knots)], rows[:, -1], maxiter=settings.fit_steps)
     slope, lacks = straight[-1] / knots[-1], end - straight.sum()
     further = min(lacks / slope, knots[-1]) if slope > 0 else knots[-1]
-    if further > NEAR * knots[-1] and lacks > 0:
+    if further > settings.knot_distance * knots[-1] and lacks > 0:
         knots = np.append(knots, knots[-1] + further)
         rows = _rows(x, y, knots)
-    rows = np.vstack([rows, SURE * np.sqrt(len(x)) * np.append(np.ones(2 * len(knots)), end)])
+    rows = np.vstack([rows, settings.end_weight * np.sqrt(len(x)) * np.append(np.ones(2 * len(knots)), end)])
     best = np.inf
-    for bent in (False, True)[: 1 + (len(x) > KNOTS)]:
+    for bent in (False, True)[: 1 + (len(x) > settings.most_knots)]:
         for first in range(len(knots)):
             fit = _fit(rows, knots, first, bent, len(x), end)
             best = min(best, fit.akaike)
-            if fit.akaike > best + HOPELESS:
+            if fit.akaike > best + settings.hopeless_criterion:
                 break
             yield fit
 
@@ -114,16 +104,17 @@ def _rows(x: np.ndarray, y: np.ndarray, knots: np.ndarray) -> np.ndarray:
 
 def _fit(rows: np.ndarray, knots: np.ndarray, first: int, bent: bool, points: int, end: float) -> ConcaveFit:
     """One of them, from the equations `rows` of all."""
+    settings = StudySettings.current()
     used = np.arange(2 * len(knots)).reshape(2, -1)[: 1 + bent, first:].ravel()
-    weights, away = nnls(rows[:, used], rows[:, -1], maxiter=STEPS)
+    weights, away = nnls(rows[:, used], rows[:, -1], maxiter=settings.fit_steps)
     strength = np.zeros((2, len(knots)))
     strength.flat[used] = weights
     free = used[weights > 0]
-    misfit = float(points * np.log(away**2 / points + (ROUNDED * end) ** 2))
+    misfit = float(points * np.log(away**2 / points + (settings.rounded_points * end) ** 2))
     gain = (_SLOPES[:, None] / knots).ravel()[free]
     spread = np.linalg.pinv(rows[:, free]).T @ gain
     noise = away / np.sqrt(max(points - len(free), 1))
-    if points <= KNOTS:
-        noise = max(noise, LEAST_NOISE * end)
+    if points <= settings.most_knots:
+        noise = max(noise, settings.least_noise * end)
     error = float(noise * np.linalg.norm(spread))
     return ConcaveFit(knots[first:], strength[:, first:], error, misfit, len(free))

@@ -17,7 +17,8 @@ from friso.quantities import exactly
 from friso.stage import Stage
 from friso.stage.section import list_fields, nearest_name, numeric_fields
 from friso.stage.tables import FrictionSection, friction_law, friction_laws, passive_where
-from friso.studies.laws.virgin import WITHIN, VirginPoints, read_virgin_curve, with_virgin_curve
+from friso.studies.laws.virgin import VirginPoints, read_virgin_curve, with_virgin_curve
+from friso.studies.settings import StudySettings
 
 ELEMENTS = 6
 """Elements of a law that has several, unless told otherwise."""
@@ -199,15 +200,18 @@ def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChan
 
 def _virgin_change(before: MeasuredFriction, after: MeasuredFriction, points: VirginPoints | None) -> MeasuredChange:
     """The virgin curve, where the two are farthest apart; or the points, which scatter."""
+    settings = StudySettings.current()
     if not after.stiffness:
-        return MeasuredChange("virgin", "N", before.levels.static, 0.0, float(before.stiffness > 0), WITHIN)
+        return MeasuredChange(
+            "virgin", "N", before.levels.static, 0.0, float(before.stiffness > 0), settings.curve_error
+        )
     if points is None:
         old, new = before.force, np.interp(before.displacement, after.displacement, after.force)
         scatter = 0.0
     else:
         new = np.interp(points.displacement, after.displacement, after.force)
         old, new = points.means(points.force), points.means(new)
-        scatter = min(points.usual / np.sqrt(points.together), 2 * WITHIN * before.levels.static)
+        scatter = min(points.usual / np.sqrt(points.together), 2 * settings.curve_error * before.levels.static)
     at, static = int(np.argmax(np.abs(new - old))), before.levels.static
-    off, allowed = float(abs(new - old)[at] / static), float(WITHIN + scatter / static)
+    off, allowed = float(abs(new - old)[at] / static), float(settings.curve_error + scatter / static)
     return MeasuredChange("virgin", "N", float(old[at]), float(new[at]), off, allowed)

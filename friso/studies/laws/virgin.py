@@ -13,32 +13,15 @@ from friso.equations.friction.measured import MeasuredFriction, virgin_displacem
 from friso.errors import InputError
 from friso.identification.logs.read import read_table
 from friso.identification.logs.units import unit_factor
-from friso.studies.laws.concave import KNOTS, concave_fits
+from friso.studies.laws.concave import concave_fits
+from friso.studies.settings import StudySettings
 
 EXAMPLE = "displacement [um],force [N]"
 """Heading of a file with such a curve."""
 
-LEAST, MOST, REACHES, LATE = 3, 100_000, 0.9, 20
-"""Points at least and at most, and the share of static friction up to which the last one in so many goes at least."""
-
-BACK = 0.01
-"""Share of the way by which a displacement may go back: noise, not a turn."""
-
-WITHIN = 0.02
-"""Share of static friction by which a virgin curve may be off and still be the same in a measurement."""
-
-PLAIN = 4
-"""What a free number has to gain to be taken: twice as much as by Akaike's criterion."""
-
-AS_LIKELY, ERRORS = 8.0, 3.0
-"""Difference of Akaike's criterion up to which a fit is taken to be as likely as the best, and standard errors to which
-its first slope is: the range of these held the truth of 97 of 100 curves drawn at random."""
 
 ELSEWHERE = (-0.2, -0.1, -0.05, 0.05, 0.1, 0.2)
 """Where the force may begin, in units of the displacement at which it is a third of static friction."""
-
-FIRST = 1 / 3
-"""Share of static friction that the first point may bear, and still say how stiff the start is."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +43,9 @@ class VirginPoints:
     @property
     def together(self) -> int:
         """How many points a mean is of."""
-        wanted = (self.usual / (WITHIN * max(self.force))) ** 2
-        return int(np.clip(np.ceil(wanted), 1, max(len(self.force) // KNOTS, 1)))
+        settings = StudySettings.current()
+        wanted = (self.usual / (settings.curve_error * max(self.force))) ** 2
+        return int(np.clip(np.ceil(wanted), 1, max(len(self.force) // settings.most_knots, 1)))
 
     @property
     def usual(self) -> float:
@@ -72,19 +56,24 @@ class VirginPoints:
 def read_virgin_curve(path: str | os.PathLike[str], kind: AxisKind) -> tuple[np.ndarray, np.ndarray]:
     """Displacement [m] from rest and force [N], both of shape (n,), of a file of any log format with one channel of
     each, by their units on such an axis. Raises InputError, LogError for a file that holds none."""
+    settings = StudySettings.current()
     channels = read_table(Path(path)).channels
     displacement, force = (
         _channel(path, [(c.values, unit_factor(c.unit, unit)) for c in channels if c.unit], unit)
         for unit in (kind.length, kind.force)
     )
-    if displacement.shape != force.shape or len(force) < LEAST:
-        raise _refused(path, f"{len(displacement)} displacements and {len(force)} forces", f"{LEAST} points or more")
-    if len(force) > MOST:
-        raise _refused(path, f"{len(force)} points", f"at most {MOST}: thin them out")
+    if displacement.shape != force.shape or len(force) < settings.least_points:
+        raise _refused(
+            path,
+            f"{len(displacement)} displacements and {len(force)} forces",
+            f"{settings.least_points} points or more",
+        )
+    if len(force) > settings.most_points:
+        raise _refused(path, f"{len(force)} points", f"at most {settings.most_points}: thin them out")
     if not (np.isfinite(displacement).all() and np.isfinite(force).all()):
         raise _refused(path, "a point that is no number", "numbers in every row")
-    noise = BACK * displacement.max()
-    if np.count_nonzero(displacement > 0) < LEAST - 1 or displacement.min() < -noise:
+    noise = settings.backward_share * displacement.max()
+    if np.count_nonzero(displacement > 0) < settings.least_points - 1 or displacement.min() < -noise:
         raise _refused(path, "displacements at or below 0", "displacements from rest, positive")
     if np.any(np.maximum.accumulate(displacement) - displacement > noise):
         raise _refused(path, "displacements that do not increase", "displacements from rest (0) on, one way")
@@ -113,28 +102,39 @@ def with_virgin_curve(
     """The same with the points [m, N], both of shape (n,), as its virgin curve, and what these tell. The curve is the
     nearest that springs which slip one after the other can have: concave, from 0 to static friction, by least squares;
     straight between few points, smooth through many. Raises InputError for points that contradict static friction."""
+    settings = StudySettings.current()
     static = measured.levels.static
-    end = float(force[-max(len(force) // LATE, 1) :].mean())
-    if not REACHES * static <= end <= static / REACHES:
+    end = float(force[-max(len(force) // settings.late_points, 1) :].mean())
+    if not settings.reached_friction * static <= end <= static / settings.reached_friction:
         actual = f"points up to {end:.4g}, where friction.static is {static:.4g} (SI)"
         raise InputError("--virgin", actual, "points up to break-away", '--set friction.static="3 N"')
     away = displacement != 0  # at rest a point says what the sensor shows there
     moved, rising = displacement[away], force[away]
     fits = list(concave_fits(moved, rising, static))
-    fit, likeliest = min(fits, key=lambda fit: fit.misfit + PLAIN * fit.free), min(fit.akaike for fit in fits)
-    if len(moved) > KNOTS:  # many points tell where the force begins, if displacement 0 is elsewhere
-        third = np.interp(FIRST * static, fit(np.sort(moved)), np.sort(moved))
+    fit, likeliest = (
+        min(fits, key=lambda fit: fit.misfit + settings.number_gain * fit.free),
+        min(fit.akaike for fit in fits),
+    )
+    if len(moved) > settings.most_knots:  # many points tell where the force begins, if displacement 0 is elsewhere
+        third = np.interp(settings.first_friction * static, fit(np.sort(moved)), np.sort(moved))
         fits += [other for share in ELSEWHERE for other in concave_fits(moved - share * third, rising, static)]
         likeliest = min(likeliest, *(other.akaike for other in fits))
-    likely = [(a.slope, ERRORS * a.error) for a in fits if a is fit or a.akaike <= likeliest + AS_LIKELY]
+    likely = [
+        (a.slope, settings.slope_errors * a.error)
+        for a in fits
+        if a is fit or a.akaike <= likeliest + settings.likely_difference
+    ]
     low, high = min(slope - error for slope, error in likely), max(slope + error for slope, error in likely)
     first = moved > 0
-    blind = np.count_nonzero(moved[first] <= fit.corners[0]) < 2 or fit(moved[first][:1])[0] > FIRST * static
+    blind = (
+        np.count_nonzero(moved[first] <= fit.corners[0]) < 2
+        or fit(moved[first][:1])[0] > settings.first_friction * static
+    )
     high += high - fit.slope  # what is left out near rest makes curves softer, never stiffer
     ends = max(low, 0.0), np.inf if blind else high
     points = VirginPoints(displacement, force, _scatter(rising - fit(moved)), ends)
     at_rest = force[~away]
-    if len(at_rest) and abs(at_rest.mean()) > WITHIN * static + points.usual:
+    if len(at_rest) and abs(at_rest.mean()) > settings.curve_error * static + points.usual:
         actual = f"a force of {at_rest.mean():.4g} at displacement 0 (SI)"
         raise InputError("--virgin", actual, "none there: less what the sensor shows at rest", f"{EXAMPLE}, then 0,0")
     dense = virgin_displacements(static, fit.slope, fit.corners)
