@@ -22,7 +22,8 @@ class Entry:
 
     `computed` is the day, `equations` the revision of the equations (of `evidence.toml`) it was computed with, and
     `code` the digest (`benchmarks.code_digest`) of the modules that it `rests_on` besides: criteria, methods and
-    experiments, as paths of folders and files from the package friso (an empty `code`: it was computed before there were digests).
+    experiments, as paths of folders and files from the package friso (an empty `code`: it was computed before there
+    were digests).
     `stated` holds, per document of the repository, the phrases that state the finding there. `note` says where the
     values come from when the command did not write them itself.
     """

@@ -102,7 +102,7 @@ class DesignSettings(Settings):
     """Share of the moves that may take longer than specified; less would need ten times the moves."""
 
     design_rounds: int = setting(12, "")
-    """Leaves and crossover that do not agree by then never have."""
+    """Leaves and crossover that do not agree by then go round in circles."""
 
     lower_crossover: float = setting(0.97, "")
     """Smaller steps need more rounds, larger ones give crossover away."""
@@ -165,7 +165,7 @@ class DesignSettings(Settings):
     """Longer than the period of the slowest hunting that was seen."""
 
     verified_rtol: float = setting(1e-5, "")
-    """Outcomes are the same as at 1e-7 on all machines that were compared."""
+    """Tells whether a machine settles and when, to a few percent; tighter runs take longer."""
 
     runs_per_report: int = setting(512, "")
     """Progress is told every second or so."""

@@ -150,7 +150,7 @@ class FrequencySettings(Settings):
     """More at once take memory for all frequencies; fewer gain nothing."""
 
     closest_members: int = setting(16, "")
-    """The member with the least margin has always been among fewer."""
+    """Members looked at exactly; the one with the least margin is among the nearest on the coarse grid."""
 
     slowest_speed_share: float = setting(1e-3, "")
     """Slower than this share of the law's slowest speed the cart is as if stuck."""

@@ -75,7 +75,7 @@ class RemedySettings(Settings):
     """A few, as a share of the machines that may miss the goal."""
 
     relaxed_points: int = setting(3, "")
-    """More points for one relaxation take minutes; the third has hardly ever helped."""
+    """More points for one relaxation take minutes."""
 
     relaxed_machines: int = setting(8, "")
     """As many as in the search, so that both judge alike."""
@@ -105,7 +105,7 @@ class RemedySettings(Settings):
     """Larger generations of the optimiser cost more moves and converge no better."""
 
     search_work: float = setting(4e8, "")
-    """About 5 s on one core; moves that chatter take most of it. Less misses remedies of four keys."""
+    """About 5 s on one core; moves that chatter take most of it. Less ends a search of four keys early."""
 
     looking_work: float = setting(4.0, "")
     """In units of the work of a search: looking at points on fresh machines, and at what attracts these."""

@@ -11,81 +11,158 @@ from friso.settings import Settings, setting
 class StudySettings(Settings):
     """Settings of sweeps, stores, draws and conversions of friction laws."""
 
-    most_axis_points: int = setting(1_000_000_000, "", "Longer axes take more than 8 GB before a cell is run.")
-    loosest_rtol: float = setting(1e-6, "", "Looser orbits lose the branch at a fold.")
-    tried_values: int = setting(9, "", "Fewer miss a range that holds stages with a cycle at its middle only.")
-    scheduler_timeout: float = setting(
-        10.0, "s", "A scheduler on a busy network answers within it; one that is not there does not."
-    )
-    timed_runs: int = setting(64, "", "Fewer runs measure the start of the threads rather than the solver.")
-    expected_swing: float = setting(
-        1.03e-3, "m", "Hunting of the template's stage with its joint locked (docs/hunting.md)."
-    )
-    swing_error: float = setting(0.02, "", "Processors agree to a thousandth; a broken kernel is off by far more.")
-    stages_together: int = setting(256, "", "Between chunks progress is reported; fewer leave lanes idle.")
-    trial_draws: int = setting(16, "", "Tell what a draw takes; fewer are misled by a single slow one.")
-    usual_draws: int = setting(256, "", "Show a share to five percent; more make a check wait.")
-    usual_work: float = setting(3e8, "", "About 4 s on one core, for a check for which no number of draws was asked.")
-    most_draws: int = setting(100_000, "", "At the edge of hunting a draw takes 50 ms: more take hours.")
-    largest_memory_block: int = setting(2048, "", "Enough that all lanes are busy nearly to its end.")
-    largest_survey_block: int = setting(
-        256, "", "A hundred runs are needed for each cell: larger blocks report progress too rarely."
-    )
-    look_interval: float = setting(
-        0.05, "s", "How often it is looked whether anybody waits; rarer looks are felt after Ctrl-C."
-    )
-    block_timeout: float = setting(10.0, "s", "Blocks that were told to end do so within a step of all lanes.")
-    rows_together: int = setting(100_000, "", "Keeps what is held in memory to some tens of megabytes.")
-    most_knots: int = setting(40, "", "A virgin curve has no more bends that a measurement could show.")
-    knot_distance: float = setting(1e-6, "", "Knots closer than this share of the last are one.")
-    rounded_points: float = setting(1e-6, "", "Points written in files are off by this share of the end.")
-    end_weight: float = setting(1e4, "", "The curve has to reach its end: a smaller weight lets noise decide.")
-    blurred_scatters: float = setting(10.0, "", "Within so many scatters of 0 no curve is told to bend.")
-    least_noise: float = setting(
-        0.01, "", "Where points are too few to show their noise, they have at least this share of the end."
-    )
-    fit_steps: int = setting(10_000, "", "A fit that needs more goes round in circles.")
-    hopeless_criterion: float = setting(
-        100.0, "", "From so much worse a criterion on no fewer knots can be the better ones."
-    )
-    least_points: int = setting(3, "", "Two points are a line.")
-    most_points: int = setting(100_000, "", "More points take seconds and tell nothing more.")
-    reached_friction: float = setting(0.9, "", "A curve that ends below it does not show the break-away.")
-    late_points: int = setting(20, "", "One in so many points goes as far: an outlier alone does not.")
-    backward_share: float = setting(0.01, "", "Displacements that go back by less are noise, not a turn.")
-    curve_error: float = setting(0.02, "", "Virgin curves that differ by less are the same in a measurement.")
-    number_gain: int = setting(4, "", "Twice as much as by Akaike's criterion: fewer free numbers are taken.")
-    likely_difference: float = setting(
-        8.0, "", "Fits whose Akaike criterion is worse by less are as likely as the best."
-    )
-    slope_errors: float = setting(3.0, "", "Standard errors of the first slope within which fits are alike.")
-    first_friction: float = setting(
-        1 / 3, "", "A first point that bears more says nothing of the stiffness of the start."
-    )
-    finer_factor: int = setting(4, "", "A boundary is shown four times finer; eight times would take most of the runs.")
-    refined_share: float = setting(0.2, "", "Fewer runs miss islands in the thesis's map.")
-    lattice_step: int = setting(8, "", "Half as many runs are left where they are informative with a step of four.")
-    refine_batches: int = setting(
-        100, "", "Each batch is chosen after the results of the last one; more batches wait for their slowest cell."
-    )
-    late_settling: float = setting(
-        10.0, "s", "The thesis counts peaks after it: a run that settles so late counts as one that swings."
-    )
-    least_blocks: int = setting(8, "", "So that an interruption loses an eighth of a study at most.")
-    usual_blocks: int = setting(250, "", "More blocks hold up the workers by writing.")
-    largest_stored_block: int = setting(16384, "", "Larger chunks are read whole for a single cell.")
-    stored_block: int = setting(
-        1024, "", "Cells of a block of a study that has no more than the usual number of blocks."
-    )
-    surveyed_block: int = setting(
-        32, "", "A survey takes a hundred runs of a cell: an interruption costs seconds there too."
-    )
-    trace_bins: int = setting(150, "", "A drawn line of as many points is a few hundred pixels wide.")
-    samples_per_bin: int = setting(20, "", "Fewer samples miss the extremes of fast motion.")
-    traces_together: int = setting(256, "", "Keeps what is held in memory to some tens of megabytes.")
-    tighter_factor: float = setting(100.0, "", "A smaller factor leaves errors of both runs alike.")
-    least_verified: int = setting(50, "", "Fewer cells give no meaningful share.")
-    wanted_survival: float = setting(0.99, "", "Share of the outcomes that survive at an automatic tolerance.")
-    candidate_rtols: tuple[float, ...] = setting(
-        (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), "", "Tolerances for the automatic choice, the loosest first."
-    )
+    most_axis_points: int = setting(1_000_000_000, "")
+    """Longer axes take more than 8 GB before a cell is run."""
+
+    loosest_rtol: float = setting(1e-6, "")
+    """Looser orbits lose the branch at a fold."""
+
+    tried_values: int = setting(9, "")
+    """Fewer miss a range that holds stages with a cycle at its middle only."""
+
+    scheduler_timeout: float = setting(10.0, "s")
+    """A scheduler on a busy network answers within it; one that is not there does not."""
+
+    timed_runs: int = setting(64, "")
+    """Fewer runs measure the start of the threads rather than the solver."""
+
+    expected_swing: float = setting(1.03e-3, "m")
+    """Hunting of the template's stage with its joint locked (docs/hunting.md)."""
+
+    swing_error: float = setting(0.02, "")
+    """Processors agree to a thousandth; a broken kernel is off by far more."""
+
+    stages_together: int = setting(256, "")
+    """Between chunks progress is reported; fewer leave lanes idle."""
+
+    trial_draws: int = setting(16, "")
+    """Tell what a draw takes; fewer are misled by a single slow one."""
+
+    usual_draws: int = setting(256, "")
+    """Show a share to five percent; more make a check wait."""
+
+    usual_work: float = setting(3e8, "")
+    """About 4 s on one core, for a check for which no number of draws was asked."""
+
+    most_draws: int = setting(100_000, "")
+    """At the edge of hunting a draw takes 50 ms: more take hours."""
+
+    largest_memory_block: int = setting(2048, "")
+    """Enough that all lanes are busy nearly to its end."""
+
+    largest_survey_block: int = setting(256, "")
+    """A hundred runs are needed for each cell: larger blocks report progress too rarely."""
+
+    look_interval: float = setting(0.05, "s")
+    """How often it is looked whether anybody waits; rarer looks are felt after Ctrl-C."""
+
+    block_timeout: float = setting(10.0, "s")
+    """Blocks that were told to end do so within a step of all lanes."""
+
+    rows_together: int = setting(100_000, "")
+    """Keeps what is held in memory to some tens of megabytes."""
+
+    most_knots: int = setting(40, "")
+    """A virgin curve has no more bends that a measurement could show."""
+
+    knot_distance: float = setting(1e-6, "")
+    """Knots closer than this share of the last are one."""
+
+    rounded_points: float = setting(1e-6, "")
+    """Points written in files are off by this share of the end."""
+
+    end_weight: float = setting(1e4, "")
+    """The curve has to reach its end: a smaller weight lets noise decide."""
+
+    blurred_scatters: float = setting(10.0, "")
+    """Within so many scatters of 0 no curve is told to bend."""
+
+    least_noise: float = setting(0.01, "")
+    """Where points are too few to show their noise, they have at least this share of the end."""
+
+    fit_steps: int = setting(10_000, "")
+    """A fit that needs more goes round in circles."""
+
+    hopeless_criterion: float = setting(100.0, "")
+    """From so much worse a criterion on no fewer knots can be the better ones."""
+
+    least_points: int = setting(3, "")
+    """Two points are a line."""
+
+    most_points: int = setting(100_000, "")
+    """More points take seconds and tell nothing more."""
+
+    reached_friction: float = setting(0.9, "")
+    """A curve that ends below it does not show the break-away."""
+
+    late_points: int = setting(20, "")
+    """One in so many points goes as far: an outlier alone does not."""
+
+    backward_share: float = setting(0.01, "")
+    """Displacements that go back by less are noise, not a turn."""
+
+    curve_error: float = setting(0.02, "")
+    """Virgin curves that differ by less are the same in a measurement."""
+
+    number_gain: int = setting(4, "")
+    """Twice as much as by Akaike's criterion: fewer free numbers are taken."""
+
+    likely_difference: float = setting(8.0, "")
+    """Fits whose Akaike criterion is worse by less are as likely as the best."""
+
+    slope_errors: float = setting(3.0, "")
+    """Standard errors of the first slope within which fits are alike."""
+
+    first_friction: float = setting(1 / 3, "")
+    """A first point that bears more says nothing of the stiffness of the start."""
+
+    finer_factor: int = setting(4, "")
+    """A boundary is shown four times finer; eight times would take most of the runs."""
+
+    refined_share: float = setting(0.2, "")
+    """Share of the fine grid that is run; fewer runs may step over small islands."""
+
+    lattice_step: int = setting(8, "")
+    """Spacing of the first runs in the fine grid; a smaller one leaves fewer runs for the boundary."""
+
+    refine_batches: int = setting(100, "")
+    """Each batch is chosen after the results of the last one; more batches wait for their slowest cell."""
+
+    late_settling: float = setting(10.0, "s")
+    """The thesis counts peaks after it: a run that settles so late counts as one that swings."""
+
+    least_blocks: int = setting(8, "")
+    """So that an interruption loses an eighth of a study at most."""
+
+    usual_blocks: int = setting(250, "")
+    """More blocks hold up the workers by writing."""
+
+    largest_stored_block: int = setting(16384, "")
+    """Larger chunks are read whole for a single cell."""
+
+    stored_block: int = setting(1024, "")
+    """Cells of a block of a study that has no more than the usual number of blocks."""
+
+    surveyed_block: int = setting(32, "")
+    """A survey takes a hundred runs of a cell: an interruption costs seconds there too."""
+
+    trace_bins: int = setting(150, "")
+    """A drawn line of as many points is a few hundred pixels wide."""
+
+    samples_per_bin: int = setting(20, "")
+    """Fewer samples miss the extremes of fast motion."""
+
+    traces_together: int = setting(256, "")
+    """Keeps what is held in memory to some tens of megabytes."""
+
+    tighter_factor: float = setting(100.0, "")
+    """A smaller factor leaves errors of both runs alike."""
+
+    least_verified: int = setting(50, "")
+    """Fewer cells give no meaningful share."""
+
+    wanted_survival: float = setting(0.99, "")
+    """Share of the outcomes that survive at an automatic tolerance."""
+
+    candidate_rtols: tuple[float, ...] = setting((1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), "")
+    """Tolerances for the automatic choice, the loosest first."""

@@ -12,7 +12,7 @@ class RigSettings(Settings):
     """Settings of the machine as built."""
 
     rig_rtol: float = setting(1e-4, "")
-    """A step is at most a sample long: looser shows in the third digit, tighter takes twice as long."""
+    """A step is at most a sample long: looser runs show in the logs, tighter ones take longer."""
 
     steps_per_sample: int = setting(200, "")
     """Runs that need more on average chatter, and would never end."""
