@@ -29,6 +29,7 @@ from friso.shown.cases import case_labels
 from friso.shown.drawing.figure import Figure
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
+from friso.studies.metric import metrics
 
 if TYPE_CHECKING:
     from friso.app.work import Work
@@ -104,7 +105,8 @@ def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The keys of the machine."""
     asked.chosen()
     others = [{"id": name, "label": name.replace("-", " ").capitalize()} for name in others_of_stages()]
-    yield {"kind": "answer", "others": others, **machines.machine_on_page(asked.machine)}
+    shown = {"others": others, "metrics": [{"id": name, "label": metric.title} for name, metric in metrics().items()]}
+    yield {"kind": "answer", **shown, **machines.machine_on_page(asked.machine)}
 
 
 def others_of_stages() -> list[str]:

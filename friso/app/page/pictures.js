@@ -207,7 +207,7 @@ export class Pictures {
       clearTimeout(this.timer);
       this.timer = setTimeout(() => this.ask(), AT_REST);
     };
-    const metric = el("select", { id: "metric" }, ...["outcome", "sketch", "verdict", "peak_to_peak", "settling_time", "largest_force"].map((name) => el("option", { value: name }, words(name))));
+    const metric = el("select", { id: "metric" }, ...this.machine.metrics.map(({ id, label }) => el("option", { value: id, selected: id === "outcome" }, label)));
     const log = this.tick("log", () => fields.every((item) => numeric.find((key) => key.path === item.key.value).range.log));
     const edge = this.tick("edge", () => false);
     for (const item of fields) item.key.addEventListener("change", log.again);
