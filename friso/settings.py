@@ -8,6 +8,8 @@ with `current()`. Other values are given for a block of code, as NumPy's `errsta
 
 The reason for a value is the text below its field: what fails when it is smaller, what it costs when it is larger.
 
+Other processes, and stores that a study is kept in, know nothing of them: use them within one process.
+
 Numbers of physics or mathematics are no settings: they stand where they are used, with their source.
 """
 
@@ -108,5 +110,5 @@ def settings_classes() -> list[type[Settings]]:
             if module.name.endswith(".settings") and module.name != __name__:
                 names = vars(import_module(module.name)).values()
                 declared = (item for item in names if isinstance(item, type) and item.__module__ == module.name)
-                classes |= {item.__qualname__: item for item in declared if issubclass(item, Settings)}
+                classes |= {f"{module.name}.{item.__name__}": item for item in declared if issubclass(item, Settings)}
     return [*classes.values()]

@@ -89,6 +89,33 @@ def test_a_curve_may_end_on_another(amplitude: float, stop: float, meets: bool) 
     assert [(meeting.curves, meeting.kind) for meeting in meetings] == [((1, 0), "end")] * meets
 
 
+def test_a_curve_that_ends_on_another_with_short_steps_does_not_run_together_with_it() -> None:
+    """Whichever of them comes first; and so does one that ends there at both ends."""
+    halved = [(0.52, y) for y in (0.4, 0.45, 0.49, 0.497, 0.4985, 0.4995)]
+    ending = curve(halved, ends=LOST)
+    for curves, number in (([LEVEL, ending], 1), ([ending, LEVEL], 0)):
+        (meeting,) = find_meetings(SPACE, curves, 1e-9)
+        assert (meeting.curves, meeting.kind) == ((number, 1 - number), "end")
+    bow = curve([(0.3, 0.499), (0.3, 0.4), (0.6, 0.4), (0.6, 0.499)], ends=(LOST[1], LOST[1]))
+    assert [meeting.kind for meeting in find_meetings(SPACE, [LEVEL, bow], 1e-9)] == ["end", "end"]
+
+
+def test_two_stretches_are_two_and_leave_crossings_between_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(CurveTracer, "on_line", lambda *arguments: None)
+    other = [(0.0, 0.5), (0.1, 0.5), (0.2, 0.7), (0.4, 0.7), (0.6, 0.3), (0.8, 0.3), (0.9, 0.5), (1.0, 0.5)]
+    meetings = find_meetings(SPACE, [LEVEL, curve(other)], 1e-9)
+    assert [meeting.kind for meeting in meetings] == ["together", "together", "cross"]
+    assert meetings[2].places == pytest.approx(np.array([[0.5, 0.5]]))
+
+
+def test_a_curve_through_the_gap_of_a_ring_meets_it_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A ring is closed by a leg from its last point to its first one."""
+    monkeypatch.setattr(CurveTracer, "on_line", lambda *arguments: None)
+    ring = curve([(0.2, 0.52), (0.2, 0.8), (0.8, 0.8), (0.8, 0.2), (0.2, 0.2), (0.2, 0.48)], ends=(CLOSED, CLOSED))
+    places = sorted(meeting.places[0, 0] for meeting in find_meetings(SPACE, [LEVEL, ring], 1e-9))
+    assert places == pytest.approx([0.2, 0.8])
+
+
 def test_a_curve_may_cross_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     """A ring meets itself at its start, which is no crossing."""
     monkeypatch.setattr(CurveTracer, "on_line", lambda *arguments: None)

@@ -111,7 +111,17 @@ def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 def others_of_stages() -> list[str]:
     """The questions of installed packages that are asked about a stage alone; a page shows each as a picture."""
-    return [name for name, declared in DECLARED.items() if name in DECLARED.others and declared.takes == ("stage",)]
+    return [name for name in DECLARED.others if name not in {*QUESTIONS, *COMMANDS} and _takes_a_stage_alone(name)]
+
+
+def _takes_a_stage_alone(name: str) -> bool:
+    """Whether a question can be asked about a stage without any option; not where its package is of no use."""
+    try:
+        declared = DECLARED[name]
+        options = (item for key, item in declared.parameters.items() if key != "stage")
+        return declared.takes == ("stage",) and all(option.default is not option.empty for option in options)
+    except InputError:  # told by friso --help
+        return False
 
 
 def other(name: str, asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -439,11 +449,13 @@ COMMANDS: Mapping[str, Callable[[PageRequest, Work], Answer]] = {
 def job_of(name: str) -> Callable[[PageRequest, Work], Iterator[AnswerPart]] | None:
     """What answers a page that asks under a name, with ".zip" for the files of a command; None for an unknown name."""
     command = name.removesuffix(".zip")
-    if command in others_of_stages():
+    if name in QUESTIONS:
+        return QUESTIONS[name]
+    if name != command and command in COMMANDS:
+        return partial(report, command)
+    if command in DECLARED.others and command in others_of_stages():
         return partial(report if name != command else other, command)
-    if name != command:
-        return partial(report, command) if command in COMMANDS else None
-    return QUESTIONS.get(name)
+    return None
 
 
 def report(command: str, asked: PageRequest, work: Work) -> Iterator[AnswerPart]:

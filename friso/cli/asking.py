@@ -4,7 +4,7 @@ first, small tables, what to do next, and details if they are wanted."""
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,7 +56,7 @@ def ask(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
         beside = drawing_beside()
     files, unwritten = [], ""
     with ProgressBar(question.during) as progress, beside:
-        with named_as_options(question.parameters):
+        with named_as_options(question.options):
             answer = question.function(*about, **options, **kept, progress=progress)
         speak_of(answer.axis_kind)
         if target is not None:
@@ -112,7 +112,7 @@ def show(
 
 
 @contextmanager
-def named_as_options(names: Mapping[str, Any]) -> Iterator[None]:
+def named_as_options(names: Collection[str]) -> Iterator[None]:
     """An InputError about a keyword speaks of the option of the same name."""
     try:
         yield

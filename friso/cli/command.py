@@ -78,7 +78,15 @@ class QuestionCommand:
         """The function that typer calls."""
         from friso.cli.derived import command_function
 
-        return command_function(self.question)
+        try:
+            return command_function(self.question)
+        except (KeyError, TypeError) as error:
+            if self.question.package.startswith("friso."):
+                raise
+            expected = "a function with @question, whose parameters are described and of kinds that friso knows"
+            raise InputError(
+                f"friso.questions: {self.question.name}", f"{self.question.module}: {error}", expected
+            ) from error
 
 
 AnyCommand = Command | QuestionCommand

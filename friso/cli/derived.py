@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from friso.cli.asking import Shown, ask, option_of
-from friso.interface.question import Question
+from friso.interface.question import OF_THE_CALLER, Question
 from friso.interface.shared_options import meaning
 from friso.stage.arguments import KINDS, ArgumentKind, alternatives
 
@@ -25,9 +25,6 @@ IN_PYTHON_ALONE = (
     "Samples",
 )
 """Kinds of arguments that a command line has no form for."""
-
-OF_THE_CALLER = ("folder", "partly", "beside", "out", "overwrite")
-"""Parameters that say where things are kept: a command sets them by --out and --overwrite."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +73,7 @@ def _asked(question: Question) -> Iterator[Parameter]:
     for name in (*question.takes, *(name for name in parameters if name not in question.takes)):
         parameter = parameters[name]
         kind = _kind_of(str(parameter.annotation))
-        if kind is not None and name not in OF_THE_CALLER:
+        if kind is not None and name not in (*OF_THE_CALLER, "out", "overwrite"):
             default = question.defaults.get(name, parameter.default)
             kind = replace(kind, metavar=question.metavars.get(name, kind.metavar))
             shown = CommandParameter(name, kind, default, meaning(question.function, name))
@@ -130,7 +127,7 @@ def _of_the_shell(question: Question) -> Iterator[Parameter]:
             "overwrite": "Write even if the folder holds other files; replace files of the same name.",
         }
         helps |= {name: meaning(question.function, name) for name in helps if name in question.parameters}
-        yield option("out", folder, Path | None, "--out", helps["out"], metavar="DIR")
+        yield option("out", folder, Path | None, "--out", helps["out"], metavar=question.metavars.get("out", "DIR"))
         yield option("overwrite", False, bool, "--overwrite", helps["overwrite"])
     if question.document:
         yield option("as_json", False, bool, "--json", "One JSON document on standard output, nothing else.")

@@ -9,7 +9,10 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class ToleranceSettings(Settings):
-    """The tolerances of runs and orbits, in one table. A value without a unit is relative."""
+    """The tolerances of runs and orbits, in one table. A value without a unit is relative.
+
+    Those that are defaults of parameters, `cycle_rtol` to `long_run_rtol`, are read once, when friso is imported.
+    """
 
     cycle_rtol: float = setting(1e-9, "")
     """Multipliers are derivatives of runs: looser runs scatter them near -1, tighter ones take longer."""

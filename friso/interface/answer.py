@@ -148,7 +148,7 @@ class Answer:
     def _shown_by(self, module: str, function: str, otherwise: Any, *more: Any) -> Any:
         """What a function of the question's folder makes of the answer; `otherwise` where there is none."""
         name = f"{self.package}.{module}"
-        shown = getattr(import_module(name), function, None) if find_spec(name) else None
+        shown = getattr(import_module(name), function, None) if self.package and find_spec(name) else None
         return otherwise if shown is None else shown(self.subject, *more)
 
     def sentences(self) -> Sequence[str]:

@@ -133,6 +133,11 @@ class Question:
         """The parameters of the function."""
         return signature(self.function).parameters
 
+    @property
+    def options(self) -> list[str]:
+        """The parameters that are options of the command, also those that no kind of the command line stands for."""
+        return [name for name in self.parameters if name not in self.takes and name not in OF_THE_CALLER]
+
     @cached_property
     def summary(self) -> str:
         """The first line of the function's docstring without its full stop, read without importing the module. Raises
@@ -151,6 +156,9 @@ class Question:
             raise InputError(f"{GROUP}: {self.name}", self.module, expected)
         return text.partition("\n")[0].rstrip(".")
 
+
+OF_THE_CALLER = ("folder", "partly", "beside", "keep", "progress")
+"""Parameters that a command gives itself, for where it keeps things."""
 
 QUESTIONS = Registry[Question]("friso.questions", "QUESTION", GROUP, Question)
 """Every folder of `friso/questions/` declares one, and every package that an installed one names."""

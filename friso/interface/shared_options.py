@@ -75,13 +75,15 @@ def described(function: Callable[..., Any]) -> str:
 
 
 def meaning(function: Callable[..., Any], name: str) -> str:
-    """Return what the help of a command says of a parameter of its function, in one line."""
+    """Return what the help of a command says of a parameter of its function: the first paragraph of its description,
+    without numbers in SI, for texts have units."""
     own = {parameter: block for names, block in _parts(function.__doc__ or "")[1] for parameter in names}
     shared = SHARED.get(name)
     if shared is not None and shared.help and own[name].endswith(shared.meaning):
         return shared.help
     _, _, lines = own[name].partition("\n")
-    return " ".join(lines.split()).replace("``", "").replace("`", "")
+    text = " ".join(lines.partition("\n\n")[0].split()).replace("``", "").replace("`", "")
+    return re.sub(r",? or (a number|two numbers) \[[^]]*\]", "", text)
 
 
 def _parts(text: str) -> tuple[str, list[tuple[list[str], str]], str]:

@@ -16,16 +16,16 @@ from friso.interface.question import Question
 def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
     """Ask for a design. Raises typer.Exit with status 2 where there is none."""
     from friso.design_method.method import NoDesign
+    from friso.interface.inputs import stage_of
     from friso.questions.design.document import refused_document
     from friso.questions.design.question import specification_of
     from friso.questions.design.words import refusal
-    from friso.stage import load
 
     try:
         ask(question, about, options, shown)
     except NoDesign as failure:
         if shown.as_json:
-            stage = load(about[0])
+            stage = stage_of(about[0], options.get("set"))
             print_document(refused_document(stage.name, specification_of(stage, about[1]).name, failure))
         say(refusal(failure))
         raise typer.Exit(2) from None

@@ -36,7 +36,7 @@ def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], show
     target = OutputFolder(question.name, shown.out, shown.overwrite, read)
     target.check([STAGE])
     kept: list[Path] = []
-    with ProgressBar() as progress, named_as_options(question.parameters):
+    with ProgressBar() as progress, named_as_options(question.options):
         try:
             answer = question.function(
                 *about,

@@ -16,7 +16,7 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
 
     target = output_folder(question.name, shown.out, shown.overwrite, about[0])
     files, unwritten = [], ""
-    with ProgressBar(question.during) as progress, named_as_options(question.parameters):
+    with ProgressBar(question.during) as progress, named_as_options(question.options):
         answer = question.function(*about, **options, folder=shown.out, partly=True, progress=progress)
         if target is not None and answer.result:
             files, unwritten = tried(lambda: target.write(answer.files(), progress))

@@ -20,13 +20,13 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
 
     (source,) = about
     if options.get("check"):
-        with named_as_options(question.parameters):
+        with named_as_options(question.options):
             return show(question.function(source, check=True), [], shown.as_json)
     store, elsewhere = shown.out or Path(f"{source.stem}_map.zarr"), None
     if source.is_dir():
         store, elsewhere = None, output_folder(question.name, shown.out, shown.overwrite)
     options = {**options, "overwrite": shown.overwrite, "out": store}
-    with ProgressBar() as progress, drawing_beside(), named_as_options(question.parameters):
+    with ProgressBar() as progress, drawing_beside(), named_as_options(question.options):
         answer = question.function(source, **options, beside=elsewhere is None, progress=progress)
         speak_of(answer.axis_kind)
         place = answer.store or source

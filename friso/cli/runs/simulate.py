@@ -12,5 +12,5 @@ from friso.interface.question import Question
 
 def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
     """Ask about a file, or with --cell about a cell."""
-    (words,) = about
+    words = about[0] or []
     ask(question, [words if "cell" in options else [Path(word) for word in words]], options, shown)

@@ -38,17 +38,33 @@ class Meeting:
 
 
 def find_meetings(space: Space, curves: Sequence[Curve], rtol: float) -> tuple[Meeting, ...]:
-    """Find where curves meet; crossings are refined by cycles that are closed to a relative tolerance."""
+    """Find where curves meet; crossings are refined by cycles that are closed to a relative tolerance. What lies within
+    a stretch that runs together, or at a crossing, is no meeting of its own."""
     meetings: list[Meeting] = []
     for first, second in combinations(range(len(curves)), 2):
-        if stretch := _together(curves, first, second):
-            meetings.append(stretch)
-            continue
-        crossings = [*_crossings(space, curves, (first, second), rtol)]
-        meetings += crossings or [*_ends_on(curves, first, second), *_ends_on(curves, second, first)][:1]
+        pair = [*_stretches(curves, first, second)] or [*_stretches(curves, second, first)]
+        others = [_crossings(space, curves, (first, second), rtol), *_ends_on(curves, first, second)]
+        for meeting in (*others[0], *others[1:], *_ends_on(curves, second, first)):
+            pair += [meeting] if not any(_lies_on(meeting.places[0], other) for other in pair) else []
+        meetings += pair
     for number in range(len(curves)):
         meetings += _crossings(space, curves, (number, number), rtol)
     return tuple(meetings)
+
+
+def _lies_on(place: np.ndarray, meeting: Meeting) -> bool:
+    """Tell whether a place, shape (2,), belongs to a meeting: it is near its point, or near its stretch."""
+    path = np.vstack([meeting.places, meeting.places[-1:]])
+    shares = leg_shares(path, place)
+    away = np.linalg.norm(path[:-1] + shares[:, None] * np.diff(path, axis=0) - place, axis=1).min()
+    return bool(away < MeetingSettings.current().end_distance)
+
+
+def _closed_path(curve: Curve) -> tuple[np.ndarray, list[Spot]]:
+    """The points of a curve, shape (n, 2), with their cycles; of a ring the first one again at the end."""
+    again = CLOSED in curve.ends
+    spots = [*curve.spots, *curve.spots[:1]] if again else [*curve.spots]
+    return (np.vstack([curve.points, curve.points[:1]]) if again else curve.points), spots
 
 
 class _Nearest(NamedTuple):
@@ -61,7 +77,8 @@ class _Nearest(NamedTuple):
 
 def _nearest(curve: Curve, at: np.ndarray) -> _Nearest:
     """Project a place, shape (2,), on the straight lines between the points of a curve."""
-    path, sizes = curve.points, np.array([_size(spot) for spot in curve.spots])
+    path, spots = _closed_path(curve)
+    sizes = np.array([_size(spot) for spot in spots])
     shares = leg_shares(path, at)
     away = np.linalg.norm(path[:-1] + shares[:, None] * np.diff(path, axis=0) - at, axis=1)
     leg = int(away.argmin())
@@ -87,34 +104,41 @@ def _alike(one: np.ndarray, other: np.ndarray) -> bool:
     return bool(max(size, min(period, abs(period - np.log(2)))) < MeetingSettings.current().same_cycle_log)
 
 
-def _together(curves: Sequence[Curve], first: int, second: int) -> Meeting | None:
-    """The stretch over which two curves are changes of one cycle and run on top of one another, if they do: as where a
-    curve was followed twice because it was lost in between."""
+def _stretches(curves: Sequence[Curve], first: int, second: int) -> Iterator[Meeting]:
+    """The stretches over which the second curve is a change of the same cycle and runs on top of the first one, as
+    where a curve was followed twice because it was lost in between. A curve that comes near at an angle does so over
+    a shorter one."""
     settings = MeetingSettings.current()
     on: list[np.ndarray] = []
-    for spot in curves[second].spots:
-        near = _nearest(curves[first], spot.at)
-        on += [spot.at] if near.away < settings.together_distance and _alike(near.cycle, _size(spot)) else []
-    if len(on) < settings.together_points:
-        return None
-    return Meeting((first, second), "together", np.array([on[0], on[-1]]), np.full(2, settings.together_distance), True)
+    for spot in (*curves[second].spots, None):
+        near = None if spot is None else _nearest(curves[first], spot.at)
+        if spot and near and near.away < settings.together_distance and _alike(near.cycle, _size(spot)):
+            on.append(spot.at)
+            continue
+        if len(on) > 1 and np.linalg.norm(on[-1] - on[0]) > settings.together_length:
+            error = np.full(2, settings.together_distance)
+            yield Meeting((first, second), "together", np.array([on[0], on[-1]]), error, True)
+        on = []
 
 
 def _crossings(space: Space, curves: Sequence[Curve], numbers: tuple[int, int], rtol: float) -> Iterator[Meeting]:
     """Where two curves cross, or one crosses itself."""
     first, second = (curves[number] for number in numbers)
-    legs, others = np.diff(first.points, axis=0), np.diff(second.points, axis=0)
-    apart = second.points[None, :-1] - first.points[:-1, None]
+    (path, spots), (other_path, other_spots) = _closed_path(first), _closed_path(second)
+    legs, others = np.diff(path, axis=0), np.diff(other_path, axis=0)
+    apart = other_path[None, :-1] - path[:-1, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         across = _cross(legs[:, None], others[None])
         shares = _cross(apart, others[None]) / across, _cross(apart, legs[:, None]) / across
     crossed = np.all([(share >= 0) & (share < 1) for share in shares], axis=0)
-    if numbers[0] == numbers[1]:  # neighbouring legs have a point in common, the first and last one of a ring as well
+    ring = numbers[0] == numbers[1] and CLOSED in first.ends
+    if numbers[0] == numbers[1]:  # neighbouring legs have a point in common
         crossed = np.triu(crossed, 2)
-        crossed[0, -1] &= first.ends[0] != CLOSED
     for k, m in zip(*(index.tolist() for index in np.nonzero(crossed)), strict=True):
-        place = first.points[k] + shares[0][k, m] * legs[k]
-        pairs = first.spots[k : k + 2], second.spots[m : m + 2]
+        place = path[k] + shares[0][k, m] * legs[k]
+        pairs = spots[k : k + 2], other_spots[m : m + 2]
+        if ring and np.linalg.norm(place - path[0]) < MeetingSettings.current().end_distance:
+            continue  # where it was begun, and followed a little beyond
         yield _refined(space, curves, numbers, place, pairs, rtol)
 
 

@@ -130,8 +130,8 @@ class MeetingSettings(Settings):
     together_distance: float = setting(0.005, "ranges")
     """Straight lines between points stray so far from a curve; curves farther apart are two."""
 
-    together_points: int = setting(3, "")
-    """Two curves that cross have fewer points near each other; those that are one have more."""
+    together_length: float = setting(0.05, "ranges")
+    """Ten times the distance within which curves are one: curves that cross at more than six degrees part sooner."""
 
     same_cycle_log: float = setting(0.05, "")
     """Logarithms of amplitude and period between points are off by less; other cycles differ by more."""

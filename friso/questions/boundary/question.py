@@ -99,7 +99,7 @@ def boundary(
     axes : dict, optional
         One key or two with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``; behind ":log", logarithmic.
     x : str, optional
-        The key over which cycles are followed: controller.crossover="1 Hz..40 Hz".
+        The key over which cycles are followed, controller.crossover="1 Hz..40 Hz"; required.
     y : str, optional
         A second key: curves in the plane of both.
     rtol : float

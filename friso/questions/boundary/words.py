@@ -205,14 +205,15 @@ def _meeting(meeting: Meeting, curves: Sequence[Line], keys: tuple[ShownKey, ...
     names = [f"{curves[number].kinds[0]} of {CYCLES[curves[number].shape]}" for number in meeting.curves]
     pair = f"A {names[0]} and a {names[1]}" if names[0] != names[1] else f"Two curves of a {names[0]}"
     places, one = [_place(place, keys) for place in meeting.places.tolist()], "both are changes of one cycle"
+    about = "at" if np.isfinite(meeting.error).all() else "at about"
     if meeting.curves[0] == meeting.curves[1]:
-        return f"A curve of a {names[0]} crosses itself at {places[0]}: there two cycles of one stage change."
+        cycles = "one cycle does so twice" if meeting.same_cycle else "there two cycles of one stage change"
+        return f"A curve of a {names[0]} crosses itself {about} {places[0]}: {cycles}."
     if meeting.kind == "together":
         whole = "are one curve, followed from two places," if names[0] == names[1] else "run together"
         return f"{pair} {whole} from {places[0]} to {places[1]}; {one}."
     if meeting.kind == "end":
         return f"{pair} meet near {places[0]}, where the first is not followed farther; {one}."
-    about = "at" if np.isfinite(meeting.error).all() else "at about"
     return f"{pair} cross {about} {places[0]}; {one if meeting.same_cycle else 'these are two cycles of one stage'}."
 
 

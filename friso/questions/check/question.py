@@ -39,8 +39,6 @@ if TYPE_CHECKING:
     from friso.shown.files import Files
     from friso.studies.laws.verdicts import VerdictsByLaw
 
-MOST_SEED = 2**32 - 1
-
 
 class CheckAnswer(Answer):
     """The verdict on a stage: `result` holds a `Case` each for "given" and, with a joint, "locked" and "free";
@@ -170,8 +168,8 @@ def check(
     Parameters
     ----------
     draws : int, optional
-        Draw so many stages from the uncertain keys, and report how many hunt; default: as many as a fixed work
-        allows, some tens.
+        Draw so many stages from the uncertain keys ("20 N +/- 1 N", "1 N .. 3 N"), and report how many hunt; default:
+        as many as a fixed work allows, some tens.
     laws : bool
         Give also the verdict under every friction law that fits the same measurements.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from friso.interface.answer import Answer, AnswerTable, question
 from friso.interface.inputs import (
@@ -20,9 +19,6 @@ from friso.interface.inputs import (
 )
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
-
-if TYPE_CHECKING:
-    pass
 
 
 class CompareAnswer(Answer):

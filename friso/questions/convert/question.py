@@ -51,7 +51,7 @@ def convert(
     Parameters
     ----------
     friction : str
-        The friction law to convert to; a wrong one is answered with all of them.
+        The friction law to convert to; friso convert --help lists them.
     elements : int
         Elements of a law that has several, side by side, 1 to 12.
     virgin : path, optional

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from friso.design_method.outline import outline
 from friso.design_method.prepare import assumed, by_rules, check_designable
@@ -15,9 +14,6 @@ from friso.interface.inputs import AS_BUILT, LOGGER, Changes, StageLike, mention
 from friso.platform.extras import need
 from friso.progress import Progress, silent
 from friso.stage import Stage, numeric_keys
-
-if TYPE_CHECKING:
-    pass
 
 
 class DesignAnswer(Answer):

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from friso.interface.answer import Answer, question
 from friso.progress import Progress, silent
-
-if TYPE_CHECKING:
-    pass
 
 
 class DoctorAnswer(Answer):

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from friso.axis import speak_of
 from friso.drives.gains import gains_of
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import Changes, FormatName, StageLike, changes_of, choice, stage_of
 from friso.progress import Progress, silent
-
-if TYPE_CHECKING:
-    pass
 
 
 class ExportAnswer(Answer):
@@ -38,7 +33,7 @@ def export(
     set : dict, optional
         Keys to override, or what no stage file says: travel_per_turn="10 mm", motor_constant="0.5 N*m/A".
     to : str, optional
-        A kind of drive, whose parameters are wanted; a wrong one is answered with all of them.
+        A kind of drive, whose parameters are wanted; friso export --help lists them.
 
     Returns
     -------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from friso.errors import InputError
 from friso.interface.answer import Answer, AnswerTable, question
@@ -13,9 +12,6 @@ from friso.platform.extras import need
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive, quoted
 from friso.stage import Stage
-
-if TYPE_CHECKING:
-    pass
 
 STROKE = Quantity("m", positive, "1 mm")
 EXAMPLE = """[flexure]

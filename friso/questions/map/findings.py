@@ -201,7 +201,13 @@ def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
 def own_place(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
     """How far, along each axis of a map of verdicts, the stage as its file gives it is from the next edge of hunting;
     none where it is not on the map."""
-    if metric not in worded(verdicts=True)[1:] or metric not in runs or study.links or SAMPLE in runs.dims:
+    if (
+        metric == "outcome"
+        or metric not in worded(verdicts=True)
+        or metric not in runs
+        or study.links
+        or SAMPLE in runs.dims
+    ):
         return []
     axes, flat = axes_of(runs), {**dict.fromkeys(SCALINGS, 1.0), **study.stage.flat()}
     own = [flat[axis.key] for axis in axes if axis.key in flat and _spans(axis, flat[axis.key])]

@@ -201,12 +201,14 @@ def sweep(
     Parameters
     ----------
     stage : Stage, path or dict
-        A stage, as everywhere in friso, or the folder of a study that is to go on.
+        The stage, its file, or its tables; or the folder of a study that is to be resumed.
     axes : dict, optional
         Keys with their values: ``(np.linspace(1, 40, 41), "Hz")``, a range ``"1 Hz..40 Hz:41"`` (behind ":log",
         logarithmic), or a list of texts with units, bare numbers, words or booleans, where the key takes these.
     samples : int or Samples, optional
-        Number of Sobol points over the ranges FIRST..LAST, instead of a grid; or several keys that vary at once.
+        Number of Sobol points over the ranges FIRST..LAST, instead of a grid.
+
+        Or `friso.Samples`: several keys that vary at once.
     x : str, optional
         Horizontal axis, controller.crossover="1 Hz..40 Hz:41"; also a list: KEY="4 Hz, 8 Hz". Besides keys: speed (the
         controller so many times as fast) and friction (so many times yours).
@@ -217,14 +219,16 @@ def sweep(
     latin : bool
         Make the samples a Latin hypercube.
     metric : str, optional
-        Quantity shown in colour; default: sketch, whether the stage hunts by coarse return maps.
+        Quantity shown in colour, of the stage or of each run; default: sketch, whether the stage hunts by coarse return
+        maps.
     confirm : bool
         Search every cell, instead of a sketch, which takes up to five times as long.
     rtol : float or "auto", optional
         Relative tolerance, default 1e-6; "auto": the loosest safe one.
     verify : float
-        Share of the cells to run again at rtol/100; `verified_surviving` among the attributes counts the outcomes that
-        survive.
+        Share of the cells to run again at rtol/100.
+
+        `verified_surviving` among the attributes counts the outcomes that survive.
     refine : bool
         Make the grid 4 times finer, and run it only along its boundaries.
     workers : int, optional
@@ -265,6 +269,8 @@ def sweep(
     3
     """
     if check:
+        if any((axes, samples, x, y, axis, link, set, metric, confirm, rtol, refine, export, out)):
+            raise InputError("check", "--check beside other options", "a store alone", "friso map rig_map.zarr --check")
         return _whole(stage)
     exports, share = _checked_exports(export), checked_share(verify)
     if confirm and metric not in (None, "sketch", "verdict"):

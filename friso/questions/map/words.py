@@ -70,7 +70,8 @@ def categories_of(name: str, inferred: bool = False) -> dict[str, Category]:
     words = (metrics()[name] if name in metrics() else metrics()["outcome"]).words
     if inferred:
         return {word.text: Category(f"{word.text} (inferred)", word.inferred) for word in words if word.inferred}
-    return {word.text: Category(word.label or word.text, PALETTE.get(word.colour, word.colour)) for word in words}
+    labels = {word.text: axis_shown().text(word.label or word.text) for word in words}
+    return {word.text: Category(labels[word.text], PALETTE.get(word.colour, word.colour)) for word in words}
 
 
 def word_category(name: str, word: str) -> Category:
@@ -82,7 +83,9 @@ def no_number(name: str, reason: str | None = None) -> Category:
     """Return what it means that a cell that was run has no such number; `reason`: the word of `Metric.reasons`."""
     metric = metrics().get(name)
     reasons = categories_of(metric.reasons) if metric and metric.reasons else {}
-    return reasons.get(reason or "") or Category(metric.missing if metric else "no value", _NO_NUMBER)
+    return reasons.get(reason or "") or Category(
+        axis_shown().text(metric.missing) if metric else "no value", _NO_NUMBER
+    )
 
 
 def grouped(number: int) -> str:
@@ -154,4 +157,4 @@ def tallied() -> list[str]:
 def _verb(word: str, number: int) -> str:
     """Return a word of a map as it agrees with a number of cells: "3 creep", "3 bistable"."""
     first, *rest = word.split(" ")
-    return " ".join([first if number == 1 else first.removesuffix("s"), *rest])
+    return " ".join([first if number == 1 or first.endswith("ss") else first.removesuffix("s"), *rest])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from friso.axis import speak_of
 from friso.equations.as_built import whole_samples
 from friso.interface.answer import Answer, question
@@ -13,9 +11,6 @@ from friso.stage import Stage
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.virtual_rig.run import as_built_keys
 from friso.virtual_rig.task import SAMPLE_TIME
-
-if TYPE_CHECKING:
-    pass
 
 MANY = 4
 """Samples from which a delay is worth a word."""
@@ -42,7 +37,7 @@ def rig(
     Parameters
     ----------
     experiment : str
-        Its name, such as "stiffness" or "hunting"; a wrong one is answered with all of them.
+        Its name, such as "stiffness" or "hunting"; friso rig --help lists them.
     seed : int
         Seed of the noise; the rail has its own, `rail.seed`.
 

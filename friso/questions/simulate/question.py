@@ -105,7 +105,7 @@ def simulate(
     Parameters
     ----------
     stage : Stage, path or dict
-        A stage, as everywhere in friso; with `cell`, the numbers of the cell: 3 4.
+        The stage, its file, or its tables; with --cell, the numbers of the cell: 3 4.
     rtol : float, optional
         Relative tolerance of the solver; default: 1e-9, or that of the study.
     sample_time : str or float, optional

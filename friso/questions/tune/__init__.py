@@ -9,5 +9,6 @@ QUESTION = Question(
     'tune examples/thesis_rig.toml --only controller --within "2 um" --out tuned',
     details=True,
     during="what attracts the stage",
+    metavars={"only": "<controller|joint>", "keep": "<controller|joint>"},
     answers_interrupted=True,
 )

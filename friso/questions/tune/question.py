@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -35,9 +35,6 @@ from friso.quantities import Bound, Quantity, positive, quoted
 from friso.remedies import Changeable
 from friso.remedies.goal import Goal
 from friso.stage import Stage
-
-if TYPE_CHECKING:
-    pass
 
 _IN_POSITION = Bound("greater than 0 and at most 1", lambda value: (value > 0) & (value <= 1))
 """Deviations [m or rad] that may count as in position."""

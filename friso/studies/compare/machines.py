@@ -12,6 +12,7 @@ from scipy.linalg import block_diag
 
 from friso.errors import InputError
 from friso.stage import Stage, numeric_keys
+from friso.stage.arguments import MOST_SEED
 from friso.stage.controllers import CONTROLLER, as_tuned
 from friso.stage.correlations import Correlations, Sample, draw
 from friso.stage.lists import element_keys
@@ -20,7 +21,6 @@ from friso.virtual_rig.task import SAMPLE_TIME
 LEAST, MOST = 20, 100_000
 """Machines at least, for an interval to tell anything, and at most, which take hours."""
 
-MOST_SEED = 2**32 - 1
 
 SPREADS: Mapping[str, float] = MappingProxyType(
     {

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from friso.interface.answer import Answer, question
 from friso.progress import Progress, silent
 from friso_thesis.studies.guideline.compute import SAMPLES
-
-if TYPE_CHECKING:
-    pass
 
 
 class GuidelineAnswer(Answer):
