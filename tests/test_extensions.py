@@ -280,7 +280,7 @@ def test_a_question_of_its_own_is_listed_and_answers(
     assert names.index("check") < names.index("hold") < names.index("simulate")
     assert run("--help", command="hold") == 0
     shown = " ".join(capsys.readouterr().out.split())
-    assert '--force-limit FORCE The force that it has to bear, "2 N" or a number [N]. [default: 2 N]' in shown
+    assert '--force-limit FORCE The force that it has to bear, "2 N". [default: 2 N]' in shown
     assert "--set KEY=VALUE Override a key" in shown
     stage, out = ROOT / "examples" / "thesis_rig.toml", tmp_path / "out"
     assert run(stage, "--force-limit", "3 N", "--json", "--out", out, command="hold") == 0

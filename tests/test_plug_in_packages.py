@@ -278,6 +278,16 @@ def test_a_question_whose_options_cannot_be_read_is_told_when_it_is_asked(tmp_pa
     assert "unread.question, which cannot be imported: name 'Nowhere' is not defined" in asked.stderr
 
 
+def test_a_question_without_its_decorator_or_a_description_is_told_when_it_is_asked(tmp_path: Path) -> None:
+    for name, text in {"plain": "def plain(stage: 'StageLike', size: 'int' = 1) -> None:\n    'Be plain.'\n"}.items():
+        write_question(tmp_path / name, "1, WHY, 'plain rig.toml'", text)
+    package(tmp_path, "other", questions={"plain": "plain"})
+    asked = friso_command(tmp_path, "plain", "rig.toml")
+    assert (asked.returncode, asked.stdout) == (2, "")
+    assert "friso.questions: plain" in asked.stderr
+    assert "a function with @question" in asked.stderr
+
+
 def test_a_function_that_is_of_no_use_is_refused_and_leaves_the_others(tmp_path: Path) -> None:
     package(tmp_path, "other", questions={"check": "taken", "missing": "missing", "stage": "taken"})
     code = "import friso\nprint(friso.check.__module__, friso.stage.__name__)\nfriso.missing"
