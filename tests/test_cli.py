@@ -195,6 +195,8 @@ def test_version() -> None:
         ["check", RIG, "--set", "controller.crossover"],
         ["check", RIG, "--set", "bias.cart=8"],
         ["check", RIG, "--out", RIG],
+        ["simulate"],
+        ["simulate", "--json"],
         ["simulate", RIG, "--sample-time", "1"],
         ["simulate", RIG, "--sample-time", "100 s"],
         ["simulate", RIG, "--sample-time", "1 mm"],

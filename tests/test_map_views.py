@@ -24,12 +24,13 @@ from scipy.stats import binomtest
 from snapshots import Snapshots
 
 import friso
+from friso.axis import ROTARY, speaking_of
 from friso.questions.map.cells import axes_of, look, pick
 from friso.questions.map.data import MOST, NONE
 from friso.questions.map.figures import SLICES, map_figure, map_panel
 from friso.questions.map.findings import headline, statement, verification
 from friso.questions.map.page import map_files, map_html, marked_figure
-from friso.questions.map.words import FAILED, INVALID, NOT_RUN, QUIET, categories_of, quantity
+from friso.questions.map.words import FAILED, INVALID, NOT_RUN, QUIET, categories_of, no_number, quantity
 from friso.shown.drawing import matplotlib_renderer, plotly_renderer
 from friso.shown.drawing.colours import painted, ramp, scale
 from friso.shown.drawing.drawable import cell_edges, colour_key, drawable
@@ -350,6 +351,12 @@ def test_picks_are_spread_evenly_and_no_more_than_fit(sizes, most):
         assert len(set(indices.tolist())) == len(indices)
         assert 0 <= indices.min() <= indices.max() < size
         assert len(indices) < 2 or np.ptp(np.diff(indices)) <= 1
+
+
+def test_what_a_cell_without_a_number_does_is_told_in_the_units_of_the_axis() -> None:
+    assert no_number("settling_time").label == "does not stay within 1 µm"
+    with speaking_of(ROTARY):
+        assert no_number("settling_time").label == "does not stay within 1 µrad"
 
 
 def test_a_single_axis_is_a_line_with_what_has_no_number_under_it():
