@@ -25,9 +25,9 @@ from friso.equations.component import state
 from friso.equations.continuous import slow_gains
 from friso.equations.sampled import SAMPLE_TIME, sampled_controller
 from friso.equations.structure import controller_form
-from friso.frequency import crossover
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases
+from friso.frequency.settings import FrequencySettings
 from friso.hunting import Hunting
 from friso.hunting import hunting as hunting_of
 from friso.identification.experiments.moves import identify_moves
@@ -386,9 +386,13 @@ def test_rig_hunting(whole: Stage) -> None:
     assert all(sentences(outcome))
 
 
+COARSE_LIMITS = FrequencySettings(crossover_steps=21, search_biases=3)
+"""Limits of the bandwidth found in seconds."""
+
+
 @pytest.mark.thorough
 def test_compare(whole: Stage) -> None:
-    with patched({crossover: {"STEPS": 21, "BIASES": 3}, study: {"FOLLOWED": 6, "LONGER": 3}}):
+    with COARSE_LIMITS.in_use(), patched({study: {"FOLLOWED": 6, "LONGER": 3}}):
         comparison = compare(whole, 20, 1)
     assert {"a", "c", "d", "e", "f"} <= {result.option.letter for result in comparison.results}
     assert all(comparison_sentences(comparison))

@@ -22,6 +22,7 @@ from friso.errors import InputError
 from friso.frequency import crossover
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases, member
+from friso.frequency.settings import FrequencySettings
 from friso.hunting.criteria import end_of_traces, outcomes, settling_of_traces
 from friso.interface.output_folder import MARKER
 from friso.questions.compare.document import compare_document
@@ -44,7 +45,7 @@ EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 COARSE = {"drive.sample_time": "250 us", "drive.delay": "250 us"}
 """A drive that costs a fifth, with the same equations: one sample of delay."""
 
-QUICK = {crossover: {"STEPS": 21, "BIASES": 3}, study: {"FOLLOWED": 6, "LONGER": 3}}
+QUICK = {study: {"FOLLOWED": 6, "LONGER": 3}}
 COUNT = 20
 RIGID = {"joint": None, "parasitic": None}
 
@@ -56,7 +57,7 @@ def built() -> Stage:
 
 @pytest.fixture(scope="module", autouse=True)
 def quick() -> Iterator[None]:
-    with patched(QUICK):
+    with FrequencySettings(crossover_steps=21, search_biases=3).in_use(), patched(QUICK):
         yield
 
 

@@ -24,11 +24,12 @@ from snapshots import Snapshots
 
 import friso
 from friso.cli.app import main
-from friso.design_method import choice, controller, edges, front, hunting_map, method, population, verification
+from friso.design_method import controller, method
 from friso.design_method.edges import Corners
 from friso.design_method.geometry import Geometry, Sheet
 from friso.design_method.method import Design, Frictions, NoDesign
 from friso.design_method.relax import Relaxation
+from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Position, Spec, load_spec
 from friso.interface.output_folder import MARKER
 from friso.progress import Progress
@@ -50,16 +51,17 @@ command = command_of("design")
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, SPEC = EXAMPLES / "thesis_rig.toml", EXAMPLES / "specs" / "thesis.toml"
 FIGURES = ("design_map", "design_front", "design_modes", "design_window", "design_damping", "design_settling")
-SMALL = {
-    front: {"POPULATION": 40, "GENERATIONS": 25},
-    choice: {"SHOWN": 3},
-    edges: {"ROUNDS": 1},
-    method: {"STEPS": 6},
-    population: {"LEVELS": (0.0, 1.0)},
-    controller: {"RATIOS": np.array([0.1, 0.7])},
-    hunting_map: {"CROSSOVERS": 4, "STROKES": 3},
-    verification: {"MACHINES": 64},
-}
+SMALL = DesignSettings(
+    front_population=40,
+    front_generations=25,
+    confirmed_candidates=3,
+    edge_bisections=1,
+    edge_steps=6,
+    corner_levels=(0.0, 1.0),
+    map_crossovers=4,
+    map_strokes=3,
+    verified_moves=64,
+)
 """Sizes with which a design takes seconds."""
 
 LEAVES = Geometry(0.07, 0.02, 0.045, Sheet(2, 3e-4, "stainless 1.4310"))
@@ -81,7 +83,7 @@ def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def small() -> Iterator[None]:
-    with patched(SMALL):
+    with SMALL.in_use(), patched({controller: {"RATIOS": np.array([0.1, 0.7])}}):
         yield
 
 

@@ -18,6 +18,7 @@ from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.continuous import slow_gains
 from friso.equations.structure import structure
 from friso.frequency import crossover
+from friso.frequency.settings import FrequencySettings
 from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.common import record
 from friso.remedies import method
@@ -137,9 +138,13 @@ def test_rig_hunting(whole: Stage, tmp_path: Path) -> None:
     assert AsBuilt.of(as_built_keys(whole)).structure.controller is not None
 
 
+COARSE_LIMITS = FrequencySettings(crossover_steps=21, search_biases=3)
+"""Limits of the bandwidth found in seconds."""
+
+
 @pytest.mark.thorough
 def test_compare(whole: Stage, tmp_path: Path) -> None:
-    with patched({crossover: {"STEPS": 21, "BIASES": 3}, study: {"FOLLOWED": 6, "LONGER": 3}}):
+    with COARSE_LIMITS.in_use(), patched({study: {"FOLLOWED": 6, "LONGER": 3}}):
         document = answer(tmp_path, whole, "compare", "--machines", 20, "--seed", 1)
     options = document["options"]
     assert {"a", "c", "d", "e", "f"} <= {*options}

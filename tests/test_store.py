@@ -362,7 +362,7 @@ def test_a_large_study_takes_no_room_before_it_is_run(rig: Stage, tmp_path: Path
     path, axes = tmp_path / "large.zarr", {**AXES, "masses.stage": "0.4 kg..0.5 kg:2"}
     study = Request(rig, {key: f"{ends.split(':')[0]}:20000" for key, ends in axes.items()}).study()
     store = Store(path, study)
-    assert np.prod(store.blocks) <= storing.LARGEST_BLOCK
+    assert np.prod(store.blocks) <= StudySettings().largest_stored_block
     with Store.opened(path, study):
         size = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
     assert size < 3e6  # the axes themselves
@@ -914,7 +914,7 @@ def test_ctrl_c_while_a_store_is_made_leaves_nothing(tmp_path: Path) -> None:
 def test_where_what_attracts_is_surveyed_blocks_are_small(rig: Stage, tmp_path: Path) -> None:
     axes = {"controller.crossover": "4 Hz..16 Hz:41", "joint.stroke": "0 m..1 mm:41"}
     store = Store(tmp_path / "a.zarr", Request(rig, axes).study(["verdict"]))
-    assert np.prod(store.blocks) <= storing.SURVEYED_BLOCK
+    assert np.prod(store.blocks) <= StudySettings().surveyed_block
 
 
 def test_a_store_of_samples_has_their_values_as_coordinates(rig: Stage, tmp_path: Path) -> None:

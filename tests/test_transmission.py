@@ -21,8 +21,8 @@ from friso.frequency.loops import response
 from friso.frequency.members import concatenate_families, limit_cases, member
 from friso.frequency.parts import plant
 from friso.hunting import Decline, Ensemble, Feeding, cannot_hunt, hunting, unstable
-from friso.hunting import feeding as hunting_feeding
 from friso.hunting.feeding import dry_friction, feeding
+from friso.hunting.settings import CheckSettings
 from friso.questions.bode.words import caveats
 from friso.questions.check.feeding_words import feeding_sentences
 from friso.stage import Stage
@@ -323,13 +323,13 @@ def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage, 
 
 @pytest.mark.inner
 @pytest.mark.parametrize(("share", "certain"), [(0.01, True), (0.001, False)])
-def test_what_feeds_it_is_computed(share: float, certain: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_feeds_it_is_computed(share: float, certain: bool) -> None:
     """A belt with play and little friction: without friction it swings on, with less play it rests, unless that is so
     little that swings may be smaller than is looked for."""
-    monkeypatch.setattr(hunting_feeding, "SHARES", np.array([share]))
     keys = {"kind": "pid", "crossover": "10 Hz", "alpha": 0.1, "beta": 2}
     little = {**LUGRE, "static": "3 N", "coulomb": "2 N"}
-    result = feeding(machine(transmission=BELT, friction=little, motor_friction=None, controller=keys))
+    with CheckSettings(feeding_shares=(share,)).in_use():
+        result = feeding(machine(transmission=BELT, friction=little, motor_friction=None, controller=keys))
     assert result == Feeding(Decline(share, None, True), Decline(1.0, share, certain))
 
 
