@@ -105,7 +105,8 @@ def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The keys of the machine."""
     asked.chosen()
     others = [{"id": name, "label": name.replace("-", " ").capitalize()} for name in others_of_stages()]
-    shown = {"others": others, "metrics": [{"id": name, "label": metric.title} for name, metric in metrics().items()]}
+    in_order = sorted(metrics().items(), key=lambda item: not item[1].words)  # those in words first
+    shown = {"others": others, "metrics": [{"id": name, "label": metric.title} for name, metric in in_order]}
     yield {"kind": "answer", **shown, **machines.machine_on_page(asked.machine)}
 
 
