@@ -1,4 +1,4 @@
-"""Which kicks and which moves end in hunting."""
+"""Find which kicks and which moves of a stage end in hunting."""
 
 from __future__ import annotations
 
@@ -31,10 +31,13 @@ from friso.stage.controllers import FORCE_LIMIT
 
 @dataclass(frozen=True)
 class Kick:
-    """Kicks of a stage at rest at its reference that start hunting: a displacement [m] (everything displaced, then let
-    go, as in the motion "release") or a push, a velocity [m/s] of all masses. `windows` are ranges of kicks that do,
-    their ends found to 1 %; the last may end with the range that was `searched`. `unknown` counts the runs that were
-    not completed: they are left out, and windows may reach across them."""
+    """Kicks of a stage at rest at its reference that start hunting.
+
+    A kick is a displacement [m], everything displaced and then released as in the motion "release", or a push, a
+    velocity [m/s] of all masses. `windows` are the ranges of kicks that start hunting, their ends known to 1 %. The
+    last may end with the range that was `searched`. `unknown` counts runs that were not completed; they are left out,
+    so a window may reach across them.
+    """
 
     windows: tuple[tuple[float, float], ...]
     searched: tuple[float, float]
@@ -42,14 +45,18 @@ class Kick:
 
     @property
     def smallest(self) -> float | None:
-        """The smallest kick that was seen to start hunting; None if none was."""
+        """Return the smallest kick that was seen to start hunting; None if none was."""
         return self.windows[0][0] if self.windows else None
 
 
 @dataclass(frozen=True)
 class MoveShare:
-    """Share of moves that end in the cycle, of an even sample over acceleration [m/s^2] and acceleration time [s]: how
-    many were drawn (and run to their end), how many hunt, and the ranges they were drawn from."""
+    """Share of moves that end in the cycle, drawn evenly over acceleration [m/s^2] and
+    acceleration time [s].
+
+    `count` moves were drawn and run to their end, `hunting` of them hunt. `accelerations` and `times` are the ranges
+    they were drawn from.
+    """
 
     count: int
     hunting: int
@@ -58,22 +65,26 @@ class MoveShare:
 
     @property
     def fraction(self) -> float:
+        """Return the share of completed moves that end in hunting."""
         return self.hunting / self.count
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The range that holds the true share with a probability of 95 %."""
+        """Return the range that holds the true share with a probability of 95 %."""
         return share_interval(self.hunting, self.count)
 
 
 def ends_in(
     flat: Mapping[str, Any], count: int, target: Target, starts: np.ndarray | None = None, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which runs of stages, given as flat keys to SI numbers or arrays (count,), end in one of the motions that attract
-    the stage: they still swing long after their motion, by half of the least of these from peak to peak or more; which
-    were completed; and how far they swing at the end, peak to peak [m]; all of shape (count,). The target is the same
-    for all, or there is one for each. Where its swings were observed, a motion that does not end in them is looked at
-    for half of its run: it may swing less often. `options`: `RunOptions`."""
+    """Run stages to see which end in one of their attractors.
+
+    The stages are flat keys to SI numbers or arrays (count,). A run ends in an attractor if, long after its motion, it
+    still swings by half of the smallest attracting swing or more, peak to peak. Returns which runs end there, which
+    were completed, and how far each swings at the end, peak to peak [m], all of shape (count,). `target` is common to
+    all runs, or has one row for each. Where its swings were only observed, half of each other run is inspected, as it
+    may swing less often. `options` are those of `RunOptions`.
+    """
     ends, completed, swing = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count)
     observed = np.broadcast_to(target.observed, (count,))
     for runs in (np.flatnonzero(~observed), np.flatnonzero(observed)):
@@ -88,7 +99,10 @@ def ends_in(
 def _ends_closed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Runs are looked at early, and those that are not caught by then are followed on, for twice as long each time."""
+    """Run stages towards attractors that are closed orbits, as `ends_in` does.
+
+    Runs are judged early. One that is not caught by then is followed on, twice as long each time.
+    """
     settings = BasinSettings.current()
     size, lasting, early, last = (
         np.broadcast_to(part, (count,))
@@ -112,7 +126,8 @@ def _ends_closed(
 def _ends_observed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which motions end in swings that were only observed, and for which that is known."""
+    """Run stages towards swings that were only observed, as `ends_in` does,
+    at a tighter tolerance."""
     settings = BasinSettings.current()
     after = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
     swing, completed, _ = _last_swing(flat, after, settings.judged_periods * target.period, starts, TIGHT, **options)
@@ -125,8 +140,11 @@ def _ends_observed(
 
 
 def swings_seldom(target: Target, ends: np.ndarray, swing: np.ndarray) -> np.ndarray:
-    """Which runs (see `ends_in`) swing as far as what was observed, but not in the last of its periods: what becomes of
-    them is not known."""
+    """Return which runs swing as far as an observed attractor,
+    but not during the last of its periods.
+
+    It is unknown how such runs (see `ends_in`) end.
+    """
     return ~ends & np.asarray(target.observed) & lasts(swing, 0.0, np.asarray(target.amplitude) / 2)
 
 
@@ -138,8 +156,11 @@ def _last_swing(
     rtol: float,
     **run_options: Any,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Peak to peak in the last time [s] before the ends of runs [s], (count,), which runs were completed, and their
-    states at the end, (count, kept)."""
+    """Run stages to the time `end` [s], (count,),
+    and measure peak to peak over the time `last` [s] before it.
+
+    Returns the swing [m], which runs were completed, and the final states, (count, kept).
+    """
     long, count = {**flat, "motion.duration": end}, len(end)
     window = float(np.min(1 - last / end))
     options = RunOptions(rtol=rtol, window=window, record_from=np.inf, least_swing=np.inf, **run_options)
@@ -159,9 +180,13 @@ def _caught(
     landing_map: LandingMap | None,
     starts: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which runs end in what attracts, and of which that is known: by the return map, as far as that is sure, or by
-    long runs. One that swings by more than the `widest` at its end, peak to peak [m], may grow or die out, and one that
-    swings less often than what was observed, too."""
+    """Return which runs end in an attractor, and for which runs this is known,
+    both of shape (count,).
+
+    The return map decides where it is reliable, long runs elsewhere. A run that swings by more than `widest` at its
+    end, peak to peak [m], may grow or die out, so it counts as unknown. A run that swings less often than an observed
+    attractor is unknown too.
+    """
     ends, decided = np.zeros(count, bool), np.zeros(count, bool)
     if landing_map is not None:
         ends, decided = motions_go_on(flat, count, landing_map, starts)
@@ -175,8 +200,10 @@ def _caught(
 def displacements_that_hunt(
     stage: Stage, target: Target, widest: float = np.inf, landing_map: LandingMap | None = None
 ) -> Kick:
-    """Find the displacements [m] from which a stage that is let go ends in its `target`; swings wider than `widest`,
-    peak to peak [m], are counted as unknown. A return map that is resolved spares long runs."""
+    """Find the displacements [m] from which a released stage ends in its `target`.
+
+    Swings wider than `widest`, peak to peak [m], count as unknown. A resolved return map saves long runs.
+    """
     flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -186,13 +213,14 @@ def displacements_that_hunt(
 
 
 def displacements_that_run_away(stage: Stage) -> Kick:
-    """The displacements after which a stage whose force is limited, without anti-windup, runs away from its reference
-    for good, in the same way."""
+    """Find the displacements after which a stage with a force limit and no anti-windup diverges
+    from its reference."""
     flat, stages = {**without_motion(stage.flat()), "motion.kind": "release"}, Ensemble.held(stage.flat(), 1)
     end = BasinSettings.current().runaway_periods * float(typical_period(stages)[0])
 
     def runs_away(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Which kicks make the stage run away, and for which that is known."""
+        """Run the stage from some displacements: return which make it diverge,
+        and for which this is known."""
         options = RunOptions(rtol=RTOL, record_from=np.inf, least_swing=np.inf)
         motions = run_motions({**flat, "motion.displacement": kicks, "motion.duration": end}, len(kicks), options)
         return motions.away, motions.away | motions.completed
@@ -203,8 +231,11 @@ def displacements_that_run_away(stage: Stage) -> Kick:
 def pushes_that_hunt(
     stage: Stage, target: Target, widest: float = np.inf, landing_map: LandingMap | None = None
 ) -> Kick:
-    """Find the pushes, velocities [m/s] of all masses, after which a stage at rest ends in its `target`; swings wider
-    than `widest`, peak to peak [m], are counted as unknown. A return map that is resolved spares long runs."""
+    """Find the pushes, velocities [m/s] of all masses,
+    after which a stage at rest ends in its `target`.
+
+    Swings wider than `widest`, peak to peak [m], count as unknown. A resolved return map saves long runs.
+    """
     stages = Ensemble.held(stage.flat(), 1)
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -216,8 +247,11 @@ def pushes_that_hunt(
 
 
 def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: float) -> Kick:
-    """The windows of kicks that hunt, searched on a grid about `unit`, their edges closer and closer; `hunts` tells
-    which kicks do, and whose runs were completed."""
+    """Find the windows of kicks that hunt: search a grid around `unit`,
+    then narrow down each edge.
+
+    `hunts` runs some kicks and returns which of them hunt and which runs were completed.
+    """
     settings = BasinSettings.current()
     tried = np.geomspace(settings.kick_range[0] * unit, settings.kick_range[1] * unit, settings.kick_count)
     hunting, completed = hunts(tried)
@@ -242,9 +276,12 @@ def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], u
 def moves_that_hunt(
     stage: Stage, target: Target, widest: float = np.inf, landing_map: LandingMap | None = None
 ) -> MoveShare | None:
-    """Draw moves about that of the stage's file and find the share of them that ends in its `target`; swings wider than
-    `widest`, peak to peak [m], are left out. A return map that is resolved spares long runs. None for motions that have
-    no acceleration, or if every run fails."""
+    """Estimate the share of moves, drawn around the one in the stage's file,
+    that ends in the `target`.
+
+    Swings wider than `widest`, peak to peak [m], are left out. A resolved return map saves long runs. Returns None for
+    motions without acceleration, or if every run fails.
+    """
     settings = BasinSettings.current()
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
@@ -265,8 +302,11 @@ def moves_that_hunt(
 
 
 def evenly(count: int) -> np.ndarray:
-    """Points spread evenly over the unit square, shape (2, count): the Kronecker sequence of the plastic number
-    (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"). SciPy's Sobol points would do as well,
-    but take 0.7 s to import."""
+    """Spread points evenly over the unit square, shape (2, count),
+    by the Kronecker sequence of the plastic number.
+
+    See Roberts 2018, "The unreasonable effectiveness of quasirandom sequences". SciPy's Sobol points would do as well,
+    but take 0.7 s to import.
+    """
     plastic = 1.32471795724474602596  # x^3 = x + 1
     return (0.5 + np.outer([1 / plastic, 1 / plastic**2], np.arange(1, count + 1))) % 1.0

@@ -1,4 +1,5 @@
-"""Builds the compiled `friso.hunting.turning`, in the process that fills the cache (`friso.engine.builder`)."""
+"""Build the compiled `friso.hunting.turning`,
+in the process that fills the cache (`friso.engine.builder`)."""
 
 from __future__ import annotations
 
@@ -13,5 +14,6 @@ from friso.hunting.turns import KINDS
 
 
 def build(folder: Path, task: bytes) -> str:
-    """Keep the loops over turning points in a folder of the cache; the name of the entry."""
+    """Compile the loops over turning points into a folder of the cache;
+    return the name of the entry."""
     return keep(folder, inspect.getsource(turning), lambda module: object_code(scalar_llvm(module.run, KINDS)))

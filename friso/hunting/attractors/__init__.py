@@ -1,4 +1,8 @@
-"""Which stages something attracts that swings for ever, and what: cycles of any period, of many stages at once."""
+"""Find every motion that attracts a stage and swings for ever, for many stages at once.
+
+A survey simulates from many starts and adds the cycles that the return map suggests. It finds cycles of any period, and
+irregular swings.
+"""
 
 from __future__ import annotations
 
@@ -18,16 +22,18 @@ from friso.hunting.loop import surely_run_away
 from friso.hunting.rows import ArrayRows
 
 BESIDE = np.array([0.9, 0.97, 0.99, 1.0, 1.01, 1.03, 1.1])
-"""Distances from which a motion that was observed is tried again, in units of its own."""
+"""Starts of the second try, as multiples of the distance at which an observed motion sticks."""
 
 
 @dataclass(frozen=True)
 class Target(ArrayRows):
-    """What motions of stages end in unless they come to rest: arrays of shape (count,), or numbers of one stage.
+    """Motions that stages end in unless they come to rest: arrays of shape (count,),
+    or numbers of one stage.
 
-    They swing by the `amplitude` [m], half of peak to peak, at least, with the `period` [s] at most, once the time
-    `lasting` [s] has passed. A motion that swings by that amplitude after the time `early` [s] will do so. Where
-    attractors were only `observed`, not closed, others beside them may swing as far, less often.
+    Each motion swings by at least `amplitude` [m], half of peak to peak, with a period of at most `period` [s]. It does
+    so once the time `lasting` [s] has passed. A motion that swings this far after the time `early` [s] will also do so
+    later. Where attractors were only `observed`, not closed as orbits, other attractors nearby may swing as far but
+    less often.
     """
 
     amplitude: Any
@@ -39,13 +45,15 @@ class Target(ArrayRows):
 
 @dataclass(frozen=True)
 class Attractors:
-    """Result of surveying several stages; arrays are of shape (count,).
+    """Result of surveying several stages; arrays have the shape (count,).
 
-    The `motions` that attract: as many of each stage as were looked for (see `attractors`). A stage is `decided` unless
-    a simulation that had to decide failed. `typical` is a typical period of hunting [s]. `families` are the cycles
-    that the return map suggests to a thorough survey, attracting or not, the symmetric ones first. Where simulations
-    at two tolerances disagree, the stage `flips`, and the tighter one holds. A survey is `complete` if every motion
-    was followed to what attracts it. A stage `runs_away` if motions from far off do, for want of anti-windup.
+    - `motions`: the attractors, as many of each stage as were looked for (see `attractors`).
+    - `decided`: every simulation that had to decide was completed.
+    - `typical`: typical period of hunting [s].
+    - `families`: cycles that the return map suggests to a thorough survey, stable or not, the symmetric ones first.
+    - `flips`: simulations at two tolerances disagree; the tighter one holds.
+    - `complete`: every motion was followed to its attractor.
+    - `runs_away`: motions from far off diverge, because there is no anti-windup.
     """
 
     motions: tuple[Swinging, ...]
@@ -58,14 +66,15 @@ class Attractors:
 
     @property
     def attracts(self) -> np.ndarray:
-        """Which stages something attracts, shape (count,)."""
+        """Return which stages have an attractor, shape (count,)."""
         attracted = np.zeros(len(self.decided), bool)
         attracted[[motion.stage for motion in self.motions]] = True
         return attracted
 
     @property
     def target(self) -> Target:
-        """What the stages' motions end in, arrays of shape (count,): NaN where nothing attracts."""
+        """Return the motions that stages end in, arrays of shape (count,):
+        NaN for a stage without an attractor."""
         settings = SurveySettings.current()
         amplitude, period, lasting, early = (np.full(len(self.decided), np.nan) for _ in range(4))
         observed = np.zeros(len(self.decided), bool)
@@ -86,7 +95,7 @@ class Attractors:
         return Target(amplitude, period, lasting, early, observed)
 
     def take(self, numbers: np.ndarray) -> Attractors:
-        """The survey of the stages with these numbers, each once."""
+        """Select the survey of the stages with these numbers, each once."""
         motions_of: dict[int, list[Swinging]] = {}
         for motion in self.motions:
             motions_of.setdefault(motion.stage, []).append(motion)
@@ -105,15 +114,20 @@ def attractors(
     cycles: bool = True,
     suggested: tuple[Cycles, ...] = (),
 ) -> Attractors:
-    """What attracts: everything that simulations from many starts end in, and the cycles that the return map suggests.
-    Of many stages at once one motion that attracts is enough; a `thorough` survey looks for all of them, and where
-    simulations alone tell what it finds, it tries them at a hundredth of the tolerance. Orbits are closed to the
-    relative tolerance. Motions begin from the `distances` [m], (count, n), too, where they are finite. Without
-    `cycles` many stages are surveyed by simulations alone, and motions that have converged are taken for attracted.
-    Starts are tried at once, and beside the cycles, by a thorough survey and where nothing is thought to attract, so
-    that the cycles are known already, `suggested`: one run alone takes as long as eight together. Of a stage of which
-    none could be closed, these are as many as those of a thorough survey. A thorough survey whose allowance is used up
-    tells what it has found by then, which is decided where an orbit was closed; others raise Exhausted."""
+    """Find the attractors of stages, by simulation from many starts and from the return map.
+
+    For many stages, one attractor each is enough. A `thorough` survey looks for all of them. Where only simulations
+    show an attractor, a thorough survey repeats them at a hundredth of the tolerance. Orbits are closed to the relative
+    tolerance `rtol`. Runs also start from the `distances` [m], (count, n), where they are finite.
+
+    Without `cycles`, many stages are surveyed by simulation alone, and a motion that has converged counts as attracted.
+    A thorough survey runs all starts at once, as does one that is given `suggested` cycles: eight runs together take as
+    long as one. It also starts beside unstable cycles. A stage for which no suggested cycle was closed gets as many
+    starts as in a thorough survey.
+
+    A thorough survey that has used up its allowance returns the attractors it has by then; a stage counts as decided
+    where an orbit was closed. Other surveys raise Exhausted.
+    """
     at_once = thorough or bool(suggested)
     survey = Survey(surely_run_away(stages), thorough, rtol, prove=cycles, decides=at_once)
     numbers = np.arange(stages.count)
@@ -145,7 +159,8 @@ def attractors(
 
 
 def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested: tuple[Cycles, ...]) -> None:
-    """Confirm the suggested cycles that attract the stages with some numbers, and begin beside those that repel."""
+    """Confirm the suggested cycles that are stable by runs,
+    and start further runs beside the unstable ones."""
     for cycles in suggested:
         survey.note_unstable_cycles(numbers, cycles)
         starts.beside(cycles)
@@ -154,7 +169,7 @@ def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested:
 
 
 def _try_memories(begun: Starts, survey: Survey) -> None:
-    """Follow stages that nothing attracts so far from bristles that are bent in many ways."""
+    """Survey stages that still have no attractor from states with bristles bent in many ways."""
     left = np.flatnonzero(~survey.attracted)
     if left.size:
         starts = begun.take(left)
@@ -164,8 +179,10 @@ def _try_memories(begun: Starts, survey: Survey) -> None:
 
 
 def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
-    """Follow stages that nothing attracts so far from the cycles that the return map suggests: near a fold these
-    attract from less far than starts are apart."""
+    """Survey stages that still have no attractor from the cycles that the return map suggests.
+
+    Near a fold the basin of a stable cycle is narrower than the spacing of the usual starts.
+    """
     left = np.flatnonzero(~survey.attracted)
     if not left.size:
         return
@@ -176,7 +193,8 @@ def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
 
 
 def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors:
-    """Try stages without a closed orbit again at a tighter tolerance, which holds where both disagree."""
+    """Survey stages without a closed orbit again at a tighter tolerance,
+    which holds where the two disagree."""
     proved = {motion.stage for motion in first.motions if motion.cycles is not None}
     which = np.array([k for k in range(stages.count) if k not in proved], dtype=np.int64)
     if not which.size:

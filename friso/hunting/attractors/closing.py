@@ -1,4 +1,4 @@
-"""Orbits closed from runs that repeat themselves, after any number of swings."""
+"""Close orbits from runs that repeat themselves, after any number of swings."""
 
 from __future__ import annotations
 
@@ -14,9 +14,13 @@ from friso.hunting.cycle.shooting import Orbits, close
 def close_orbits(
     runs: Pending, swings: np.ndarray, times: np.ndarray, sizes: np.ndarray, rtol: float
 ) -> list[tuple[np.ndarray, Cycles]]:
-    """The cycles beside runs that repeat themselves after numbers of swings and times [s], with sizes from peak to peak
-    [m], each of shape (runs,): in groups of as many swings, the numbers of the runs and their cycles, which are not
-    `closed` where no orbit like the run could be closed."""
+    """Close an orbit near each run that repeats itself, by Newton's method.
+
+    Run k repeats after `swings[k]` swings and `times[k]` [s]; `sizes[k]` [m] is its peak-to-peak deviation, each of
+    shape (runs,). Returns groups of runs with equal numbers of swings: the numbers of the runs, and their cycles. A
+    cycle is not `closed` where no orbit of the run's size was reached. An orbit that passes through a simpler one
+    several times is replaced by the simpler one.
+    """
     settings = SurveySettings.current()
     states = _where_they_stick(runs, times)
     parts = []
@@ -47,8 +51,10 @@ def close_orbits(
 
 
 def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> np.ndarray:
-    """Which closed orbits, shape (count,), are simpler ones passed through several times: `fewer` swings lead back to
-    where the stage sticks, or, if their number is odd, to its mirror image."""
+    """Return which closed orbits, shape (count,), pass through a simpler orbit several times.
+
+    After `fewer` swings such an orbit is back where the stage sticks, or at its mirror image if the number is odd.
+    """
     if not stages.count:
         return np.zeros(0, bool)
     ends = stages.run(orbits.states, orbits.times * fewer / orbits.swings, rtol).ends[:, stages.sticking]
@@ -57,7 +63,8 @@ def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> 
 
 
 def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.ndarray:
-    """Which orbits, (count,), are others passed through so many times, by where they stick and how long they take."""
+    """Return which orbits, (count,), are the simpler orbit `once` passed so many times,
+    by sticking distance and time."""
     settings = SurveySettings.current()
     distances = np.abs(once.states[:, sticking]) / np.abs(orbits.states[:, sticking])
     return (np.abs(distances - 1) < settings.repeated_orbit_share) & (
@@ -66,9 +73,12 @@ def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.nda
 
 
 def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
-    """States (runs, states) that runs pass within the next times [s], (runs,), where the integrator is such that the
-    actuator balances constant forces on a stage at rest: of several that before which the stage has
-    stood still for longest."""
+    """Return a state of each run, (runs, states), while it sticks within the next times [s],
+    (runs,).
+
+    It is the instant at which the integrator balances the constant forces on a stage at rest. If there are several, the
+    one after the longest standstill counts.
+    """
     settings = SurveySettings.current()
     stages, size = pending.stages, len(pending.stages.kernel.states)
     numbers, ahead = np.arange(stages.count), np.zeros(stages.count)
@@ -83,8 +93,11 @@ def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
 
 
 def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
-    """The sample, and what share of the step to the next, at which the integrator is no longer off that balance,
-    where the stage has stood still in its place [m] for longest before; both of shape (samples,)."""
+    """Return the sample, with a fraction, at which the integrator's imbalance passes zero after
+    the longest standstill.
+
+    `residuals` are the imbalance of the integrator, `place` [m] the position that sticks, both of shape (samples,).
+    """
     settings = SurveySettings.current()
     if not np.isfinite(place).any():  # the run failed
         return 0.0

@@ -1,4 +1,4 @@
-"""Whether swings repeat themselves: after how many of them, and after what time."""
+"""Detect whether swings repeat themselves: after how many swings, and after what time."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ from friso.hunting.rows import ArrayRows
 
 @dataclass(frozen=True)
 class Recurrence(ArrayRows):
-    """How runs repeat themselves, arrays of shape (runs,): after how many swings at least, `swings` (0: a run
-    does not), and the number after which it does so best, `better`; the times that these take, `time` and
-    `better_time` [s]; peak to peak, `size` [m], the share of that by which it fails to repeat itself, `deviation`;
-    and the mean size of single swings, `mean` [m]."""
+    """How runs repeat themselves, arrays of shape (runs,).
+
+    `swings` is the smallest number of swings after which a run repeats itself (0: it does not), and `time` [s] the time
+    they take. `better` is the number after which it repeats best, and `better_time` [s] the time of these. `size` [m]
+    is peak to peak, `deviation` the error of the best repetition as a share of it, and `earlier` that error some swings
+    before. `mean` [m] is the mean size of single swings.
+    """
 
     swings: np.ndarray
     time: np.ndarray
@@ -29,9 +32,12 @@ class Recurrence(ArrayRows):
 
 @np.errstate(all="ignore")  # swings that a run does not have are NaN
 def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> Recurrence:
-    """How the swings of runs end: where they turn [m] and when [s], shape (runs, swings), the last in the last column,
-    NaN before the first. Where `mirrored`, shape (runs,), a motion may repeat as its mirror image, after an odd number
-    of swings; else it cannot."""
+    """Detect how the last swings of runs repeat.
+
+    `values` [m] and `times` [s] are the turning points, shape (runs, swings), the last in the last column, NaN before
+    the first. Where `mirrored`, shape (runs,), a motion may also repeat as its mirror image, after an odd number of
+    swings.
+    """
     settings = SurveySettings.current()
     runs, room = values.shape
     legs = np.abs(np.diff(values, axis=1))
@@ -57,12 +63,13 @@ def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> R
 
 
 def _deviation(values: np.ndarray, swings: int, end: int) -> np.ndarray:
-    """By how much swings up to a number fail to repeat what was some swings before [m], shape (runs,)."""
+    """Return by how much the swings before the column `end` differ from those `swings` earlier
+    [m], shape (runs,)."""
     compared = _compared(swings)
     last, before = values[:, end - compared : end], values[:, end - compared - swings : end - swings]
     return np.asarray(np.abs(last - (-1) ** swings * before).max(axis=1))
 
 
 def _compared(swings: int) -> int:
-    """How many swings have to repeat what was some swings before."""
+    """Return how many swings must match those before them for a repetition."""
     return max(swings, 4)

@@ -1,5 +1,5 @@
-"""What becomes of stages that start from many states: followed in rounds, each longer than the one before, until they
-rest or repeat themselves."""
+"""Follow stages from many states in rounds, each longer than the last,
+until they rest or repeat themselves."""
 
 from __future__ import annotations
 
@@ -22,14 +22,17 @@ from friso.hunting.settings import ToleranceSettings
 
 RTOL = ToleranceSettings().survey_rtol
 TIGHT = ToleranceSettings().tight_survey_rtol
-"""Relative tolerance of these runs, and that at which they are tried again where they alone tell."""
+"""Relative tolerances of these runs: the usual one, and a tighter one where simulations alone decide."""
 
 
 @dataclass(frozen=True)
 class Pending(ArrayRows):
-    """Runs on their way, each of a stage of the ensemble `stages`, one for each; their states (runs, kept) now; the
-    durations of their next round [s], the distance from which they break away, `loose` [m], and whether their mirror
-    images are motions too, `mirrored`, each of shape (runs,); and the relative tolerance."""
+    """Runs on their way, one for each stage of the ensemble `stages`.
+
+    `states` (runs, kept) are the present states and `durations` [s] the lengths of the next round. `loose` [m] is the
+    distance from which a stage breaks away. `mirrored` says that mirror images are motions too. Each has the shape
+    (runs,) unless stated; `rtol` is the relative tolerance.
+    """
 
     stages: Ensemble
     states: np.ndarray
@@ -41,9 +44,12 @@ class Pending(ArrayRows):
 
 @dataclass(frozen=True)
 class Ends(ArrayRows):
-    """How a round ended, arrays of shape (runs,): in what `states`, (runs, kept), which runs were `completed`, which
-    ran `away` from their reference instead, which surely `rest`, the `steps` that they took, and how their last swings
-    repeat, with where these turn [m] and when [s], (runs, swings)."""
+    """How a round of runs ended, arrays of shape (runs,).
+
+    `states`, (runs, kept), are the final states. Runs were `completed`, ran `away` from their reference, or surely
+    `rest`; `steps` counts solver steps. `repeats` says how the last swings repeat; `values` [m] and `times` [s] are
+    their turning points, (runs, swings).
+    """
 
     states: np.ndarray
     completed: np.ndarray
@@ -56,19 +62,21 @@ class Ends(ArrayRows):
 
     @property
     def swing(self) -> np.ndarray:
-        """Which runs swing, whether they repeat themselves yet or not, shape (runs,)."""
+        """Return which runs swing, shape (runs,), whether they already repeat themselves or not."""
         settings = SurveySettings.current()
         return (self.repeats.swings > 0) | (np.isfinite(self.values).sum(axis=1) >= settings.least_turns)
 
 
 def typical_period(stages: Ensemble) -> np.ndarray:
-    """About the period of a cycle [s], shape (count,)."""
+    """Estimate the period of a hunting cycle [s], shape (count,),
+    from the wait while sticking and the loop's frequency."""
     settings = SurveySettings.current()
     return 2 * (wait(stages, settings.typical_distance * stages.length) + 2 * np.pi / stages.number("rate"))
 
 
 def loose_from(stages: Ensemble) -> np.ndarray:
-    """The distance [m] up to which a stage creeps home, and from which on it breaks away, shape (count,)."""
+    """Return the distance [m] from which a stage breaks away instead of creeping home,
+    shape (count,)."""
     settings = SurveySettings.current()
     shares = np.geomspace(*settings.creep_distances)
     distances = shares * stages.length[:, None]
@@ -80,8 +88,8 @@ def loose_from(stages: Ensemble) -> np.ndarray:
 
 
 def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
-    """Follow runs for their durations, in so many steps each at most: the runs from where they are then, and how they
-    ended."""
+    """Run each stage for its duration, within a `budget` of steps,
+    and return the runs at their new states and how they ended."""
     settings = SurveySettings.current()
     stages, count = runs.stages, runs.stages.count
     least = settings.least_swing * stages.length
@@ -113,7 +121,8 @@ def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
 def _stands_still(
     stages: Ensemble, ends: np.ndarray, swing: np.ndarray, durations: np.ndarray, loose: np.ndarray
 ) -> np.ndarray:
-    """Which runs have moved so little, for so long, that they will not break away again."""
+    """Return which runs have moved so little, for so long, that they cannot break away again,
+    shape (runs,)."""
     settings = SurveySettings.current()
     distances = np.abs(ends[:, stages.sticking])
     home = (swing < loose / 2) & (distances < loose / 2) & (durations / 2 > settings.rest_waits * wait(stages, loose))
@@ -126,8 +135,8 @@ def _stands_still(
 def lengthened(runs: Pending, swing: np.ndarray) -> Pending:
     """Give runs a longer next round.
 
-    A run that does not `swing`, (runs,), gets as long as shows that it rests, or swings slowly, but not so much longer
-    that one which begins to swing does so for most of it.
+    A run that does not `swing`, (runs,), gets a round long enough to show that it rests or swings slowly. The round
+    stays short enough that a run which begins to swing does not swing through most of it.
     """
     settings = SurveySettings.current()
     least = np.where(

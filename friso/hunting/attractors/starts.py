@@ -1,4 +1,5 @@
-"""Where motions begin that are to end in everything that attracts a stage."""
+"""Choose the states from which a survey starts,
+so that runs reach every attractor of a stage."""
 
 from __future__ import annotations
 
@@ -16,27 +17,29 @@ from friso.hunting.cycle.rest import bent, pushed, stuck
 from friso.stage.controllers import FORCE_LIMIT
 
 THOROUGH_DISTANCES = np.geomspace(0.001, 0.009, 12), np.geomspace(0.01, 3.0, 96), np.geomspace(4.0, 300.0, 16)
-"""Distances at which a stage sticks at first, in units of the deflection of the loop by the break-away force: from the
-nearest most creep home, farther off they do not stick."""
+"""Distances at which a stage sticks at first, in deflections of the loop by the break-away force. From the nearest most
+runs creep home; from the farthest they do not stick."""
 
 DISTANCES = np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 48), np.geomspace(5.0, 300.0, 6)
-"""Distances for many stages at once: half as many."""
+"""Distances for surveys of many stages at once: half as many."""
 
 LIMITED = np.geomspace(500.0, 30000.0, 8)
-"""Distances beyond these, in the same units, for stages with a force limit: cycles that it drives are as large as the
-limit moves the masses in the time in which the integrator unwinds."""
+"""Farther distances, in deflections of the loop by the break-away force, for stages with a force limit. A cycle driven
+by the limit is as large as the limit moves the masses while the integrator unwinds."""
 
 
 PUSHES = np.geomspace(0.03, 300.0, 12)
-"""Velocities of stages at their reference, in units of what deflects the loop by as much."""
+"""Start velocities of stages at their reference, in units of the velocity that deflects the loop as far as break-away.
+"""
 
 REMEMBERED = np.geomspace(0.01, 30.0, 128), np.geomspace(0.01, 10.0, 32)
-"""Distances, in the same units, from which stages with several bristles begin with these bent in many ways: of a
-thorough survey, and of others."""
+"""Start distances of stages whose several bristles are bent in many ways, in deflections of the loop by the break-away
+force: for a thorough survey, and for others."""
 
 
 class Starts:
-    """Runs that begin, of stages of an ensemble: their states (runs, states) and the stages' numbers (runs,)."""
+    """Runs that are about to begin: their states (runs,
+    states) and the numbers of their stages (runs,)."""
 
     def __init__(self, stages: Ensemble, rtol: float = RTOL, loose: np.ndarray | None = None) -> None:
         self.stages, self.rtol = stages, rtol
@@ -46,12 +49,15 @@ class Starts:
         self.states: list[np.ndarray] = []
 
     def take(self, numbers: np.ndarray) -> Starts:
-        """Starts of the stages with these numbers, none of them begun."""
+        """Return empty starts of the stages with these numbers."""
         return Starts(self.stages.take(numbers), self.rtol, self.loose[numbers])
 
     def spread(self, thorough: np.ndarray | bool) -> None:
-        """Stuck at distances on both sides (on one of symmetric stages); those stages that are `thorough`, (count,) or
-        all, at twice as many, and pushed as well."""
+        """Add runs stuck at distances on both sides of the reference,
+        or on one side of symmetric stages.
+
+        Stages that are `thorough`, (count,) or all, get twice as many distances, and pushes as well.
+        """
         settings = SurveySettings.current()
         controller = self.stages.structure.controller
         limited = controller is not None and controller.anti_windup is not None
@@ -75,7 +81,7 @@ class Starts:
                     self._add(owners, pushed(stages, side * speeds))
 
     def _wound_up(self, which: np.ndarray, side: float) -> None:
-        """Let go at distances on one side, their integrators wound up."""
+        """Add runs released at distances on one side with their integrators wound up."""
         settings = SurveySettings.current()
         span, times = settings.wound_up_starts
         distances = np.geomspace(*span)
@@ -88,9 +94,12 @@ class Starts:
             self._add(np.repeat(which, len(distances)), states)
 
     def remembering(self, thorough: bool) -> None:
-        """With several bristles, bent in ways in which motions leave them: let go at a distance, the controller being
-        switched on before or only then, and pushed; and stuck, drawn there from the reference, after a long way out or
-        back, and after travels to and fro that are drawn at random."""
+        """Add runs of stages with several bristles, bent in the ways in which motions leave them.
+
+        Some runs are released at a distance, with the controller switched on before or only then; some are pushed.
+        Others stick: after being drawn from the reference, after a long way out or back, and after random travels to
+        and fro.
+        """
         settings = SurveySettings.current()
         units = REMEMBERED[0 if thorough else 1]
         rng = np.random.default_rng(0)
@@ -112,7 +121,7 @@ class Starts:
                     self._add(owners, bent(stages, distances, *travels))
 
     def beside(self, cycles: Cycles) -> None:
-        """Beside cycles that repel."""
+        """Add runs that begin on both sides of unstable cycles."""
         settings = SurveySettings.current()
         which = np.flatnonzero(cycles.closed & ~cycles.attracting & np.isfinite(cycles.direction).all(axis=1))
         owners, away = (
@@ -123,14 +132,17 @@ class Starts:
         self._add(owners, cycles.states[owners] + (away * size)[:, None] * cycles.direction[owners])
 
     def stuck_at(self, distances: np.ndarray) -> None:
-        """Stuck at distances [m], (count, n), those that are finite."""
+        """Add runs stuck at the finite ones of some distances [m], (count, n)."""
         owners, which = np.nonzero(np.isfinite(distances))
         if owners.size:
             self._add(owners, stuck(self.stages.take(owners), distances[owners, which]))
 
     def seen(self, owner: int, state: np.ndarray) -> None:
-        """Farther from and nearer to rest than a state (kept,) in which a run of the stage with a number ended; on from
-        there itself, a run might stay on a cycle that hardly repels."""
+        """Add runs a little farther from rest and nearer to it than the final state (kept,) of a run
+        of stage `owner`.
+
+        A run from the state itself could stay on a cycle that is only weakly unstable.
+        """
         settings = SurveySettings.current()
         states = np.outer(1 + np.array(settings.beside_cycle_shares), state[: self.stages.kernel.initial_size])
         self._add(np.full(len(states), owner), states)
@@ -141,8 +153,10 @@ class Starts:
         self.states.append(states)
 
     def waves(self, at_once: bool) -> Iterator[tuple[Pending, np.ndarray]]:
-        """The runs before their first round, and the numbers of their stages: all `at_once`, or a few first, from which
-        most stages that hunt do."""
+        """Yield the runs ready for their first round, with the numbers of their stages.
+
+        All come `at_once`, or in waves: the first few runs suffice for most stages that hunt.
+        """
         settings = SurveySettings.current()
         if not self.owners:
             return
@@ -157,11 +171,12 @@ class Starts:
             left[which] = False
 
     def on_cycles(self, cycles: Cycles, which: np.ndarray) -> Pending:
-        """Runs that begin on the cycles of some stages."""
+        """Return runs that begin on the cycles of the stages with numbers `which`."""
         return self._begun(which, cycles.states[which])
 
     def _begun(self, owners: np.ndarray, states: np.ndarray) -> Pending:
-        """Make runs ready for their first round: how long it is, and whether mirror images are motions too."""
+        """Prepare runs for their first round: set its length,
+        and note where mirror images are motions too."""
         settings = SurveySettings.current()
         stages, mirrored = self.stages.take(owners), self.stages.symmetric[owners]
         begins = stages.kernel.with_modes(states, np.zeros(3), stages.values)

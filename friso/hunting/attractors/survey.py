@@ -1,4 +1,4 @@
-"""A survey of stages: simulated from many starts, to everything that attracts them."""
+"""Survey stages: simulate them from many starts, and follow the runs to their attractors."""
 
 from __future__ import annotations
 
@@ -15,12 +15,17 @@ from friso.hunting.rows import ArrayRows
 
 @dataclass(frozen=True)
 class Swinging:
-    """A motion that a stage does not leave: the number of the `stage`; half of peak to peak, `amplitude` [m]; the
-    `time` in which it repeats itself [s] (NaN: it does not) and its `period` [s], twice that if it is its mirror image
-    by then (of one that does not repeat itself, about the time from one swing to the next but one); a `distance` [m] at
-    which it sticks; the number of `swings`, to one side or the other, in a period; and the cycle, closed as an orbit,
-    with its number among `cycles` (None: it was observed, in a simulation, and last `seen` in a state, (states,), or on
-    a return map, whose `slope` tells how much of a deviation remains after its time; NaN: that is not known)."""
+    """A swing that a stage does not leave: an attractor that was closed as an orbit,
+    or only observed.
+
+    - `stage`: number of the stage; `amplitude` [m]: half of peak to peak.
+    - `time` [s]: after which the motion, or its mirror image, repeats; NaN if it does not.
+    - `period` [s]: of a whole repetition; about the time of two swings if the motion does not repeat.
+    - `distance` [m]: at which the stage sticks; `swings`: to either side in a period.
+    - `cycles`, `number`: the closed orbit and its row; None if a simulation or a return map alone shows the motion.
+    - `seen`: final state (states,) of the run that showed it.
+    - `slope`: share of a deviation left after `time`, by the return map; NaN if unknown.
+    """
 
     stage: int
     amplitude: float
@@ -34,7 +39,7 @@ class Swinging:
     slope: float = float("nan")
 
     def like(self, other: Swinging) -> bool:
-        """Whether two motions of a stage are the same, or mirror images."""
+        """Tell whether two motions of a stage are equal, or mirror images."""
         settings = SurveySettings.current()
         if self.stage != other.stage:
             return False
@@ -46,38 +51,48 @@ class Swinging:
 
     @property
     def observed(self) -> bool:
-        """Whether a simulation alone shows it: there may be others beside it, and how soon motions come to it is not
-        known."""
+        """Tell whether only a simulation shows the motion.
+
+        Then other attractors may lie beside it, and its time constant is unknown.
+        """
         return self.cycles is None and not np.isfinite(self.slope)
 
     @property
     def time_constant(self) -> float:
-        """In which deviations from it shrink by a factor of e [s]; NaN where that is not known."""
+        """Return the time [s] in which a deviation from the motion shrinks by the factor e;
+        NaN if it is unknown."""
         if self.cycles is not None:
             return float(self.cycles.time_constant[self.number])
         return -self.time / float(np.log(self.slope)) if 0 < self.slope < 1 else float("nan")
 
 
 _Kind = tuple[int, float, float]
-"""The number of a stage, and peak to peak [m] and time [s] of a motion of it that repeats itself."""
+"""A kind of motion: number of the stage, peak to peak [m], and time of repetition [s]."""
 
 
 @dataclass(frozen=True)
 class _Beside(ArrayRows):
-    """The numbers of the closed cycles that repel like which runs repeat themselves, `cycles` (runs,), -1: none; and by
-    which share they swing farther than these, `offsets` (runs,), 0 without one."""
+    """Unstable cycles near which runs repeat themselves, arrays of shape (runs,).
+
+    `cycles` are the numbers of the cycles, -1 for none. `offsets` are the shares by which runs swing farther than the
+    cycle, 0 without one.
+    """
 
     cycles: np.ndarray
     offsets: np.ndarray
 
     @classmethod
     def nothing(cls, count: int) -> _Beside:
-        """No run is beside a cycle that repels."""
+        """Return the case in which no run is near an unstable cycle."""
         return cls(np.full(count, -1), np.zeros(count))
 
     @property
     def leave_first(self) -> np.ndarray:
-        """The runs that are followed for all on the same side of the same cycle, (runs,)."""
+        """Choose the runs that are followed for all runs on their side of an unstable cycle,
+        (runs,).
+
+        The farthest runs leave the cycle first, so a few of the outer ones stand for the rest.
+        """
         settings = SurveySettings.current()
         chosen, far, sides = np.zeros(len(self.cycles), bool), np.abs(self.offsets), np.sign(self.offsets)
         for cycle, side in {*zip(self.cycles.tolist(), sides.tolist(), strict=True)} - {(-1, 0.0)}:
@@ -89,7 +104,8 @@ class _Beside(ArrayRows):
 
 
 def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
-    """Which runs, of the stages with the numbers `owners`, repeat themselves like one of some kinds of motion."""
+    """Return which runs, of the stages `owners`,
+    repeat themselves like one of some kinds of motion, (runs,)."""
     settings = SurveySettings.current()
     motions_of: dict[int, list[tuple[float, float]]] = {}
     for stage, size, time in kinds:
@@ -104,7 +120,8 @@ def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
 
 
 def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int, which: np.ndarray | None = None) -> list[Swinging]:
-    """The cycles of the stages with some numbers as motions: those that attract, or `which` are asked for, (count,)."""
+    """Return the stable cycles of the stages with some numbers as motions,
+    or the cycles marked in `which`, (count,)."""
     return [
         Swinging(
             int(numbers[k]),
@@ -122,12 +139,17 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int, which: np.ndar
 
 @dataclass
 class Survey:
-    """What has been learned of stages so far, by a `thorough` survey, or by one that has to `prove` what attracts, or
-    takes motions that have converged for attracted; one that `decides` may take more steps. Of the stages that are
-    `unbounded`, (count,), motions that run away from their reference have not failed. The motions that attract; and of
-    which stages that is `unknown`, because a run failed or had to be given up, the time constant of the cycle that
-    repels most slowly, `slowest` [s] (0: none), the steps that its runs may take still, `left`, and the farthest
-    distances [m] from which runs came to rest, `rested`, and ran `away` (0: none), all of shape (count,)."""
+    """Results of a survey so far.
+
+    A `thorough` survey looks for every attractor. A survey that has to `prove` attraction closes orbits; without it, a
+    motion that has converged counts as attracted. A survey that `decides` may take more steps. `unbounded` marks stages
+    for which a run that diverges has not failed.
+
+    `attracting` are the attractors so far. The following have the shape (count,). A stage is `unknown` if a run failed
+    or was given up. `slowest` [s] is the time constant of the most weakly unstable cycle (0: none). `left` counts the
+    solver steps left for the runs of a stage. `rested` and `away` [m] are the farthest starts from which runs came to
+    rest or diverged (0: none).
+    """
 
     unbounded: np.ndarray
     thorough: bool
@@ -146,7 +168,7 @@ class Survey:
 
     @property
     def count(self) -> int:
-        """How many stages there are."""
+        """Return the number of stages."""
         return len(self.unbounded)
 
     def __post_init__(self) -> None:
@@ -159,25 +181,26 @@ class Survey:
 
     @property
     def attracted(self) -> np.ndarray:
-        """Which stages something attracts, shape (count,)."""
+        """Return which stages have an attractor so far, shape (count,)."""
         attracted = np.zeros(self.count, bool)
         attracted[[motion.stage for motion in self.attracting]] = True
         return attracted
 
     @property
     def runs_away(self) -> np.ndarray:
-        """Which stages run away from the farthest distances tried, shape (count,): so does what begins beyond them."""
+        """Return which stages diverge from the farthest starts tried, and so from beyond them,
+        shape (count,)."""
         return self.unbounded & (self.away > self.rested)
 
     def add(self, motions: list[Swinging]) -> None:
-        """Add motions that attract, but those that are there already."""
+        """Add attractors that are not in the survey yet."""
         for motion in motions:
             if not (self.thorough and any(motion.like(other) for other in self.attracting)):
                 self.attracting.append(motion)
                 self._attracting_kinds.append((motion.stage, 2 * motion.amplitude, motion.time))
 
     def note_unstable_cycles(self, numbers: np.ndarray, cycles: Cycles) -> None:
-        """Note unstable cycles of the stages with some numbers: runs take long to leave them."""
+        """Note the unstable cycles of the stages with some numbers: runs take long to leave them."""
         settings = SurveySettings.current()
         repel = np.flatnonzero(cycles.closed & ~cycles.attracting)
         for k in repel:
@@ -188,7 +211,7 @@ class Survey:
         np.maximum.at(self.slowest, numbers[repel], cycles.time_constant[repel])
 
     def follow(self, runs: Pending, owners: np.ndarray) -> None:
-        """Follow runs, each of the stage with the number `owners`, (runs,), to what attracts them."""
+        """Follow runs of the stages `owners`, (runs,), round by round to their attractors."""
         settings = SurveySettings.current()
         before, begun = np.full(len(owners), np.nan), np.abs(runs.states[:, runs.stages.sticking])
         for number in range(settings.most_rounds):
@@ -227,8 +250,11 @@ class Survey:
             runs = lengthened(runs.take(swinging), ends.swing[swinging])
 
     def _still_swinging(self, runs: Pending, owners: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
-        """The numbers of the runs that swing on without having come to an attractor, once orbits were closed: `early`
-        from those alone that repeat themselves well, and unlike any cycle that is known to repel."""
+        """Close orbits from runs that are ready, and return the numbers of the runs that still swing
+        without an attractor.
+
+        `early` restricts closing to runs that repeat themselves well and resemble no unstable cycle.
+        """
         self.unknown[owners[~ends.completed & ~(ends.away & self.unbounded[owners])]] = True
         swinging = ends.completed & ~ends.rest & ~self._known_to_attract(owners, ends)
         ready = swinging & (ends.repeats.swings > 0)
@@ -241,14 +267,15 @@ class Survey:
         return np.flatnonzero(swinging & ~self._known_to_attract(owners, ends))
 
     def _within_budget(self, swinging: np.ndarray, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Keep the runs, of those with the numbers `swinging`, whose stages have steps left after a round."""
+        """Return the runs, of those numbered `swinging`,
+        whose stages have steps left after this round."""
         np.subtract.at(self.left, owners, ends.steps)
         spent = self.left[owners[swinging]] <= 0
         self.unknown[owners[swinging[spent]]] = True
         return swinging[~spent]
 
     def _affordable(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """How many kinds of runs of its stage may be followed on, for each run."""
+        """Return, for each run, how many kinds of run of its stage may be followed further."""
         settings = SurveySettings.current()
         runs = np.bincount(owners, minlength=self.count)
         steps = np.bincount(owners, ends.steps, minlength=self.count) / np.maximum(runs, 1)
@@ -258,7 +285,7 @@ class Survey:
     def _kinds(
         self, owners: np.ndarray, ends: Ends, most: np.ndarray | int, beside: _Beside | None = None
     ) -> np.ndarray:
-        """The numbers of runs that are followed on for all of their kind.
+        """Return one run of each kind, to be followed for all of its kind.
 
         Marks a stage unknown if it has more kinds of run than may be followed.
         """
@@ -267,7 +294,7 @@ class Survey:
         return chosen
 
     def _beside(self, owners: np.ndarray, ends: Ends) -> _Beside:
-        """Beside which closed cycles that repel runs repeat themselves like them: the nearest ones."""
+        """Return the nearest unstable cycle that each run resembles, and its offset from the cycle."""
         settings = SurveySettings.current()
         cycles, offsets = np.full(len(owners), -1), np.full(len(owners), np.inf)
         for number, kind in enumerate(self._closed):
@@ -277,18 +304,18 @@ class Survey:
         return _Beside(cycles, np.where(cycles < 0, 0.0, offsets))
 
     def _repels(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Which runs repeat themselves like a cycle that repels, or like what no orbit that attracts could be closed
-        from."""
+        """Return which runs resemble an unstable cycle,
+        or a run from which no stable orbit could be closed."""
         return _like(self._closed, owners, ends) | _like(self._unclosed, owners, ends)
 
     def _known_to_attract(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Which runs repeat themselves like a motion that is known already to attract their stage."""
+        """Return which runs resemble an attractor of their stage that is in the survey already."""
         if not self.thorough:
             return self.attracted[owners]
         return _like(self._attracting_kinds, owners, ends)
 
     def _close(self, runs: Pending, owners: np.ndarray, ends: Ends, which: np.ndarray) -> None:
-        """Close orbits from one of each kind of runs, of those with some numbers."""
+        """Close an orbit from one run of each kind, of the runs numbered `which`."""
         most, repeats = SurveySettings.current().orbits_per_round if self.thorough else 1, ends.repeats
         kinds = which[_kinds(owners[which], ends.take(which), most)[0]]
         pairs = runs.mirrored & (repeats.swings == 2)  # as swings about a symmetric cycle that approach it, too, seem
@@ -305,7 +332,7 @@ class Survey:
     def _close_after(
         self, runs: Pending, owners: np.ndarray, ends: Ends, swinging: np.ndarray, swings: np.ndarray, times: np.ndarray
     ) -> None:
-        """Close orbits from the runs with the numbers `swinging`, after numbers of swings and times [s]."""
+        """Close orbits from the runs numbered `swinging`, after so many swings and the times [s]."""
         repeats = ends.repeats
         for group, cycles in close_orbits(runs.take(swinging), swings, times, repeats.size[swinging], self.rtol):
             numbers = swinging[group]
@@ -316,8 +343,10 @@ class Survey:
                 kinds_of += zip(*columns, strict=True)  # the runs are not as exact as their orbits
 
     def _last(self, runs: Pending, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
-        """Take runs that swing to the end for attracted, if they have not decayed; those that may be about to leave a
-        cycle that repels are followed for as long as that takes."""
+        """Count runs that swing to the last round as attracted, unless they decay.
+
+        A run that may still be leaving an unstable cycle is first followed for as long as that takes.
+        """
         settings = SurveySettings.current()
         kinds = self._kinds(owners, ends, settings.orbits_per_round)
         leave = settings.leaving_time_constants * self.slowest[owners]
@@ -333,7 +362,7 @@ class Survey:
         self._observe(owners[kinds], ends.take(kinds), before[kinds])
 
     def confirm(self, runs: Pending, owners: np.ndarray, cycles: Cycles) -> None:
-        """Add those cycles, of the stages `owners` (runs,), that a run which begins on them stays on."""
+        """Add the cycles of the stages `owners`, (runs,), on which a run stays that begins there."""
         settings = SurveySettings.current()
         _, ends = one_round(runs)
         size = np.abs(ends.repeats.size / (2 * cycles.amplitude) - 1) < settings.same_motion_share
@@ -342,15 +371,21 @@ class Survey:
         self.add(of_cycles(owners[which], cycles.take(which), runs.stages.sticking))
 
     def _regular(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> np.ndarray:
-        """Which runs repeat themselves so well, and have changed so little in the last round, that they will not leave
-        where they are: unless that is beside a cycle that repels."""
+        """Return which runs repeat so well, and changed so little in the last round,
+        that they will stay.
+
+        Runs near an unstable cycle are left out.
+        """
         settings = SurveySettings.current()
         same = np.abs(ends.repeats.mean / before - 1) < settings.unchanged_swing_share
         return same & (ends.repeats.deviation < settings.settled_swing_share) & ~self._repels(owners, ends)
 
     def _exact(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Which runs repeat themselves as exactly as they do on what attracts alone, or approach that where nothing
-        has to be proved, and unlike any closed cycle that repels, or beside one to stay."""
+        """Return which runs repeat as exactly as only a motion on an attractor does.
+
+        Where nothing has to be proved, runs that clearly approach a repetition count as well. A run that resembles an
+        unstable cycle only counts if it stays beside it.
+        """
         settings = SurveySettings.current()
         repeats, unlike = ends.repeats, (ends.repeats.swings > 0) & ~_like(self._closed, owners, ends)
         if self.prove:
@@ -361,14 +396,14 @@ class Survey:
         return unlike & ((repeats.deviation < settings.converged_swing_share) | approaches)
 
     def _stay(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Which runs repeat themselves beside a closed cycle that repels more exactly than they would on their way from
-        it: they are on another one."""
+        """Return which runs beside an unstable cycle repeat too exactly to be leaving it:
+        they are on another cycle."""
         settings = SurveySettings.current()
         offsets = np.abs(self._beside(owners, ends).offsets)
         return (ends.repeats.swings > 0) & (ends.repeats.deviation < settings.exact_repetition_share * offsets)
 
     def _observe(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
-        """Take motions for attracted that were only observed: their repetitions become attractors of their stages."""
+        """Add steady runs whose orbit was not closed as observed attractors of their stages."""
         settings = SurveySettings.current()
         repeats = ends.repeats
         begun = (before == 0) & ~(
@@ -399,9 +434,12 @@ class Survey:
 def _kinds(
     owners: np.ndarray, ends: Ends, most: np.ndarray | int, beside: _Beside | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The numbers of runs that stand for all, no two of a stage that are alike and not more than `most` of each, a
-    number or one for each run, and of those that are like none of these. Runs that do not repeat themselves are on
-    their way, and soon apart. A few of those `beside` a cycle that repels stand for all on the same side of it."""
+    """Choose runs that stand for all: no two of a stage alike, and at most `most` of each stage.
+
+    Returns their numbers, and the numbers of the runs of further kinds. `most` is one number, or one for each run. Runs
+    that do not repeat count as alike only if they are very close. A few of the runs `beside` an unstable cycle stand
+    for all on that side of it.
+    """
     settings = SurveySettings.current()
     limits, beside = np.broadcast_to(most, (len(owners),)), beside or _Beside.nothing(len(owners))
     chosen: dict[int, list[int]] = {}

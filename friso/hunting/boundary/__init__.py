@@ -1,4 +1,5 @@
-"""The boundary of hunting: cycles followed through one key or two, and where they stop attracting."""
+"""Follow hunting cycles through one key or two, and locate where they stop attracting:
+the boundary of hunting."""
 
 from friso.hunting.boundary.branch import END_OF_RANGE, Branch, Point
 from friso.hunting.boundary.curve import CLOSED, Curve, Spot

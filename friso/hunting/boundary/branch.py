@@ -1,7 +1,8 @@
-"""A hunting cycle followed along a line through the keys, round its folds: pseudo-arclength continuation.
+"""Follow a hunting cycle along a line through the keys, around its folds,
+by pseudo-arclength continuation.
 
 Keller 1977, in Applications of Bifurcation Theory (Academic Press); Kuznetsov 2004, doi:10.1007/978-1-4757-3978-7,
-chapter 10. The line is measured by a place (0 to 1) and the cycle by the distance at which the stage sticks.
+chapter 10. A place from 0 to 1 measures the line; the distance at which the stage sticks measures the cycle.
 """
 
 from __future__ import annotations
@@ -18,23 +19,26 @@ from friso.hunting.cycle.find import RTOL, Cycles, described
 from friso.hunting.cycle.shooting import Border, Family, close_along
 
 END_OF_RANGE = "end of the range"
-"""How a branch ends that has been followed to the end."""
+"""Reason given when a branch was followed to the end of the range."""
 
 REACHED = "it reached the end of the requested range"
-"""How a branch ends that was followed until something happened."""
+"""Reason given when a branch was followed until the condition of the walk held."""
 
 NO_FARTHER = "it could not be followed farther"
-"""How the reason begins where the next cycle of a branch was not found."""
+"""First words of the reason given when the next cycle of a branch was not found."""
 
 
 HUNDREDTH = float(np.log(1.01))
-"""Length of a line over which what is varied changes by a hundredth, where places are logarithms of it."""
+"""Length of a line over which the key changes by a hundredth, if places are logarithms of the key."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """A cycle on a branch, its place on the line, and the logarithms of its distance [m] and its time of return [s];
-    with the Jacobian that it was closed with (see `Followed`), if it was followed."""
+    """A cycle on a branch, at a place on the line.
+
+    `distance` and `time` are logarithms of its sticking distance [m] and its time of return [s]. `jacobians` is the
+    Jacobian with which it was closed (see `Followed`), if it was followed from another cycle.
+    """
 
     place: float
     distance: float
@@ -44,24 +48,27 @@ class Point:
 
     @classmethod
     def of(cls, stages: Ensemble, place: float, cycle: Cycles, jacobians: np.ndarray | None = None) -> Point:
-        """The point of one cycle."""
+        """Make the point of one cycle."""
         distance = abs(float(cycle.states[0, stages.sticking]))
         return cls(place, float(np.log(distance)), float(np.log(cycle.orbits.times[0])), cycle, jacobians)
 
     @property
     def multiplier(self) -> float:
-        """The multiplier that decides whether the cycle attracts."""
+        """Return the multiplier that decides whether the cycle is stable."""
         return float(self.cycle.multiplier[0])
 
     @property
     def vector(self) -> np.ndarray:
-        """Where it is in the space of place, log distance and log time."""
+        """Return the point in the space of place, log distance and log time."""
         return np.array([self.place, self.distance, self.time])
 
 
 @dataclass(frozen=True)
 class Branch:
-    """Cycles in order along a branch, of half a period (sign -1) or a whole one, and how it ends on either side."""
+    """Cycles in order along a branch, and the reasons why it ends on either side.
+
+    `sign` is -1 for cycles closed over half a period, 1 for a whole one.
+    """
 
     sign: float
     points: tuple[Point, ...]
@@ -69,10 +76,14 @@ class Branch:
 
 
 class Tracer:
-    """Follows one cycle along a line of stages (a family of one), from place 0 to the farthest; `sign` and `swings` are
-    those of the cycle (the latter only if they are not as few as there may be); `pace` times as fast as a curve is
-    drawn, in steps not shorter than `shortest`, the `first` one as long as is asked, as long as its multiplier is below
-    the `steepest`. At a place, what is varied changes by a hundredth over a length of the line, `hundredth`."""
+    """Follows one cycle along a line of stages (a family of one),
+    from place 0 to the `farthest`.
+
+    `sign` and `swings` are those of the cycle; None means the fewest swings possible. Steps are `pace` times as long as
+    for drawing a curve, at least `shortest` long, and the first has the length `first`. The cycle is followed while its
+    multiplier is below `steepest`. `hundredth` gives, at a place, the length of the line over which the key changes by
+    a hundredth.
+    """
 
     def __init__(
         self,
@@ -101,9 +112,13 @@ class Tracer:
     def solve(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
     ) -> Point | None:
-        """The cycle on the plane through a target (place, log distance, log time) with this normal, found from a cycle
-        near it, or from about its own states (1, states); None if none is found, with the Jacobian of the one near it
-        or with one of its own."""
+        """Find the cycle on a plane in the space of place, log distance and log time,
+        from a cycle `near` it.
+
+        The plane passes through `target` with the normal `normal`. The search starts from the nearby cycle, or from its
+        own approximate `states` (1, states). It uses the Jacobian of the nearby cycle first, then a new one. Returns
+        None if no cycle is found.
+        """
         point = self._solved(near, target, normal, states)
         if point is None and near.jacobians is not None:
             return self._solved(replace(near, jacobians=None), target, normal, states)
@@ -112,7 +127,8 @@ class Tracer:
     def _solved(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
     ) -> Point | None:
-        """Solve for the cycle as `solve` does, but with the Jacobian of the nearby cycle alone, if it has one."""
+        """Find the cycle as `solve` does, but only with the Jacobian of the nearby cycle,
+        if it has one."""
         border = Border(normal[None, :], np.array([normal @ target]))
         begin, times, place = near.cycle.states, near.cycle.orbits.times, np.array([near.place])
         if states is not None or near.jacobians is None:
@@ -132,9 +148,12 @@ class Tracer:
     def walk(
         self, start: Point, ahead: float, until: Callable[[Point, Point], bool] | None = None
     ) -> tuple[list[Point], str]:
-        """The points that follow the start on one side, and how they end; `ahead` is 1 or -1. The first point of which,
-        with the one before it, `until` holds is the last, and asymmetric cycles are then followed on where they meet
-        the symmetric one."""
+        """Follow the branch from a point to one side,
+        and return the points and the reason for the end.
+
+        `ahead` is 1 or -1. The walk ends with the first point for which `until` holds, given the point before it and
+        the point itself. Without `until`, a branch of asymmetric cycles also ends where it meets the symmetric cycle.
+        """
         settings = ContinuationSettings.current()
         points, direction, step = [start], np.array([ahead, 0.0, 0.0]), self.first
         while len(points) <= settings.most_branch_steps:
@@ -173,26 +192,28 @@ class Tracer:
         return points[1:], "it was followed for as many steps as there may be"
 
     def reaches(self, points: Sequence[Point], reason: str) -> bool:
-        """Whether a walk with these points that ended for a reason came to the farthest place, and not back to the
-        first, on a branch that turns."""
+        """Tell whether a walk came to the farthest place, rather than turning back to the first one."""
         return reason == END_OF_RANGE and bool(points) and points[-1].place > self.farthest * (1 - 1e-6)
 
     def _at_the_end(self, last: Point, beyond: Point) -> list[Point]:
-        """The point at the end of the range that lies between two."""
+        """Return the cycle at the end of the range,
+        between the last point inside and the first beyond; none if it is not found."""
         end = 0.0 if beyond.place < 0 else self.farthest
         share = (end - last.place) / (beyond.place - last.place)
         terminal = self.solve(last, last.vector + share * (beyond.vector - last.vector), np.array([1.0, 0.0, 0.0]))
         return [terminal] if terminal else []
 
     def _is_mirrored(self, start: Point, point: Point) -> bool:
-        """Whether a cycle of a symmetric stage leans to the other side than the start: beyond the symmetric cycle the
-        branch is its own mirror image."""
+        """Tell whether a cycle of a symmetric stage leans to the other side than the start.
+
+        Beyond the symmetric cycle a branch of asymmetric cycles is its own mirror image.
+        """
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
         leans = float(point.cycle.middle[0] * start.cycle.middle[0])
         return bool(self.sign > 0 and stages.symmetric[0] and leans < 0)
 
     def _stop(self, point: Point) -> str:
-        """Why a branch is not followed beyond a point; "" if it is."""
+        """Return the reason why a branch is not followed beyond a point; "" if it is."""
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
         if point.cycle.amplitude[0] < ContinuationSettings.current().vanished_amplitude * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"
@@ -201,15 +222,18 @@ class Tracer:
         return ""
 
     def branch(self, start: Point) -> Branch:
-        """The whole branch through a point."""
+        """Follow the whole branch through a point, to both sides."""
         (after, last), (before, first) = self.walk(start, 1.0), self.walk(start, -1.0)
         return Branch(self.sign, (*before[::-1], start, *after), (first, last))
 
 
 def continued(points: Sequence[Point], step: float, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-    """Where the cycle a step beyond the last of up to three points is, in the space of place, log distance and log
-    time, a step ahead along a direction there; and its states (1, states), None if there is one point alone: on the
-    straight line through two, on the parabola through three, over the lengths between them."""
+    """Extrapolate a branch one step beyond the last of up to three points.
+
+    Returns the point in the space of place, log distance and log time, and the cycle's states (1, states). Two points
+    give a straight line, three a parabola over the lengths between them. One point alone gives no states: the step then
+    goes along `direction`.
+    """
     last = points[-1]
     if len(points) == 1:
         return last.vector + step * direction, None

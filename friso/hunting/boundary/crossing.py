@@ -1,4 +1,5 @@
-"""Where values that scatter pass zero, or turn, and up to what that is known: by a cubic through them."""
+"""Locate where scattered values pass zero or turn, with an error bound,
+by a cubic through them."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ from friso.hunting.boundary.settings import ContinuationSettings
 
 
 class Crossing(NamedTuple):
-    """A place at which values pass zero, by how much it may be off, and their slope there."""
+    """A place at which values pass zero, its error bound `reserve`, and the slope there."""
 
     place: float
     reserve: float
@@ -18,10 +19,13 @@ class Crossing(NamedTuple):
 
 
 def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
-    """The last place at which the cubic through values, (n,), passes zero in the direction of their trend. It may be
-    off by twice what their scatter moves the cubic or their trend, or by the distance to where the cubic passes zero as
-    well; None if that is more than half of the range of places, beyond which nothing is known, or if it does not pass
-    zero, or there are too few values."""
+    """Find the last place at which a cubic through values, (n,),
+    passes zero in the direction of their trend.
+
+    The error is twice what their scatter moves the cubic or their trend, or the distance to another zero of the cubic.
+    Returns None if there are too few values, if the cubic does not pass zero, or if the error exceeds half of the range
+    of places.
+    """
     if len(places) < ContinuationSettings.current().least_cubic_values:
         return None
     trend, curve = (np.polynomial.Polynomial.fit(places, values, degree) for degree in (1, 3))
@@ -41,7 +45,8 @@ def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
 
 
 class FoldBack(NamedTuple):
-    """A length along a branch at which it turns back, its place there, and by how much that may be off."""
+    """A fold of a branch: the length along the branch, the place there,
+    and the error bound of the place."""
 
     length: float
     place: float
@@ -49,9 +54,11 @@ class FoldBack(NamedTuple):
 
 
 def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
-    """Where the cubic through places, (n,), over lengths turns, nearest to length 0. The place may be off by twice what
-    they scatter about it; None if it does not turn among them, from either end by more than that, or there are too
-    few."""
+    """Find where a cubic through places, (n,), over lengths turns back, nearest to length 0.
+
+    The error of the place is twice the scatter about the cubic. Returns None if the cubic does not turn within the
+    lengths, if the error exceeds half of the range of places, or if there are too few places.
+    """
     if len(places) < ContinuationSettings.current().least_cubic_values:
         return None
     curve = np.polynomial.Polynomial.fit(lengths, places, 3)
@@ -66,5 +73,5 @@ def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
 
 
 def _scatter(curve: np.polynomial.Polynomial, at: np.ndarray, values: np.ndarray) -> float:
-    """Standard deviation of values, (n,), about a cubic through them."""
+    """Return the standard deviation of values, (n,), about a cubic through them."""
     return float(np.sqrt(np.sum((values - curve(at)) ** 2) / (len(at) - 4)))

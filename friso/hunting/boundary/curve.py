@@ -1,7 +1,8 @@
-"""The edge of hunting in two keys: the curve on which a cycle flips or folds, followed point by point.
+"""Follow the edge of hunting in two keys: the curve on which a cycle flips or folds.
 
-Every point is corrected on the line through the predicted one across the curve, along which the cycle is a branch of
-its own: at a flip it is moved along the key, at a fold, beyond which there is no cycle, along its distance and time.
+Each point is predicted, then corrected on a line across the curve. Along that line the cycle is a branch of its own. At
+a flip the correction moves along the keys. At a fold it moves along the cycle's distance and time, because there is no
+cycle beyond.
 """
 
 from __future__ import annotations
@@ -23,8 +24,11 @@ from friso.hunting.cycle.find import RTOL
 
 @dataclass(frozen=True)
 class Spot:
-    """A point of a curve: its place in the box of the keys, shape (2,), the special point there, and the direction of
-    the line across the curve on which it was located, shape (2,)."""
+    """A point of a curve on which a cycle changes.
+
+    `at` is its place in the box of the keys, shape (2,), `special` the point of change there. `across` is the direction
+    of the line on which it was located, shape (2,).
+    """
 
     at: np.ndarray
     special: LocatedPoint
@@ -32,12 +36,12 @@ class Spot:
 
     @property
     def size(self) -> np.ndarray:
-        """Logarithms of the cycle's distance [m] and time [s], shape (2,)."""
+        """Return logarithms of the cycle's distance [m] and time [s], shape (2,)."""
         return self.special.point.vector[1:]
 
     @property
     def error(self) -> np.ndarray:
-        """By how much it may be off along each key, shape (2,)."""
+        """Return the error of the place along each key, shape (2,)."""
         if not np.isfinite(self.special.error):
             return np.full(2, np.inf)
         return np.abs(self.special.error * self.across)
@@ -45,8 +49,11 @@ class Spot:
 
 @dataclass(frozen=True)
 class Curve:
-    """Spots in order along the curve, of cycles of half a period (sign -1) or a whole one, and how it ends on either
-    side ("closed" twice if it is)."""
+    """Spots in order along a curve on which cycles of one kind change,
+    and how the curve ends on either side.
+
+    `sign` is -1 for cycles closed over half a period, 1 for a whole one. Both ends are "closed" for a ring.
+    """
 
     kind: Bifurcation
     sign: float
@@ -55,14 +62,17 @@ class Curve:
 
     @property
     def points(self) -> np.ndarray:
-        """Where it runs in the box of the keys, shape (spots, 2)."""
+        """Return the curve in the box of the keys, shape (spots, 2)."""
         return np.array([spot.at for spot in self.spots])
 
 
 @dataclass(frozen=True)
 class Expected:
-    """About where a point of a curve will be, shape (2,), the logarithms of its cycle's distance [m] and time [s], the
-    cycle's states (1, states), and the direction of the curve there, shape (2,)."""
+    """Prediction of the next point of a curve.
+
+    `at` is the place, shape (2,), `size` the logarithms of the cycle's distance [m] and time [s]. `states` (1, states)
+    lie on the cycle, and `direction`, shape (2,), is the direction of the curve there.
+    """
 
     at: np.ndarray
     size: np.ndarray
@@ -71,7 +81,8 @@ class Expected:
 
     @classmethod
     def beyond(cls, spots: Sequence[Spot], step: float) -> Expected:
-        """A step beyond points of a curve: on the parabola through the last three, or the straight line through two."""
+        """Extrapolate a curve one step: by a parabola through the last three points,
+        or a straight line through two."""
         last = spots[-3:]
         away = [-float(np.linalg.norm(spot.at - last[-1].at)) for spot in last]
         rows = [np.concatenate([spot.at, spot.size, spot.special.point.cycle.states[0]]) for spot in last]
@@ -81,7 +92,8 @@ class Expected:
 
 
 class CurveTracer:
-    """Follows the points of one kind through the box of two keys."""
+    """Follows the points of one kind of change, a flip, a fold or a torus,
+    through the box of two keys."""
 
     def __init__(self, space: Space, kind: Bifurcation, sign: float, rtol: float = RTOL) -> None:
         self.space, self.sign, self.rtol = space, sign, rtol
@@ -90,8 +102,11 @@ class CurveTracer:
     def on_line(
         self, origin: np.ndarray, across: np.ndarray, near: Spot, reach: float, expected: Expected | None = None
     ) -> Spot | None:
-        """The point of the curve on the line through an origin of the box along a direction, found from one near it, or
-        from about what is expected there."""
+        """Find the point of the curve on a line through the box,
+        no farther than `reach` from its `origin`.
+
+        The search starts from the point `near` it, or from the `expected` one. Returns None if it fails.
+        """
         hundredth = self.space.hundredth(origin, across)
         tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol, hundredth=hundredth)
         point, special = near.special.point, near.special
@@ -109,8 +124,11 @@ class CurveTracer:
         return Spot(origin + located.point.place * across, located, across)
 
     def _slope(self, near: Spot, across: np.ndarray, expected: Expected) -> float:
-        """About how fast the multiplier changes along the line on which a point is expected: across the curve as at the
-        point near it, along a line at an angle to it less. NaN if the line through that point grazes the curve."""
+        """Estimate how fast the multiplier changes along the line on which a point is expected.
+
+        Across the curve it changes as at the nearby point, along an oblique line less. Returns NaN if the line through
+        the nearby point grazes the curve.
+        """
         if self.kind == "fold":
             return near.special.slope
         normal = expected.direction[::-1] * [-1.0, 1.0]
@@ -120,7 +138,7 @@ class CurveTracer:
         return near.special.slope * float(normal @ across) / crossing / float(near.special.direction[0])
 
     def curve(self, first: Spot) -> Curve | None:
-        """The whole curve through a point; None if no second point is found next to it."""
+        """Follow the whole curve through a point; None if no second point is found next to it."""
         settings = ContinuationSettings.current()
         aside = first.across[::-1] * [1.0, -1.0]
         for side in (settings.second_point_distance, -settings.second_point_distance):
@@ -139,7 +157,8 @@ class CurveTracer:
         return Curve(self.kind, self.sign, (*before[:1:-1], *after), (beginning, last))
 
     def walk(self, spots: list[Spot]) -> tuple[list[Spot], str]:
-        """Two neighbouring points with those that follow them, and how they end."""
+        """Follow a curve from two neighbouring points; return these with the points that follow,
+        and the reason for the end."""
         settings = ContinuationSettings.current()
         start, step = spots[0], settings.first_curve_step
         direction = unit_vector(spots[1].at - spots[0].at)
@@ -164,7 +183,7 @@ class CurveTracer:
         return spots, "it was followed for as many steps as there may be"
 
     def _at_the_side(self, spots: list[Spot], direction: np.ndarray, step: float) -> list[Spot]:
-        """The point at which the curve leaves the box."""
+        """Find the point at which the curve leaves the box; none if it is not found."""
         last = spots[-1]
         with np.errstate(divide="ignore", invalid="ignore"):
             times = np.where(
@@ -178,7 +197,7 @@ class CurveTracer:
         return [spot] if spot is not None and inside else []
 
     def _named(self, at: np.ndarray) -> str:
-        """The keys at a place in the box, with their values and units."""
+        """Return words for a place in the box: the keys with their values and units."""
         values = self.space.values(at[None])
         units = [swept.unit for swept in self.space.ranges]
         named = zip(values.items(), units, strict=True)
@@ -191,4 +210,4 @@ def unit_vector(vector: np.ndarray) -> np.ndarray:
 
 
 CLOSED = "closed"
-"""How a curve ends that comes back to its start."""
+"""Reason given when a curve comes back to its start."""

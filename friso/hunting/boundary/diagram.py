@@ -1,4 +1,5 @@
-"""The bifurcation diagram in one key: all branches of cycles over its range, and where they stop attracting."""
+"""Compute the bifurcation diagram in one key: all branches of cycles,
+and where they stop attracting."""
 
 from __future__ import annotations
 
@@ -19,14 +20,18 @@ from friso.hunting.loop import unstable_among
 from friso.progress import Progress, Tally, silent
 
 BRANCHES = "following branches of cycles"
-"""What is reported to a progress: each cycle that was found lies on a branch."""
+"""Progress message for each cycle whose branch is followed."""
 
 
 @dataclass(frozen=True)
 class Diagram:
-    """Branches of cycles over the range of one key, the special points of each, and, of stages evenly over the range
-    (their places), the hunting cycles, whether anything attracts, whether that is known, and whether their loop is
-    unstable, whatever the friction does, shape (places,)."""
+    """Bifurcation diagram over the range of one key: branches of cycles,
+    and the special points of each.
+
+    The arrays belong to stages spaced evenly over the range, at `places`. `cycles` are their hunting cycles. `attracts`
+    says whether there is an attractor, `decided` whether that is known. `unstable` says whether the loop is unstable
+    regardless of friction. Each has the shape (places,).
+    """
 
     space: Space
     branches: tuple[Branch, ...]
@@ -38,29 +43,32 @@ class Diagram:
     unstable: np.ndarray
 
     def value(self, place: float) -> float:
-        """The value of the key [SI] at a place."""
+        """Return the value of the key [SI] at a place."""
         return float(self.space.ranges[0].at(np.array(place)))
 
     def error(self, special: LocatedPoint) -> float:
-        """By how much the value [SI] of a special point may be off."""
+        """Return the error of the key's value [SI] at a special point."""
         return abs(self.value(special.point.place + special.error) - self.value(special.point.place))
 
     def in_doubt(self, places: np.ndarray) -> np.ndarray:
-        """Whether places, (n,), lie within the error of a special point: there multipliers tell nothing."""
+        """Return which places, (n,), lie within the error of a special point,
+        where multipliers decide nothing."""
         return _in_doubt(self.special, places)
 
 
 def _in_doubt(special: Sequence[Sequence[LocatedPoint]], places: np.ndarray) -> np.ndarray:
-    """Which places, (n,), lie within the error of a special point."""
+    """Return which places, (n,), lie within the error of a special point."""
     near = [np.abs(spot.point.place - places) < spot.error for own in special for spot in own]
     return np.any([np.zeros(len(places), bool), *near], axis=0)
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress: Progress = silent) -> Diagram:
-    """Follow over the range of one key every cycle that is found at `seeds` stages evenly over it: those that the
-    return map suggests, the symmetric one and asymmetric ones, and those that simulations end in, of any number of
-    swings. Orbits are closed to a relative tolerance."""
+    """Follow every cycle that is found at `seeds` stages over the range of one key.
+
+    The cycles are the symmetric and asymmetric ones that the return map suggests, and the cycles that simulations end
+    in, of any number of swings. Orbits are closed to a relative tolerance.
+    """
     settings = ContinuationSettings.current()
     places = np.linspace(0, 1, settings.range_stages if seeds is None else seeds)
     places = places[space.allowed(places[:, None])]
@@ -71,7 +79,8 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress
     special: list[tuple[LocatedPoint, ...]] = []
 
     def follow(number: int, cycle: Cycles) -> bool:
-        """Follow the branch through a cycle, unless one that was followed passes it: whether it was followed."""
+        """Follow the branch through a cycle unless an earlier branch passes it;
+        tell whether it was followed."""
         start = Point.of(stages.take(np.array([number])), float(places[number]), cycle)
         if any(_passes(branch, start) for branch in branches):
             return False
@@ -101,9 +110,12 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress
 def each_once(
     special: Sequence[Sequence[LocatedPoint]], hundredth: Callable[[float], float]
 ) -> tuple[tuple[LocatedPoint, ...], ...]:
-    """The special points of branches, of those within the errors of each other the first alone, and so of those of
-    several branches that are CLOSE, in terms of the `hundredth` of the key at a place: where a limiter chatters cycles
-    are followed over short ways, which overlap, and multipliers scatter. What these differ by is part of its error."""
+    """Merge special points that are one: keep the first of those within each other's errors.
+
+    Points of several branches also merge if they are close in terms of `hundredth`, the length over which the key
+    changes by a hundredth. Where a limiter chatters, multipliers scatter, and cycles are followed over short,
+    overlapping ways. The error of a merged point includes the difference between the points.
+    """
     settings = ContinuationSettings.current()
     once: list[tuple[int, LocatedPoint]] = []
     for number, own in enumerate(special):
@@ -121,8 +133,8 @@ def each_once(
 
 
 def _same(first: LocatedPoint, second: LocatedPoint, close: float) -> bool:
-    """Whether two special points are one: of the same kind, with the same cycle there, not farther apart than `close`
-    or what is known of their errors."""
+    """Tell whether two special points are one: equal in kind and cycle,
+    and no farther apart than `close` or their errors."""
     settings = ContinuationSettings.current()
     close = max([close, *(spot.error for spot in (first, second) if np.isfinite(spot.error))])
     apart = np.abs(first.point.vector - second.point.vector)
@@ -131,7 +143,7 @@ def _same(first: LocatedPoint, second: LocatedPoint, close: float) -> bool:
 
 
 def _passes(branch: Branch, point: Point) -> bool:
-    """Whether a branch passes through a cycle, or through its mirror image."""
+    """Tell whether a branch passes through a cycle or its mirror image."""
     settings = ContinuationSettings.current()
     if (branch.sign, branch.points[0].cycle.swings) != (point.cycle.sign, point.cycle.swings):
         return False

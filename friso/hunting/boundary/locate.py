@@ -1,4 +1,5 @@
-"""Where on a branch a cycle stops attracting: its multiplier passes -1 (flip), 1 (fold) or the unit circle (torus)."""
+"""Locate where a cycle on a branch loses stability: a multiplier passes -1 (flip),
+1 (fold) or the unit circle (torus)."""
 
 from __future__ import annotations
 
@@ -22,9 +23,12 @@ ALONG = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True)
 class LocatedPoint:
-    """A point at which a branch stops attracting (or begins to), with the direction of the branch there, by how much
-    its place may be off (what the search has left, and the change at a hundredth of the tolerance; with a limiter that
-    chatters, the reserve of `smoothed` or `turned`), and how fast the multiplier changes along that direction."""
+    """A point at which a branch loses or gains stability.
+
+    `direction` is that of the branch there. `error` is the error of the place: the rest left by the search, and the
+    change at a hundredth of the tolerance. With a limiter that chatters it is the reserve of `smoothed` or `turned`.
+    `slope` is the change of the multiplier along the direction.
+    """
 
     kind: Bifurcation
     point: Point
@@ -33,22 +37,23 @@ class LocatedPoint:
     slope: float = np.nan
 
     def in_doubt(self, point: Point) -> bool:
-        """Whether a point of the same branch lies within the error of this one, if that is known: whether the cycle
-        attracts there is not."""
+        """Tell whether a point of the branch lies within the error of this one,
+        so that its stability is unknown."""
         settings = ContinuationSettings.current()
         apart = np.abs(self.point.vector - point.vector)
         return bool(np.isfinite(self.error) and apart[0] < self.error and apart[1:].max() < settings.same_cycle_log)
 
 
 def distance_to(kind: Bifurcation, point: Point) -> float:
-    """How far the multiplier is from where the kind of point has it; it changes sign there."""
+    """Return the distance of the multiplier from its value at this kind of point;
+    it changes sign there."""
     if kind == "torus":
         return abs(point.multiplier) - 1
     return point.multiplier + (1 if kind == "flip" else -1)
 
 
 def changes(first: Point, second: Point) -> tuple[Bifurcation, ...]:
-    """What happens to the multiplier between two neighbours on a branch."""
+    """Return the kinds of point that lie between two neighbours on a branch."""
     if _complex(first) or _complex(second):
         return ("torus",) if (abs(first.multiplier) - 1) * (abs(second.multiplier) - 1) < 0 else ()
     kinds: tuple[Bifurcation, ...] = ("flip", "fold")
@@ -56,13 +61,14 @@ def changes(first: Point, second: Point) -> tuple[Bifurcation, ...]:
 
 
 def _complex(point: Point) -> bool:
-    """Whether the multiplier that decides is the modulus of a complex pair."""
+    """Tell whether the deciding multiplier is the modulus of a complex pair."""
     leading = complex(point.cycle.local[0, 0])
     return bool(abs(leading.imag) > 1e-3 and np.isclose(abs(leading), point.multiplier))
 
 
 def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> LocatedPoint | None:
-    """The point between two neighbours on a branch at which it happens, with its error; None if it is not reached."""
+    """Locate the special point between two neighbours on a branch, with its error;
+    None if it is not reached."""
     direction = towards(first, second)
     points = _enclosed(tracer, first, second, kind, ContinuationSettings.current().special_point_step)
     if points is None:
@@ -72,9 +78,11 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> L
 
 
 def last_inside(tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float) -> Point | None:
-    """The last point between two neighbours on a branch at which the cycle still attracts.
+    """Return the last point between two neighbours on a branch at which the cycle is still
+    stable.
 
-    It lies within `precise` of the special point, along the branch. None if a cycle on the way cannot be closed.
+    It lies within `precise` of the special point, along the branch. Returns None if a cycle on the way cannot be
+    closed.
     """
     points = _enclosed(tracer, first, second, kind, precise)
     if points is None:
@@ -83,7 +91,7 @@ def last_inside(tracer: Tracer, first: Point, second: Point, kind: Bifurcation, 
 
 
 def towards(first: Point, second: Point) -> np.ndarray:
-    """The direction from one point of a branch to another."""
+    """Return the direction from one point of a branch to another, of length one."""
     direction = second.vector - first.vector
     return direction / np.linalg.norm(direction)
 
@@ -91,8 +99,11 @@ def towards(first: Point, second: Point) -> np.ndarray:
 def _enclosed(
     tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float
 ) -> dict[float, Point] | None:
-    """The points between two neighbours that the search for where it happens has met, by their places along the branch;
-    None if one of them cannot be reached."""
+    """Search for a special point between two neighbours,
+    and return all points on the way by place along the branch.
+
+    Returns None if a cycle cannot be closed.
+    """
     settings = ContinuationSettings.current()
     from scipy.optimize import brentq  # 0.4 s to import
 
@@ -100,7 +111,7 @@ def _enclosed(
     points: dict[float, Point] = {0.0: first, length: second}
 
     def distance(place_along: float) -> float:
-        """How far the multiplier is off at a place along the branch. Raises Unreached."""
+        """Return the distance of the multiplier at a place along the branch. Raises Unreached."""
         if place_along not in points:
             nearest = min(points, key=lambda place: abs(place - place_along))
             point = tracer.solve(points[nearest], first.vector + place_along * direction, direction)
@@ -118,11 +129,12 @@ def _enclosed(
 
 
 class Unreached(Exception):
-    """No cycle is found where one is looked for."""
+    """No cycle was found at a place on a branch."""
 
 
 def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
-    """Change of the distance along the branch, from the two points nearest to where it is zero."""
+    """Return the change of the multiplier's distance along the branch,
+    from the two points nearest to zero."""
     (a, first), (b, second) = sorted(points.items(), key=lambda item: abs(distance_to(kind, item[1])))[:2]
     return (distance_to(kind, second) - distance_to(kind, first)) / (b - a)
 
@@ -130,8 +142,10 @@ def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
 def _special_point(
     tracer: Tracer, kind: Bifurcation, point: Point, direction: np.ndarray, slope: float
 ) -> LocatedPoint:
-    """The point with its error; infinite where it cannot be computed at the tighter tolerance, or multipliers scatter
-    too much."""
+    """Make a special point with its error.
+
+    The error is infinite if the point cannot be computed at the tighter tolerance, or if multipliers scatter too much.
+    """
     if tracer.family(np.zeros(1, np.int64), np.array([point.place])).chatters:
         if kind == "fold":
             return _turning_point(tracer, point, direction, slope)
@@ -152,7 +166,8 @@ def _special_point(
 
 
 def _turning_point(tracer: Tracer, point: Point, direction: np.ndarray, slope: float) -> LocatedPoint:
-    """A fold with a limiter that chatters, about a point at which the multiplier is 1."""
+    """Locate a fold with a limiter that chatters,
+    starting from a point at which the multiplier is 1."""
     at = turned(tracer, point, direction)
     there = at and tracer.solve(point, point.vector + at.length * direction, direction)
     if not at or not there:
@@ -161,9 +176,12 @@ def _turning_point(tracer: Tracer, point: Point, direction: np.ndarray, slope: f
 
 
 def smoothed(tracer: Tracer, guess: Point, kind: Bifurcation) -> Crossing | None:
-    """Where on a branch a flip or a torus is, from a curve through the multipliers of orbits within a hundredth of the
-    key about a first guess: where a limiter chatters these scatter, and may pass -1 several times. Its reserve is that
-    of the curve, or the distance to the first guess, if that is larger. None if it is not known."""
+    """Locate a flip or torus by a curve through the multipliers of orbits near a first guess.
+
+    Where a limiter chatters, multipliers scatter and may pass -1 several times, so orbits within a hundredth of the key
+    are used. The reserve is that of the curve, or the distance to the first guess if larger. Returns None if it is
+    unknown.
+    """
     orbits = _beside(tracer, guess, ALONG, tracer.hundredth(guess.place))
     places = np.array([point.place for point in orbits])
     passed = crossing(places, np.array([distance_to(kind, point) for point in orbits]))
@@ -171,9 +189,12 @@ def smoothed(tracer: Tracer, guess: Point, kind: Bifurcation) -> Crossing | None
 
 
 def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | None:
-    """Where a branch turns back at a fold, from a curve through the places of orbits about a first guess along a
-    direction: where a limiter chatters the multiplier is that over a range of distances, and passes 1 beside the fold.
-    Its reserve is that of the curve, or the distance to the first guess, if that is larger. None if it is not known."""
+    """Locate a fold by a curve through the places of orbits near a first guess,
+    along a direction.
+
+    Where a limiter chatters, the multiplier belongs to a range of distances and passes 1 beside the fold. The reserve
+    is that of the curve, or the distance to the first guess if larger. Returns None if it is unknown.
+    """
     orbits = _beside(tracer, guess, direction, ContinuationSettings.current().chattering_fold_reach)
     lengths = np.array([(point.vector - guess.vector) @ direction for point in orbits])
     at = turn(lengths, np.array([point.place for point in orbits]))
@@ -181,7 +202,8 @@ def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | No
 
 
 def _beside(tracer: Tracer, guess: Point, direction: np.ndarray, reach: float) -> list[Point]:
-    """Orbits on either side of a point of a branch along a direction, not farther than `reach`."""
+    """Return orbits on either side of a point of a branch,
+    along a direction and not farther than `reach`."""
     settings = ContinuationSettings.current()
     orbits: list[Point] = []
     for way in (-1.0, 1.0):
@@ -202,9 +224,12 @@ def corrected(
     states: np.ndarray,
     slope: float = np.nan,
 ) -> LocatedPoint | None:
-    """The point at which it happens, by the secant method along a direction from an origin (place, log distance, log
-    time), not farther from it than `reach`, from a cycle near it; None if there is none. The search begins with
-    about its `states` (1, states), and with the `slope` of the multiplier, if that is known."""
+    """Find the special point along a direction from an origin (place, log distance, log time),
+    by the secant method.
+
+    The point lies no farther than `reach` from the origin; None if there is none. The search starts from a nearby
+    cycle, from its approximate `states` (1, states), and from the `slope` of the multiplier if that is known.
+    """
     settings = ContinuationSettings.current()
     places, points = [0.0], [tracer.solve(near, origin, direction, states)]
     for _ in range(settings.special_point_tries):
@@ -226,13 +251,14 @@ def corrected(
 
 
 def special_points(tracer: Tracer, branch: Branch) -> list[LocatedPoint]:
-    """All points of a branch at which a multiplier passes the unit circle."""
+    """Locate all points of a branch at which a multiplier passes the unit circle."""
     specials = [located(tracer, *pair, kind) for pair in pairwise(branch.points) for kind in changes(*pair)]
     return [special for special in specials if special and not _meets_symmetric(tracer, special)]
 
 
 def _meets_symmetric(tracer: Tracer, special: LocatedPoint) -> bool:
-    """Whether what looks like a fold of an asymmetric branch is where it meets the symmetric cycle."""
+    """Tell whether an apparent fold of an asymmetric branch is its meeting with the symmetric
+    cycle."""
     cycle = special.point.cycle
     leans = abs(cycle.middle[0]) > 0.02 * cycle.amplitude[0]
     stages = tracer.family(np.zeros(1, np.int64), np.array([special.point.place]))

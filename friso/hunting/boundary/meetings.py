@@ -1,7 +1,8 @@
-"""Where curves of the edge of hunting meet in the plane of two keys: they cross, run together, or end on one another.
+"""Find where curves of the edge of hunting meet in the plane of two keys: they cross,
+run together, or end on one another.
 
-Curves are straight between their points, at most a twentieth of the ranges apart; a crossing is then refined with
-cycles. That two curves meet in the plane says nothing of their cycles: one stage may have both cycles at once.
+Curves are straight between their points, which are at most a twentieth of the ranges apart. A crossing is then refined
+with cycles. That two curves meet says nothing about their cycles: one stage may have both at once.
 """
 
 from __future__ import annotations
@@ -19,15 +20,16 @@ from friso.hunting.boundary.settings import MeetingSettings
 from friso.hunting.boundary.space import Space
 
 MeetingKind = Literal["cross", "together", "end"]
-"""Two curves cross at a point; they run together over a stretch; the first one ends on the second."""
+"""Two curves cross at a point, run together over a stretch, or the first one ends on the second."""
 
 
 @dataclass(frozen=True)
 class Meeting:
-    """How two curves of a plane meet, by their numbers (twice the same number: a curve that crosses itself).
+    """How two curves of a plane meet; the curves have equal numbers where one crosses itself.
 
-    `places` in the box of the keys, shape (1, 2), or (2, 2) for both ends of a stretch, may be off by `error` along
-    each key (infinite: not refined). Either both are changes of the `same_cycle` there, or of two cycles of one stage.
+    `places` in the box of the keys have the shape (1, 2), or (2, 2) for both ends of a stretch. `error` is their error
+    along each key (infinite: not refined). At the meeting either both curves are changes of the `same_cycle`, or of two
+    cycles of one stage.
     """
 
     curves: tuple[int, int]
@@ -38,8 +40,10 @@ class Meeting:
 
 
 def find_meetings(space: Space, curves: Sequence[Curve], rtol: float) -> tuple[Meeting, ...]:
-    """Find where curves meet; crossings are refined by cycles that are closed to a relative tolerance. What lies within
-    a stretch that runs together, or at a crossing, is no meeting of its own."""
+    """Find where curves meet; crossings are refined by cycles closed to a relative tolerance.
+
+    A crossing or an end within a stretch that runs together, or at another crossing, does not count as well.
+    """
     meetings: list[Meeting] = []
     for first, second in combinations(range(len(curves)), 2):
         pair = [*_stretches(curves, first, second)] or [*_stretches(curves, second, first)]
@@ -61,15 +65,16 @@ def _lies_on(place: np.ndarray, meeting: Meeting) -> bool:
 
 
 def _closed_path(curve: Curve) -> tuple[np.ndarray, list[Spot]]:
-    """The points of a curve, shape (n, 2), with their cycles; of a ring the first one again at the end."""
+    """Return the points of a curve, shape (n, 2), with their cycles;
+    a ring repeats its first point at the end."""
     again = CLOSED in curve.ends
     spots = [*curve.spots, *curve.spots[:1]] if again else [*curve.spots]
     return (np.vstack([curve.points, curve.points[:1]]) if again else curve.points), spots
 
 
 class _Nearest(NamedTuple):
-    """The point of a curve nearest to a place, by how far it is away, and logarithms of its cycle's amplitude and
-    period, shape (2,)."""
+    """Point of a curve nearest to a place: its distance `away`,
+    and its cycle's log amplitude and log period, shape (2,)."""
 
     away: float
     cycle: np.ndarray
@@ -92,22 +97,26 @@ def leg_shares(path: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def _size(spot: Spot) -> np.ndarray:
-    """Logarithms of the amplitude [m] and period [s] of the cycle at a point of a curve, shape (2,)."""
+    """Return logarithms of the amplitude [m] and period [s] of the cycle at a point of a curve,
+    shape (2,)."""
     cycle = spot.special.point.cycle
     return np.log([cycle.amplitude[0], cycle.period[0]])
 
 
 def _alike(one: np.ndarray, other: np.ndarray) -> bool:
-    """Tell from logarithms of amplitude and period whether two cycles are one, or one of them, of twice the period,
-    grows out of the other."""
+    """Tell from log amplitude and log period whether two cycles are one,
+    or one is the period-doubled form of the other."""
     size, period = np.abs(one - other)
     return bool(max(size, min(period, abs(period - np.log(2)))) < MeetingSettings.current().same_cycle_log)
 
 
 def _stretches(curves: Sequence[Curve], first: int, second: int) -> Iterator[Meeting]:
-    """The stretches over which the second curve is a change of the same cycle and runs on top of the first one, as
-    where a curve was followed twice because it was lost in between. A curve that comes near at an angle does so over
-    a shorter one."""
+    """Find stretches over which the second curve runs on top of the first and changes the same
+    cycle.
+
+    This happens where a curve was lost and then followed again. A curve that crosses at an angle stays near over a
+    shorter stretch.
+    """
     settings = MeetingSettings.current()
     on: list[np.ndarray] = []
     for spot in (*curves[second].spots, None):
@@ -122,7 +131,7 @@ def _stretches(curves: Sequence[Curve], first: int, second: int) -> Iterator[Mee
 
 
 def _crossings(space: Space, curves: Sequence[Curve], numbers: tuple[int, int], rtol: float) -> Iterator[Meeting]:
-    """Where two curves cross, or one crosses itself."""
+    """Find where two curves cross, or one crosses itself."""
     first, second = (curves[number] for number in numbers)
     (path, spots), (other_path, other_spots) = _closed_path(first), _closed_path(second)
     legs, others = np.diff(path, axis=0), np.diff(other_path, axis=0)
@@ -143,7 +152,7 @@ def _crossings(space: Space, curves: Sequence[Curve], numbers: tuple[int, int], 
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products of vectors in the plane, along the last axis."""
+    """Return cross products of vectors in the plane, along the last axis."""
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
@@ -155,9 +164,12 @@ def _refined(
     pairs: Sequence[Sequence[Spot]],
     rtol: float,
 ) -> Meeting:
-    """The crossing near a guess, between two neighbouring points of each curve: straight lines through a point of
-    either curve, in the directions of the curves there, cross at the next guess. Where a cycle is lost on the way, or a
-    limiter chatters, so that a single point takes as long as many, the guess is what is known."""
+    """Refine a crossing from a guess between two neighbouring points of each curve.
+
+    The next guess is where straight lines through a point of either curve, in the curves' directions, cross. The first
+    guess stands if a cycle is lost on the way. It also stands where a limiter chatters, because one point then costs as
+    much as many.
+    """
     settings, place = MeetingSettings.current(), guess
     refinements = 0 if space.stages(guess[None]).chatters else settings.crossing_refinements
     ways = [unit_vector(last.at - first.at) for first, last in pairs]
@@ -186,14 +198,16 @@ def _refined(
 
 
 def _turned(way: np.ndarray, chord: np.ndarray) -> np.ndarray:
-    """The direction of a curve after a step to another point of it, `chord`: as before, if that is hardly along it."""
+    """Return a curve's direction after the step `chord` to another point;
+    unchanged if the step is hardly along the curve."""
     along, length = abs(float(chord @ way)), float(np.linalg.norm(chord))
     settings = MeetingSettings.current()
     return unit_vector(chord) if along > max(settings.crossing_precision, settings.chord_along * length) else way
 
 
 def _ends_on(curves: Sequence[Curve], number: int, other: int) -> Iterator[Meeting]:
-    """The ends of a curve inside the range that lie on another curve, with the same cycle there."""
+    """Find the ends of a curve inside the range that lie on another curve,
+    with the same cycle there."""
     curve = curves[number]
     for how, spot in zip(curve.ends, (curve.spots[0], curve.spots[-1]), strict=True):
         if how not in (END_OF_RANGE, CLOSED):

@@ -1,4 +1,4 @@
-"""The edges of hunting in the plane of two keys: all curves, found from a grid of cycles."""
+"""Find all edges of hunting in the plane of two keys, from a grid of cycles."""
 
 from __future__ import annotations
 
@@ -24,15 +24,21 @@ from friso.hunting.loop import unstable_among
 from friso.progress import Progress, Tally, silent
 
 CURVES = "following the edge of hunting"
-"""What is reported to a progress."""
+"""Progress message while curves are followed."""
 
 
 @dataclass(frozen=True)
 class Plane:
-    """What was found in the box of two keys: the curves; the hunting cycles on those nodes of a grid, numbered in C
-    order with the first key along the first side, that are `allowed`; whether anything attracts the stages on these,
-    whether that is known, and whether their loop is unstable, whatever the friction does; where a change was seen that
-    no curve could be begun at, each shape (2,); and where curves meet."""
+    """Edges of hunting in the box of two keys.
+
+    - `curves`: the edges, and `meetings`: where they meet.
+    - `nodes`: stages along each side of the grid; `allowed`: numbers of the valid ones in C order, the first key along
+      the first side.
+    - `cycles`: hunting cycles of the allowed stages; `attracts`: whether they have an attractor; `decided`: whether
+      that is known.
+    - `unstable`: whether the loop is unstable regardless of friction.
+    - `gaps`: places, shape (2,), at which a change was seen but no curve could be begun.
+    """
 
     space: Space
     curves: tuple[Curve, ...]
@@ -48,9 +54,11 @@ class Plane:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def plane(space: Space, rtol: float = RTOL, nodes: int | None = None, progress: Progress = silent) -> Plane:
-    """Find all curves in the plane of two keys on which the hunting cycle stops attracting, and those on which an
-    asymmetric cycle that bounds its basin appears; orbits are closed to a relative tolerance, and looked for from
-    `nodes` x `nodes` stages."""
+    """Find all curves in the plane of two keys on which the hunting cycle stops attracting.
+
+    Curves on which an asymmetric cycle appears that bounds its basin are found as well. Changes are looked for between
+    `nodes` x `nodes` stages. Orbits are closed to a relative tolerance.
+    """
     nodes = ContinuationSettings.current().grid_stages if nodes is None else nodes
     points = space.grid(nodes)
     allowed = np.flatnonzero(space.allowed(points))
@@ -91,8 +99,11 @@ def _sought(
     rtol: float,
     tally: Tally,
 ) -> tuple[list[Curve], list[np.ndarray]]:
-    """The curves between neighbours of which one has such a cycle as is looked for, `changing`, and where none could be
-    begun at; `allowed` are the numbers of the stages among all points (points, 2)."""
+    """Follow the curves between neighbours of which only the first has the cycle,
+    and list places where none began.
+
+    `changing` are pairs of neighbours, and `allowed` the numbers of the valid stages among all points (points, 2).
+    """
     curves: list[Curve] = []
     gaps: list[np.ndarray] = []
     for a, b in changing:
@@ -112,12 +123,14 @@ def _sought(
 
 
 CurveSearch = tuple[Cycles, np.ndarray, np.ndarray]
-"""Cycles, the numbers of the stages on one side of a curve, and of those on the other."""
+"""Cycles, and the numbers of the stages on one side of a curve and on the other."""
 
 
 def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[CurveSearch]]:
-    """The hunting cycles of stages, and what to look for; where no cycle could be closed, the stage is on neither
-    side."""
+    """Return the hunting cycles of stages, and the searches for curves to make.
+
+    A stage for which no cycle could be closed is on neither side.
+    """
     hunting, *pairs = families(stages, rtol)
     outside = ~hunting.attracting & ~hunting.uncertain
     searches = [(hunting, np.flatnonzero(hunting.attracting), np.flatnonzero(outside))]
@@ -130,14 +143,15 @@ def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[CurveSearch]]
 
 
 def _on_grid(numbers: np.ndarray, nodes: int) -> np.ndarray:
-    """Which nodes of the grid have these numbers, shape (nodes, nodes)."""
+    """Mark the nodes of the grid with these numbers, shape (nodes, nodes)."""
     grid = np.zeros(nodes * nodes, bool)
     grid[numbers] = True
     return grid.reshape(nodes, nodes)
 
 
 def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Neighbours on the grid, by number, of which the first is inside and the second outside."""
+    """Return pairs of neighbours on the grid, by number,
+    of which the first is inside and the second outside."""
     numbers = np.arange(inside.size).reshape(inside.shape)
     pairs = [(numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:])]
     for first, second in [*pairs, *(pair[::-1] for pair in pairs)]:
@@ -146,7 +160,7 @@ def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int
 
 
 def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
-    """Whether a curve passes by the way between two neighbours."""
+    """Tell whether a curve passes close to the way between two neighbours."""
     settings = ContinuationSettings.current()
     points, mesh = curve.points, float(np.linalg.norm(end - start))
     for at in start + np.linspace(0, 1, 9)[:, None] * (end - start):
@@ -157,8 +171,11 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
 
 
 def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:
-    """The first point on the way from a stage with a cycle to a neighbour at which the cycle stops attracting or folds
-    back, if there is one, and whether it reaches that neighbour without."""
+    """Follow a cycle from a stage towards a neighbour to the first point at which it loses
+    stability or folds.
+
+    Returns the point, if there is one, and whether the cycle reaches the neighbour unchanged.
+    """
     settings = ContinuationSettings.current()
     mesh = float(np.linalg.norm(end - start))
     across = (end - start) / mesh

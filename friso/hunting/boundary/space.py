@@ -1,4 +1,4 @@
-"""The keys that are varied, as a box whose every side runs from 0 to 1."""
+"""Represent the keys that are varied as a box whose every side runs from 0 to 1."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from friso.hunting.cycle.shooting import Family
 from friso.stage import Stage, violations
 
 GENERIC = 0.4721359549995794
-"""A place at which no key has a special value (it is irrational)."""
+"""An irrational place, at which no key has a special value."""
 
 FlatAt = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
-"""Flat keys of stages (SI) from arrays of values by name."""
+"""Function that turns arrays of values by name into flat keys of stages (SI)."""
 
 
 @dataclass(frozen=True)
@@ -32,20 +32,22 @@ class KeyRange:
     unit: str = ""
 
     def at(self, place: np.ndarray) -> np.ndarray:
-        """The values [SI] at places, 0 at `low` and 1 at `high`."""
+        """Return the values [SI] at places: `low` at 0 and `high` at 1."""
         if self.log:
             return self.low * (self.high / self.low) ** place
         return self.low + (self.high - self.low) * place
 
     def place(self, value: np.ndarray) -> np.ndarray:
-        """The places of values [SI]."""
+        """Return the places of values [SI]."""
         if self.log:
             return np.log(value / self.low) / np.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
 
     def hundredth(self, place: float) -> float:
-        """By how much a place changes with a hundredth of the value there, or, where the range holds 0, of its larger
-        end."""
+        """Return the change of place that changes the value there by a hundredth.
+
+        If the range holds 0, it is a hundredth of the larger end.
+        """
         if self.log:
             return float(np.log(1.01) / abs(np.log(self.high / self.low)))
         ends = [abs(self.low), abs(self.high)]
@@ -62,45 +64,53 @@ class Space:
 
     @classmethod
     def of(cls, stage: Stage, ranges: Sequence[KeyRange]) -> Space:
-        """The stages around one, over ranges of its keys."""
+        """Make the space around one stage, over ranges of its keys."""
         return cls(tuple(ranges), stage.flat)
 
     def values(self, points: np.ndarray) -> dict[str, np.ndarray]:
-        """The values [SI] of the keys at points of the box, shape (count, keys)."""
+        """Return the values [SI] of the keys at points of the box, shape (count, keys)."""
         return {swept.key: swept.at(points[:, i]) for i, swept in enumerate(self.ranges)}
 
     def stages(self, points: np.ndarray) -> Ensemble:
-        """The stages at points of the box, shape (count, keys)."""
+        """Return the stages at points of the box, shape (count, keys)."""
         return Ensemble.held(self.flat(self.values(points)), len(points), form=self.form)
 
     @cached_property
     def form(self) -> Structure:
-        """The structure of the stages inside the box, at a place where no key is zero or a whole number; those that are
-        simpler, as where the stroke is zero or an exponent whole, are treated the same."""
+        """Return the structure shared by all stages in the box,
+        taken where no key is zero or a whole number.
+
+        Simpler stages, with a stroke of zero or a whole exponent, use it too.
+        """
         return shared_structure(self.flat(self.values(np.full((1, len(self.ranges)), GENERIC))))
 
     def grid(self, nodes: int) -> np.ndarray:
-        """Points evenly over the box, `nodes` along every side, the first key the slowest, shape (points, keys)."""
+        """Return points spaced evenly over the box, `nodes` along every side, shape (points, keys);
+        the first key varies slowest."""
         sides = np.meshgrid(*[np.linspace(0, 1, nodes)] * len(self.ranges), indexing="ij")
         return np.stack([side.ravel() for side in sides], axis=1)
 
     def allowed(self, points: np.ndarray) -> np.ndarray:
-        """Which points of the box, shape (count, keys), belong to stages that may be, shape (count,)."""
+        """Return which points of the box, shape (count, keys), are valid stages, shape (count,)."""
         broken = [np.broadcast_to(where, len(points)) for where, _ in violations(self.flat(self.values(points)))]
         return ~np.any([np.zeros(len(points), bool), *broken], axis=0)
 
     def lines(self, origins: np.ndarray, directions: np.ndarray) -> Family:
-        """The stages along lines through the box: from origins (count, keys) along directions (count, keys)."""
+        """Return the family of stages along lines through the box, from origins (count,
+        keys) along directions (count, keys)."""
 
         def family(which: np.ndarray, places: np.ndarray) -> Ensemble:
-            """The stages at places along the lines with these numbers."""
+            """Return the stages at places along the lines with these numbers."""
             return self.stages(origins[which] + places[:, None] * directions[which])
 
         return family
 
     def hundredth(self, origin: np.ndarray, direction: np.ndarray) -> Callable[[float], float]:
-        """The length of a line through the box, from an origin (keys,) along a direction (keys,), over which the key
-        that changes soonest does so by a hundredth, at a place on it."""
+        """Return a function of place: the length of a line over which its fastest key changes by a
+        hundredth.
+
+        The line runs through the box from an origin (keys,) along a direction (keys,).
+        """
 
         def length(place: float) -> float:
             steps = zip(self.ranges, origin + place * direction, direction, strict=True)
