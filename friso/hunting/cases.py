@@ -1,4 +1,4 @@
-"""The verdict on a stage: as given and, if it has a joint, with the joint locked and free."""
+"""Check a stage: judge it as given and, if it has a joint, with the joint locked and free."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Solver:
-    """How a run went: status in words, steps attempted and rejected, relative tolerance."""
+    """How a run went: its status in words, steps attempted and rejected, relative tolerance."""
 
     status: str
     steps: int
@@ -49,27 +49,30 @@ class Solver:
 
     @property
     def done(self) -> bool:
-        """Whether the run came to its end."""
+        """Tell whether the run came to its end."""
         return self.status == Status.DONE.text
 
 
 @dataclass(frozen=True)
 class Case:
-    """A stage and what became of it.
+    """A stage and the results of checking it.
 
-    `judgement` holds the verdict and what it rests on; `peaks` counts the thesis's peaks, at `peak_times` [s] and of
-    `peak_heights` [m] above the reference; `peak_to_peak` [m], the `offset` from the reference half-way between both
-    [m], and `period` [s] (None: no cycle) are of the last quarter; `settling_time` maps each band [m] to the time [s]
-    in which the stage settles into it wherever the reference stands (see `friso.hunting.criteria.settling`; None: it
-    does not), `in_the_end` at the last of these places alone; `largest_force` [N] is the actuator's, `breakaway` [N]
-    the least force of it that may move what sticks, constant forces taken off; a motion that exerts less leaves a stage
-    without a free joint `unmoved`; `force_limit` [N] is that of the controller, if that keeps it off its reference
-    (None: it does not); `unstable` tells in which of its states the loop is not stable, whatever the friction does (see
-    `friso.hunting.loop`); `feeding`, with a backlash, without what hunting ends (None, too, where that was given up).
-    `static_friction` is the margin in that (None: see `friso.hunting.stage_margins`, or it was not asked for), and
-    `advice_keeps_friction` tells whether the bandwidth that advice leads to, a factor beyond the edge of hunting, still
-    does not hunt with that factor more, or less, static friction (None: there is no such advice, or that is not known).
-    `trace` holds the time response if asked for."""
+    - `judgement`: the verdict and the results it rests on.
+    - `peaks`: the thesis's peak count, with peaks at `peak_times` [s] and of `peak_heights` [m] above the reference.
+    - `peak_to_peak` [m], `offset` [m] of the middle from the reference, `period` [s] (None: no cycle): of the last
+      quarter.
+    - `settling_time`: for each band [m], the time [s] to settle into it wherever the reference stands (None: it does
+      not settle; see `friso.hunting.criteria.settling`); `in_the_end`: at the last of these places alone.
+    - `largest_force` [N]: of the actuator; `breakaway` [N]: the smallest actuator force, beside constant forces, that
+      may move the stage. A motion with less force leaves a stage without a free joint `unmoved`.
+    - `force_limit` [N]: the controller's limit, if it keeps the stage off its reference (None: it does not).
+    - `unstable`: states in which the loop is unstable regardless of friction (see `friso.hunting.loop`).
+    - `feeding`: with a backlash, the cause without which hunting ends (None also if this was given up).
+    - `static_friction`: margin in static friction (None: not asked for, or see `friso.hunting.stage_margins`).
+    - `advice_keeps_friction`: whether the advised bandwidth, a factor beyond the edge of hunting, still does not hunt
+      with that factor more or less static friction (None: no such advice, or unknown).
+    - `trace`: the time response, if asked for.
+    """
 
     stage: Stage
     judgement: Judgement
@@ -93,27 +96,29 @@ class Case:
 
     @property
     def verdict(self) -> Verdict:
-        """ "hunts", "bistable", "transient", "settles" or "failed" (see `Judgement`)."""
+        """Return the verdict: "hunts", "bistable", "transient",
+        "settles" or "failed" (see `Judgement`)."""
         return self.judgement.verdict
 
     @property
     def runs_away(self) -> bool:
-        """Whether the motion leaves its reference for good because the loop is unstable: there is no other verdict."""
+        """Tell whether the motion diverges because the loop is unstable,
+        so that there is no other verdict."""
         return self.verdict == "failed" and self.judgement.runs_away
 
     @property
     def unmoved(self) -> bool:
-        """Whether the motion exerts too little force to move the stage."""
+        """Tell whether the motion exerts too little force to move the stage."""
         joint = self.stage.joint
         return self.largest_force < self.breakaway and (joint is None or joint.locked)
 
 
 PART_COUNT = len(PARTS) + 1
-"""Parts of a case: those of its verdict, and its margin in static friction."""
+"""Number of parts of a case: those of its verdict, and its margin in static friction."""
 
 
 LONG_RUN_RTOL = ToleranceSettings().long_run_rtol
-"""Relative tolerance of runs that only tell what becomes of a motion; that of which times are told is finer."""
+"""Relative tolerance of runs that only decide how a motion ends; runs that give times are finer."""
 
 
 def check(
@@ -124,12 +129,13 @@ def check(
     margins: bool = True,
     tell: Callable[[str, Verdict], None] = lambda name, verdict: None,
 ) -> dict[str, Case]:
-    """Check a stage: what becomes of it as given ("given"), with its joint locked ("locked") and free ("free").
+    """Check a stage as given ("given"), with its joint locked ("locked") and with it free
+    ("free").
 
-    A stage without a joint has the case "given" alone, one whose file does not tell the joint's stiffness no "free".
-    With `traces`, each case has its time response, and with `margins` its margin in static friction. `progress` is
-    called as work is done, and `tell` with the name of a case and its verdict as soon as that is certain, both also
-    from worker threads. Raises InputError for an `rtol` that is not usable.
+    A stage without a joint has only the case "given". A file that leaves out the joint's stiffness gives no case
+    "free". With `traces`, each case has its time response, and with `margins` its margin in static friction. `progress`
+    is called as work is done. `tell` is called with the name of a case and its verdict as soon as the verdict is
+    certain. Both may be called from worker threads. Raises InputError for an `rtol` that is not usable.
     """
     settings = CheckSettings.current()
     checked_rtol(rtol)
@@ -152,27 +158,30 @@ def check(
 
 
 def needed_kernels(stage: Stage) -> set[KernelRequest]:
-    """The kernels that a check of a stage needs: who checks several stages has them compiled side by side."""
+    """Return the kernels that a check of a stage needs,
+    so that those of several stages can be compiled side by side."""
     return set[KernelRequest]().union(*map(_needed, stage.variants().values()))
 
 
 def _share(stage: Stage) -> float:
-    """The share of the work of a check that a case with its joint locked, or free, may use beside the other one."""
+    """Return the share of a check's work for the case with its joint locked, or free."""
     settings = CheckSettings.current()
     free = stage.joint is not None and not stage.joint.locked
     return settings.free_work_share if free else 1 - settings.free_work_share
 
 
 def check_given(stage: Stage, rtol: float = RTOL, progress: Progress = silent) -> Case:
-    """Check a stage as it is given, its joint as its file has it; `progress` is called as parts of it end. Raises
-    InputError for an unusable `rtol`."""
+    """Check a stage with its joint as in its file; `progress` is called as parts end.
+
+    Raises InputError for an unusable `rtol`.
+    """
     checked_rtol(rtol)
     kernels(_needed(stage))
     return _case(stage, rtol, False, Tally(progress, PART_COUNT), CheckSettings.current().check_work)
 
 
 def _needed(stage: Stage) -> set[KernelRequest]:
-    """The kernels for a case."""
+    """Return the kernels for one case."""
     return kernels_to_judge(structure(stage.flat()))
 
 
@@ -185,12 +194,13 @@ def _case(
     tell: Callable[[Verdict], None] = lambda verdict: None,
     margins: bool = False,
 ) -> Case:
-    """Check one stage with so much work; `tell` is called with the verdict, `done` counts the parts."""
+    """Check one stage with so much work; `tell` is called with the verdict,
+    `done` counts the parts."""
     survey_settings = SurveySettings.current()
     flat, ended = stage.flat(), 0
 
     def begin(part: CheckPart) -> None:
-        """Count a part of the check as begun, and those before it as ended."""
+        """Count a part of the check as begun, and the parts before it as ended."""
         nonlocal ended
         ended += (step := int(part != CheckPart.ATTRACTION))
         done.add(step, part.progress_word)
@@ -239,7 +249,8 @@ def _case(
 
 
 def _fed(stage: Stage, work: float) -> Feeding | None:
-    """What feeds the cycle of a stage with a backlash; None where that takes more work."""
+    """Find the cause that feeds the cycle of a stage with a backlash;
+    None if that takes too much work."""
     try:
         with allowance(work):
             return feeding(stage)
@@ -248,8 +259,10 @@ def _fed(stage: Stage, work: float) -> Feeding | None:
 
 
 def _friction(stage: Stage, judgement: Judgement, work: float) -> tuple[ParameterMargin | None, bool | None]:
-    """The margin of a stage in static friction, and whether the bandwidth that advice leads to keeps one, as far as
-    shares of so much work suffice."""
+    """Return the margin in static friction, and whether the advised bandwidth keeps one.
+
+    Each part gets its share of the work and is None if that does not suffice.
+    """
     settings = CheckSettings.current()
     with allowance(settings.friction_margin_work_share * work):
         margin = friction_margin(stage, judgement)
@@ -263,8 +276,12 @@ def _friction(stage: Stage, judgement: Judgement, work: float) -> tuple[Paramete
 
 
 def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, breakaway: float) -> float | None:
-    """The limit of the force [N] that keeps one stage off its reference for ever: break-away takes more [N], or its run
-    ends with the force there. None where it settles or swings, or nothing shows that it stays there."""
+    """Return the force limit [N] that keeps a stage off its reference for ever;
+    None if there is no such limit.
+
+    Either break-away takes more force, `breakaway` [N], or the run ends with the force at the limit. A stage that
+    settles, swings, or may still move gives None.
+    """
     settings = CheckSettings.current()
     limit, possible = flat.get(FORCE_LIMIT), judgement.hunting.possible
     stands = judgement.followed is not None if possible else judgement.verdict == "settles"
@@ -278,8 +295,10 @@ def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, break
 
 
 def _breakaway(flat: Mapping[str, Any]) -> float:
-    """The least force of the actuator [N] that may move what sticks: constant forces may help it, and friction may be
-    smaller to one side. 0 without friction."""
+    """Return the smallest actuator force [N] that may move a sticking stage; 0 without friction.
+
+    Constant forces may help it, and friction may be smaller in one direction.
+    """
     if leading_friction(flat)["friction.model"] == "none":
         return 0.0
     uneven = abs(flat.get("friction.asymmetry") or 0.0)

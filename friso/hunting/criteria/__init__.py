@@ -1,5 +1,8 @@
-"""What words and numbers on hunting mean, all on arrays: the verdict on a stage (`stage_verdict`), what a run did
-(`run_outcome`), when it has settled (`settling`), and the thesis's peak count of a run (`peak_count`)."""
+"""Define the words and numbers on hunting, all on arrays.
+
+`stage_verdict` has the verdict on a stage, `run_outcome` the outcome of a run, `settling` the settling time, and
+`peak_count` the thesis's peak count of a run.
+"""
 
 from friso.hunting.criteria.peak_count import (
     COUNTED_ABOVE,

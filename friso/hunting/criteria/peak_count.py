@@ -1,15 +1,15 @@
-"""The thesis's peak count: a number of a run, and no verdict.
+"""Count peaks of a run as the thesis does: a number, and no verdict.
 
-The rule (Fix, Univ. of Twente, Sec. 3.2.2): maxima of the stage position after 10 s, higher than 0.1 mm above the
-reference, 0.5 s apart, the tallest kept first, as MATLAB's findpeaks does it. It counts a transient that is long enough
-as well as a cycle, and nothing of a cycle below 0.1 mm. `friso.sweep` and `friso.check` call it `peaks`; turning points
-less than 0.25 um from each other are passed over there.
+The rule (Fix, Univ. of Twente, Sec. 3.2.2) counts maxima of the stage position after 10 s, more than 0.1 mm above the
+reference and 0.5 s apart. The tallest are kept first, as MATLAB's findpeaks does. So a long transient counts like a
+cycle, and a cycle below 0.1 mm does not count. `friso.sweep` and `friso.check` call the number `peaks`; there, turning
+points less than 0.25 um from each other are skipped.
 
-A maximum need not be much of one. A stage that breaks away halfway back springs forward by half a micrometre first, and
-the rule counts that as it counts the swing itself; with the noise of an encoder on it, a stage that stands 0.2 mm off
-its reference has two peaks a second. Distinct peaks are counted by the same rule, but of maxima alone from which the
-deviation falls by 1 um on both sides before it rises higher: our addition, for logs of a drive (`friso rig`, `friso
-compare`). `friso reproduce` judges the maps of the thesis by its own count, without it.
+A maximum need not be a distinct one. A stage that breaks away halfway back first springs forward by half a micrometre,
+and the rule counts that like the swing itself. With encoder noise, a stage that stands 0.2 mm off its reference has two
+peaks a second. Distinct peaks follow the rule too, but the deviation must fall by 1 um on both sides before it rises
+higher. This is our addition, for logs of a drive (`friso rig`, `friso compare`). `friso reproduce` judges the maps of
+the thesis by its own count, without it.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ DISTINCT_CRITERION = f"{PEAK_CRITERION}; of maxima with valleys of {1e6 * DISTIN
 
 
 def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Which turning points (or samples) of runs are counted peaks, shape (runs, room); sums over rows are the counts.
+    """Mark the counted peaks among turning points or samples, shape (runs, room);
+    sums over rows are the counts.
 
     `times` [s] and `values` [m] of position minus reference have the shape (runs, room) and are valid up to `counts`,
     shape (runs,).
@@ -51,18 +52,21 @@ def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> 
 
 
 def distinct_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Which turning points of runs are distinct peaks, shape (runs, room): counted peaks whose valleys on both sides
-    are at least `DISTINCT` deep. `times` [s] and `values` [m] of position minus reference have the shape (runs, room)
-    and are valid up to `counts`, shape (runs,)."""
+    """Mark the distinct peaks: counted peaks with valleys at least `DISTINCT` deep on both
+    sides, shape (runs, room).
+
+    `times` [s] and `values` [m] of position minus reference have the shape (runs, room) and are valid up to `counts`,
+    shape (runs,).
+    """
     nothing = np.zeros(len(counts))
     return scan_turning_points(times, values, counts, nothing, nothing).distinct
 
 
 def peaks_in_traces(time: np.ndarray, deviation: np.ndarray) -> np.ndarray:
-    """How many distinct peaks sampled runs have, shape (runs,): deviations [m], shape (runs, n), over times [s], shape
-    (n,).
+    """Count the distinct peaks of sampled runs, shape (runs,).
 
-    From a peak the deviation falls on both sides: where a trace ends on its way up, its highest sample is none.
+    The deviations [m] have the shape (runs, n), the times [s] (n,). From a peak the deviation falls on both sides, so
+    the highest sample of a trace that ends on its way up does not count.
     """
     counting = time >= min(0.8 * COUNTED_AFTER, time[-1] / 2)  # what is long before the first that may count is idle
     values = np.ascontiguousarray(deviation[:, counting])
@@ -71,7 +75,8 @@ def peaks_in_traces(time: np.ndarray, deviation: np.ndarray) -> np.ndarray:
 
 
 def _until_last_fall(values: np.ndarray) -> np.ndarray:
-    """How many samples of each row there are until the end of the last fall by `DISTINCT`; 0 where nothing falls."""
+    """Count the samples of each row up to the end of the last fall by `DISTINCT`;
+    0 if nothing falls."""
     ahead = np.minimum.accumulate(values[:, ::-1], axis=1)[:, ::-1]
     falls = values - ahead >= DISTINCT
     last = values.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)

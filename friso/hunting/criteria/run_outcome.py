@@ -30,12 +30,12 @@ OUTCOMES = (SWINGS, CREEPS, RESTS, FAILED)
 """The words, the worst first."""
 
 BAND = 1e-5
-"""Band about the reference [m] within which a run of a sweep rests: ours; of `friso.hunting.measures.BANDS` the
-wider."""
+"""Band [m] about the reference within which a run of a sweep rests: friso's choice, the wider of
+`friso.hunting.measures.BANDS`."""
 
 LASTING = 0.5
-"""Share of the peak-to-peak deviation of the last half that the last quarter has at least where a swing lasts: what
-dies out at a tenth of the rate at which it swings is gone by then."""
+"""Least share of the last half's peak-to-peak deviation that the last quarter of a lasting swing has. A swing that
+decays at a tenth of the rate at which it swings is gone by then."""
 
 OUTCOME_CRITERION = (
     "what the run does at its end: swings (a lasting swing), creeps (outside the band without), rests (inside)"
@@ -44,10 +44,12 @@ OUTCOME_CRITERION = (
 
 @dataclass(frozen=True)
 class End:
-    """How runs end, arrays of shape (runs,): whether each was `completed`; peak to peak of its deviation over the last
-    quarter, `swing` [m], and over the last half, `earlier` [m]; the `period` of the swing [s] (NaN: none), and when it
-    `turned` for the last time [s] (-inf: never); when it was outside the band for the last time, `outside` [s], and
-    when it `ended` [s]."""
+    """How runs end, arrays of shape (runs,).
+
+    `completed`: the run came to its end. `swing` [m] is peak to peak over the last quarter, `earlier` [m] over the last
+    half. `period` [s] is that of the swing (NaN: none). `turned` [s] is the time of the last turn (-inf: never),
+    `outside` [s] the last time outside the band, and `ended` [s] the end of the run.
+    """
 
     completed: np.ndarray
     swing: np.ndarray
@@ -61,15 +63,19 @@ class End:
 def lasts(
     swing: np.ndarray, earlier: np.ndarray | float, band: np.ndarray | float, lasting: float = LASTING
 ) -> np.ndarray:
-    """Which deviations still go to and fro by more than twice the `band` [m]: peak to peak `swing` [m], at least the
-    share `lasting` of what it was `earlier` [m]. Runs that are followed for so long that nothing else is left need no
-    earlier swing to compare with (0)."""
+    """Return which deviations still swing by more than twice the `band` [m].
+
+    The peak-to-peak `swing` [m] must also be at least the share `lasting` of the `earlier` one [m]. A run that is long
+    enough for any transient to die out needs no earlier swing to compare with (0).
+    """
     return (swing > 2 * np.asarray(band)) & (swing >= lasting * np.asarray(earlier))
 
 
 def outcomes(end: End, band: np.ndarray | float = BAND, hold: np.ndarray | float = 0.0) -> np.ndarray:
-    """The word of `OUTCOMES` for every run, shape (runs,): of runs that rest the band [m] was left for the last time
-    more than `hold` [s] before the end."""
+    """Return the word of `OUTCOMES` for every run, shape (runs,).
+
+    A run rests if it left the band [m] for the last time more than `hold` [s] before its end.
+    """
     with np.errstate(invalid="ignore"):
         swings = lasts(end.swing, end.earlier, band) & (end.ended - end.turned <= end.period)
         rests = end.outside + hold < end.ended
@@ -79,9 +85,10 @@ def outcomes(end: End, band: np.ndarray | float = BAND, hold: np.ndarray | float
 
 @np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
 def end_of_traces(time: np.ndarray, deviation: np.ndarray, band: float, completed: np.ndarray | None = None) -> End:
-    """How sampled runs end: deviations [m], shape (runs, n), over times [s], shape (n,); all `completed` unless told.
+    """Describe how sampled runs end: deviations [m], shape (runs, n), over times [s],
+    shape (n,).
 
-    A run outside the band at its last sample was outside when it ended.
+    All runs count as `completed` unless given. A run outside the band at its last sample was outside when it ended.
     """
     runs = len(deviation)
     swing, earlier = (np.ptp(deviation[:, time >= share * time[-1]], axis=1) for share in (WINDOW, HALF))
@@ -94,8 +101,11 @@ def end_of_traces(time: np.ndarray, deviation: np.ndarray, band: float, complete
 
 
 def last_outside(time: np.ndarray, deviation: np.ndarray, band: float) -> np.ndarray:
-    """When deviations [m], shape (runs, n), over times [s], shape (n,), were outside the band [m] (or NaN) for the last
-    time [s], shape (runs,); -inf where they never were."""
+    """Return the last time [s] at which deviations were outside the band [m] or NaN,
+    shape (runs,); -inf if never.
+
+    The deviations [m] have the shape (runs, n), the times [s] (n,).
+    """
     outside = ~(np.abs(deviation) <= band)
     last = len(time) - 1 - outside[:, ::-1].argmax(axis=1)
     return np.where(outside.any(axis=1), time[last], -np.inf)

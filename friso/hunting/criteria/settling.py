@@ -1,9 +1,10 @@
-"""When a run has settled: the one definition of `friso check`, `compare`, `simulate`, `sweep`, `map` and `tune`.
+"""Define the settling time for `friso check`, `compare`, `simulate`, `sweep`,
+`map` and `tune`.
 
-At every place where the reference comes to stand, the time from its last corner until the deviation stays within a band
-as long as it stands there; of a motion there and back the longer of the times at both ends. It is infinite where the
-deviation is outside the band when the reference leaves, or the run ends: a stage that never leaves is in position once
-the reference is back, and has not settled for that.
+It is the time from the last corner of the reference until the deviation stays within a band for as long as the
+reference stands there. For a motion there and back it is the longer of the times at both ends. It is infinite if the
+deviation is outside the band when the reference leaves, or when the run ends. So a stage that never leaves is in
+position once the reference is back, but it has not settled.
 """
 
 from __future__ import annotations
@@ -21,19 +22,25 @@ BandName = Literal["inner", "outer"]
 
 
 def settling_of_runs(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.ndarray:
-    """The settling times [s] of a chunk of runs into one of their bands, shape (runs,); the keys of the stages are
-    `flat`, arrays of which have one entry per run of the chunk. Runs that were not completed have one all the same."""
+    """Return the settling times [s] of a chunk of runs into one of their bands, shape (runs,).
+
+    `flat` are the keys of the stages; arrays have one entry per run of the chunk. Runs that were not completed get a
+    time as well.
+    """
     return _longest(_at_stands(flat, runs, band))
 
 
 def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.ndarray:
-    """The settling times [s] of a chunk of runs (see `settling_of_runs`) at the last place alone where the reference
-    stands, shape (runs,): the verdict on a stage asks no more."""
+    """Return the settling times [s] of runs at the last place where the reference stands,
+    shape (runs,).
+
+    The verdict on a stage needs no other place (see `settling_of_runs`).
+    """
     return _at_stands(flat, runs, band)[-1]
 
 
 def _at_stands(flat: Mapping[str, Any], runs: Runs, band: BandName) -> list[np.ndarray]:
-    """Settling times [s] of runs at each place where the reference stands."""
+    """Return settling times [s] of runs at each place where the reference stands."""
     last, before = runs.statistic(f"{band}_exit"), runs.statistic(f"{band}_before")
     outside = [before, np.where(last < runs.statistic("ended"), last, np.inf)]
     places = stands(flat)
@@ -41,8 +48,12 @@ def _at_stands(flat: Mapping[str, Any], runs: Runs, band: BandName) -> list[np.n
 
 
 def settling_of_traces(places: list[Stand], time: np.ndarray, deviation: np.ndarray, within: float) -> np.ndarray:
-    """The settling times [s] at places where the reference stands of deviations [m], shape (runs, n), over times [s],
-    shape (n,), shape (runs,): until the sample after the last one outside of the band, `within` [m]."""
+    """Return the settling times [s] of sampled runs, shape (runs,),
+    at the places where the reference stands.
+
+    The deviations [m] have the shape (runs, n), the times [s] (n,). A run has settled at the sample after the last one
+    outside of the band, `within` [m].
+    """
     times = []
     for place in places:
         seen = time if place is places[-1] else time[time < place.until]

@@ -31,9 +31,11 @@ VERDICT_CRITERION = "verdict on the stage, by its attracting cycles and where it
 
 
 def verdicts(decided: np.ndarray, attracts: np.ndarray, ends_in_cycle: np.ndarray, rests: np.ndarray) -> np.ndarray:
-    """The word of `VERDICTS` for every stage, all arrays of shape (count,): whether what follows is `decided`; whether
-    a cycle `attracts`; and of the stage's own motion whether it `ends_in_cycle` (asked where one attracts) and `rests`
-    in the end (asked where none does)."""
+    """Return the word of `VERDICTS` for every stage; all arrays have the shape (count,).
+
+    `decided`: the following is known. `attracts`: a cycle attracts the stage. `ends_in_cycle`, used where one attracts,
+    and `rests`, used where none does, describe the end of the stage's own motion.
+    """
     hunting = np.where(ends_in_cycle, "hunts", "bistable")
     free = np.where(rests, "settles", "transient")
     return np.where(decided, np.where(attracts, hunting, free), "failed").astype(object)

@@ -1,4 +1,5 @@
-"""Stages that share their equations, their reference held at zero, started from any state."""
+"""Represent stages that share their equations, with their reference held at zero,
+started from any state."""
 
 from __future__ import annotations
 
@@ -19,17 +20,17 @@ from friso.hunting.cycle.settings import OrbitSettings
 from friso.stage.transmission import BACKLASH
 
 PER_STAGE = ("symmetric", "length", "scales", "relaxed", "per_newton", "balancing")
-"""Properties of the stages one by one, which are kept with them."""
+"""Cached properties with one row per stage."""
 
 OF_ALL = ("structure", "kernel")
-"""Properties that all stages share, which are kept with any of them."""
+"""Cached properties that all stages share."""
 
 
 @dataclass(frozen=True)
 class Ensemble:
     """Stages of one structure, given as flat keys to SI numbers or arrays of shape (count,).
 
-    `form` is their structure where the first of them does not tell it. `threads` bounds the threads of their runs,
+    `form` is their structure, where the first stage alone does not show it. `threads` bounds the threads of their runs;
     `cancel` is a flag that stops them (see `RunOptions`).
     """
 
@@ -41,11 +42,11 @@ class Ensemble:
 
     @classmethod
     def held(cls, flat: Mapping[str, Any], count: int, **options: Any) -> Ensemble:
-        """The stages with their reference held at 0 instead of their motion."""
+        """Make an ensemble of stages with their reference held at 0 instead of their motion."""
         return cls({**without_motion(flat), "motion.kind": "release"}, count, **options)
 
     def take(self, numbers: np.ndarray) -> Ensemble:
-        """The stages with these numbers, any of them as often as wanted."""
+        """Select the stages with these numbers, any of them as often as wanted."""
         flat = {key: value[numbers] if getattr(value, "ndim", 0) else value for key, value in self.flat.items()}
         taken = replace(self, flat=flat, count=len(numbers))
         computed = {name: value[numbers] for name, value in vars(self).items() if name in PER_STAGE}
@@ -55,128 +56,150 @@ class Ensemble:
 
     @cached_property
     def structure(self) -> Structure:
-        """The structure of the equations of all these stages."""
+        """Return the structure of the equations that all stages share."""
         return self.form or shared_structure(self.flat)
 
     @cached_property
     def kernel(self) -> Kernel:
-        """The compiled equations of these stages."""
+        """Return the compiled equations of the stages."""
         return kernel(self.structure)
 
     @property
     def chatters(self) -> bool:
-        """Whether the stages have a stroke limiter that may be touched and left many times in a swing, or a controller
-        that pushes beyond a window, at whose edge it may hold them as a relay does."""
+        """Tell whether the stages may chatter.
+
+        A stroke limiter may be touched and left many times in a swing. A controller that pushes beyond a window may
+        hold the stage at the window's edge as a relay does.
+        """
         controller = self.structure.controller
         return self.structure.joint == "free" or (controller is not None and bool(controller.settings.push))
 
     @property
     def remember(self) -> bool:
-        """Whether the stages have several bristles, of which some may stick on while others slip: such a stage breaks
-        away without having forgotten how it came to stick."""
+        """Tell whether the stages have several bristles, of which some may stick while others slip.
+
+        Such a stage still depends on its past when it breaks away.
+        """
         return len(self.kernel.having(Role.BRISTLE)) > 1
 
     @cached_property
     def symmetric(self) -> np.ndarray:
-        """Whether the mirror image of every motion is one, shape (count,): tried on states drawn at random."""
+        """Tell whether the mirror image of every motion is a motion too, shape (count,),
+        from random states."""
         states = np.random.default_rng(0).normal(size=(8, 1, self.scales.shape[1])) * self.scales
         pairs = ((self.rates(family), self.rates(-family)) for family in states)
         return np.all([np.all(np.abs(a + b) <= 1e-9 * np.abs(a), axis=1) for a, b in pairs], axis=0)
 
     @cached_property
     def values(self) -> list[np.ndarray]:
-        """The parameters of each stage, as the generated functions take them."""
+        """Return the parameters of each stage, as the generated functions take them."""
         return self.kernel.values({**self.flat, "motion.size": np.nan, "motion.duration": np.inf}, self.count)
 
     def number(self, name: str) -> np.ndarray:
-        """What the generated function `name` has to say about every stage, shape (count,): "rate" [1/s], the natural
-        frequency of mass and loop, "breakaway" [N], the largest friction force at rest, or "stiffness" [N/m], the
-        proportional one of the loop."""
+        """Return a number of every stage from the generated function `name`, shape (count,).
+
+        "rate" [1/s] is the natural frequency of mass and loop. "breakaway" [N] is the largest friction force at rest.
+        "stiffness" [N/m] is the proportional stiffness of the loop.
+        """
         (value,) = getattr(self.kernel.module, name)(self.values)
         return np.broadcast_to(np.asarray(value, dtype=float), (self.count,))
 
     @property
     def backlash(self) -> np.ndarray:
-        """Width of the backlash [m], shape (count,); 0 without one."""
+        """Return the width of the backlash [m], shape (count,); 0 without one."""
         return np.broadcast_to(np.asarray(self.flat[BACKLASH] if self.structure.plays else 0.0), (self.count,))
 
     @property
     def friction_at_rest(self) -> np.ndarray:
-        """The largest friction force at rest [N], shape (count,), the mean of both directions: that of break-away, but
-        for what the controller exerts half a backlash off its reference, which moves nothing."""
+        """Return the largest friction force at rest [N], shape (count,),
+        the mean of both directions.
+
+        It is the break-away force less the controller's force half a backlash off its reference, which moves nothing.
+        """
         return self.number("breakaway") - self.number("stiffness") * self.backlash / 2
 
     @cached_property
     def length(self) -> np.ndarray:
-        """By how much the break-away force deflects the loop [m], shape (count,)."""
+        """Return the deflection of the loop by the break-away force [m], shape (count,)."""
         return self.number("breakaway") / self.number("stiffness")
 
     @cached_property
     def scales(self) -> np.ndarray:
-        """Magnitudes of the states, shape (count, states)."""
+        """Return the magnitudes of the states, shape (count, states)."""
         size = np.where(self.length > 0, self.length, OrbitSettings.current().frictionless_size)
         values = self.kernel.values({**self.flat, "motion.size": size, "motion.duration": np.inf}, self.count)
         return columns(self.kernel.module.scales(values), self.count)
 
     @property
     def sticking(self) -> int:
-        """The state that stays where it is while a stage sticks: the position of what the friction acts on."""
+        """Return the index of the state that stays put while a stage sticks:
+        the position of the body with friction."""
         return self.kernel.cart_position
 
     @property
     def integral(self) -> int:
-        """The state that winds up while a stage sticks; of several, the innermost, which holds the force."""
+        """Return the index of the integrator's state; with several integrators, of the innermost,
+        which holds the force."""
         return self.kernel.having(Role.INTEGRAL)[-1]
 
     @property
     def outer_integrals(self) -> list[int]:
-        """The other states that wind up."""
+        """Return the indices of the integrators of outer loops."""
         return self.kernel.having(Role.INTEGRAL)[:-1]
 
     def settled(self, steady: Steady) -> np.ndarray:
-        """States in a steady motion that has lasted, shape (count, states)."""
+        """Return the states in a steady motion that has lasted, shape (count, states)."""
         return self.kernel.settled_at(self.values, steady, self.count)
 
     def displaced(self, displacement: np.ndarray) -> np.ndarray:
-        """States of stages at rest that are displaced [m], the controller's filters having followed, all else zero."""
+        """Return the states of stages at rest that are displaced [m]: filters have followed,
+        everything else is zero."""
         return self.kernel.unwound_at(self.values, Steady(-displacement, displacement), self.count)
 
     @cached_property
     def relaxed(self) -> np.ndarray:
-        """State of the integrator per displacement [s] at which the actuator exerts no more force on a stage at rest
-        than at the reference, shape (count,)."""
+        """Return the integrator state per displacement [s] at which the actuator's force is as at
+        the reference, shape (count,)."""
         return self.settled(Steady(-1.0, 1.0))[:, self.integral]
 
     @cached_property
     def balancing(self) -> np.ndarray:
-        """Force of the actuator [N] about which a stage sticks, shape (count,): none where friction alone holds the
-        constant forces, else what balances them."""
+        """Return the actuator force [N] about which a stage sticks, shape (count,).
+
+        It is zero if friction alone holds the constant forces; otherwise it balances them.
+        """
         constant = sum(np.asarray(self.flat[f"bias.{name}"]) for name in self.structure.biased)
         held = np.abs(constant) < self.number("breakaway")
         return np.where(held, 0.0, -constant) + np.zeros(self.count)
 
     def unbalanced(self, states: np.ndarray, number: int | None = None) -> np.ndarray:
-        """By how much the integrators are off the state in which the actuator balances what friction does not hold of
-        the constant forces on a stage at rest where it sticks, shape (count,), in states (count, states); or in states
-        (n, states) of the stage with that number alone, shape (n,)."""
+        """Return how far integrators are from balancing the constant forces on a sticking stage,
+        shape (count,).
+
+        Only constant forces that friction does not hold need balance. `states` have the shape (count, states), or (n,
+        states) for the stage with one `number` alone; then the result has the shape (n,).
+        """
         of = slice(None) if number is None else number
         balanced = self.relaxed[of] * states[:, self.sticking] + self.per_newton[of] * self.balancing[of]
         return states[:, self.integral] - balanced
 
     @cached_property
     def per_newton(self) -> np.ndarray:
-        """By how much the integrator changes for a force of 1 N, shape (count,)."""
+        """Return the change of the integrator's state for a force of 1 N, shape (count,)."""
         held, free = (self.settled(Steady(0.0, 0.0, force=force))[:, self.integral] for force in (1.0, 0.0))
         return held - free
 
     def rates(self, states: np.ndarray) -> np.ndarray:
-        """The time derivative of the states, both of shape (count, states)."""
+        """Return the time derivative of the states, both of shape (count, states)."""
         modes = self.kernel.modes(states.T, 0.0, np.zeros(3), self.values)
         return columns(self.kernel.module.right_hand_side(states.T, modes, 0.0, np.zeros(3), self.values), self.count)
 
     def steady_friction(self, velocities: np.ndarray) -> np.ndarray | None:
-        """Friction force [N] in steady motions of the cart at velocities [m/s], one per stage, both of shape (count,);
-        None where the law cannot say it."""
+        """Return the friction force [N] in steady motion of the cart at velocities [m/s],
+        both of shape (count,).
+
+        Returns None for a law without a steady force.
+        """
         states = np.zeros((self.count, self.kernel.initial_size))
         states[:, self.kernel.cart_velocity] = velocities
         rows = self.kernel.module.steady_friction(states.T, self.values)
@@ -192,11 +215,13 @@ class Ensemble:
         along: tuple[str, ...] = (),
         **run_options: Any,
     ) -> Results:
-        """Run each stage from its state for its duration [s]; `run_options` as in `RunOptions`. Modes that remember are
-        those in which a run begins in that state; `ends` are states alone unless they are to be `with_modes` too.
-        Deviations may be `along` keys (see `KernelRequest`), by what the flat keys say of them. Turning points are kept
-        where a `least_swing` is asked for: a limiter that chatters makes so many that runs would have to be repeated
-        with more room."""
+        """Run each stage from its state for its duration [s]; `run_options` as in `RunOptions`.
+
+        A run begins in the modes that belong to its state. `ends` are states alone, or with the modes if `with_modes`.
+        Deviations may be `along` keys (see `KernelRequest`), by the values of the flat keys. Turning points are only
+        kept where `least_swing` is given: a limiter that chatters makes so many that runs would have to be repeated
+        with more room.
+        """
         run_options = {"least_swing": np.inf, **run_options}
         options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **run_options)
         flat = {**self.flat, "motion.duration": durations, "motion.displacement": self.length}
@@ -211,15 +236,15 @@ class Ensemble:
         return results if with_modes else results._replace(ends=results.ends[:, : starts.shape[1]])
 
     def same_modes(self, states: np.ndarray, ends: np.ndarray) -> np.ndarray:
-        """Whether runs end, `ends` (count, kept), in the modes that remember in which they began in `states`, shape
-        (count,)."""
+        """Return which runs end, in `ends` (count, kept),
+        with the switched modes they began with in `states`, shape (count,)."""
         begun, ended = (self.kernel.modes(state.T, 0.0, np.zeros(3), self.values) for state in (states, ends))
         switches = list(self.kernel.switches)
         return np.all(begun[switches] == ended[switches], axis=0)
 
 
 def _with_room(results: Results, room: int) -> Results:
-    """The results with room for so many turning points."""
+    """Widen or cut results to room for so many turning points."""
     turns = results.turn_times[:, :room], results.turn_values[:, :room]
     if missing := room - turns[0].shape[1]:
         turns = tuple(np.pad(column, ((0, 0), (0, missing))) for column in turns)
@@ -227,5 +252,5 @@ def _with_room(results: Results, room: int) -> Results:
 
 
 def done(results: Results) -> np.ndarray:
-    """Which runs were completed, shape (runs,)."""
+    """Return which runs were completed, shape (runs,)."""
     return np.equal(results.statuses, Status.DONE)

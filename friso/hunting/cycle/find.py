@@ -1,4 +1,5 @@
-"""Hunting cycles of many stages at once: found, closed, and judged by their multipliers."""
+"""Find hunting cycles of many stages at once: close them,
+and judge their stability by multipliers."""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ RTOL = ToleranceSettings().cycle_rtol
 """Default relative tolerance for following cycles."""
 
 COARSE_RTOL = ToleranceSettings().guess_rtol
-"""Relative tolerance that does for guesses."""
+"""Relative tolerance that suffices for guesses."""
 
 
 NO_RETURN = "from every distance the stage swings back less far than it started"
@@ -31,24 +32,28 @@ NO_PAIR = "there is no asymmetric cycle beside the symmetric one"
 NOT_CLOSED = "the return map has a fixed point, but no orbit near it could be closed"
 
 UNCERTAIN = (NOT_CLOSED, NO_MULTIPLIER)
-"""Reasons why no cycle was found although there may be one."""
+"""Reasons after which a cycle may exist although none was found."""
 
 
 def time_constant(returned: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
-    """Time [s] in which a deviation changes by the factor e that is multiplied within a time `returned` [s]."""
+    """Return the time [s] in which a deviation changes by the factor e,
+    if it is multiplied once per time `returned` [s]."""
     return returned / np.maximum(np.abs(np.log(np.abs(multiplier))), 1e-12)
 
 
 @dataclass(frozen=True)
 class Cycles(ArrayRows):
-    """One cycle per stage, or none.
+    """One cycle per stage, or none; arrays are NaN where there is none.
 
-    `closed` (count,), whether there is one; `reasons` (count,), why there is none; `sign`, -1 for cycles that are their
-    own mirror image after half a period, over which everything is taken then, and 1 for others; `swings`, those in that
-    time; `states` (count, states) on the cycle, in the middle of the sticking; `period` [s], `amplitude` [m], half of
-    peak to peak, `middle` [m] between the peaks, `gap` (see `Orbits`), the `local` multipliers (count, states - 1), the
-    largest first, their `direction` (count, states), the macroscopic `slope` (where a limiter may chatter) and the
-    `multiplier`, that of the two which decides, each of shape (count,); NaN where there is none.
+    - `sign`: -1 for cycles that are their own mirror image after half a period, over which everything is then taken; 1
+      for others. `swings`: swings in that time.
+    - `closed` (count,): whether there is a cycle; `reasons` (count,): why there is none.
+    - `states` (count, states): on the cycle, in the middle of sticking.
+    - `period` [s], `amplitude` [m], half of peak to peak, and `middle` [m] between the peaks, (count,).
+    - `gap` (count,): error of closing (see `Orbits`).
+    - `local` (count, states - 1): Floquet multipliers, the largest first; `direction` (count, states): of the first.
+    - `slope` (count,): macroscopic slope of the return map, where a limiter may chatter.
+    - `multiplier` (count,): the one of the two that decides stability.
     """
 
     sign: float
@@ -67,42 +72,46 @@ class Cycles(ArrayRows):
 
     @property
     def attracting(self) -> np.ndarray:
-        """Which of them attract, shape (count,)."""
+        """Return which cycles are stable, shape (count,)."""
         return self.closed & (np.abs(self.multiplier) < 1)
 
     @property
     def time_constant(self) -> np.ndarray:
-        """Time [s] in which a small deviation from the cycle shrinks, or grows, by the factor e, shape (count,)."""
+        """Return the time [s] in which a small deviation from the cycle shrinks or grows by the
+        factor e, shape (count,)."""
         return time_constant(self.orbits.times, self.multiplier)
 
     @property
     def uncertain(self) -> np.ndarray:
-        """Which stages may have a cycle that was not found, shape (count,)."""
+        """Return which stages may have a cycle that was not found, shape (count,)."""
         return np.isin(self.reasons.astype(str), UNCERTAIN)
 
     @property
     def orbits(self) -> Orbits:
-        """The cycles as closed orbits."""
+        """Return the cycles as closed orbits."""
         times = self.period * (0.5 if self.sign < 0 else 1.0)
         return Orbits(self.states, times, self.sign, self.gap, self.closed, self.swings)
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
-        """What is known of every stage, by name."""
+        """Return the arrays with one row per stage, by name."""
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("sign", "swings")}
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap | None = None) -> Cycles:
-    """The cycle of every stage that is its own mirror image, of stages whose equations are."""
+    """Find the symmetric cycle of every stage, its own mirror image,
+    for stages with symmetric equations."""
     positive = positive or return_map(stages, COARSE_RTOL)
     return _closed(stages, symmetric_guess(stages, positive, COARSE_RTOL), -1.0, rtol)
 
 
 def find_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
-    """Find one hunting cycle of every stage, attracting or not: of a symmetric stage the symmetric cycle, whose
-    multiplier is that of half a period, of others the cycle whose multiplier is that of a whole one (`sign` is 0 if
-    there are both kinds of stages). Orbits are closed to a relative tolerance."""
+    """Find one hunting cycle of every stage, stable or not.
+
+    For a symmetric stage it is the symmetric cycle, with the multiplier of half a period; for others the multiplier is
+    that of a whole period. `sign` is 0 if there are both kinds of stage. Orbits are closed to a relative tolerance.
+    """
     symmetric = stages.symmetric
     kinds = ((symmetric, symmetric_cycles), (~symmetric, whole_cycles))
     parts = [(which, find(stages.take(which), rtol)) for mask, find in kinds if (which := np.flatnonzero(mask)).size]
@@ -110,7 +119,7 @@ def find_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
 
 
 def concatenate_cycles(parts: Sequence[tuple[np.ndarray, Cycles]]) -> Cycles:
-    """The cycles of all stages from those of some and others, with the numbers of these."""
+    """Join the cycles of groups of stages, each given with the numbers of its stages."""
     if len(parts) == 1:
         return parts[0][1]
     order = np.argsort(np.concatenate([which for which, _ in parts]))
@@ -119,8 +128,11 @@ def concatenate_cycles(parts: Sequence[tuple[np.ndarray, Cycles]]) -> Cycles:
 
 
 def families(stages: Ensemble, rtol: float = RTOL) -> tuple[Cycles, ...]:
-    """The cycles that the return maps suggest: the symmetric one and one of an asymmetric pair, or the one over a whole
-    period where some of the stages are not symmetric."""
+    """Find the cycles that the return maps suggest.
+
+    Symmetric stages give the symmetric cycle and one of an asymmetric pair. If any stage is not symmetric, there is one
+    cycle over a whole period.
+    """
     positive = return_map(stages, COARSE_RTOL)
     if stages.symmetric.all():
         return symmetric_cycles(stages, rtol, positive), asymmetric_cycles(stages, positive, rtol)
@@ -129,8 +141,11 @@ def families(stages: Ensemble, rtol: float = RTOL) -> tuple[Cycles, ...]:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def asymmetric_cycles(stages: Ensemble, positive: ReturnMap, rtol: float = RTOL) -> Cycles:
-    """One of the pair of cycles, mirror images of each other, that a symmetric stage may have beside its symmetric
-    cycle; from its return map."""
+    """Find one of the pair of asymmetric cycles that a symmetric stage may have,
+    from its return map.
+
+    The other of the pair is its mirror image.
+    """
     settings = OrbitSettings.current()
     cycles = _closed(stages, whole_guess(stages, positive, positive, settings.least_asymmetry_share), 1.0, rtol)
     same = np.abs(cycles.middle) < settings.least_lean_share * cycles.amplitude
@@ -140,14 +155,16 @@ def asymmetric_cycles(stages: Ensemble, positive: ReturnMap, rtol: float = RTOL)
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def whole_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap | None = None) -> Cycles:
-    """The cycle of every stage, followed over a whole period, of stages that need not be symmetric; `positive` is the
-    return map of stages that stick on the positive side."""
+    """Find the cycle of every stage over a whole period, for stages that need not be symmetric.
+
+    `positive` is the return map of stages that stick on the positive side.
+    """
     positive = positive or return_map(stages, COARSE_RTOL)
     return _closed(stages, whole_guess(stages, positive, return_map(stages, COARSE_RTOL, -1.0)), 1.0, rtol)
 
 
 def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
-    """The cycles near guesses."""
+    """Close cycles near guesses, from several variants of each guess in turn."""
     count, size = stages.count, len(stages.kernel.states)
     orbits = Orbits(
         np.full((count, size), np.nan),
@@ -171,19 +188,19 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
 
 
 def kept(stages: Ensemble, orbits: Orbits, distances: np.ndarray) -> np.ndarray:
-    """Which orbits stick about where they were guessed to, at distances [m], shape (count,)."""
+    """Return which orbits stick near the guessed distances [m], shape (count,)."""
     return np.abs(orbits.states[:, stages.sticking] / distances - 1) < OrbitSettings.current().kept_distance_share
 
 
 def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, trial: Orbits, guess: Guess) -> None:
-    """Take over the orbits that are closed where they were expected."""
+    """Take over the trial orbits that are closed near their guess."""
     good = trial.closed & kept(stages, trial, guess.distances[which])
     for name in ("states", "times", "gaps", "closed"):
         getattr(orbits, name)[which[good]] = getattr(trial, name)[good]
 
 
 def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float) -> None:
-    """Close orbits from where a long simulation ends, as far as it repeats itself."""
+    """Close orbits from the end of a long simulation, where that repeats itself."""
     settings = OrbitSettings.current()
     missing = guess.numbers[~orbits.closed[guess.numbers]]
     if not missing.size:
@@ -212,7 +229,10 @@ def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray | str = NOT_CLOSED) -> Cycles:
-    """Cycles from closed orbits: their size and their multipliers; `reasons` of those that are not closed."""
+    """Make cycles from closed orbits: compute size and multipliers.
+
+    `reasons` are given to the orbits that are not closed.
+    """
     which = np.flatnonzero(orbits.closed)
     subset, shut = stages.take(which), orbits.take(which)
     periods = shut.times * (2.0 if shut.sign < 0 else 1.0)

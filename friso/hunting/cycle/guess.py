@@ -1,4 +1,4 @@
-"""Where hunting cycles may be: fixed points of the return map, and of the way there and back."""
+"""Guess hunting cycles: fixed points of the return map, and of the way there and back."""
 
 from __future__ import annotations
 
@@ -14,20 +14,24 @@ from friso.hunting.cycle.settings import OrbitSettings
 
 @dataclass(frozen=True)
 class Guess:
-    """A distance [m] at which each stage sticks, again and again, and the time [s] of its return, both of shape
-    (count,); NaN where there is none."""
+    """Distance [m] at which each stage sticks again and again, and time [s] of its return,
+    (count,); NaN for no guess."""
 
     distances: np.ndarray
     times: np.ndarray
 
     @property
     def numbers(self) -> np.ndarray:
-        """The numbers of the stages that have one."""
+        """Return the numbers of the stages with a guess."""
         return np.flatnonzero(np.isfinite(self.times))
 
 
 def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess:
-    """The largest distance from which a stage lands as far on the other side, the map falling through the diagonal."""
+    """Guess the symmetric cycle: the largest distance from which a stage lands as far on the
+    other side.
+
+    The return map falls through its diagonal there.
+    """
     settings = OrbitSettings.current()
     low, high = _falling(positive.distances, positive.returns - positive.distances)
     numbers = np.flatnonzero(np.isfinite(low))
@@ -44,10 +48,12 @@ def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess
 
 
 def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apart: float = 0.0) -> Guess:
-    """The distance from which a stage comes back to where it was, by way of one that differs by a share of at least
-    `apart`. Of several it is that for which the two differ least if apart is 0, else that for which they differ most.
+    """Guess the cycle over a whole period: the distance from which a stage comes back to where
+    it was.
 
-    `positive` and `negative` are the maps of the stages that stick on the positive and on the negative side.
+    The distance on the other side differs from it by a share of at least `apart`. Of several, the least different one
+    is taken if `apart` is 0, else the most different one. `positive` and `negative` are the maps of stages that stick
+    on the positive and on the negative side.
     """
     settings = OrbitSettings.current()
     guess = Guess(np.full(stages.count, np.nan), np.full(stages.count, np.nan))
@@ -67,9 +73,13 @@ def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apar
 
 
 def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.ndarray, apart: float) -> float | None:
-    """The distance that is its own end, of those whose numbers are in `goes`; if there is none, the one that is almost:
-    near a fold both lie between two points of the map. With `apart` neither where the map passes its symmetric fixed
-    point, or comes near that: it almost comes back there whenever a flip is near."""
+    """Return the distance that returns to itself, among those numbered `goes`;
+    None if there is none.
+
+    If no distance does, the one that almost does is returned: near a fold both fixed points lie between two points of
+    the map. With `apart`, places near the symmetric fixed point are left out, because the map almost returns there
+    whenever a flip is near.
+    """
     rise, side = end - start, np.zeros(len(start) + 1)
     side[goes] = np.sign(far - start)[goes] if apart else 1.0
     crosses = np.flatnonzero((side[:-2] * side[1:-1] > 0) & (rise[:-1] * rise[1:] <= 0))
@@ -91,7 +101,8 @@ def _ascending(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _falling(distances: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The neighbouring distances between which a function falls through zero, the last such; NaN where none are."""
+    """Return the last neighbouring distances between which a function falls through zero;
+    NaN if there are none."""
     falls = (rise[:, :-1] > 0) & (rise[:, 1:] <= 0)
     last = falls.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)
     rows = np.arange(len(rise))
@@ -100,12 +111,12 @@ def _falling(distances: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _crossing(distances: np.ndarray, rise: np.ndarray) -> np.ndarray:
-    """Where a function falls through zero, between two of the distances."""
+    """Return where a function falls through zero, by a straight line between two distances."""
     low, high = _falling(distances, rise)
     above, below = _interpolated(low, distances, rise), _interpolated(high, distances, rise)
     return low + (high - low) * above / (above - below)
 
 
 def _interpolated(at: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Straight between the points x, y (count, points), at one place each (count,)."""
+    """Interpolate linearly between the points x, y (count, points), at one place each (count,)."""
     return np.array([np.interp(*row) for row in zip(at, x, y, strict=True)])

@@ -1,5 +1,5 @@
-"""Motions that go on for ever beside a cycle that repels, of any number of swings or none, told from the return map
-near it."""
+"""Find lasting motions near an unstable cycle, of any number of swings,
+from the return map around it."""
 
 from __future__ import annotations
 
@@ -15,9 +15,13 @@ from friso.hunting.settings import ToleranceSettings
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> np.ndarray:
-    """Distances [m] at which stages stick in motions that their return map keeps within a few per cent of a cycle that
-    repels, shape (count, KEPT), NaN where it keeps none. The map is interpolated: a simulation has to decide whether
-    they attract. None either where a limiter chatters: the map is too rough there to tell what it keeps."""
+    """Return distances [m] at which stages stick in motions that the return map keeps close to
+    an unstable cycle.
+
+    Close means within a few per cent. The shape is (count, KEPT), NaN where there is none. The map is interpolated, so
+    a simulation has to decide whether the motions are attractors. Where a limiter chatters, the map is too rough and
+    the result is NaN.
+    """
     settings = OrbitSettings.current()
     tolerances = ToleranceSettings.current()
     distances = np.full((stages.count, settings.held_starts), np.nan)
@@ -41,8 +45,12 @@ def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> np.ndar
 
 
 def _returns(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
-    """How far stages swing [m] when they begin beside their orbits, shape (count, runs, RETURNS): across the range
-    first, the orbit in the middle of that, then where on either side the next return is no longer near it."""
+    """Measure how far stages swing [m] when they begin beside their orbits, shape (count, runs,
+    RETURNS).
+
+    Runs first span the range, with the orbit in the middle. More runs follow where, on either side, the next return
+    leaves the range.
+    """
     settings = OrbitSettings.current()
     away = np.linspace(-settings.held_range_share, settings.held_range_share, settings.held_runs)
     heights = returns_of(stages, orbits, direction, away[None, :], settings.held_returns, rtol)
@@ -56,9 +64,12 @@ def _returns(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: floa
 
 
 def held_by(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Where motions are after many returns that a map, which takes deviations `before` a return to those `after` it,
-    each of shape (runs,), keeps within its range, ascending. Those that have only ever grown are not held: it takes
-    them long to leave a cycle whose multiplier is close to 1 or -1."""
+    """Return the deviations, ascending, at which motions are after many returns of a map that
+    keeps them in its range.
+
+    The map takes the deviations `before` a return to those `after` it, each of shape (runs,). A motion that only ever
+    grew is not kept: near a multiplier of 1 or -1 it merely leaves slowly.
+    """
     settings = OrbitSettings.current()
     inside = (np.abs(before) <= settings.held_range_share) & (np.abs(after) <= settings.held_range_share)
     breaks = before[~inside & np.isfinite(before)]

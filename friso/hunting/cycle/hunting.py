@@ -1,4 +1,5 @@
-"""The hunting cycles of one stage: how large, how long, whether they attract; and why there are none."""
+"""Find the hunting cycles of one stage, their size, period and stability,
+or the reason why there are none."""
 
 from __future__ import annotations
 
@@ -31,23 +32,23 @@ if TYPE_CHECKING:
 
 
 UNDECIDED = "simulations that had to decide failed, or had not settled when they were stopped"
-"""Why it is not certain whether anything attracts a stage."""
+"""Reason given when simulations that had to decide were not completed."""
 
 GIVEN_UP = "the search for what attracts the stage would have taken more work than a check may"
-"""Why it is not certain what attracts a stage where an allowance was used up."""
+"""Reason given when the allowance of work was used up."""
 
 
 FLIPS = "whether the stage hunts depends on the tolerance of the simulation, a hundredth of which decided"
-"""Why it is not certain what attracts a stage where simulations contradict each other."""
+"""Reason given when simulations at two tolerances contradict each other."""
 
 REACHED = "a cycle that attracts at another bandwidth could be followed to this one, but was not found here"
 """Reason given when the search through the bandwidths contradicts the survey of the stage itself."""
 
 DITHERS = "dither keeps the stage moving, so no cycle is searched for: only runs show whether it hunts"
-"""Why cycles of a stage are not searched that may hunt all the same."""
+"""Reason why no cycles are searched for a stage with dither, which may hunt all the same."""
 
 BY_ITSELF = "its loop is unstable, or not linear even without friction"
-"""Why it is not certain that a stage settles which friction cannot make hunt."""
+"""Reason given when a stage that friction cannot make hunt may still not settle."""
 
 GROWS = "with this force limit and no anti-windup swings may grow without bound: a size is where a run was stopped"
 """Reason given when an observed swing may grow without bound, as the loop is unstable at lower gains."""
@@ -61,7 +62,7 @@ MAY_DIE_OUT = "without anti-windup large swings die out the slower the larger th
 PASSING: Mapping[LowerGains, str] = {"stable": MAY_DIE_OUT, "unstable": GROWS, "unknown": MAY_GROW}
 
 FARTHER_KICKS = "with a force limit and no anti-windup, kicks larger than those tried may keep it swinging"
-"""Why something may attract a stage that a survey does not reach."""
+"""Reason given when something may attract a stage from farther off than the survey reaches."""
 
 MOSTLY_WITHIN = "most starts tried lie within error_deadband, few beyond it: some of those beyond may keep swinging"
 """Reason given when a wide dead zone holds most starts of a survey."""
@@ -83,24 +84,26 @@ STIFF_BRISTLES = "bristles give way by so little that runs do not resolve how fr
 """Reason given when bristles bend by less than runs resolve."""
 
 RESOLVED_BRISTLES = 10 * TIGHT
-"""Deflection of bristles, in units of that of the loop, below which runs do not resolve it, even at the tightest
-tolerance of a survey: with 9e-10 nothing attracts in friso's runs where the exact map of a stage has a cycle, with 1e-8
-and more the cycle is there (`benchmarks.oracles`, always)."""
+"""Smallest deflection of bristles, in deflections of the loop, that runs resolve at the tightest tolerance of a survey:
+at 9e-10 friso's runs find no attractor where the exact map of a stage has a cycle; from 1e-8 on the cycle is there
+(`benchmarks.oracles`, always)."""
 
 
 @dataclass(frozen=True)
 class Cycle:
     """A hunting cycle.
 
-    `amplitude` [m], half of peak to peak, `middle` [m] between the peaks, `period` [s], after which it repeats itself,
-    and the number of `swings` to one side or the other in it. A `symmetric` cycle is its
-    own mirror image after half a period, and its multipliers are those of half a period; those of others are of a whole
-    one. `multipliers`, shape (states - 1,), are the Floquet multipliers, the largest first, without the one that every
-    cycle has along itself; `slope` is that of the return map over 1 % of the amplitude (NaN where stages so near do not
-    come back), and `multiplier` that of the two which decides: the slope with a stroke limiter, which may chatter, else
-    the largest Floquet multiplier (its modulus if it is complex). `growth` is the multiplier as a simulation beside the
-    cycle shows it, by an independent route (NaN where it leaves too fast). `residual` is the gap at which the orbit
-    closes, as a share of the magnitudes of its states; `signals` are one period in time, from where the stage sticks.
+    - `symmetric`: it is its own mirror image after half a period; its multipliers are then those of half a period.
+    - `amplitude` [m], half of peak to peak, `middle` [m] between the peaks, `period` [s], and `swings` to either side
+      in a period.
+    - `multipliers`, shape (states - 1,): Floquet multipliers, the largest first, without the trivial one along the
+      cycle.
+    - `slope`: slope of the return map over 1 % of the amplitude (NaN where stages so near do not come back).
+    - `multiplier`: the number that decides stability. It is the slope with a stroke limiter, which may chatter, else
+      the largest Floquet multiplier (its modulus if complex).
+    - `growth`: the multiplier as an independent simulation beside the cycle shows it (NaN if that leaves too fast).
+    - `residual`: gap at which the orbit closes, as a share of the magnitudes of its states.
+    - `signals`: one period in time, from where the stage sticks.
     """
 
     symmetric: bool
@@ -117,28 +120,32 @@ class Cycle:
 
     @cached_property
     def trace(self) -> xr.Dataset:
-        """The signals as a dataset over the time [s]."""
+        """Return the signals as a dataset over the time [s]."""
         import xarray as xr
 
         return xr.Dataset(dict(self.signals))
 
     @property
     def attracts(self) -> bool:
-        """Whether motions near the cycle approach it."""
+        """Tell whether the cycle is stable: motions near it approach it."""
         return abs(self.multiplier) < 1
 
     @property
     def time_constant(self) -> float:
-        """Time [s] in which a small deviation from the cycle shrinks, or grows, by the factor e."""
+        """Return the time [s] in which a small deviation from the cycle shrinks or grows by the
+        factor e."""
         returned = self.period / 2 if self.symmetric else self.period
         return float(time_constant(np.array(returned), np.array(self.multiplier)))
 
 
 @dataclass(frozen=True)
 class Swing:
-    """A lasting swing that was observed in a long simulation, and of which no orbit could be closed, or none that
-    attracts: half of peak to peak, `amplitude` [m]; its `period` [s], about that if it is not `regular`; and the number
-    of `swings` to one side or the other in it."""
+    """A lasting swing that a long simulation shows,
+    but of which no stable orbit could be closed.
+
+    `amplitude` [m] is half of peak to peak. `period` [s] is approximate unless the swing is `regular`. `swings` counts
+    swings to either side in a period.
+    """
 
     amplitude: float
     period: float
@@ -148,13 +155,18 @@ class Swing:
 
 @dataclass(frozen=True)
 class Hunting:
-    """What there is to know of a stage's hunting: its `cycles`, those that attract first, or the `reason` why there are
-    none, or why it is not `certain` what attracts (if simulations that had to decide failed or were stopped); the
-    return map, of a stage that sticks on the positive side (None where a stage cannot hunt at all); swings that were
-    `observed` and are none of the cycles; what motions end in that do not come to rest, the `target` (None where
-    nothing attracts); all of this as it was `surveyed`; and the loop as motions far beyond a force limit without
-    anti-windup see it, at `lower_gains` (None: there is no such limit): unless it is stable there, large motions may
-    run away. What was observed is `passing` then, or may be."""
+    """Cycles and other attractors of a stage.
+
+    - `cycles`: hunting cycles, the stable ones first.
+    - `reason`: why there are none, or why it is not `certain` what attracts the stage.
+    - `certain`: every simulation that had to decide was completed.
+    - `returns`: return map of the stage sticking on the positive side (None: the stage cannot hunt).
+    - `observed`: attracting swings that are none of the cycles.
+    - `target`: motions that do not come to rest end in this (None: nothing attracts).
+    - `surveyed`: the survey itself.
+    - `lower_gains`: stability of the loop far beyond a force limit without anti-windup (None: there is no such limit).
+      Unless it is "stable", large motions may diverge, and an observed swing may be `passing`.
+    """
 
     cycles: tuple[Cycle, ...]
     reason: str
@@ -167,28 +179,33 @@ class Hunting:
 
     @property
     def attracting(self) -> tuple[Cycle, ...]:
-        """The cycles that attract."""
+        """Return the stable cycles."""
         return tuple(cycle for cycle in self.cycles if cycle.attracts)
 
     @property
     def passing(self) -> bool:
-        """Whether what attracts was observed, and may be a swing that grows without bound, or dies out slowly: its size
-        is only that at which its run was stopped."""
+        """Tell whether an observed swing may be transient: it may grow without bound,
+        or die out slowly.
+
+        Its size is then only the size at which the run was stopped.
+        """
         return self.lower_gains is not None and bool(self.observed)
 
     @property
     def possible(self) -> bool:
-        """Whether there is friction to stick to, and integral action that winds up."""
+        """Tell whether the stage has friction to stick to and integral action that winds up."""
         return self.returns is not None
 
 
 def cannot_hunt(stage: Stage) -> str:
-    """Why a stage cannot hunt, whatever its numbers, or why its cycles are not searched (`DITHERS`); "" if they are."""
+    """Return why a stage cannot hunt whatever its numbers,
+    or why its cycles are not searched (`DITHERS`); "" if they are."""
     return why_not(structure(stage.flat()))
 
 
 def why_not(form: Structure) -> str:
-    """Why stages of this structure cannot hunt, or why their cycles are not searched; "" if they are."""
+    """Return why stages of this structure cannot hunt, or why their cycles are not searched;
+    "" if they are."""
     drive = form.transmission
     if form.friction == "none" and (drive is None or (drive.friction == "none" and not drive.backlash)):
         return "there is no friction to stick to"
@@ -199,11 +216,11 @@ def why_not(form: Structure) -> str:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
-    """Find the hunting cycles of a stage, and whatever else attracts it.
+    """Find the hunting cycles of a stage, and everything else that attracts it.
 
-    The motion of the stage file plays no part. Cycles are followed to a relative tolerance. The search for what
-    attracts may use so much `work` (see `friso.engine.allowance`); what it could not settle by then is not certain.
-    Raises InputError for a tolerance that is not usable.
+    The motion of the stage file plays no part. Cycles are closed to a relative tolerance. The search may use so much
+    `work` (see `friso.engine.allowance`); anything not settled by then is not certain. Raises InputError for a
+    tolerance that is not usable.
     """
     checked_rtol(rtol)
     if reason := cannot_hunt(stage):
@@ -236,10 +253,10 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
 
 
 def surely_surveyed(stages: Ensemble, survey: Attractors | None) -> np.ndarray:
-    """Which stages it is certain of what attracts them, shape (count,).
+    """Return for which stages the attractors are certain, shape (count,).
 
-    A survey decided that, and nothing may lie beyond it. Stages that cannot hunt are not surveyed (None): they are
-    certain if they keep up no other swing.
+    The survey decided, and nothing can attract beyond its reach. Stages that cannot hunt are not surveyed (None): they
+    are certain if they keep up no other swing.
     """
     if survey is None:
         return surely_calm(stages) if why_not(stages.structure) else np.ones(stages.count, bool)
@@ -247,8 +264,8 @@ def surely_surveyed(stages: Ensemble, survey: Attractors | None) -> np.ndarray:
 
 
 def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
-    """Why it is not certain what attracts stages, whatever a survey of them decided: words of shape (count,), "" where
-    there is no such reason."""
+    """Return why something may attract stages beyond a survey, words of shape (count,),
+    "" for no reason."""
     why = np.full(stages.count, "", dtype=object)
     far, farther = far_beyond_a_limit(stages), np.zeros(stages.count, bool)
     if far is not None:
@@ -262,8 +279,11 @@ def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
 
 
 def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
-    """Why something may attract stages that a survey does not reach, words of shape (count,): motions from `farther`
-    off, (count,), for instance, which may swing on for all that is known."""
+    """Return why something may attract stages without an attractor, words of shape (count,),
+    "" for no reason.
+
+    `farther`, (count,), marks stages that may swing on from farther off than was tried.
+    """
     settings = OrbitSettings.current()
     if stages.outer_integrals:
         why = np.full(stages.count, OUTER_INTEGRALS, dtype=object)
@@ -278,10 +298,10 @@ def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
 
 
 def small_cycles_possible(stages: Ensemble) -> np.ndarray:
-    """Which stages may have cycles smaller than is looked for, shape (count,).
+    """Return which stages may have cycles smaller than the survey covers, shape (count,).
 
-    A cycle that the fall of friction feeds is a certain share of that fall (`feeding_ratio_range`), and it attracts
-    where friction falls more slowly than cycles grow.
+    A cycle fed by the fall of friction has an amplitude in a certain ratio to this fall (`feeding_ratio_range`). It is
+    stable where friction falls more slowly than cycles grow.
     """
     settings = OrbitSettings.current()
     possible, rub = np.zeros(stages.count, bool), np.flatnonzero(stages.number("breakaway") > 0)
@@ -292,7 +312,8 @@ def small_cycles_possible(stages: Ensemble) -> np.ndarray:
 
 
 def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
-    """Which stages with friction may have cycles smaller than is looked for, shape (count,)."""
+    """Return which stages with friction may have cycles smaller than the survey covers,
+    shape (count,)."""
     settings = OrbitSettings.current()
     breakaway = stages.number("breakaway")[:, None]
     sizes = np.geomspace(1e-3 * settings.least_certain_swing, settings.least_certain_swing, 60)
@@ -325,7 +346,7 @@ def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
 
 
 def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
-    """One cycle of a stage as it is shown, with one period in time."""
+    """Make one cycle of a stage ready for display, with one period in time."""
     slope = cycles.slope if stages.chatters else slopes(stages, cycles.orbits, cycles.direction, rtol)
     return Cycle(
         symmetric=cycles.sign < 0,
@@ -343,7 +364,7 @@ def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
 
 
 def _growth(stages: Ensemble, cycles: Cycles) -> float:
-    """Growth of a small deviation from one return to the next, in a simulation near the cycle."""
+    """Return the growth of a small deviation per return, from a simulation near the cycle."""
     settings = OrbitSettings.current()
     away = np.array([[0.0, settings.beside_cycle_share, -settings.beside_cycle_share]])
     heights = returns_of(
@@ -360,7 +381,7 @@ def _growth(stages: Ensemble, cycles: Cycles) -> float:
 
 
 def _signals(stages: Ensemble, cycles: Cycles) -> dict[str, Any]:
-    """Signals of one period of a cycle, by name."""
+    """Return the signals of one period of a cycle, by name."""
     settings = OrbitSettings.current()
     period = float(cycles.period[0])
     results = stages.run(cycles.states, cycles.period, COARSE_RTOL / 100, interval=period / settings.trace_samples)

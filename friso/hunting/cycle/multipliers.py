@@ -1,5 +1,7 @@
-"""By how much a deviation from a cycle grows from one return to the next: Floquet multipliers, and the slope of the
-return map over a small but finite range."""
+"""Compute the growth of deviations from a cycle per return.
+
+Floquet multipliers give it for small deviations, the slope of the return map over a small but finite range.
+"""
 
 from __future__ import annotations
 
@@ -16,10 +18,12 @@ from friso.hunting.settings import ToleranceSettings
 
 @dataclass(frozen=True)
 class Multipliers:
-    """Floquet multipliers of orbits, but for the one that every cycle has along itself, the largest first
-    (count, states - 1), the direction that belongs to the first, with a position of 1 (count, states), and the
-    macroscopic slope of the return map along it (count,), NaN where no limiter chatters: it decides nothing there; and
-    the extremes of the position on the way that they were taken on, `high` and `low` [m] (count,)."""
+    """Floquet multipliers of orbits, without the trivial one along the cycle.
+
+    `local` (count, states - 1) has the largest first. `direction` (count, states) belongs to the first, scaled to a
+    position of 1. `slope` (count,) is the macroscopic slope of the return map along it, NaN where no limiter chatters.
+    `high` and `low` [m] (count,) are the extremes of the position on the orbit.
+    """
 
     local: np.ndarray
     direction: np.ndarray
@@ -29,8 +33,11 @@ class Multipliers:
 
 
 def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
-    """The multipliers of closed orbits, one per stage, from runs to a relative tolerance; per half a period where that
-    is what they were closed over."""
+    """Compute the multipliers of closed orbits, one orbit per stage,
+    from runs to a relative tolerance.
+
+    They belong to half a period if the orbits were closed over half a period.
+    """
     shot = shoot(stages, orbits.states, orbits.times, orbits.sign, rtol)
     flows = np.where(shot.done[:, None, None], shot.flows, np.nan)
     local, direction = _floquet(stages, flows, stages.rates(shot.ends))
@@ -40,8 +47,8 @@ def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
 
 
 def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Multipliers and leading directions of the flow seen on the section at which the integrator's state is what it was
-    at the start."""
+    """Return multipliers and leading directions of the flow on the section of constant
+    integrator state."""
     phase = stages.integral
     sections = flows - rates[:, :, None] * flows[:, None, phase, :] / rates[:, phase, None, None]
     sections[:, :, phase] = 0.0
@@ -56,8 +63,10 @@ def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np
 
 
 def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
-    """Slope of the straight line through the returns from a small range about the orbits along a direction (count,
-    states), shape (count,)."""
+    """Return the slope of the return map from a small range about the orbits, shape (count,).
+
+    The starts lie along a direction (count, states); a straight line is fitted to the returns.
+    """
     settings = OrbitSettings.current()
     away = np.linspace(-settings.slope_range_share / 2, settings.slope_range_share / 2, settings.slope_runs)[None, :]
     heights = returns_of(stages, orbits, direction, away, 2, ToleranceSettings.current().slope_rtol_factor * rtol)
@@ -65,8 +74,11 @@ def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float)
 
 
 def _straight(pairs: np.ndarray) -> float:
-    """Slope of a straight line through pairs (points, 2) without outliers, as where the stage
-    does not break away; NaN with too few."""
+    """Fit a straight line through pairs (points, 2) without outliers, and return its slope;
+    NaN with too few.
+
+    An outlier arises where the stage does not break away.
+    """
     settings = OrbitSettings.current()
     if len(pairs) < settings.least_slope_runs:
         return np.nan
@@ -82,8 +94,11 @@ def _straight(pairs: np.ndarray) -> float:
 def returns_of(
     stages: Ensemble, orbits: Orbits, direction: np.ndarray, away: np.ndarray, returns: int, rtol: float
 ) -> np.ndarray:
-    """How far stages swing [m], shape (count, points, returns), on each of some returns, when they begin beside their
-    orbits: away along a direction (count, states) by shares (1, points) of the distance at which they stick."""
+    """Measure how far stages swing [m] on each return when they begin beside their orbits,
+    shape (count, points, returns).
+
+    The starts lie along a direction (count, states), at shares (1, points) of the sticking distance.
+    """
     count, points = stages.count, away.shape[1]
     distance = orbits.states[:, stages.sticking]
     starts = orbits.states[:, None, :] + (away * np.abs(distance)[:, None])[:, :, None] * direction[:, None, :]

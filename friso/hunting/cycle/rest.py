@@ -1,4 +1,4 @@
-"""Stages stuck off their reference, from where hunting starts."""
+"""Make states of stages stuck off their reference, from where hunting starts."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from friso.stage.standstill import integral_leak
 
 
 def stuck(stages: Ensemble, displacement: np.ndarray, wound: np.ndarray | float = 0.0) -> np.ndarray:
-    """States, shape (count, states), of stages at rest that are displaced [m] (count,), the bristles relaxed and the
-    integrator such that the actuator exerts no force, or balances constant forces that friction does not hold; but
-    integrals of outer loops have `wound` up for a time [s].
+    """Return states of stages stuck at displacements [m] (count,), shape (count, states).
 
-    A stage that sticks winds up from here until it breaks away, and has forgotten by then how it came to stick: these
-    states are a line through all hunting cycles with sticking, and the distance to the reference alone tells what
-    follows, unless there are integrals in several loops.
+    Bristles are relaxed. The actuator exerts no force, or balances constant forces that friction does not hold.
+    Integrals of outer loops have `wound` up for a time [s].
+
+    A stage stuck here winds up until it breaks away, and by then its past no longer matters. So these states are a line
+    through all hunting cycles with sticking, and the distance to the reference decides what follows. Integrals in
+    several loops are the exception.
     """
     states = stages.settled(Steady(-displacement, displacement, force=stages.balancing))
     states[:, stages.outer_integrals] = np.reshape(-displacement * wound, (-1, 1))
@@ -25,12 +26,10 @@ def stuck(stages: Ensemble, displacement: np.ndarray, wound: np.ndarray | float 
 
 
 def bent(stages: Ensemble, displacement: np.ndarray, *travels: np.ndarray) -> np.ndarray:
-    """Stuck states as `stuck` gives them, with the bristles bent by slow travels of the masses.
+    """Return stuck states as `stuck` does, with the bristles bent by slow travels of the masses.
 
     The `travels` [m], each of shape (count,), follow one another, and bend bristles no farther than break-away does.
-
-    Of several bristles some stick on while others slip. What breaks away has not forgotten these then, and the distance
-    alone does not tell what follows.
+    With several bristles some stick while others slip, so that the distance alone does not decide what follows.
     """
     states, bristles = stuck(stages, displacement), stages.kernel.having(Role.BRISTLE)
     most = stages.scales[:, bristles]
@@ -40,15 +39,20 @@ def bent(stages: Ensemble, displacement: np.ndarray, *travels: np.ndarray) -> np
 
 
 def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
-    """States of stages at their reference, all masses moving at a velocity [m/s], all else zero."""
+    """Return states of stages at their reference, all masses moving at a velocity [m/s],
+    everything else zero."""
     states = np.zeros((stages.count, len(stages.kernel.states)))
     states[:, stages.kernel.having(Role.VELOCITY)] = velocity[:, None]
     return states
 
 
 def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
-    """Time [s] that the integrator takes to wind up to the break-away force while a stage sticks, shape (count,); where
-    it pauses instead, a time in which the loop moves. No longer than an integrator with a leak winds at all."""
+    """Return the time [s] that the integrator takes to wind up to break-away while a stage
+    sticks, shape (count,).
+
+    Where the integrator pauses, it is a time in which the loop moves. It is never longer than an integrator with a leak
+    winds.
+    """
     settings = OrbitSettings.current()
     rate = np.abs(stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton)
     with np.errstate(divide="ignore"):

@@ -1,4 +1,5 @@
-"""The return map of hunting: from the distance at which a stage sticks to how far it swings to the other side."""
+"""Compute the return map of hunting: from the sticking distance to how far a stage swings to
+the other side."""
 
 from __future__ import annotations
 
@@ -14,8 +15,11 @@ from friso.hunting.cycle.swings import swings
 
 @dataclass(frozen=True)
 class ReturnMap:
-    """For each stage and side, shape (count, points): distances at which it sticks [m], ascending, how far it
-    swings to the other side [m] (negative where it stops before, 0 where it does not break away), and when [s]."""
+    """Return map of each stage on one side, shape (count, points).
+
+    `distances` [m], ascending, are where the stage sticks. `returns` [m] are how far it swings to the other side:
+    negative if it stops before, 0 if it does not break away. `times` [s] are when.
+    """
 
     distances: np.ndarray
     returns: np.ndarray
@@ -24,7 +28,10 @@ class ReturnMap:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def return_map(stages: Ensemble, rtol: float, side: float = 1.0) -> ReturnMap:
-    """The map of stages that stick on one side, 1 or -1, of their reference; finer where it might return as far."""
+    """Compute the map of stages that stick on one side, 1 or -1, of their reference.
+
+    The map is finer where the stage might return as far.
+    """
     settings = OrbitSettings.current()
     coarse = np.geomspace(*settings.map_range, settings.map_points)[None, :] * stages.length[:, None]
     first = trace_returns(stages, coarse, rtol, side)
@@ -44,7 +51,8 @@ def _columns(return_map: ReturnMap) -> tuple[np.ndarray, ...]:
 
 
 def trace_returns(stages: Ensemble, distances: np.ndarray, rtol: float, side: float) -> ReturnMap:
-    """Let every stage go from each of the distances [m], shape (count, points), ascending."""
+    """Release every stage from each of the distances [m], shape (count, points), ascending,
+    and measure its first swing."""
     settings = OrbitSettings.current()
     shape = distances.shape
     several = stages.take(np.repeat(np.arange(stages.count), shape[1]))

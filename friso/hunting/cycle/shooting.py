@@ -1,4 +1,5 @@
-"""Periodic orbits by Newton's method on the flow over a period, or on half of it followed by the mirror."""
+"""Close periodic orbits by Newton's method on the flow over a period,
+or over half of it followed by the mirror."""
 
 from __future__ import annotations
 
@@ -17,9 +18,11 @@ from friso.hunting.settings import ToleranceSettings
 
 @dataclass(frozen=True)
 class Shot:
-    """Where orbits from states (count, states) are after times [s] (count,): `ends`, mirrored after half a period,
-    and their derivative by the starts, `flows` (count, states, states); the extremes of the position on the way, `high`
-    and `low` [m] (count,); and which of them are `done`."""
+    """Result of following orbits from states (count, states) over times [s] (count,).
+
+    `ends` are the final states, mirrored after half a period. `flows` (count, states, states) are their derivatives by
+    the starts. `high` and `low` [m] (count,) are the extremes of the position. `done` marks completed runs.
+    """
 
     ends: np.ndarray
     flows: np.ndarray
@@ -30,10 +33,13 @@ class Shot:
 
 @dataclass(frozen=True)
 class Orbits(ArrayRows):
-    """Closed orbits: a state of each (count, states), the time after which it comes back, or comes to its mirror
-    image where sign is -1 [s] (count,), the gap that is left, as a share of the states' magnitudes (count,), whether
-    Newton's method has come that far that they may be called closed (count,), and the number of `swings` in that time:
-    one to the other side in half a period of the simplest cycles, two in a whole one."""
+    """Closed orbits.
+
+    `states` (count, states) has one state of each. `times` [s] (count,) is the time after which it comes back, or to
+    its mirror image if `sign` is -1. `gaps` (count,) is the error left, as a share of the states' magnitudes. `closed`
+    (count,) says whether Newton's method came close enough. `swings` counts swings in that time: one in half a period
+    of the simplest cycles, two in a whole one.
+    """
 
     states: np.ndarray
     times: np.ndarray
@@ -44,10 +50,11 @@ class Orbits(ArrayRows):
 
 
 def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Shot:
-    """Follow orbits from states (count, states) over times [s] (count,), with a small deviation along every state.
+    """Follow orbits from states (count, states) over times [s] (count,),
+    with a small deviation along every state.
 
-    That along one of them, whose rate is the largest, follows from the others: the flow carries the rates at the start
-    to those at the end. A state alone does not tell the rates where modes remember: then all are followed.
+    One deviation is computed rather than run, along the state with the largest rate: the flow carries the rates at the
+    start to those at the end. Where modes remember, a state alone does not give the rates, so all deviations are run.
     """
     count, size = states.shape
     rows, before = np.arange(count)[:, None], stages.rates(states)
@@ -72,20 +79,23 @@ def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, 
 
 
 def swings_of_simplest(sign: float) -> int:
-    """The swings in half a period (sign -1), or in a whole one, of the simplest cycles."""
+    """Return the swings of the simplest cycles in half a period (sign -1) or in a whole one."""
     return 1 if sign < 0 else 2
 
 
 def close(
     stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float, swings: int | None = None
 ) -> Orbits:
-    """Close orbits from guesses: states (count, states) at which the stage sticks, and times [s] (count,).
+    """Close orbits from guesses: states (count, states) at which the stage sticks,
+    and times [s] (count,).
 
-    `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one; `swings` are those in that time, if they are
-    not as few as there may be. The phase is that at which the integrator's state makes the actuator balance constant
-    forces on a stage at rest, and exert none without these. A Jacobian serves for as long as steps with it bring the
-    gap down fast. Where a limiter chatters, the flow's derivative changes from one nanometre to the next and points
-    nowhere; the last Jacobian from farther away then serves for as many steps as it takes.
+    `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one. `swings` are those in that time, by default
+    as few as possible. The phase is fixed where the integrator makes the actuator balance the constant forces on a
+    stage at rest, or exert none without these.
+
+    A Jacobian is kept for as long as steps with it shrink the gap fast. Where a limiter chatters, the flow's derivative
+    changes from one nanometre to the next and is useless. The last Jacobian from farther away is then kept for all
+    further steps.
     """
     orbits = _iterated(_Shooting(lambda which, places: stages.take(which), states, times, sign, rtol)).orbits
     return replace(orbits, swings=swings or orbits.swings)
@@ -93,21 +103,26 @@ def close(
 
 @dataclass(frozen=True)
 class Border:
-    """A plane for each orbit in the space of its place and the logarithms of its distance [m] and time [s]: the orbit
-    lies on it if normal @ (place, log distance, log time) = level; shapes (count, 3) and (count,)."""
+    """A plane for each orbit in the space of its place and the logarithms of its distance [m]
+    and time [s].
+
+    The orbit lies on it if normal @ (place, log distance, log time) = level; shapes (count, 3) and (count,).
+    """
 
     normal: np.ndarray
     level: np.ndarray
 
 
 Family = Callable[[np.ndarray, np.ndarray], Ensemble]
-"""Stages that depend on a number each, their place: from their numbers (count,) and places (count,)."""
+"""Stages that depend on one number each, their place: a function of their numbers (count,) and places (count,)."""
 
 
 class Followed(NamedTuple):
-    """Orbits, the places of their stages, and the Jacobians that they were closed with, shape (count, states + 2,
-    states + 2), with which orbits near them may begin (NaN: there is none, as where a limiter chatters:
-    they change too fast there)."""
+    """Orbits, the places of their stages, and the Jacobians with which they were closed.
+
+    The Jacobians, shape (count, states + 2, states + 2), start the search for nearby orbits. They are NaN where a
+    limiter chatters, because they change too fast there.
+    """
 
     orbits: Orbits
     places: np.ndarray
@@ -125,10 +140,12 @@ def close_along(
     swings: int | None = None,
     jacobians: np.ndarray | None = None,
 ) -> Followed:
-    """Close orbits as `close` does, from states and times [s], their stages being free to change their places so that
-    each comes to lie on its border. Goes round folds, at which there is no orbit at a place beyond. With `jacobians`
-    of closed orbits at these states, times and places, or near them, the step to the border is made before anything is
-    run; they may come from another line through the keys: steps tell what changes by the place along this one.
+    """Close orbits as `close` does, while their stages change their places until each orbit lies
+    on its border.
+
+    The orbits start from states and times [s]. The method passes folds, beyond which there is no orbit at a place. With
+    `jacobians` of closed orbits at or near the start, the first step to the border needs no run. The Jacobians may
+    belong to another line through the keys: further steps learn the derivative along this one.
     """
     following = _Following(family, states, times, sign, rtol, places)
     following.border = border
@@ -142,7 +159,8 @@ _S = TypeVar("_S", bound="_Shooting")
 
 
 class _Shooting:
-    """Orbits on their way to being closed, all at once; those that are closed, or have failed, rest."""
+    """Orbits on their way to being closed, all at once;
+    an orbit that is closed or has failed is left alone."""
 
     def __init__(
         self,
@@ -174,7 +192,7 @@ class _Shooting:
         )
 
     def advance(self) -> bool:
-        """One step of the orbits still on their way; whether any is on its way still."""
+        """Take one step of all active orbits, and tell whether any is still active."""
         renewed = self.gaps > OrbitSettings.current().fresh_jacobian_gap if self.chatters else ~self.serves
         for which in (np.flatnonzero(self.active & renewed), np.flatnonzero(self.active & ~renewed)):
             if which.size:
@@ -182,7 +200,7 @@ class _Shooting:
         return bool(self.active.any())
 
     def _advance(self, which: np.ndarray, renew: bool) -> None:
-        """One step of some orbits, with a Jacobian of their own or with the last one."""
+        """Take one step of some orbits, with a new Jacobian or with the last one."""
         settings = OrbitSettings.current()
         stages, states, times = self.family(which, self.places[which]), self.states[which], self.times[which]
         if renew:
@@ -204,7 +222,7 @@ class _Shooting:
             self._step(k, np.concatenate([miss, other]), stages.sticking, scale)
 
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
-        """Derivatives of the misses and of the phase by the states and the time."""
+        """Return derivatives of the misses and of the phase by the states and the time."""
         count, size = shot.ends.shape
         jacobians = np.zeros((count, size + 1, size + 1))
         jacobians[:, :size, :size] = shot.flows - np.eye(size)
@@ -214,12 +232,13 @@ class _Shooting:
         return jacobians
 
     def _residual(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
-        """By how much the phase is off, shape (orbits, 1): the integrator's state is wanted in which the actuator
-        balances constant forces, and exerts none without these."""
+        """Return the phase error, shape (orbits, 1):
+        how far the integrator is from balancing the constant forces."""
         return stages.unbalanced(self.states[which])[:, None]
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
-        """Keep what is closer than before; what is closed, fails or gets no closer rests."""
+        """Keep orbits that are closer than before; deactivate those that are closed,
+        fail or get no closer."""
         better = which[gaps < self.gaps[which]]
         self.idle[which] = np.where(gaps < 0.5 * self.gaps[which], 0, self.idle[which] + 1)
         for best, current in ((self.best_states, self.states), (self.best_times, self.times)):
@@ -236,7 +255,8 @@ class _Shooting:
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
 
     def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
-        """Take a step of one orbit, shortened to the stride; what it was. `scales` are those of its states."""
+        """Take a Newton step of one orbit, shortened to the stride, and return it.
+        `scales` are those of its states."""
         settings = OrbitSettings.current()
         step, size = self.inverses[k] @ -residual, self.states.shape[1]
         far = abs(step[sticking]) / (settings.newton_stride * abs(self.states[k, sticking]))
@@ -249,7 +269,7 @@ class _Shooting:
 
     @property
     def orbits(self) -> Orbits:
-        """The best orbits so far, and whether they are closed."""
+        """Return the best orbits so far, and whether they are closed."""
         closed = self.gaps < self.limit
         return Orbits(self.best_states, self.best_times, self.sign, self.gaps, closed, swings_of_simplest(self.sign))
 
@@ -274,7 +294,7 @@ class _Following(_Shooting):
         self.latest: list[tuple[np.ndarray, np.ndarray] | None] = [None] * len(self.times)
 
     def begin_with(self, jacobians: np.ndarray) -> None:
-        """Take Jacobians of closed orbits to begin with, and the step with these to the border."""
+        """Start from Jacobians of closed orbits, with a first step to the border."""
         self.jacobians = jacobians.copy()
         which = np.arange(len(self.times))
         stages = self.family(which, self.places)
@@ -287,7 +307,8 @@ class _Following(_Shooting):
         self.serves[:] = True
 
     def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
-        """Take a step, once the Jacobian tells how far the last one came (Broyden 1965, doi:10.2307/2003941)."""
+        """Take a step after updating the Jacobian by the last one (Broyden 1965,
+        doi:10.2307/2003941)."""
         if latest := self.latest[k]:
             step, before = latest
             inverse, weights = self.inverses[k], np.concatenate([scales, [self.times[k], 1.0]]) ** -2.0
@@ -307,7 +328,7 @@ class _Following(_Shooting):
         super()._keep_best(which, gaps)
 
     def _set_border(self, which: np.ndarray, stages: Ensemble) -> None:
-        """Derivatives of how far orbits are from their borders."""
+        """Set the derivatives of the distance of orbits from their borders."""
         along, out, late = self.border.normal[which].T
         self.jacobians[which, -1] = 0.0
         self.jacobians[which, -1, stages.sticking] = out / self.states[which, stages.sticking]
@@ -315,7 +336,8 @@ class _Following(_Shooting):
         self.jacobians[which, -1, -1] = along
 
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
-        """Jacobians by states, time and place; where a limiter chatters, that by place serves while gaps shrink."""
+        """Return Jacobians by states, time and place; where a limiter chatters,
+        the column of the place is kept while gaps shrink."""
         settings = OrbitSettings.current()
         self.jacobians[which, :-1, :-1] = super()._jacobians(which, stages, shot)
         gaps = np.max(np.abs(shot.ends - self.states[which]) / stages.scales, axis=1)
@@ -330,8 +352,10 @@ class _Following(_Shooting):
         return self.jacobians[which]
 
     def _beside(self, which: np.ndarray) -> np.ndarray:
-        """Where the orbits end, and how far their phase is off, with the stages a little farther back and ahead along
-        their lines, shape (2, orbits, states + 1)."""
+        """Run the orbits with their stages a little farther back and ahead along their lines.
+
+        Returns the ends and the phase errors, shape (2, orbits, states + 1).
+        """
         settings = OrbitSettings.current()
         both = np.concatenate([which, which])
         nudge = np.repeat([-settings.place_nudge, settings.place_nudge], len(which))
@@ -340,7 +364,7 @@ class _Following(_Shooting):
         return np.hstack([ends, super()._residual(both, stages)]).reshape(2, len(which), -1)
 
     def _residual(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
-        """What is left of the conditions of orbits, and how far they are from their borders."""
+        """Return the phase errors of orbits, and their distances from the borders."""
         sizes = (np.abs(self.states[which, stages.sticking]), self.times[which])
         where = np.stack([self.places[which], *np.log(sizes)], axis=1)
         residual = (self.border.normal[which] * where).sum(axis=1) - self.border.level[which]
@@ -356,7 +380,7 @@ def _iterated(shooting: _S) -> _S:
 
 
 def _inverse(jacobian: np.ndarray) -> np.ndarray:
-    """The inverse of a matrix; NaN where there is none."""
+    """Invert a matrix; NaN if it is singular."""
     try:
         return np.linalg.inv(jacobian)
     except np.linalg.LinAlgError:

@@ -1,4 +1,5 @@
-"""Swings of many runs at once: the extrema of the zigzag that each stage draws about its reference."""
+"""Find the swings of many runs at once: the extrema of the zigzag that each stage draws
+about its reference."""
 
 from __future__ import annotations
 
@@ -13,17 +14,18 @@ from friso.hunting.cycle.settings import OrbitSettings
 
 @dataclass(frozen=True)
 class Swings:
-    """The first swings of runs, shape (runs, swings): where they turn [m] and when [s]; NaN beyond the last."""
+    """The first swings of runs, shape (runs, swings): turning points [m] and their times [s];
+    NaN beyond the last."""
 
     values: np.ndarray
     times: np.ndarray
 
 
 def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: int, rtol: float) -> Swings:
-    """The first `most` swings of stages that start at rest from states (count, states) and are followed for durations
-    [s] (count,); a failed run has none.
+    """Return the first `most` swings of stages that start at rest; a failed run has none.
 
-    An extremum counts once the way back from it is a leg long, or the run is over.
+    Stages start from states (count, states) and are followed for durations [s] (count,). An extremum counts once the
+    way back from it is a leg long, or the run is over.
     """
     position = starts[:, stages.kernel.position]
     legs = OrbitSettings.current().swing_leg_share * np.abs(position)
@@ -36,8 +38,12 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
 
 
 def last_swings(results: Results, legs: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """Where runs turned last [m] and when [s], shape (runs, most), the last swing in the last column, NaN before the
-    first: legs are at least `legs` [m] long, shape (runs,), and the swing that a run ends in does not count."""
+    """Return where [m] and when [s] runs turned last, shape (runs, most),
+    the last swing in the last column.
+
+    The columns before the first swing are NaN. Legs are at least `legs` [m] long, shape (runs,). The swing in which a
+    run ends does not count.
+    """
     runs, room = results.turn_values.shape
     held = (np.arange(room) < results.turn_counts[:, None]) & done(results)[:, None]
     values = np.where(held, results.turn_values, np.nan)
@@ -52,7 +58,7 @@ def last_swings(results: Results, legs: np.ndarray, most: int) -> tuple[np.ndarr
 
 
 def _zigzag(values: np.ndarray, times: np.ndarray, least: np.ndarray, side: np.ndarray, most: int) -> Swings:
-    """Follow the zigzags column by column; `side` is that on which they start."""
+    """Follow the zigzags column by column; `side` is the side on which they start."""
     runs = len(values)
     rows = np.arange(runs)
     extrema = Swings(np.full((runs, most + 1), np.nan), np.full((runs, most + 1), np.nan))
