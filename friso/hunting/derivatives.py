@@ -1,4 +1,4 @@
-"""By how much a cycle, and the edge of hunting, change with keys of the stage file."""
+"""Differentiate a cycle, and the edge of hunting, by keys of the stage file."""
 
 from __future__ import annotations
 
@@ -18,8 +18,11 @@ from friso.hunting.settings import EdgeSettings
 
 @dataclass(frozen=True)
 class CycleDerivatives:
-    """The symmetric cycle (that over a whole period, of stages that are not symmetric), whether it `attracts`, its
-    `amplitude` [m] and `period` [s], and their derivatives to the keys [SI], each of shape (keys,)."""
+    """The hunting cycle of a stage and its derivatives by keys [SI], each of shape (keys,).
+
+    It is the symmetric cycle, or the cycle over a whole period of a stage that is not symmetric. `attracts` says
+    whether it is stable; `amplitude` [m] and `period` [s] are its size.
+    """
 
     attracts: bool
     amplitude: float
@@ -30,8 +33,11 @@ class CycleDerivatives:
 
 @np.errstate(all="ignore")
 def cycle_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], rtol: float) -> CycleDerivatives | None:
-    """Differentiate a stage's cycle by some of its flat keys, with runs to a relative tolerance; None where no cycle
-    could be closed. Derivatives are exact, by variational equations along the keys, with saltation at kinks."""
+    """Differentiate a stage's cycle by some of its flat keys, with runs to a relative tolerance.
+
+    Derivatives are exact: variational equations along the keys, with saltation at kinks. Returns None if no cycle could
+    be closed.
+    """
     stages = Ensemble.held(flat, 1)
     cycles = find_cycles(stages)
     if not cycles.closed[0]:
@@ -59,8 +65,12 @@ def cycle_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], rtol: floa
 def flow_derivatives(
     stages: Ensemble, keys: tuple[str, ...], state: np.ndarray, time: np.ndarray, rtol: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Where the flow of a stage takes a state (1, states) in a time [s] (1,), and the derivatives of that to the state
-    and to flat keys: shapes (states,), (states, states) and (states, keys). None where a run was not completed."""
+    """Follow a stage from a state (1, states) for a time [s] (1,),
+    and differentiate its final state.
+
+    Returns the final state (states,), its derivatives by the start (states, states) and by flat keys (states, keys).
+    None if a run was not completed.
+    """
     from friso.equations.variational import along  # SymPy takes 0.3 s to import
 
     size, count = state.shape[1], state.shape[1] + len(keys)
@@ -79,8 +89,10 @@ def flow_derivatives(
 def _extremes(
     stages: Ensemble, keys: tuple[str, ...], orbits: Orbits, moved: np.ndarray, rtol: float
 ) -> tuple[float, np.ndarray] | None:
-    """Half of peak to peak of the position on an orbit and its derivatives to the keys, the orbit's state being moved
-    (states, keys) by these."""
+    """Return half of peak to peak of the position on an orbit, and its derivatives by the keys.
+
+    `moved` (states, keys) are the derivatives of the orbit's state by the keys. None if a run was not completed.
+    """
     whole = orbits.times * (2.0 if orbits.sign < 0 else 1.0)
     results = stages.run(orbits.states, whole, rtol, least_swing=0.0)
     turns = int(results.turn_counts[0])
@@ -99,11 +111,12 @@ def _extremes(
 
 @np.errstate(all="ignore")
 def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: float, rtol: float) -> np.ndarray | None:
-    """By what share the bandwidth of the edge of hunting changes, for a change of each key by a share, shape (keys,);
-    the edge is at so many times the bandwidth of the stage, all else of which stays. None where no cycle flips there.
+    """Return the relative change of the bandwidth at the edge of hunting per relative change of
+    each key, shape (keys,).
 
-    Along the edge the multiplier stays what it is: of that, an exact derivative of the flow, central differences are
-    taken.
+    The edge lies at `factor` times the bandwidth of the stage, everything else unchanged. Along the edge the multiplier
+    keeps its value. Its derivatives are central differences of an exact derivative of the flow. Returns None if no
+    cycle flips there.
     """
     settings = EdgeSettings.current()
     inside = faster(flat, factor * (1 - settings.inside_edge_share))
@@ -129,7 +142,11 @@ def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: flo
 def _multipliers(
     inside: Mapping[str, Any], changed: Sequence[Mapping[str, Any]], first: Cycles, rtol: float
 ) -> np.ndarray | None:
-    """The multipliers of stages that are a little different from one whose cycle is known, shape (stages,)."""
+    """Return the multipliers of stages that differ a little from one whose cycle is given,
+    shape (stages,).
+
+    None if an orbit could not be closed, or a multiplier is complex.
+    """
     count = len(changed)
     names = {name for change in changed for name, value in change.items() if value != inside[name]}
     flat = {**inside, **{name: np.array([change.get(name, inside[name]) for change in changed]) for name in names}}

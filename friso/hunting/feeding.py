@@ -1,8 +1,8 @@
-"""What feeds the hunting of a stage with a backlash: whether it lasts while the dry friction, or the backlash, is taken
-to nothing, step by step.
+"""Find the cause that feeds the hunting of a stage with a backlash:
+dry friction or the backlash.
 
-Each of both is scaled down on its own, the stage being surveyed anew at every share, so that it does not matter
-whether the cycle changes its form on the way. Viscous friction stays: it only damps.
+Each cause is scaled down to nothing on its own, step by step, and the stage is surveyed anew at every share. So the
+cycle may change its form on the way. Viscous friction stays: it only damps.
 """
 
 from __future__ import annotations
@@ -24,9 +24,12 @@ from friso.stage.transmission import BACKLASH, MOTOR_FRICTION
 
 @dataclass(frozen=True)
 class Decline:
-    """What becomes of hunting as one cause is scaled down: the least share at which something `lasts` that attracts,
-    and the greatest below it at which nothing does, `gone` (None: something attracts down to the last share; 0: it
-    shrinks in proportion to its cause, and is gone without that alone); and whether all of this is `certain`."""
+    """How hunting ends as one cause is scaled down.
+
+    `lasts` is the smallest share at which something still attracts. `gone` is the largest share below it at which
+    nothing does. It is None if something attracts down to the last share, and 0 if the cycle shrinks in proportion to
+    its cause. `certain` says whether all surveys were certain.
+    """
 
     lasts: float
     gone: float | None
@@ -34,20 +37,22 @@ class Decline:
 
     @property
     def needed(self) -> bool:
-        """Whether hunting ends without it."""
+        """Tell whether hunting ends without the cause."""
         return self.gone is not None
 
 
 @dataclass(frozen=True)
 class Feeding:
-    """What becomes of the hunting of a stage without its dry friction (None: it has none), and without its backlash."""
+    """How hunting declines without the dry friction (None: there is none),
+    and without the backlash."""
 
     friction: Decline | None
     backlash: Decline
 
 
 def feeding(stage: Stage) -> Feeding | None:
-    """What feeds the cycle that attracts a stage with a backlash; None for a stage without."""
+    """Find the cause that feeds the hunting of a stage with a backlash;
+    None for a stage without backlash."""
     flat = stage.flat()
     if not structure(flat).plays:
         return None
@@ -58,16 +63,20 @@ def feeding(stage: Stage) -> Feeding | None:
 
 
 def _without_friction(stage: Stage) -> Decline:
-    """What becomes of a stage without dry friction as its backlash goes: all motions are as much smaller as that is, so
-    that nothing changes until it is gone, and with it all that is not linear."""
+    """Return the decline of a stage without dry friction as its backlash vanishes.
+
+    All motions scale with the backlash, so nothing changes until it is gone, and the loop is then linear.
+    """
     settings = CheckSettings.current()
     rests = not unstable(stage.replace({BACKLASH: None}))
     return Decline(lasts=float(np.array(settings.feeding_shares)[-1]), gone=0.0 if rests else None, certain=True)
 
 
 def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
-    """The keys in proportion to all of which the dry friction of guide and motor goes: forces, and what makes the
-    bristles as much softer."""
+    """Return the keys that scale the dry friction of guide and motor.
+
+    They are the forces, and the stiffnesses, which make bristles softer in proportion.
+    """
     units = {key: field.unit for key, field in declared_keys(flat).items() if key in flat}
     tables = ("friction.", f"{MOTOR_FRICTION}.")
     return tuple(
@@ -78,7 +87,7 @@ def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _decline(flat: Mapping[str, Any], keys: tuple[str, ...]) -> Decline:
-    """What becomes of hunting with some keys at all shares."""
+    """Survey a stage with some keys scaled to all shares, and return how hunting declines."""
     settings = CheckSettings.current()
     scaled = {**flat, **{key: flat[key] * np.array(settings.feeding_shares) for key in keys}}
     attracted = find_attractors(scaled, len(np.array(settings.feeding_shares)))

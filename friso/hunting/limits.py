@@ -1,4 +1,4 @@
-"""How far and how finely friso searches for hunting."""
+"""State how far and how finely friso searches for hunting."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SearchLimits:
-    """What a search for hunting covers, for words that quote it.
+    """Range and steps of a search for hunting, for words that quote them.
 
-    Bandwidths are searched from `lowest_bandwidth` to `highest_bandwidth`, in units of that of a stage, in so many
-    steps to a factor of ten: `steps_to_edge` where an edge is looked for, `steps_beyond` where something may attract
-    again (windows narrower than a step may be missed). Static friction is searched up to `most_friction` times that of
-    the stage, and down to the same share of it, or to Coulomb friction. Advice keeps off an edge by the factor
-    `edge_distance`: machines differ, and searches may miss some. Moves are drawn between `move_shares` of the
-    acceleration, and of the acceleration time, of the stage file.
+    Bandwidths are searched from `lowest_bandwidth` to `highest_bandwidth`, in units of the stage's own. Steps per
+    factor of ten are `steps_to_edge` where an edge is looked for, and `steps_beyond` where something may attract again.
+    Windows narrower than a step may be missed. Static friction is searched up to `most_friction` times the stage's own,
+    and down to the inverse of this, or to Coulomb friction. Advice keeps away from an edge by the factor
+    `edge_distance`, because machines differ and searches may miss a window. Moves are drawn between `move_shares` of
+    the acceleration, and of the acceleration time, in the stage file.
     """
 
     lowest_bandwidth: float = 0.25

@@ -1,4 +1,5 @@
-"""Whether the loop of a stage is stable, friction aside: where it is not, tuning is to blame, and not friction."""
+"""Judge the stability of a stage's loop without friction: if it is unstable,
+tuning is to blame, not friction."""
 
 from __future__ import annotations
 
@@ -20,40 +21,44 @@ LowerGains = Literal["stable", "unstable", "unknown"]
 
 
 def winds_up_at_a_limit(stages: Ensemble) -> bool:
-    """Whether stages have a force limit without anti-windup."""
+    """Tell whether stages have a force limit without anti-windup."""
     controller = stages.structure.controller
     return bool(controller and controller.anti_windup == "none")
 
 
 def far_beyond_a_limit(stages: Ensemble) -> np.ndarray | None:
-    """The loops of stages as swings far beyond a force limit without anti-windup see them, words of shape (count,):
-    where they are unstable these grow, where they are stable these shrink. None: there is no such limit."""
+    """Return the stability of loops for swings far beyond a force limit without anti-windup,
+    words of shape (count,).
+
+    Swings grow where the loop is unstable, and shrink where it is stable. Returns None if there is no such limit.
+    """
     return at_lower_gains(stages) if winds_up_at_a_limit(stages) else None
 
 
 def may_run_away(stages: Ensemble) -> np.ndarray:
-    """Which stages swings far beyond such a limit may grow of, for all that is known, shape (count,)."""
+    """Return which stages may have swings that grow far beyond such a limit, shape (count,)."""
     far = far_beyond_a_limit(stages)
     return np.zeros(stages.count, bool) if far is None else far != "stable"
 
 
 def surely_run_away(stages: Ensemble) -> np.ndarray:
-    """Which stages such swings do grow of, shape (count,)."""
+    """Return which stages surely have swings that grow far beyond such a limit, shape (count,)."""
     far = far_beyond_a_limit(stages)
     return np.zeros(stages.count, bool) if far is None else far == "unstable"
 
 
 @np.errstate(all="ignore")
 def at_lower_gains(stages: Ensemble) -> np.ndarray:
-    """Whether the loops of sliding stages are stable at their own gain and at all lower ones, by the viscous friction
-    of the direction in which that is less, or unstable at one of them: a `LowerGains` each, shape (count,).
+    """Judge the stability of sliding stages at their own gain and all lower ones:
+    a `LowerGains` each, shape (count,).
 
-    That is unknown where the controller does not tell which keys its gain is, or acts otherwise about the reference
-    than far from it, which the linear loop at rest does not show.
+    A loop is "unstable" if it is so at one of the gains. The viscous friction is that of the direction with less. The
+    result is "unknown" if the controller does not name the keys of its gain. It is also unknown if the controller acts
+    differently about the reference than far from it, which the linear loop at rest does not show.
 
-    A force limit acts as a lower gain, the lower the larger the motion. Without anti-windup the largest motions go by
-    the force limit and the viscous friction alone: of a mass m with viscous friction b they shrink where
-    b k_p > m k_i, which is Hurwitz's criterion for the same loop at any gain, and grow where it is less.
+    A force limit acts as a lower gain, the lower the larger the motion. Without anti-windup, only the force limit and
+    the viscous friction matter for the largest motions. With a mass m and viscous friction b, they shrink if b k_p > m
+    k_i and grow if less. This is Hurwitz's criterion for the loop at any gain.
     """
     at_once = CheckSettings.current().loops_at_once
     controller, form = controller_of(stages.flat), stages.structure.controller
@@ -65,7 +70,8 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
 
 
 def _at_lower_gains(stages: Ensemble) -> np.ndarray:
-    """Tell whether loops are stable at lower gains, of few enough stages for the memory, whose gain is a known key."""
+    """Judge the stability at lower gains of few enough stages for the memory,
+    whose gain is a known key."""
     settings = CheckSettings.current()
     shares = np.geomspace(*settings.lower_gain_shares)
     controller, form = controller_of(stages.flat), stages.structure
@@ -82,14 +88,20 @@ def _at_lower_gains(stages: Ensemble) -> np.ndarray:
 
 
 def unstable(stage: Stage) -> tuple[LoopState, ...]:
-    """In which of its states the loop is not stable, the limiter not touched: while the stage sticks, held by its
-    bristles, and while it slides, with no friction but its viscous share."""
+    """Return the states in which the loop is unstable, with the limiter untouched.
+
+    The stage either sticks, held by its bristles, or slides with only viscous friction.
+    """
     return tuple(state for state, where in unstable_among(Ensemble.held(stage.flat(), 1)).items() if where[0])
 
 
 def leaves_for_good(stage: Stage) -> bool:
-    """Whether a motion that has gone farther from its reference than runs are followed goes on for good: the loop is
-    unstable, and there is no force limit with anti-windup, behind which it may come to a swing farther out."""
+    """Tell whether a motion that has gone farther from its reference than runs are followed
+    diverges.
+
+    It does if the loop is unstable and there is no force limit with anti-windup, behind which it may reach a larger
+    swing.
+    """
     stages = Ensemble.held(stage.flat(), 1)
     controller = stages.structure.controller
     limited = bool(controller and controller.anti_windup) and not winds_up_at_a_limit(stages)
@@ -98,18 +110,22 @@ def leaves_for_good(stage: Stage) -> bool:
 
 @np.errstate(all="ignore")  # absurd gains leave infinities behind
 def unstable_among(stages: Ensemble) -> dict[LoopState, np.ndarray]:
-    """The loops of which stages are not stable in each of these states, shape (count,); a swing is damped by the mean
-    of the viscous friction in both directions."""
+    """Return which stages have an unstable loop in each state, shape (count,).
+
+    A swing is damped by the mean viscous friction of both directions.
+    """
     limit = CheckSettings.current().least_growth_rate * stages.number("rate")
     return {state: growth > limit for state, growth in _growths(stages).items()}
 
 
 @np.errstate(all="ignore")
 def surely_calm(stages: Ensemble) -> np.ndarray:
-    """Which stages that cannot hunt surely keep up no other swing either, shape (count,): their loops are
-    stable, those of a free joint with its limiter touched as well, and beyond a force limit without anti-windup;
-    nothing opens them or keeps them moving and, where there is no friction, nothing makes them act otherwise near the
-    reference than far from it."""
+    """Return which stages that cannot hunt surely keep up no other swing either, shape (count,).
+
+    Their loops are stable, also with the limiter of a free joint touched, and beyond a force limit without anti-windup.
+    No backlash opens them and no dither keeps them moving. Without friction, the controller must also act alike near
+    the reference and far from it.
+    """
     least_rate = CheckSettings.current().least_growth_rate
     form = stages.structure
     drive, controller = form.transmission, form.controller
@@ -126,14 +142,18 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
 
 
 def _growths(stages: Ensemble, touched: bool = False) -> dict[LoopState, np.ndarray]:
-    """The fastest growth rates [1/s] in each of these states, shape (count,); NaN where equations are not finite. A
-    limiter may be `touched`."""
+    """Return the fastest growth rates [1/s] in each state, shape (count,);
+    NaN where equations are not finite.
+
+    A limiter may be `touched`.
+    """
     stuck = _rates(stages, touched)
     return {"sticks": _growth(stuck), "slides": _growth(_sliding(stages, stuck, np.mean))}
 
 
 def _growth(matrices: np.ndarray) -> np.ndarray:
-    """The fastest growth rates [1/s] of linear equations, (count, states, states); NaN where these are not finite."""
+    """Return the fastest growth rates [1/s] of linear equations, (count, states, states);
+    NaN where they are not finite."""
     rates = np.full(len(matrices), np.nan)
     finite = np.isfinite(matrices).all(axis=(1, 2))
     rates[finite] = np.linalg.eigvals(matrices[finite]).real.max(axis=1)
@@ -141,13 +161,15 @@ def _growth(matrices: np.ndarray) -> np.ndarray:
 
 
 def _motor_state(stages: Ensemble, which: int) -> int:
-    """Which state is the position (0) or the velocity (1) of the motor; the first without a transmission."""
+    """Return the index of the motor's position (0) or velocity (1);
+    the first state without a transmission."""
     names = stages.kernel.states
     return names.index(MOTOR_STATES[which]) if stages.structure.transmission else 0
 
 
 def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
-    """Each state moved a little from rest at the reference, all others at rest, (count, states)."""
+    """Yield each state moved a little from rest at the reference, all others at rest, (count,
+    states)."""
     settings = CheckSettings.current()
     for k, scale in enumerate(stages.scales.T):
         moved = np.zeros(stages.scales.shape)
@@ -156,8 +178,11 @@ def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
 
 
 def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
-    """Derivatives of the rates at rest by the states, in units of the magnitudes of these, (count, states, states);
-    with a limiter that is `touched`, far enough beyond the stroke."""
+    """Return the derivatives of the rates at rest by the states, scaled by their magnitudes,
+    (count, states, states).
+
+    A limiter that is `touched` is far enough beyond the stroke.
+    """
     settings = CheckSettings.current()
     flank = np.zeros((stages.count, len(stages.kernel.states)))
     if touched:
@@ -172,9 +197,9 @@ def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
 
 
 def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., np.ndarray]) -> np.ndarray:
-    """The linear system while the stage slides: of friction, only its viscous share is left.
+    """Return the linear system of a sliding stage, with only the viscous share of friction.
 
-    `of_directions` makes one share of those in the two directions. States of the friction law are left out.
+    `of_directions` combines the shares in the two directions. States of the friction law are left out.
     """
     settings = CheckSettings.current()
     kernel, flat = stages.kernel, stages.flat
@@ -198,14 +223,15 @@ def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., n
 
 
 def _viscous(stages: Ensemble, speed: np.ndarray, output: str) -> np.ndarray:
-    """By how much a friction force rises with speed [N s/m] beyond a high one [m/s], both (count,)."""
+    """Return by how much a friction force rises with speed [N s/m] beyond a high speed [m/s],
+    both (count,)."""
     slow, fast = (_force(stages, _slid(stages, times * speed), output) for times in (1.0, 2.0))
     return (fast - slow) / speed
 
 
 def _slid(stages: Ensemble, speed: np.ndarray) -> np.ndarray:
-    """States of stages that have slid for long at a speed [m/s] each: those of the friction law do not change any
-    more."""
+    """Return states of stages that have slid for long at a speed [m/s] each,
+    so that friction is steady."""
     states = stages.settled(Steady(0.0, 0.0, speed))
     bristles = stages.kernel.having(Role.BRISTLE)
     begun = stages.rates(states)[:, bristles]
@@ -222,7 +248,7 @@ def _slid(stages: Ensemble, speed: np.ndarray) -> np.ndarray:
 
 
 def _force(stages: Ensemble, states: np.ndarray, output: str) -> np.ndarray:
-    """A force [N] among the outputs, shape (count,)."""
+    """Return a force [N] among the outputs, shape (count,)."""
     kernel = stages.kernel
     modes = kernel.modes(states.T, 0.0, np.zeros(3), stages.values)
     rows = kernel.module.outputs(states.T, modes, 0.0, np.zeros(3), stages.values)

@@ -1,7 +1,7 @@
-"""Many stages of one structure at once: what attracts them, and the verdicts on them.
+"""Find attractors of many stages of one structure at once, and judge the stages.
 
-Stages are given as flat keys to SI numbers, or to arrays of shape (count,) where they differ. From fewer starts than
-`friso.hunting.check` takes, so that what attracts from a narrow range of them may be missed.
+Stages are flat keys to SI numbers, or to arrays of shape (count,) where they differ. There are fewer starts than in
+`friso.hunting.check`, so an attractor with a narrow basin may be missed.
 """
 
 from __future__ import annotations
@@ -40,13 +40,14 @@ from friso.hunting.what_attracts import surveyed_roughly
 
 @dataclass(frozen=True)
 class StageAttractors(ArrayRows):
-    """What attracts each of many stages that swings for ever, arrays of shape (count,).
+    """Attractors of many stages that swing for ever, arrays of shape (count,).
 
-    Whether anything that `attracts` was found; whether that is `decided`, as every simulation that had to decide was
-    completed; whether it is `certain`, as nothing may attract beyond what is searched either. Of the largest swing
-    found: its `amplitude` [m], half of peak to peak, and `period` [s] (NaN: nothing attracts); whether it was `closed`
-    as an orbit, and the `multiplier` of that (NaN: it was not). `target` is what motions of the stages end in that do
-    not come to rest (None: stages of this structure cannot hunt, and nothing was searched).
+    - `attracts`: something that attracts was found.
+    - `decided`: every simulation that had to decide was completed.
+    - `certain`: moreover, nothing can attract beyond the range searched.
+    - `amplitude` [m], half of peak to peak, and `period` [s]: of the largest swing (NaN: nothing attracts).
+    - `closed`: the largest swing was closed as an orbit; `multiplier`: of this orbit (NaN: it was not).
+    - `target`: motions that do not come to rest end in this (None: stages of this structure cannot hunt).
     """
 
     attracts: np.ndarray
@@ -60,8 +61,10 @@ class StageAttractors(ArrayRows):
 
     @classmethod
     def of(cls, survey: Attractors | None, certain: np.ndarray) -> StageAttractors:
-        """Summarise a survey of stages, and which of them it is certain about, shape (count,); a survey of None stands
-        for stages that cannot hunt."""
+        """Summarise a survey of stages, given which of them are `certain`, shape (count,).
+
+        A survey of None stands for stages that cannot hunt.
+        """
         count = len(certain)
         closed, (amplitude, period, multiplier) = np.zeros(count, bool), np.full((3, count), np.nan)
         if survey is None:
@@ -76,13 +79,16 @@ class StageAttractors(ArrayRows):
 
 
 def can_hunt(flat: Mapping[str, Any]) -> bool:
-    """Whether stages of one structure may hunt: there is friction to stick to, integral action that winds up, and a
-    reference that stands still."""
+    """Tell whether stages of one structure may hunt.
+
+    They need friction to stick to, integral action that winds up, and a reference that stands still.
+    """
     return not why_not(shared_structure(flat)) and not keeps_moving(flat)
 
 
 def kernels_to_judge(form: Structure) -> set[KernelRequest]:
-    """The kernels that a verdict on stages of a structure needs: who judges several has those of all built at once."""
+    """Return the kernels that a verdict on stages of a structure needs,
+    so that several can be built at once."""
     variational = set() if why_not(form) else {KernelRequest(form, variational=True)}
     return {KernelRequest(form), *variational}
 
@@ -96,12 +102,11 @@ def find_attractors(
     threads: int | None = None,
     cancel: np.ndarray | None = None,
 ) -> StageAttractors:
-    """Find what attracts stages of one structure, one motion that attracts each being enough.
+    """Find one attractor of each stage, for stages of one structure.
 
-    Their own motions play no part, but that stages whose references never stand still cannot hunt. Orbits are closed to
-    the relative tolerance; without `close_orbits` stages are searched by simulations alone, and motions that have
-    converged are taken for attracted. `threads` and `cancel` as in `RunOptions`. Raises Exhausted where an allowance is
-    used up.
+    Their own motions play no part, but stages whose references never stand still cannot hunt. Orbits are closed to the
+    relative tolerance. Without `close_orbits`, only simulations are used, and motions that have converged count as
+    attracted. `threads` and `cancel` as in `RunOptions`. Raises Exhausted where an allowance is used up.
     """
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = attractors(stages, rtol=rtol, cycles=close_orbits) if can_hunt(flat) else None
@@ -112,10 +117,11 @@ def find_attractors(
 def sketch_attractors(
     flat: Mapping[str, Any], count: int, threads: int | None = None, cancel: np.ndarray | None = None
 ) -> StageAttractors:
-    """Sketch what attracts stages of one structure, by their return maps as far as these go: sooner than
-    `find_attractors`, and wrong where something attracts from a narrow range of distances alone.
+    """Sketch the attractors of stages of one structure,
+    by coarse return maps where these suffice.
 
-    `threads` and `cancel` as in `RunOptions`. Raises Exhausted where an allowance is used up.
+    A sketch is faster than `find_attractors`, and wrong where an attractor has a narrow basin. `threads` and `cancel`
+    as in `RunOptions`. Raises Exhausted where an allowance is used up.
     """
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = surveyed_roughly(stages) if can_hunt(flat) else None
@@ -123,25 +129,27 @@ def sketch_attractors(
 
 
 def find_swings(flat: Mapping[str, Any]) -> tuple[Swinging, ...]:
-    """Find all that attracts one stage, given as flat keys, as thoroughly as a check does.
+    """Find all attractors of one stage, given as flat keys, as thoroughly as a check does.
 
-    The stage's own motion plays no part. Where an allowance is used up, what was found until then is returned.
+    The stage's own motion plays no part. Where an allowance is used up, the attractors found so far are returned.
     """
     return () if why_not(shared_structure(flat)) else attractors(Ensemble.held(flat, 1), thorough=True).motions
 
 
 def loops_unstable(flat: Mapping[str, Any], count: int) -> np.ndarray:
-    """Which stages of one structure have a loop that is not stable, sticking or sliding, whatever the friction does,
-    shape (count,)."""
+    """Return which stages of one structure have an unstable loop, sticking or sliding,
+    regardless of friction, shape (count,)."""
     states = unstable_among(Ensemble.held(flat, count, form=shared_structure(flat)))
     return np.any([*states.values()], axis=0)
 
 
 @np.errstate(all="ignore")
 def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
-    """Judge stages of one structure, whose own motions are run to a relative tolerance: words of
-    `friso.hunting.criteria.VERDICTS`, shape (count,), "failed" where simulations that had to decide failed, or what
-    attracts is not certain."""
+    """Judge stages of one structure, whose own motions are run to a relative tolerance.
+
+    Returns words of `friso.hunting.criteria.VERDICTS`, shape (count,). A stage has "failed" if a simulation that had to
+    decide failed, or if its attractors are not certain.
+    """
     attracted = find_attractors(flat, count)
     return judge_runs(flat, run_motions(flat, count, measuring_options(rtol)), attracted, rtol)
 
@@ -155,8 +163,11 @@ def judge_runs(
     threads: int | None = None,
     cancel: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Judge stages of one structure as `judge_many` does, whose own motions were run already, to a relative tolerance,
-    and of which it is known what attracts them; `threads` and `cancel` as in `RunOptions`."""
+    """Judge stages as `judge_many` does, from motions that were run already and attractors found
+    already.
+
+    `rtol` is the relative tolerance of further runs; `threads` and `cancel` as in `RunOptions`.
+    """
     count, target = len(motions.completed), attracted.target
     stages = Ensemble.held(flat, count, form=shared_structure(flat))
     decided = motions.completed & attracted.certain
@@ -188,12 +199,15 @@ def judge_runs(
 
 
 def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions) -> tuple[np.ndarray, np.ndarray]:
-    """Follow motions that do not end in what was found to attract their stages: which swing on by less, and for which
-    it is decided that they swing on or rest, both of shape (motions,)."""
+    """Follow motions that do not end in an attractor of their stages.
+
+    Returns which of them swing on by less, and which surely swing on or rest, both of shape (motions,).
+    """
     rest = followed_motions(flat, motions, len(motions.completed), run_options, possible=True)
     return rest.steady, rest.steady | _stands(flat, rest)
 
 
 def _stands(flat: Mapping[str, Any], rest: FollowedMotions) -> np.ndarray:
-    """Which motions were followed to where they do not swing any more, as far as they had to be, shape (count,)."""
+    """Return which motions were followed, as far as necessary, until they no longer swing,
+    shape (count,)."""
     return ~rest.unknown & (~rest.moving | (rest.swing <= resting(flat, len(rest.moving))))

@@ -1,4 +1,5 @@
-"""How far a stage is from the edge of hunting: the crossover up to which something attracts that hunts."""
+"""Find the edge of hunting in bandwidth: the crossover above which nothing that hunts
+attracts the stage."""
 
 from __future__ import annotations
 
@@ -26,14 +27,13 @@ LOWEST, HIGHEST = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidt
 
 @dataclass(frozen=True)
 class Margin:
-    """The edge of hunting in bandwidth: the highest one, over the range searched, below which something attracts and
-    above which nothing does, but in the windows told beside it. Of a stage that nothing attracts it is the nearest
-    below.
+    """The edge of hunting in bandwidth: below it something attracts, above it nothing does.
 
-    `factor` is the bandwidth at the edge over that of the stage, `crossover` [Hz] the crossover there (None for a
-    controller given by its gains, all of whose poles and zeros the factor scales). At `quiet`, a factor just above,
-    nothing attracts any more: the edge lies between both. It is `certain` where a closed orbit was followed to its end,
-    or both are close together, and all that had to decide beyond it was completed.
+    It is the highest edge in the range searched; windows above it are listed separately. For a stage without an
+    attractor it is the nearest edge below. `factor` is the bandwidth at the edge over the stage's own. `crossover` [Hz]
+    is the crossover there; None for a controller given by its gains, all of whose poles and zeros the factor scales. At
+    `quiet`, a factor just above, nothing attracts: the edge lies between both. It is `certain` if a closed orbit was
+    followed to its end, or both are close together, and every run that had to decide was completed.
     """
 
     factor: float
@@ -43,25 +43,27 @@ class Margin:
 
     @property
     def end(self) -> AttractionEnd:
-        """The end of what attracts, in factors of the bandwidth."""
+        """Return the end of attraction, in factors of the bandwidth."""
         return AttractionEnd(self.factor, self.quiet, self.certain)
 
     @property
     def reserve(self) -> float:
-        """Up to which share of it the edge is known."""
+        """Return the relative error of the edge."""
         return self.end.reserve
 
 
 @dataclass(frozen=True)
 class SearchedBandwidths:
-    """What a search through the bandwidths showed.
+    """Result of a search through the bandwidths.
 
-    The `margin` (None: no such edge); the other `windows` in which something attracts; of a stage that something
-    attracts the end below it of what does, `lower` (None: there is none). Whether the search `contradicts` that nothing
-    attracts the stage itself, to which an orbit was followed; whether something attracts up to the highest bandwidth,
-    so that there is no edge, `to_the_top`; whether no edge was found, but something may attract at a bandwidth for all
-    that is known, `undecided`. The `last_returns`: factors at which a cycle may repel while none does at the next one,
-    each with the end of the range on that side.
+    - `margin`: the edge of hunting (None: there is none).
+    - `windows`: other bandwidths at which something attracts.
+    - `lower`: for a stage with an attractor, the end of attraction below it (None: there is none).
+    - `contradicts`: an orbit was followed to a stage that seemed to have no attractor.
+    - `to_the_top`: something attracts up to the highest bandwidth, so that there is no edge.
+    - `undecided`: no edge was found, but something may attract at some bandwidth.
+    - `last_returns`: factors at which an unstable cycle may exist while none does at the next one, each with the end of
+      the range on that side.
     """
 
     margin: Margin | None
@@ -74,18 +76,23 @@ class SearchedBandwidths:
 
 
 NOT_SOUGHT = SearchedBandwidths(None, ())
-"""What is told of a stage that cannot hunt at any bandwidth."""
+"""Result for a stage that cannot hunt at any bandwidth."""
 
 
 def find_margin(stage: Stage, attracting: bool) -> Margin | None:
-    """Find the edge of hunting of a stage, whose own motion plays no part: above its bandwidth the last edge, if
-    something is `attracting` it at that, else the next one below. None where there is none in the range searched."""
+    """Find the edge of hunting of a stage, whose own motion plays no part.
+
+    If something is `attracting` the stage it is the last edge above its bandwidth, else the next one below. None if
+    there is no edge in the range searched.
+    """
     return search_bandwidths(stage, attracting).margin
 
 
 def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None = None) -> SearchedBandwidths:
-    """Where something attracts, over the bandwidths of `SEARCH_LIMITS`; `survey` is what attracts the stage itself,
-    if that was surveyed. Where an allowance is used up, ends are where they are known to be by then, and not certain.
+    """Search the bandwidths of `SEARCH_LIMITS` for attractors.
+
+    `survey` is the survey of the stage itself, if there was one. Where an allowance is used up, ends are as known by
+    then, and not certain.
     """
     flat, crossover = stage.flat(), bandwidth(stage.flat())
     fine, coarse = SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond
@@ -116,8 +123,11 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
 
 
 def followed_on(stage: Stage, sought: SearchedBandwidths) -> SearchedBandwidths:
-    """What a search through the bandwidths showed, with the windows in which cycles attract again that repel: next to
-    the folds in which these end. As far as an allowance reaches."""
+    """Add windows in which an unstable cycle becomes stable again,
+    next to the fold in which it ends.
+
+    The search stops where an allowance is used up.
+    """
     windows = sought.windows
     for at, farthest in sought.last_returns:
         windows += windows_again(stage.flat(), at, farthest, windows)
@@ -125,10 +135,11 @@ def followed_on(stage: Stage, sought: SearchedBandwidths) -> SearchedBandwidths:
 
 
 class _Grid:
-    """Factors, ascending, at which it is known whether something attracts, from the `lowest` that was searched on."""
+    """Factors of the bandwidth, ascending, with the attractors at each;
+    all from number `lowest` on were searched."""
 
     def __init__(self, flat: Mapping[str, Any], factors: np.ndarray, first: int) -> None:
-        """Survey the stages at factors from the `first` on, by number. Raises Exhausted."""
+        """Survey the stages at factors from number `first` on. Raises Exhausted."""
         self.flat, self.factors, self.lowest = flat, factors, first
         self.attracts, self.decided, self.passed = (np.zeros(len(factors), bool) for _ in range(3))
         self.returns, self.resolved = np.zeros(len(factors), bool), np.zeros(len(factors), bool)
@@ -139,7 +150,7 @@ class _Grid:
         self._survey(np.arange(first, len(factors)))
 
     def search_below(self) -> None:
-        """Survey the stages at the other factors, whose motions are the slowest, as far as an allowance reaches."""
+        """Survey the other factors, whose motions are the slowest, until an allowance is used up."""
         try:
             self._survey(np.arange(self.lowest))
         except Exhausted:
@@ -147,8 +158,11 @@ class _Grid:
         self.lowest = 0
 
     def _survey(self, numbers: np.ndarray) -> None:
-        """Sketch the stages at some factors, by number; those whose maps are not resolved are searched by simulations,
-        the nearest to the stage itself first, as far as so much work suffices. Raises Exhausted."""
+        """Sketch the stages at some factors, by number,
+        and simulate those whose maps are not resolved.
+
+        Factors nearest to the stage come first, until a share of the work is used up. Raises Exhausted.
+        """
         settings = EdgeSettings.current()
         sketch = sketched(self._stages(numbers))
         self.attracts[numbers], self.decided[numbers] = sketch.attracts, sketch.decided
@@ -169,11 +183,11 @@ class _Grid:
                     raise
 
     def _stages(self, numbers: np.ndarray) -> Ensemble:
-        """The stage with its bandwidth multiplied by the factors with these numbers."""
+        """Return the stage with its bandwidth multiplied by the factors with these numbers."""
         return Ensemble.held(faster(self.flat, self.factors[numbers]), len(numbers))
 
     def record(self, index: int, survey: Attractors) -> None:
-        """Take over what a thorough survey of one of the stages shows."""
+        """Record a thorough survey of the stage at one factor."""
         self.attracts[index], self.decided[index] = survey.attracts[0], survey.decided[0]
         self.motions[index] = list(survey.motions)
         self.inspected.add(index)
@@ -181,9 +195,12 @@ class _Grid:
             self.settled = float(self.factors[index])
 
     def last_edge(self, index: int, above: bool) -> tuple[int, AttractionEnd, bool] | None:
-        """The last factor, by number, at which something attracts while nothing does at the next one, of those from a
-        number on if the edge is looked for `above`, else of those below it; the end of what attracts; and whether that
-        is certain. None if there is no such factor."""
+        """Find the last factor, by number, at which something attracts while nothing does at the
+        next one.
+
+        The search runs from a number on if `above`, else below it. Returns the number, the end of attraction and
+        whether it is certain. None if there is no such factor.
+        """
         while True:
             falls = np.flatnonzero(self.attracts[:-1] & ~self.attracts[1:])
             falls = falls[falls >= index] if above else falls[falls < index]
@@ -201,7 +218,8 @@ class _Grid:
             return at, end, bool(end.certain and self.decided[upper].all())
 
     def _proved_at_the_top(self) -> bool:
-        """Whether something attracts at the highest factor, or that is not decided, as the allowance is used up."""
+        """Tell whether something attracts at the highest factor; also if that is undecided,
+        with the allowance used up."""
         try:
             return self.proved(len(self.factors) - 1, 1)
         except Exhausted:
@@ -209,10 +227,13 @@ class _Grid:
             return True
 
     def end(self, at: int, ahead: int) -> AttractionEnd | None:
-        """The end of what attracts at a factor, by number, while nothing does at the next one, above (`ahead` 1) or
-        below (-1). None if it attracts as far as the search goes: then it is known to do so everywhere up to there; or
-        if it does not attract on closer inspection, which is known then. Where the allowance is used up, an end that is
-        not certain."""
+        """Find the end of attraction between a factor, by number,
+        and the next one above (`ahead` 1) or below (-1).
+
+        Returns None if attraction reaches the end of the search, which is then recorded for all factors up to there.
+        Returns None as well if closer inspection shows no attractor. Where the allowance is used up, the end is not
+        certain.
+        """
         if (at, ahead) in self.ends:
             return self.ends[at, ahead]
         try:
@@ -222,7 +243,7 @@ class _Grid:
             return self.ends.setdefault((at, ahead), end)
 
     def _followed(self, at: int, ahead: int) -> AttractionEnd | None:
-        """The end of what attracts at a factor (see `end`), which was not followed before. Raises Exhausted."""
+        """Follow attraction from a factor to its end (see `end`). Raises Exhausted."""
         if not self.proved(at, ahead):
             return None
         outward = EdgeSearch(self.flat, HIGHEST if ahead > 0 else LOWEST, self.settled)
@@ -245,14 +266,16 @@ class _Grid:
         return end
 
     def _pass(self, where: np.ndarray) -> None:
-        """Take notice of factors, shape (count,), at which an orbit that was followed past them attracts."""
+        """Record factors, shape (count,), at which an orbit that was followed past them attracts."""
         self.passed |= where
         self.attracts |= where
         self.inspected -= set(np.flatnonzero(where & [not motions for motions in self.motions]).tolist())
 
     def proved(self, at: int, ahead: int) -> bool:
-        """Whether something attracts at a factor, by number, once orbits were tried to be closed; if not, that is known
-        of the next ones behind it as well, at which something seemed to attract."""
+        """Tell whether something attracts at a factor, by number, after trying to close orbits.
+
+        If nothing does, the next factors behind it that seemed to have an attractor are inspected too.
+        """
         if at not in self.inspected:
             self._inspect(np.array([at]))
             if not self.attracts[at]:
@@ -264,7 +287,7 @@ class _Grid:
         return bool(self.attracts[at])
 
     def _inspect(self, numbers: np.ndarray) -> None:
-        """Close orbits at the factors with some numbers."""
+        """Close orbits at the factors with these numbers."""
         survey = what_attracts(self._stages(numbers))
         self.attracts[numbers] = survey.attracts | self.passed[numbers]
         self.decided[numbers] = survey.decided
@@ -273,8 +296,10 @@ class _Grid:
         self.inspected |= set(numbers.tolist())
 
     def lower_end(self, index: int) -> AttractionEnd | None:
-        """The end below of what attracts at a number; None if it attracts as far as the search goes, or if it is not
-        known that nothing does below."""
+        """Find the end of attraction below a number.
+
+        None if attraction reaches the end of the search, or if it is not sure that nothing attracts below.
+        """
         while self.attracts[index] and not self.attracts[self.lowest : index].all():
             first = self.lowest + int(np.flatnonzero(~self.attracts[self.lowest : index])[-1]) + 1
             end = self.end(first, -1)
@@ -285,8 +310,10 @@ class _Grid:
         return None
 
     def last_returns(self) -> tuple[tuple[float, float], ...]:
-        """Factors at which nothing attracts, and cycles that repel end before the next one, each with the end of the
-        range on that side."""
+        """Return factors without an attractor whose unstable cycles end before the next factor.
+
+        Each comes with the end of the range on that side.
+        """
         ends = []
         for ahead, farthest in ((1, HIGHEST), (-1, LOWEST)):
             beyond = np.roll(~self.returns & self.resolved, -ahead)
@@ -296,7 +323,8 @@ class _Grid:
         return tuple(ends)
 
     def windows(self, besides: int) -> tuple[BandwidthWindow, ...]:
-        """The windows of factors in which something attracts, besides that of the factor with a number."""
+        """Return the windows of factors with an attractor,
+        except the window of factor number `besides`."""
         while True:
             before = self.attracts.copy()
             windows = tuple(self._window(a, b) for a, b in self._spans() if not a <= besides <= b)
@@ -304,13 +332,13 @@ class _Grid:
                 return windows
 
     def _window(self, first: int, last: int) -> BandwidthWindow:
-        """The window from the first to the last of neighbouring factors, with its ends."""
+        """Return the window from the first to the last of neighbouring factors, with its ends."""
         return BandwidthWindow(
             self.end(first, -1) if first > self.lowest else None,
             self.end(last, 1) if last + 1 < len(self.factors) else None,
         )
 
     def _spans(self) -> list[tuple[int, int]]:
-        """The first and last of neighbouring factors, by number, at which something attracts."""
+        """Return the first and last numbers of runs of neighbouring factors with an attractor."""
         ends = np.flatnonzero(np.diff(self.attracts.astype(int), prepend=0, append=0))
         return [(int(first), int(after) - 1) for first, after in zip(ends[::2], ends[1::2], strict=True)]

@@ -1,6 +1,6 @@
-"""Measures of many runs at once, from their turning points and statistics.
+"""Measure many runs at once, from their turning points and statistics.
 
-Part of the interface of `friso.hunting` for other floors.
+This module is part of the interface of `friso.hunting` for other floors.
 """
 
 from __future__ import annotations
@@ -42,18 +42,22 @@ BANDS = (1e-6, BAND)
 """Bands about the reference into which a stage settles [m]."""
 
 RESOLVED = DISTINCT / 4
-"""Swings [m] that are passed over when turning points are kept: peaks, periods and outcomes look at larger ones."""
+"""Swings [m] that are skipped when turning points are kept: peaks, periods and outcomes use larger ones."""
 
 
 @dataclass(frozen=True)
 class Measures:
-    """Measures of runs, each of shape (runs,): the thesis's peak count (`peaks`), and that of distinct peaks (see
-    `friso.hunting.criteria.peak_count`); peak-to-peak deviation [m] of the last quarter and its period [s] (NaN: none);
-    time [s] until the deviation stays within each of `BANDS` at every place where the reference stands, and
-    `in_the_end` at the last of them alone (see `friso.hunting.criteria.settling`; NaN: it does not within the run);
-    what the run did at its end (`outcome`, words of `friso.hunting.criteria.run_outcome`); largest actuator force [N];
-    status, and steps attempted and rejected. `turns` tells which turning points are counted peaks, shape (runs,
-    room)."""
+    """Measures of runs, each of shape (runs,).
+
+    - `peaks`: the thesis's peak count; `distinct_peaks`: of distinct peaks (see `friso.hunting.criteria.peak_count`).
+    - `peak_to_peak` [m] and `period` [s] of the last quarter (NaN: no period).
+    - `settling_time` [s]: until the deviation stays within each of `BANDS`, wherever the reference stands;
+      `in_the_end`: at the last of these places alone (NaN: not within the run; see `friso.hunting.criteria.settling`).
+    - `outcome`: words of `friso.hunting.criteria.run_outcome`.
+    - `largest_force` [N]: of the actuator.
+    - `status`, `steps` attempted and `rejected`: of the solver.
+    - `turns`: which turning points are counted peaks, shape (runs, room).
+    """
 
     peaks: np.ndarray
     distinct_peaks: np.ndarray
@@ -70,8 +74,10 @@ class Measures:
 
 
 def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarray | None = None) -> RunOptions:
-    """How to run stages whose runs are to be measured, to a relative tolerance; `threads` and `cancel` as in
-    `RunOptions`. Turning points are kept from a little before the first that may count."""
+    """Return the options for runs that are to be measured, to a relative tolerance.
+
+    `threads` and `cancel` as in `RunOptions`. Turning points are kept from a little before the first that may count.
+    """
     return RunOptions(
         rtol=rtol,
         bands=BANDS,
@@ -84,7 +90,7 @@ def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarra
 
 
 def turns_of(runs: Runs) -> Turns:
-    """What the turning points of a chunk of runs tell, `room` being that of the run with most of them."""
+    """Scan the turning points of a chunk of runs, up to the largest number that a run has."""
     results = runs.results
     room = max(1, int(results.turn_counts.max(initial=0)))
     times, values = results.turn_times[:, :room], results.turn_values[:, :room]
@@ -92,12 +98,13 @@ def turns_of(runs: Runs) -> Turns:
 
 
 def swing_of(runs: Runs) -> np.ndarray:
-    """Peak-to-peak deviation [m] over the window at the end of each run (see `RunOptions`), shape (runs,)."""
+    """Return the peak-to-peak deviation [m] over the window at the end of each run (see
+    `RunOptions`), shape (runs,)."""
     return runs.statistic("deviation_max") - runs.statistic("deviation_min")
 
 
 def run_ends(runs: Runs, turns: Turns, outside: str) -> End:
-    """How a chunk of runs ends, with respect to the "inner" or "outer" of their bands."""
+    """Describe how a chunk of runs ends, for the "inner" or the "outer" band."""
     return End(
         completed=np.equal(runs.results.statuses, Status.DONE),
         swing=swing_of(runs),
@@ -110,7 +117,8 @@ def run_ends(runs: Runs, turns: Turns, outside: str) -> End:
 
 
 def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
-    """The measures of a chunk of runs of the stages `flat`, arrays of which have one entry per run of the chunk."""
+    """Measure a chunk of runs of the stages `flat`,
+    arrays of which have one entry per run of the chunk."""
     results = runs.results
     ended, turns = runs.statistic("ended"), turns_of(runs)
     passing = np.nan_to_num(turns.period) / 2  # a cycle that crosses the reference as the run ends has not settled
@@ -142,8 +150,11 @@ def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
 
 
 def measured_run(stage: Stage, rtol: float = 1e-6) -> Measures:
-    """What the run of a stage's motion does, arrays of shape (1,); whatever the sampling interval of a time response,
-    the turning points of the run itself decide. Raises ValueError for a tolerance that is not usable."""
+    """Run a stage's motion and measure it, arrays of shape (1,).
+
+    The turning points of the run itself count, regardless of the sampling interval of a time response. Raises
+    ValueError for a tolerance that is not usable.
+    """
     flat = stage.flat()
     (runs,) = run_chunks(kernel(structure(flat)), flat, 1, measuring_options(rtol))
     return measure_runs(flat, runs)

@@ -1,4 +1,5 @@
-"""What becomes of the stages' own motions: run and measured, and followed for longer where they do not come to rest."""
+"""Run and measure the stages' own motions,
+and follow those that do not come to rest for longer."""
 
 from __future__ import annotations
 
@@ -27,9 +28,12 @@ from friso.hunting.turning import HALF, WINDOW
 
 @dataclass(frozen=True)
 class Motions(ArrayRows):
-    """How the stages' own motions went, arrays of shape (count,): whether they were `completed`, or ran `away` from the
-    reference, the thesis's `peaks`, peak to peak of the last quarter, `swing` [m], and the time from the last corner of
-    the reference until they stay within 10 um, `settling` [s] (NaN: not within the run)."""
+    """How the stages' own motions went, arrays of shape (count,).
+
+    Runs were `completed`, or ran `away` from the reference. `peaks` is the thesis's peak count and `swing` [m] peak to
+    peak of the last quarter. `settling` [s] is the time from the last corner of the reference until the deviation stays
+    within 10 um (NaN: not within the run).
+    """
 
     completed: np.ndarray
     away: np.ndarray
@@ -39,7 +43,7 @@ class Motions(ArrayRows):
 
     @classmethod
     def of(cls, measures: Measures) -> Motions:
-        """The motions of runs that were measured."""
+        """Take the motions from runs that were measured."""
         completed, away = (np.equal(measures.status, status) for status in (Status.DONE, Status.DIVERGED))
         return cls(completed, away, measures.peaks, measures.peak_to_peak, measures.in_the_end[1])
 
@@ -49,7 +53,7 @@ class Motions(ArrayRows):
 
 
 def run_motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) -> Motions:
-    """The motions of stages of one structure, run and measured."""
+    """Run and measure the motions of stages of one structure."""
     columns = [*(np.zeros(count, bool) for _ in range(2)), *(np.full(count, np.nan) for _ in range(3))]
     for runs in run_chunks(kernel(shared_structure(flat)), flat, count, run_options):
         part = Motions.of(measure_runs(runs.part(flat), runs))
@@ -60,12 +64,16 @@ def run_motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) ->
 
 @dataclass(frozen=True)
 class FollowedMotions:
-    """Motions of stages without an attracting cycle, arrays of shape (count,): whether they have come to rest at
-    their end, within 10 um of the reference; which are still `moving`, as they have not, or swing within that; the time
-    [s] after which they rest, if they are followed for long (NaN: not then either, or unknown); whether they swing on
-    `steady`, neither settling nor decaying; for how long they were `followed` [s] (NaN: no longer than their end, or
-    not to the end of the longer run); peak to peak of the last quarter of that, `swing` [m]; and whether they run
-    `away` from the reference in it."""
+    """Motions of stages without a stable cycle, arrays of shape (count,).
+
+    - `rests`: at rest at the end, within 10 um of the reference.
+    - `moving`: not at rest, or still swinging within that.
+    - `after` [s]: time after which it rests when followed for long (NaN: it does not, or unknown).
+    - `steady`: swings on, neither settling nor decaying.
+    - `followed` [s]: time for which it was followed (NaN: only to its end, or the longer run was not completed).
+    - `swing` [m]: peak to peak of the last quarter of this time.
+    - `away`: diverges from the reference in it.
+    """
 
     rests: np.ndarray
     moving: np.ndarray
@@ -77,11 +85,11 @@ class FollowedMotions:
 
     @property
     def unknown(self) -> np.ndarray:
-        """Which had to be followed for long, and were not to the end of that, shape (count,)."""
+        """Return which motions had to be followed for long but were not to the end, shape (count,)."""
         return self.moving & ~np.isfinite(self.followed)
 
     def follow(self, which: np.ndarray, flat: Mapping[str, Any], count: int, run_options: RunOptions) -> None:
-        """Follow the motions with the numbers `which`, those of the stages `flat`, for long. Raises Exhausted."""
+        """Follow the motions numbered `which`, of the stages `flat`, for long. Raises Exhausted."""
         settings = CheckSettings.current()
         stages = Ensemble.held(flat, count, form=shared_structure(flat))
         waits = settings.least_followed_waits * wait(stages, loose_from(stages))
@@ -104,8 +112,11 @@ class FollowedMotions:
 def followed_motions(
     flat: Mapping[str, Any], motions: Motions, count: int, run_options: RunOptions, possible: bool
 ) -> FollowedMotions:
-    """Where hunting is not `possible`, a stage may rest off its reference; else a motion that has not come to rest at
-    its end, or still swings there, is followed, as far as an allowance reaches."""
+    """Follow motions that have not come to rest at their end, or still swing there.
+
+    Motions are followed until an allowance is used up. Where hunting is not `possible`, a stage may also rest off its
+    reference.
+    """
     rests, still = np.isfinite(motions.settling), np.zeros(count, bool)
     steady, away, followed = np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan)
     rest = FollowedMotions(rests, still, motions.settling.copy(), steady, followed, motions.swing.copy(), away)
@@ -123,15 +134,16 @@ def followed_motions(
 
 
 def resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
-    """The swings, peak to peak [m], up to which stages of one structure are at rest, shape (count,)."""
+    """Return the peak-to-peak swings [m] up to which stages of one structure count as at rest,
+    shape (count,)."""
     return 2 * SurveySettings.current().least_swing * Ensemble.held(flat, count, form=shared_structure(flat)).length
 
 
 def some_of(columns: Mapping[str, Any], which: np.ndarray) -> dict[str, Any]:
-    """Some entries of the arrays among the values."""
+    """Select some entries of the arrays among the values."""
     return {key: value[which] if np.ndim(value) else value for key, value in columns.items()}
 
 
 def keeps_moving(flat: Mapping[str, Any]) -> bool:
-    """Whether the reference of stages never stands still."""
+    """Tell whether the reference of the stages never stands still."""
     return flat["motion.kind"] == "ramp" and bool(np.any(flat["motion.velocity"]))

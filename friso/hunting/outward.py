@@ -1,8 +1,8 @@
-"""The edge of hunting in bandwidth: the factor at which what attracts a stage ceases to.
+"""Find the edge of hunting in bandwidth: the factor beyond which nothing attracts a stage.
 
-A closed orbit is followed through the bandwidth to its end: a flip, a fold, or where it is lost. Just beyond that end
-something else may attract; then its orbit is followed in turn, until nothing attracts. Where no orbit can be followed,
-surveys at bandwidths between the last one with an attractor and the next one without close in on the edge.
+A closed orbit is followed through the bandwidth to its end: a flip, a fold, or where it is lost. Just beyond this end
+something else may attract. Its orbit is then followed in turn, until nothing attracts. Where no orbit can be followed,
+surveys between the last bandwidth with an attractor and the next one without narrow down the edge.
 """
 
 from __future__ import annotations
@@ -24,20 +24,22 @@ from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import has_a_map, what_attracts
 
 FARTHER = np.array([1.03, 1.06])
-"""Factors beyond the end of an orbit at which it is looked whether something attracts again: windows that nothing
-followed leads to lie there most often, and are narrower than the steps of a search through all bandwidths."""
+"""Factors beyond the end of an orbit at which attractors are looked for again: windows that no orbit leads to lie there
+most often, and are narrower than the steps of a search through all bandwidths."""
 
 
 ALONG = 1 + np.array([-0.08, -0.04, -0.02, -0.01, -0.005, -0.0025, 0.0, 0.0025, 0.005, 0.01, 0.02, 0.04, 0.08])
-"""Distances from which a motion is followed from one bandwidth to the next, in units of its own."""
+"""Start distances from which a motion is followed to the next bandwidth, as multiples of its own distance."""
 
 
 @dataclass(frozen=True)
 class AttractionEnd:
-    """Two factors of the bandwidth: something attracts at `inside`, nothing does at `outside`. It is `certain` where an
-    orbit was followed to its end at `inside`, or to where it was lost, or something was seen to attract there; nothing
-    attracts at `outside`; all of that was decided; and both are close together. The end is known up to a share of it,
-    the `reserve`: it lies between both."""
+    """Two factors of the bandwidth: something attracts at `inside`, nothing does at `outside`.
+
+    The end is `certain` if an orbit was followed to its end or its loss at `inside`, or an attractor was seen there.
+    Nothing may attract at `outside`, all runs must have decided, and both factors must be close together. The end lies
+    between both, with the relative error `reserve`.
+    """
 
     inside: float
     outside: float
@@ -45,33 +47,34 @@ class AttractionEnd:
 
     @property
     def reserve(self) -> float:
-        """Share of the bandwidth up to which the end is known."""
+        """Return the relative error of the end."""
         return abs(self.outside / self.inside - 1)
 
 
 @dataclass(frozen=True)
 class BandwidthWindow:
-    """Bandwidths at which something attracts: its ends, in factors of that of a stage. None: as far as the search
-    goes."""
+    """Bandwidths at which something attracts, by its two ends in factors of the stage's own;
+    None at the end of the search."""
 
     low: AttractionEnd | None
     high: AttractionEnd | None
 
     @property
     def narrow(self) -> bool:
-        """Whether no machine holds its bandwidth so exactly that it would stay in there."""
+        """Tell whether the window is too narrow for a machine to stay in it."""
         settings = EdgeSettings.current()
         return bool(self.low and self.high and self.high.inside < self.low.inside * (1 + settings.narrow_window_share))
 
     def holds(self, factor: float) -> bool:
-        """Whether something attracts at a factor."""
+        """Tell whether something attracts at a factor."""
         low, high = self.low.inside if self.low else 0.0, self.high.inside if self.high else np.inf
         return low <= factor <= high
 
 
 @dataclass
 class _Place:
-    """How far a search has come: motions that attract `at` a factor, and a factor `outside` where nothing seems to."""
+    """Progress of a search: motions that attract `at` a factor,
+    and a factor `outside` at which nothing seems to."""
 
     at: float
     motions: tuple[Swinging, ...]
@@ -79,14 +82,15 @@ class _Place:
 
 
 class Beyond(Exception):
-    """What attracts was followed to the end of the range of bandwidths."""
+    """An attractor was followed to the end of the range of bandwidths."""
 
 
 @dataclass(frozen=True)
 class EdgeSearch:
-    """The search for an edge of hunting of a stage, given as flat keys, towards the `farthest` factor of its bandwidth.
+    """Search for an edge of hunting of a stage, given as flat keys,
+    towards the `farthest` factor of its bandwidth.
 
-    Nothing attracts at the factor `settled`, if any: what attracts beyond it belongs to another window.
+    Nothing attracts at the factor `settled`, if given: an attractor beyond it belongs to another window.
     """
 
     flat: Mapping[str, Any]
@@ -94,9 +98,11 @@ class EdgeSearch:
     settled: float | None = None
 
     def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> AttractionEnd:
-        """The end of what attracts: these motions do at a factor, nothing does at the one `outside`. Raises Beyond
-        where something attracts as far as the search goes. Where an allowance is used up on the way, the end is as
-        close as it is known by then, and not certain: what attracts may have been followed past `outside` by then."""
+        """Find the end of attraction: these motions attract at a factor, nothing does at `outside`.
+
+        Raises Beyond if something attracts up to the end of the search. Where an allowance is used up, the end is as
+        close as known by then, and not certain; attraction may have been followed past `outside`.
+        """
         place = _Place(at, motions, outside)
         try:
             return self._followed_to_the_end(place)
@@ -104,7 +110,7 @@ class EdgeSearch:
             return AttractionEnd(place.at, place.outside, False)
 
     def _followed_to_the_end(self, place: _Place) -> AttractionEnd:
-        """Follow orbits from a place to the edge; the place is kept up to date, so that it tells how far that came."""
+        """Follow orbits from a place to the edge, updating the place on the way."""
         for _ in range(EdgeSettings.current().most_orbits_followed):
             orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
             if orbit is None:
@@ -121,10 +127,11 @@ class EdgeSearch:
         return self._bracketed(place)
 
     def _proved(self, next_to: float, farther: np.ndarray, distances: np.ndarray) -> tuple[np.ndarray, Attractors]:
-        """Look for attractors beyond the end of an orbit: next to it, and at the factors farther off.
+        """Look for attractors beyond the end of an orbit: next to it,
+        and at the factors farther off.
 
-        Returns the factors that were searched, and what attracts there. Without a map, factors farther off are only
-        searched if a simulation shows that something attracts.
+        Returns the factors that were searched, and the attractors there. Without a map, factors farther off are only
+        searched if a simulation shows an attractor.
         """
         if farther.size and not has_a_map(self._stages(farther)):
             seen = attractors(self._stages(farther), cycles=False)
@@ -136,7 +143,8 @@ class EdgeSearch:
         return beyond, survey if decided else replace(survey, decided=survey.decided & survey.attracts)
 
     def _just_beyond(self, end: float) -> tuple[float, np.ndarray]:
-        """The factor next to the end of an orbit, at which nothing may attract, and those farther off."""
+        """Return the factor next to the end of an orbit, and the factors farther off,
+        at which to look for attractors."""
         ahead = self._ahead(end)
         next_to, farther = end * EdgeSettings.current().beyond_edge_factor ** ahead, end * FARTHER**ahead
         if self.settled is not None and ahead * (self.settled - end) > 0:
@@ -149,10 +157,10 @@ class EdgeSearch:
         return next_to, farther[within]
 
     def _bracketed(self, place: _Place) -> AttractionEnd:
-        """Close in on the edge by surveys where no orbit can be followed to it.
+        """Narrow down the edge by surveys where no orbit can be followed to it.
 
-        Of several factors, the edge lies between the last at which something attracts and the next one; the search is
-        repeated between these two until they are close together.
+        The edge lies between the last of several factors with an attractor and the next one. The search repeats between
+        these two until they are close together.
         """
         settings = EdgeSettings.current()
         reach, ahead = settings.reach_log, self._ahead(place.at)
@@ -176,7 +184,8 @@ class EdgeSearch:
                 return replace(end, certain=end.certain and self._surely_attracts(place))
 
     def _surely_attracts(self, place: _Place) -> bool:
-        """Whether something attracts at a place for sure: a closed orbit, or what a thorough survey observes, too."""
+        """Tell whether something surely attracts at a place: a closed orbit,
+        or a swing seen by a thorough survey."""
         if any(motion.cycles is not None for motion in place.motions):
             return True
         distances = np.outer([motion.distance for motion in place.motions], ALONG).reshape(1, -1)
@@ -184,28 +193,35 @@ class EdgeSearch:
         return bool(survey.attracts[0] and survey.decided[0])
 
     def _told(self, factors: np.ndarray, distances: np.ndarray, confirm: tuple[int, ...] = ()) -> Attractors:
-        """What attracts at some factors, where maps do not tell from `distances` [m], shape (n,), too; runs confirm the
-        maps of some of them, by number."""
+        """Find the attractors at some factors; where maps do not decide,
+        runs also start from `distances` [m], shape (n,).
+
+        Runs confirm the maps of the factors numbered `confirm`.
+        """
         begun = np.broadcast_to(distances, (len(factors), len(distances)))
         return what_attracts(self._stages(factors), distances=begun, confirm=confirm)
 
     def _stages(self, factors: np.ndarray) -> Ensemble:
-        """The stage with its bandwidth multiplied by factors."""
+        """Return the stage with its bandwidth multiplied by factors."""
         return Ensemble.held(faster(self.flat, factors), len(factors))
 
     def _ahead(self, at: float) -> float:
-        """The direction of the search from a factor: 1 up, -1 down."""
+        """Return the direction of the search from a factor: 1 up, -1 down."""
         return 1.0 if self.farthest >= at else -1.0
 
     def _still_ahead(self, at: float, outside: float) -> float:
-        """A factor at which nothing attracts; where it was passed, one ahead instead."""
+        """Return the factor `outside` without an attractor,
+        or one further ahead if the search has passed it."""
         ahead = self._ahead(at)
         return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * EdgeSettings.current().reach_log))
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
     def followed(self, at: float, orbit: Swinging) -> tuple[float, float]:
-        """The last factor at which a closed orbit attracts, found at `at`, and the distance [m] at which the stage
-        sticks there. Raises Beyond where it attracts as far as the search goes."""
+        """Follow a closed orbit from a factor to the last one at which it is stable.
+
+        Returns this factor and the distance [m] at which the stage sticks there. Raises Beyond if the orbit is stable
+        up to the end of the search.
+        """
         settings = EdgeSettings.current()
         ahead, cycles = self._ahead(at), orbit.cycles
         assert cycles is not None
@@ -252,16 +268,16 @@ class EdgeSearch:
 
 
 def _orbit_distance(point: Point, orbit: Swinging) -> float:
-    """The distance [m] at which a stage sticks on an orbit, on the side on which it was followed."""
+    """Return the distance [m] at which a stage sticks on an orbit, with the sign of its side."""
     return float(np.copysign(np.exp(point.distance), orbit.distance))
 
 
 def _nearer(ahead: float, one: float, other: float) -> float:
-    """The factor that comes first on the way up, `ahead` 1, or down, -1."""
+    """Return the factor that comes first on the way up, `ahead` 1, or down, -1."""
     return float(min(one, other) if ahead > 0 else max(one, other))
 
 
 def _kind(first: Point, second: Point) -> Bifurcation:
-    """How the orbit ceases to attract from one point to the next, beyond which it repels."""
+    """Return how an orbit loses stability from one point to the next."""
     kinds = changes(first, second)
     return kinds[0] if kinds else "torus"

@@ -1,4 +1,4 @@
-"""How far a parameter of a stage may be from its value before hunting begins, or ends."""
+"""Find how far a parameter of a stage may change before hunting begins, or ends."""
 
 from __future__ import annotations
 
@@ -15,28 +15,29 @@ from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import surveyed_roughly, what_attracts
 
 SHARES = np.array([0.04, 0.08, 0.13, 0.19, 0.28, 0.42, 0.65, 1.0])
-"""Values that are tried first on either side of the stage's own, as shares of the logarithm of the farthest factor:
-closest together where a machine may well be, and as many as are run at once on most processors."""
+"""Values tried first on either side of the stage's own, as shares of the logarithm of the farthest factor. They are
+closest together near the stage's own value, and as many as run at once on most processors."""
 
 
 WITHIN = np.array([2, 4])
-"""Numbers of the values, from the stage's own outward, that are searched thoroughly where a rough survey finds no
-change: for a farthest factor of three 9 and 23 % off."""
+"""Numbers of the values, from the stage's own outward, that are searched thoroughly if a rough survey finds no change:
+9 and 23 % off for a farthest factor of three."""
 
 
 class Undecided(Exception):
-    """It is not known whether what attracts changes on a side."""
+    """It is not known whether attraction changes on a side."""
 
 
 Scaled = Callable[[np.ndarray], Mapping[str, Any]]
-"""Stages, given as flat keys, whose parameter is multiplied by factors, shape (count,)."""
+"""Function that returns stages, as flat keys, whose parameter is multiplied by factors, shape (count,)."""
 
 
 @dataclass(frozen=True)
 class MarginEnd:
-    """Two factors of a parameter, close together: up to `same`, from 1 on, what holds at the stage itself does, hunting
-    or none, and it does not at `other`. It is `certain` where something attracts at one of both, closed as an orbit,
-    and nothing does at the other, by a search that was completed.
+    """Two factors of a parameter, close together, between which hunting begins or ends.
+
+    From 1 up to `same` the stage hunts or not as it does itself; at `other` it does the opposite. The end is `certain`
+    if a closed orbit attracts at one of both, and a completed search finds no attractor at the other.
     """
 
     same: float
@@ -46,10 +47,11 @@ class MarginEnd:
 
 @dataclass(frozen=True)
 class ParameterMargin:
-    """How far a parameter of a stage may change before hunting ends, if something `attracts` the stage, or begins.
+    """How far a parameter of a stage may change before hunting ends,
+    if something `attracts` the stage, or begins.
 
     `below` and `above` are the nearest factors of the parameter at which it does (None: at no factor tried up to the
-    end of the `range`). On the `open_sides`, -1 or 1, that is not known.
+    end of the `range`). On the `open_sides`, -1 or 1, this is not known.
     """
 
     attracts: bool
@@ -60,22 +62,23 @@ class ParameterMargin:
 
     @property
     def certain(self) -> bool:
-        """Whether both ends, where there are any, are certain, and no side is open; of what lies between the values
-        that were tried it tells nothing."""
+        """Tell whether no side is open and both ends, if any, are certain.
+
+        Ranges between the values tried may still differ.
+        """
         return not self.open_sides and all(end.certain for end in (self.below, self.above) if end)
 
     def end(self, side: int) -> MarginEnd | None:
-        """The end on a side, -1 or 1."""
+        """Return the end on a side, -1 or 1."""
         return self.below if side < 0 else self.above
 
 
 def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: float) -> ParameterMargin:
-    """The margin of a stage in a parameter, searched from the factor `lowest` to the `highest` one.
+    """Find the margin of a stage in a parameter, from the factor `lowest` to the `highest` one.
 
-    What holds at the stage itself is known: whether something `attracts`. Both sides are surveyed roughly, at values
-    that lie farther apart the farther off they are, then more closely where that changes; both ends are searched
-    thoroughly. So ranges narrower than these steps may be missed. Where an allowance is used up, or that does not
-    decide, a side is open.
+    `attracts` says whether something attracts the stage itself. Each side is surveyed roughly, at values that are
+    farther apart the farther off they are, then more closely around a change. Both ends are searched thoroughly. Ranges
+    narrower than these steps may be missed. A side is open if an allowance is used up, or the search does not decide.
     """
     settings = EdgeSettings.current()
     ends: dict[int, MarginEnd | None] = {-1: None, 1: None}
@@ -95,10 +98,11 @@ def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: flo
 
 
 class _Side:
-    """Factors of a parameter on one side of its own value, from 1 outward, and what is known at each.
+    """Factors of a parameter on one side of its own value, from 1 outward,
+    and the result at each.
 
-    Whether hunting has `changed`, begun or ended; whether that is `decided`; whether the stage there was `searched`
-    thoroughly; and whether that made it `certain`.
+    `changed`: hunting has begun or ended. `decided`: this is known. `searched`: the stage was searched thoroughly.
+    `certain`: the thorough search was certain.
     """
 
     def __init__(self, scaled: Scaled, attracts: bool, farthest: float) -> None:
@@ -109,7 +113,10 @@ class _Side:
         self._try(farthest**SHARES)
 
     def end(self) -> MarginEnd | None:
-        """Where what attracts changes first; None if it does nowhere. Raises Exhausted, and Undecided."""
+        """Find the first factor at which hunting begins or ends; None if there is none.
+
+        Raises Exhausted, and Undecided.
+        """
         for _ in range(EdgeSettings.current().most_proofs):
             first = self._bracketed()
             pair = WITHIN if first is None else self._pair(first)
@@ -128,8 +135,8 @@ class _Side:
         raise Undecided
 
     def _bracketed(self) -> int | None:
-        """The number of the first factor at which it has changed, once others close to it were tried; None if it has
-        nowhere."""
+        """Return the number of the first changed factor, after trying others close to it;
+        None if nothing changes."""
         settings = EdgeSettings.current()
         while (changed := np.flatnonzero(self.changed)).size:
             first = int(changed[0])
@@ -139,15 +146,15 @@ class _Side:
         return None
 
     def _finer(self, first: int) -> np.ndarray:
-        """Factors between the first at which it has changed and the one before it."""
+        """Return factors between the first changed one and the one before it."""
         settings = EdgeSettings.current()
         return np.geomspace(self.factors[first - 1], self.factors[first], settings.bracket_steps + 1)[1:-1]
 
     def _pair(self, first: int) -> np.ndarray:
-        """Choose the two factors, by number, that are searched thoroughly about the first one that has changed.
+        """Choose the two factors, by number, to search thoroughly around the first changed one.
 
-        They lie as far off it as `proved_distances` says: next to where hunting ends motions take long to die out, and
-        a rough survey may be wrong. Factors that are new are surveyed roughly.
+        They lie as far off it as `proved_distances` says: close to where hunting ends, motions take long to die out,
+        and a rough survey may be wrong. New factors are surveyed roughly.
         """
         settings = EdgeSettings.current()
         inward, outward = settings.proved_distances if self.attracts else settings.proved_distances[::-1]

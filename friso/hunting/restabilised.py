@@ -1,9 +1,9 @@
-"""Where cycles that repel attract again, farther along their branch.
+"""Find where unstable cycles become stable again, farther along their branch.
 
-A cycle whose multiplier has passed -1 goes on as one that repels. To end in a fold, where its multiplier is 1, this has
-to come back through the range in which the cycle attracts, unless the branch breaks off at a corner of the equations.
-That happens next to the fold, where bandwidth hardly changes along the branch: such windows of bandwidths may be as
-narrow as 1e-5 of it, and no survey of bandwidths meets them.
+A cycle whose multiplier has passed -1 goes on as an unstable one. To end in a fold, where its multiplier is 1, the
+multiplier has to come back through the stable range, unless the branch breaks off at a corner of the equations. This
+happens next to the fold, where bandwidth hardly changes along the branch. Such windows of bandwidth may be as narrow as
+1e-5 of it, and no survey of bandwidths meets them.
 """
 
 from __future__ import annotations
@@ -30,15 +30,18 @@ RTOL = ToleranceSettings().survey_rtol
 """Relative tolerance of the runs."""
 
 Stretch = tuple[tuple[float, float], tuple[float, float] | None]
-"""Places between which a cycle attracts, each with its error (None: it does to the end of the family)."""
+"""Places between which a cycle is stable, each with its error (None: up to the end of the family)."""
 
 
 def windows_again(
     flat: Mapping[str, Any], at: float, farthest: float, besides: Sequence[BandwidthWindow]
 ) -> tuple[BandwidthWindow, ...]:
-    """Windows `besides` some others in which a cycle attracts that repels at a factor of the bandwidth, `at`, where
-    nothing attracts, on its way to the farthest factor; none where a limiter chatters, which makes multipliers rough,
-    and no more once an allowance is used up."""
+    """Find further windows in which a cycle is stable that is unstable at a factor `at` of the
+    bandwidth.
+
+    Nothing attracts at that factor. The cycle is followed to the `farthest` factor; windows in `besides` are left out.
+    There are none where a limiter chatters, which makes multipliers rough, and no more once an allowance is used up.
+    """
     settings = EdgeSettings.current()
     ahead, form = 1.0 if farthest > at else -1.0, shared_structure(flat)
 
@@ -64,7 +67,7 @@ def windows_again(
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _ranges(family: Family, farthest: float) -> Iterator[Stretch]:
-    """Where cycles attract that repel at place 0 of a family."""
+    """Yield ranges in which cycles are stable that are unstable at place 0 of a family."""
     stages = family(np.zeros(1), np.zeros(1))
     if stages.chatters:
         return
@@ -74,8 +77,11 @@ def _ranges(family: Family, farthest: float) -> Iterator[Stretch]:
 
 
 def restabilised(family: Family, cycle: Cycles, farthest: float) -> Iterator[Stretch]:
-    """Where a single cycle that repels at place 0 of a family of stages attracts, as far as the farthest place, or to
-    where its branch first turns back or is lost."""
+    """Yield ranges in which one cycle is stable that is unstable at place 0 of a family of
+    stages.
+
+    It is followed to the farthest place, or to where its branch first turns back or is lost.
+    """
     settings = EdgeSettings.current()
     tracer = Tracer(
         family,
@@ -100,7 +106,7 @@ def restabilised(family: Family, cycle: Cycles, farthest: float) -> Iterator[Str
 
 
 def _between(tracer: Tracer, first: Point, last: Point) -> Point | None:
-    """The cycle half-way between two of a branch."""
+    """Return the cycle half-way between two points of a branch."""
     return tracer.solve(first, (first.vector + last.vector) / 2, towards(first, last))
 
 
