@@ -1,4 +1,5 @@
-"""What is known of many stages, or runs, row by row: arrays of which some rows can be taken together."""
+"""Base for results of many stages or runs: arrays with one row each,
+from which rows can be selected."""
 
 from __future__ import annotations
 
@@ -9,19 +10,20 @@ import numpy as np
 
 
 class ArrayRows:
-    """Base of dataclasses whose arrays, and parts with rows of their own, have one row for every stage or run.
+    """Base of dataclasses whose arrays, and parts with rows of their own,
+    have one row for every stage or run.
 
-    Numbers, words and what else is the same for all rows stay as they are.
+    Everything that all rows share, such as numbers and words, stays unchanged.
     """
 
     def take(self, numbers: Any) -> Self:
-        """Take the rows with these numbers, any of them as often as wanted."""
+        """Select the rows with these numbers, any of them as often as wanted."""
         parts = {part.name: _rows_of(getattr(self, part.name), numbers) for part in fields(self)}  # type: ignore[arg-type]
         return replace(self, **parts)  # type: ignore[type-var]
 
 
 def _rows_of(part: Any, numbers: Any) -> Any:
-    """Rows of an array, or of all arrays that a part holds; anything else as it is."""
+    """Return rows of an array, or of all arrays that a part holds; anything else unchanged."""
     if isinstance(part, np.ndarray):
         return part[numbers]
     if isinstance(part, tuple):

@@ -1,4 +1,5 @@
-"""The margins of a stage in what nobody knows exactly, or may build otherwise: static friction, and its joint."""
+"""Find the margins of a stage in values that are uncertain, or that a designer may change:
+static friction and its joint."""
 
 from __future__ import annotations
 
@@ -17,13 +18,15 @@ from friso.hunting.what_attracts import what_attracts
 from friso.stage import Stage
 
 JOINT_KEYS = "joint.stroke", "joint.stiffness"
-"""What of a joint's design hunting depends on."""
+"""Keys of a joint's design on which hunting depends."""
 
 
 def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | None:
-    """The margin of a stage in static friction, its Coulomb friction held, from where both are equal to so many times
-    its own as `SEARCH_LIMITS` tell. None where a friction law does not tell both, and of a stage that cannot hunt, or
-    of which it is not known what attracts it."""
+    """Find the margin of a stage in static friction, with its Coulomb friction unchanged.
+
+    The range runs from static friction equal to Coulomb friction up to a multiple given by `SEARCH_LIMITS`. None if a
+    friction law lacks one of both, if the stage cannot hunt, or if its attractors are unknown.
+    """
     flat = stage.flat()
     if not static_frictions(flat) or not _is_known(judgement):
         return None
@@ -32,9 +35,11 @@ def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | Non
 
 
 def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMargin]:
-    """The margins of a stage with a free joint in the joint's stroke and stiffness, by their keys, within so many times
-    their values as `SEARCH_LIMITS` tell; none of a stage that cannot hunt, or of which it is not known what attracts
-    it."""
+    """Find the margins of a stage with a free joint in the joint's stroke and stiffness,
+    by their keys.
+
+    The range is given by `SEARCH_LIMITS`. There are none for a stage that cannot hunt, or whose attractors are unknown.
+    """
     flat = stage.flat()
     if stage.joint is None or stage.joint.locked or not _is_known(judgement):
         return {}
@@ -48,7 +53,7 @@ def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMarg
 
 
 def _is_known(judgement: Judgement) -> bool:
-    """Whether it is known what attracts a stage that may hunt."""
+    """Tell whether the attractors of a stage that may hunt are known."""
     hunting, unclear = judgement.hunting, judgement.observed and judgement.hunting.target is None
     failed = judgement.verdict == "failed" or judgement.runs_away or hunting.passing
     return hunting.possible and hunting.certain and not failed and not unclear
@@ -56,13 +61,17 @@ def _is_known(judgement: Judgement) -> bool:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _margin(scaled: Scaled, judgement: Judgement, lowest: float) -> ParameterMargin:
-    """The margin in a parameter, where it is known whether something attracts the stage itself."""
+    """Find the margin in a parameter of a stage whose own attractors are known."""
     return parameter_margin(scaled, judgement.hunting.target is not None, lowest, SEARCH_LIMITS.most_friction)
 
 
 def keeps_friction_margin(stage: Stage, factor: float, work: float) -> bool | None:
-    """Whether nothing attracts a stage whose controller is faster by a factor, also with as much more, or less, static
-    friction as advice keeps off an edge. None where that takes more than so much work, or is not certain."""
+    """Tell whether nothing attracts a stage with a faster controller,
+    also with more or less static friction.
+
+    The controller is faster by `factor`; friction changes by the factor by which advice keeps away from an edge. None
+    if this takes more than so much work, or is not certain.
+    """
     flat = stage.flat()
     if not static_frictions(flat):
         return None

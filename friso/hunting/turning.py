@@ -1,6 +1,7 @@
-"""Counted peaks, periods and swings of runs from their turning points, as plain loops over runs.
+"""Count peaks, and find periods and swings of runs from their turning points,
+as plain loops over runs.
 
-A few runs are scanned by this module as it stands. For many, `friso.hunting.turns` has it compiled
+A few runs are scanned by this module as it stands. For many, `friso.hunting.turns` compiles it
 (`friso.engine.scalar_code`).
 """
 
@@ -30,8 +31,11 @@ def clear(kinds, count):
 
 
 def maxima(values, count, kinds):
-    """Mark the local maxima with 1 and all others with 0; of a level stretch the first point stands for all. The ends
-    are maxima where they are higher than what is beside them: turning points, as a rule, are."""
+    """Mark the local maxima with 1 and all others with 0;
+    the first point of a level stretch stands for all of it.
+
+    The ends count as maxima if they are higher than their neighbours; turning points usually are.
+    """
     clear(kinds, count)
     k = 0
     while k < count:
@@ -47,8 +51,10 @@ def maxima(values, count, kinds):
 
 
 def zigzag(values, count, least, kinds):
-    """Mark the extrema of a zigzag through the turning points `values` whose legs are at least `least`: 1 for its
-    maxima, -1 for its minima, 0 for the others. A first and last turning point that end such a leg are among them."""
+    """Mark the extrema of a zigzag through `values` with legs of at least `least`.
+
+    Maxima get 1, minima -1, all others 0. A first and a last turning point that end such a leg are included.
+    """
     clear(kinds, count)
     way, high, low = 0, 0, 0
     for k in range(1, count):
@@ -69,8 +75,11 @@ def zigzag(values, count, least, kinds):
 
 
 def keep_tallest(times, values, count, kinds, peaks):
-    """Mark the counted peaks: of maxima late and tall enough but less than `SEPARATION` apart the tallest
-    stays (as MATLAB's findpeaks does with MinPeakDistance)."""
+    """Mark the counted peaks: of maxima that are late and tall enough,
+    the tallest within `SEPARATION` stays.
+
+    MATLAB's findpeaks does so with MinPeakDistance.
+    """
     for k in range(count):
         if times[k] < COUNTED_AFTER or values[k] <= COUNTED_ABOVE:
             kinds[k] = 0
@@ -88,8 +97,10 @@ def keep_tallest(times, values, count, kinds, peaks):
 
 
 def mean_period(times, count, kinds, ended):
-    """Mean time between the maxima of a zigzag, or else its minima, in the last quarter [s], NaN where it has no two of
-    a kind; of a swing slower than that, between the last two of the last half."""
+    """Return the mean time between maxima of a zigzag, or else minima, in the last quarter [s].
+
+    A slower swing gives the time between the last two of the last half. NaN if there are no two of a kind.
+    """
     last = -1  # its swing is not over yet
     for k in range(count):
         if kinds[k] != 0:
@@ -127,8 +138,11 @@ def last_turn(times, count, kinds):
 
 
 def run(times, values, counts, swing, ended, kinds, peaks, distinct, period, turned, earlier):
-    """Fill `peaks` and `distinct`, shape (runs, room), `period`, `turned` and `earlier`, shape (runs,); see
-    `friso.hunting.turns.scan_turning_points`. `kinds`, shape (room,), are for marks in between."""
+    """Fill `peaks` and `distinct`, shape (runs, room), and `period`, `turned` and `earlier`,
+    shape (runs,).
+
+    See `friso.hunting.turns.scan_turning_points`. `kinds`, shape (room,), holds marks in between.
+    """
     for j in range(counts.size):
         count = counts[j]
         period[j], turned[j] = np.nan, -np.inf

@@ -1,4 +1,4 @@
-"""What the turning points of many runs tell: counted peaks, period, and how far they swung before."""
+"""Scan the turning points of many runs: counted peaks, period, and the swing before."""
 
 from __future__ import annotations
 
@@ -18,15 +18,18 @@ from friso.hunting.settings import CheckSettings
 _FLAT, _SQUARE = ArrayKind("float64", 1), ArrayKind("float64", 2)
 _COUNTS, _MARKS = ArrayKind("int64", 1), ArrayKind("bool", 2)
 KINDS = (_SQUARE, _SQUARE, _COUNTS, _FLAT, _FLAT, _COUNTS, _MARKS, _MARKS, _FLAT, _FLAT, _FLAT)
-"""What `friso.hunting.turning.run` is given."""
+"""Kinds of the arguments of `friso.hunting.turning.run`."""
 
 
 @dataclass(frozen=True)
 class Turns:
-    """What turning points tell of runs: which are counted `peaks` and which `distinct` ones, shape (runs, room) (see
-    `friso.hunting.criteria.peak_count`); the `period` of the swing [s] (NaN: none), when it `turned` for the last time
-    [s] (-inf: never), and peak to peak of the last half of the run, `earlier` [m], shape (runs,) (see
-    `friso.hunting.criteria.run_outcome`)."""
+    """Results from the turning points of runs.
+
+    `peaks` and `distinct` mark counted and distinct peaks, shape (runs, room) (see
+    `friso.hunting.criteria.peak_count`). The others have the shape (runs,): the `period` of the swing [s] (NaN: none),
+    the time of the last turn, `turned` [s] (-inf: never), and peak to peak of the last half of the run, `earlier` [m]
+    (see `friso.hunting.criteria.run_outcome`).
+    """
 
     peaks: np.ndarray
     distinct: np.ndarray
@@ -38,11 +41,11 @@ class Turns:
 def scan_turning_points(
     times: np.ndarray, values: np.ndarray, counts: np.ndarray, swing: np.ndarray, ended: np.ndarray
 ) -> Turns:
-    """Scan the turning points of runs: `times` [s] and `values` [m] of position minus reference, shape (runs, room),
-    valid up to `counts`, shape (runs,).
+    """Scan the turning points of runs for peaks, period and last turn.
 
-    `swing` [m], shape (runs,), is the peak-to-peak deviation of the last quarter, of which legs of a half or more make
-    the period: ringing on top of it does not count. `ended` [s], shape (runs,), is the end of each run.
+    `times` [s] and `values` [m] of position minus reference have the shape (runs, room), valid up to `counts`, shape
+    (runs,). `swing` [m], shape (runs,), is the peak-to-peak deviation of the last quarter. Legs of at least half of it
+    make the period, so that ringing on top does not count. `ended` [s], shape (runs,), is the end of each run.
     """
     settings = CheckSettings.current()
     runs = len(counts)
@@ -57,7 +60,7 @@ def scan_turning_points(
 
 @cache
 def _compiled() -> Loops:
-    """The loops over turning points as machine code, built once on a machine."""
+    """Return the loops over turning points as machine code, built once on a machine."""
     version = code_digest("hunting/turning.py", "hunting/build.py")
     (entry,) = built_entries(
         [CodeRequest(f"turning points {version}", "loops over turning points", "friso.hunting.build")]

@@ -1,4 +1,5 @@
-"""The verdict on one stage and what it rests on: whether a cycle attracts, and whether its own motion ends in it."""
+"""Judge one stage: whether a cycle attracts it,
+and whether its own motion ends in that cycle."""
 
 from __future__ import annotations
 
@@ -44,43 +45,43 @@ from friso.hunting.what_attracts import resolved_map
 from friso.stage import Stage
 
 MOVING = "the reference never stands still"
-"""Why a stage whose reference is a ramp does not hunt: it may stick and slip, but not about a place."""
+"""Reason why a stage whose reference is a ramp does not hunt: it may stick and slip, but not about a place."""
 
 
 LEFT_OVER = "not every motion that kept swinging was followed to its end: this one may end in another swing"
-"""Why it is not certain that a motion comes to rest which does not end in what attracts."""
+"""Reason given when a motion that does not end in a known attractor may end in another one."""
 
 SWINGS_ON = "this motion was still swinging when it was given up, by less than half of what was found to attract"
-"""Why it is not certain that a motion comes to rest which was seen to swing on."""
+"""Reason given when a motion was seen to swing on by less than the known attractor."""
 
 STILL_SWINGS = "this motion still swings a little at the end of the longest run, but nothing was found that attracts"
 
 UNFOLLOWED = (
     "this motion was not followed for long enough to see it come to rest: that takes more work than a check may"
 )
-"""Why it is not certain that a motion comes to rest where nothing was found that attracts."""
+"""Reason given when no attractor was found, but the motion was not followed until it rests."""
 
 CHANGED = 1 + np.array([0.0, -1e-5, -1e-6, -1e-7, 1e-7, 1e-6, 1e-5])
-"""Masses, as multiples of the stage's own, with which its motion is run: no machine is known as closely."""
+"""Multiples of the stage's masses with which its motion is run: no machine is known as exactly."""
 
 
 RUNS_AWAY = "this motion swings much farther at its end than what was found to attract, and may run away"
-"""Why it is not certain that a motion hunts which swings much farther than what attracts."""
+"""Reason given when a motion swings much farther than the known attractor."""
 
 BY_CHANCE = "a change of its mass by a hundred-thousandth, or rounding, decides whether this motion ends in hunting"
-"""Why it is not certain how a motion ends that ends otherwise with some of these masses."""
+"""Reason given when a motion ends differently with slightly changed masses."""
 
 UNCHECKED = "runs with hardly different masses, which show whether chance decides how this motion ends, were given up"
 """Reason given when the runs with changed masses were not completed."""
 
 
 class CheckPart(StrEnum):
-    """A part of a check: what is reported as it begins, and named where it is given up (`Judgement.given_up`), because
-    it would take more work than was allowed.
+    """A part of a check, reported as it begins,
+    and named if it is given up (`Judgement.given_up`) for lack of work.
 
-    The first three are computed in this order; without anything that attracts `STARTS` is left out. `LOWER_BANDWIDTHS`
-    is what is given up of `BANDWIDTHS` where something attracts up to the highest one. `FRICTION` is computed behind
-    these, and `FEEDING`, of a stage with a backlash that something attracts.
+    The first three are computed in this order; `STARTS` is left out without an attractor. `LOWER_BANDWIDTHS` replaces
+    `BANDWIDTHS` if something attracts up to the highest bandwidth. `FRICTION` comes after these, and `FEEDING` for a
+    hunting stage with a backlash.
     """
 
     ATTRACTION = "what attracts the stage"
@@ -92,7 +93,7 @@ class CheckPart(StrEnum):
 
     @property
     def progress_word(self) -> str:
-        """What the user reads while this part is computed: words of the glossary."""
+        """Return the words shown while this part is computed; they are in the glossary."""
         return _PROGRESS_WORDS.get(self, self.value)
 
 
@@ -103,21 +104,23 @@ _PROGRESS_WORDS = {
 
 
 PARTS = CheckPart.ATTRACTION, CheckPart.STARTS, CheckPart.BANDWIDTHS
-"""What is computed for a verdict, in this order."""
+"""Parts that are computed for a verdict, in this order."""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict (see `friso.hunting.criteria.stage_verdict`) and what it rests on.
+    """The verdict (see `friso.hunting.criteria.stage_verdict`) and the results it rests on.
 
-    `displacement`, `push` and `moves` tell what starts hunting, where there is a cycle that attracts; `margin` the edge
-    of hunting in bandwidth, `windows` where else something attracts, and `lower` the end below the bandwidth of what
-    attracts a stage that hunts (None: none was found); `settled_after` the time [s] after the last corner of the
-    reference from which on this motion stays within 10 um, up to the time for which it was `followed` [s] (None: no
-    longer than its own end, as the longer run was not needed or not completed). `observed`: what attracts was observed
-    in long simulations, no orbit that attracts could be closed. `lasting` [m], peak to peak, is where this motion alone
-    was seen to swing on, at the end of the time for which it was followed; it `runs_away` if it leaves its reference
-    for good. `given_up`: the parts that would have taken more work than was allowed.
+    - `displacement`, `push`, `moves`: starts of hunting, if a cycle attracts.
+    - `margin`: edge of hunting in bandwidth; `windows`: other bandwidths at which something attracts.
+    - `lower`: end of attraction below the bandwidth of a stage that hunts (None: none was found).
+    - `settled_after` [s]: time after the last corner of the reference from which the motion stays within 10 um.
+    - `followed` [s]: time for which the motion was followed (None: only to its own end, as the longer run was not
+      needed or not completed).
+    - `observed`: the attractor was seen in long simulations only, not closed as an orbit.
+    - `lasting` [m]: peak to peak of a swing seen in this motion alone, when it was followed to the end.
+    - `runs_away`: the motion diverges from its reference.
+    - `given_up`: parts that would have taken more work than was allowed.
     """
 
     verdict: Verdict
@@ -138,12 +141,12 @@ class Judgement:
 
     @property
     def swing(self) -> Cycle | Swing | None:
-        """What attracts: a cycle, or else a swing that was observed; None if nothing does."""
+        """Return the attractor: a cycle, or else an observed swing; None if there is none."""
         return next(iter((*self.hunting.attracting, *self.hunting.observed)), None)
 
     @property
     def cycle(self) -> Cycle | None:
-        """The cycle that matters most: the one that attracts, or else the first there is."""
+        """Return the cycle that matters most: the stable one, or else the first."""
         return next(iter((*self.hunting.attracting, *self.hunting.cycles)), None)
 
 
@@ -155,11 +158,11 @@ def judge(
     work: float | None = None,
     tell: Callable[[Verdict], None] = lambda verdict: None,
 ) -> Judgement:
-    """The verdict on a stage whose motion was run and measured at a relative tolerance.
+    """Judge a stage whose motion was run and measured at a relative tolerance.
 
-    `begin` is told what is begun (see `CheckPart`), and `tell` the verdict itself as soon as it is certain by all that
-    was computed for it: kicks and other bandwidths follow, and a cycle that is followed here from another bandwidth may
-    still contradict it. What cannot be settled by so much `work` (see `friso.engine.allowance`) is not certain.
+    `begin` is called as each part begins (see `CheckPart`). `tell` is called with the verdict as soon as it is certain.
+    Kicks and other bandwidths follow, and a cycle followed here from another bandwidth may still contradict it.
+    Anything that so much `work` does not settle (see `friso.engine.allowance`) is not certain.
     """
     settings = CheckSettings.current()
     work = settings.check_work if work is None else work
@@ -186,7 +189,8 @@ def _without_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
-    """Judge a stage that nothing attracts: whether its own motion comes to rest, and where hunting begins."""
+    """Judge a stage without an attractor: whether its own motion comes to rest,
+    and where hunting begins."""
     with allowance(CheckSettings.current().rest_work_share * work) as spent:
         rest = followed_motions(
             stage.flat(),
@@ -238,7 +242,8 @@ def _with_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
-    """Judge a stage that something attracts: whether its own motion ends in that, and what starts hunting."""
+    """Judge a stage with an attractor: whether its own motion ends in it,
+    and which starts cause hunting."""
     settings = CheckSettings.current()
     with allowance() as spent:
         own = own_motion(stage, target, settings.rest_work_share * work)
@@ -272,8 +277,11 @@ def _with_a_target(
 
 @dataclass(frozen=True)
 class OwnMotion:
-    """Where a stage's own motion ends: whether in what attracts it, whether its run was completed, how far it swings at
-    the end, peak to peak [m], and what makes that uncertain, "" if nothing does: a mass that is hardly another may."""
+    """How a stage's own motion ends.
+
+    It `ends` in the attractor or not, its run was `completed`, and `swing` [m] is its final swing, peak to peak.
+    `doubt` is the reason why this is uncertain, "" if it is not: a tiny change of mass may change the end.
+    """
 
     ends: bool
     completed: bool
@@ -282,8 +290,12 @@ class OwnMotion:
 
 
 def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
-    """Where the stage's own motion ends (see `ends_in`). One that still swings then, by less than what attracts, or
-    less often, is followed for longer, if that takes no more than so much work: it may be dying out."""
+    """Run the stage's own motion, also with slightly different masses,
+    and see how it ends (see `ends_in`).
+
+    A motion that still swings, but less far or less often than the attractor, may be dying out. It is followed for
+    longer if so much work suffices.
+    """
     settings = CheckSettings.current()
     flat = stage.flat()
     changed = {key: value * CHANGED for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
@@ -304,22 +316,22 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
 
 
 def _runs_away(stage: Stage, target: Target) -> bool:
-    """Whether the stage's own motion leaves its reference farther than runs are followed, before it has come to what
-    attracts it."""
+    """Tell whether the stage's own motion diverges before it has come to the attractor."""
     flat = stage.flat()
     longer = {**flat, "motion.duration": float(np.max(last_corner(flat)) + target.lasting)}
     return bool(run_motions(longer, 1, measuring_options(RTOL)).away[0])
 
 
 def _widest(attraction: Hunting) -> float:
-    """The largest swing that attracts, peak to peak [m]."""
+    """Return the largest attracting swing, peak to peak [m]."""
     return 2 * max(swing.amplitude for swing in (*attraction.attracting, *attraction.observed))
 
 
 def _starts(
     stage: Stage, attraction: Hunting, target: Target, work: float
 ) -> tuple[tuple[Kick | None, Kick | None, MoveShare | None], tuple[CheckPart, ...]]:
-    """Which kicks and moves start hunting, as far as so much work shows, and what of that had to be given up."""
+    """Find the kicks and moves that start hunting, within so much work,
+    and the part that was given up."""
     settings = CheckSettings.current()
     starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
     if attraction.passing:  # what swings less at its end may be passing as well
@@ -340,9 +352,12 @@ def _starts(
 
 
 def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) -> str:
-    """Why a motion need not come to rest that does not end in what was found to attract, and at last swings by so much
-    [m], peak to peak; `within` is the time from which on it stays near its reference [s] (NaN: not within its run).
-    "" if it does."""
+    """Return why a motion that does not end in the known attractor need not come to rest;
+    "" if it does.
+
+    `swing` [m] is its final swing, peak to peak; `within` [s] the time from which on it stays near its reference (NaN:
+    not within its run).
+    """
     if swing > resting(stage.flat())[0]:
         return SWINGS_ON
     surveyed = attraction.surveyed
@@ -351,14 +366,16 @@ def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) ->
 
 
 def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare | None) -> bool:
-    """Whether no kick or no move of one kind was seen to start hunting, and runs of that kind were not completed."""
+    """Tell whether no kick, or no move, was seen to start hunting while some runs were not
+    completed."""
     kicks = [kick for kick in (displacement, push) if kick]
     lost = any(kick.unknown and not kick.windows for kick in kicks)
     return lost or (moved is not None and not moved.hunting and moved.count < BasinSettings.current().drawn_moves)
 
 
 def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[CheckPart, ...]]:
-    """What a search through the bandwidths shows that may use so much work, and what of it had to be given up."""
+    """Search the bandwidths within so much work;
+    return the result and the part that was given up."""
     attracting = attraction.target is not None
     with allowance(work) as search:
         sought = search_bandwidths(stage, attracting, attraction.surveyed)
@@ -369,7 +386,8 @@ def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBan
 
 
 def _as_sure(stage: Stage, sought: SearchedBandwidths, attraction: Hunting) -> SearchedBandwidths:
-    """Make the ends found by a search no more certain than the verdict, and uncertain where the stage may run away."""
+    """Make the ends found by a search no more certain than the verdict,
+    and uncertain where the stage may diverge."""
 
     def sure(end: AttractionEnd) -> bool:
         if not (end.certain and attraction.certain):

@@ -1,4 +1,5 @@
-"""What attracts stages: their return maps tell; where a map leaves that open, a search from many starts does."""
+"""Find the attractors of stages by their return maps,
+and by a search from many starts where a map does not decide."""
 
 from __future__ import annotations
 
@@ -26,8 +27,7 @@ from friso.hunting.settings import ToleranceSettings
 from friso.stage.standstill import dead_band
 
 SKETCH_DISTANCES = np.concatenate([[0.003], np.geomspace(0.02, 3.0, 14)])
-"""Distances at which stages are stuck at first for a sketch, in units of the deflection of the loop by the break-away
-force."""
+"""Distances at which stages stick at first for a sketch, in deflections of the loop by the break-away force."""
 
 
 SKETCH_RTOL = ToleranceSettings().sketch_rtol
@@ -38,13 +38,14 @@ SKETCH_RTOL = ToleranceSettings().sketch_rtol
 def what_attracts(
     stages: Ensemble, rtol: float = RTOL, distances: np.ndarray | None = None, confirm: Sequence[int] = ()
 ) -> Attractors:
-    """What attracts stages that may hunt: closed orbits, by their return maps where these are resolved.
+    """Find the attractors of stages that may hunt: closed orbits,
+    by their return maps where these are resolved.
 
-    A map shows that nothing attracts if no cycle that Newton's method closes from the map of stages at rest attracts;
-    if none of these that repel, nor any that was closed from the map itself, holds motions beside it; and if, of the
-    stages to `confirm`, by number, runs land where it says. All other stages are searched from many starts, beside
-    these cycles and motions, and from `distances` [m], shape (count, n). Orbits are closed to a relative tolerance.
-    Raises Exhausted where an allowance is used up.
+    A map shows that nothing attracts under three conditions. No cycle that Newton's method closes from the map of
+    stages at rest is stable. No unstable cycle, from there or from the map itself, has a lasting motion beside it. For
+    the stages numbered `confirm`, runs land where the map predicts. All other stages are searched from many starts:
+    beside these cycles and motions, and from `distances` [m], shape (count, n). Orbits are closed to a relative
+    tolerance. Raises Exhausted where an allowance is used up.
     """
     if not has_a_map(stages):
         return _searched(stages, rtol, distances, _Cycles.of(stages, rtol))
@@ -68,20 +69,24 @@ def what_attracts(
 
 @dataclass(frozen=True)
 class _Cycles(ArrayRows):
-    """The cycles of stages that Newton's method closes from their maps at rest, and distances [m], shape (count, n), in
-    motions that those hold which repel, NaN where there is none."""
+    """Cycles that Newton's method closes from the maps of stages at rest,
+    and starts of lasting motions beside them.
+
+    `held` [m], shape (count, n), are sticking distances of motions beside unstable cycles, NaN for none.
+    """
 
     families: tuple[Cycles, ...]
     held: np.ndarray
 
     @classmethod
     def of(cls, stages: Ensemble, rtol: float) -> _Cycles:
-        """The cycles of stages, closed to a relative tolerance."""
+        """Close the cycles of stages to a relative tolerance, and find lasting motions beside them."""
         cycles = families(stages, rtol)
         return cls(cycles, np.hstack([held_beside(stages, family) for family in cycles]))
 
     def beside(self, survey: MapSurvey, numbers: np.ndarray) -> _Cycles:
-        """Add the motions held by unstable orbits that a survey of maps closed, of the stages with some numbers."""
+        """Add lasting motions beside the unstable orbits that a survey of maps closed,
+        for the stages with these numbers."""
         more = [np.full((len(numbers), 1), np.nan)]
         for motion in survey.repelling:
             if motion.cycles is not None and (rows := np.flatnonzero(numbers == motion.stage)).size:
@@ -93,18 +98,20 @@ class _Cycles(ArrayRows):
 
     @property
     def attract_or_hold(self) -> np.ndarray:
-        """Which stages have a cycle that attracts, or that holds motions, shape (count,)."""
+        """Return which stages have a stable cycle,
+        or an unstable one with a lasting motion beside it, shape (count,)."""
         return np.any([family.attracting for family in self.families], axis=0) | np.isfinite(self.held).any(axis=1)
 
 
 def _searched(stages: Ensemble, rtol: float, distances: np.ndarray | None, cycles: _Cycles) -> Attractors:
-    """What attracts stages, by simulations from many starts, from distances [m], and beside cycles."""
+    """Search the attractors of stages by simulation: from many starts, from distances [m],
+    and beside cycles."""
     starts = cycles.held if distances is None else np.hstack([cycles.held, distances])
     return attractors(stages, False, rtol, starts, suggested=cycles.families)
 
 
 def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | None:
-    """The return map of one stage, if it has all the `motions` that attract the stage, and nothing else attracts on it;
+    """Return the return map of one stage if its attractors are exactly the given `motions`;
     None if not."""
     if not has_a_map(stages) or stages.remember:
         return None
@@ -120,8 +127,11 @@ def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | 
 
 @dataclass(frozen=True)
 class Sketch:
-    """What coarse return maps show of stages, arrays of shape (count,): which something seems to attract, `attracts`;
-    of which that is `decided`; and which land as far off again from some distance, attracting or not, `returns`."""
+    """Result of coarse return maps of stages, arrays of shape (count,).
+
+    Something seems to attract a stage, `attracts`; this is `decided`; the stage `returns` as far from some distance, so
+    that it has a cycle, stable or not.
+    """
 
     attracts: np.ndarray
     decided: np.ndarray
@@ -130,8 +140,11 @@ class Sketch:
 
 @np.errstate(all="ignore")
 def sketched(stages: Ensemble) -> Sketch:
-    """Sketch the return maps of stages that may hunt: no orbit is closed, and what attracts from a narrow range of
-    distances is missed. Nothing is decided of stages without a map. Raises Exhausted where an allowance is used up."""
+    """Sketch the return maps of stages that may hunt, without closing orbits.
+
+    An attractor with a narrow basin is missed. Stages without a map stay undecided. Raises Exhausted where an allowance
+    is used up.
+    """
     mapped, decided = _sketch(stages)
     if mapped is None:
         return Sketch(decided, decided, decided)
@@ -139,7 +152,8 @@ def sketched(stages: Ensemble) -> Sketch:
 
 
 def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
-    """Coarse return maps of stages, None if they have none, and which of them are resolved, shape (count,)."""
+    """Return coarse maps of stages, None if they have none, and which are resolved,
+    shape (count,)."""
     if not has_a_map(stages):
         return None, np.zeros(stages.count, bool)
     mapped = map_stages(stages, SKETCH_DISTANCES, 1, SKETCH_RTOL, sparse=True)
@@ -148,12 +162,12 @@ def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
 
 @np.errstate(all="ignore")
 def surveyed_roughly(stages: Ensemble, rtol: float = RTOL, close: bool = True) -> Attractors:
-    """What seems to attract stages that may hunt, of each one motion at least, if anything does: many times sooner than
-    `what_attracts`, and wrong where it attracts from a narrow range of distances alone.
+    """Find at least one apparent attractor of each stage that may hunt, if it has one.
 
-    A sketch of their maps tells; where an attractor of that hardly attracts, or landings wander, the cycles that
-    Newton's method closes from the map at rest do, to a relative tolerance, unless none are to be closed. Stages whose
-    maps are not resolved are simulated. Raises Exhausted where an allowance is used up.
+    It is many times faster than `what_attracts`, and wrong where an attractor has a narrow basin. A sketch of the maps
+    decides. If its attractor is weak, or landings wander, the cycles that Newton's method closes from the map at rest
+    decide instead, unless `close` is off. Stages whose maps are not resolved are simulated. Raises Exhausted where an
+    allowance is used up.
     """
     mapped, decided = _sketch(stages)
     motions: list[Swinging] = []
@@ -173,9 +187,11 @@ def surveyed_roughly(stages: Ensemble, rtol: float = RTOL, close: bool = True) -
 
 
 def _hardly_attracts(landing_map: LandingMap) -> bool:
-    """Whether no attractor of a map is as simple, attracts as strongly, and from as many of its points, that a coarse
-    map is to be trusted: where the next landing is about as far off as the last one, straight pieces between points
-    come to cycles of several landings that the stage does not have."""
+    """Tell whether a coarse map has no attractor that can be trusted.
+
+    A trusted one is simple, strongly stable, and reached from enough points. Where the next landing is about as far off
+    as the last, straight pieces between points lead to long cycles that the stage does not have.
+    """
     settings = ReturnMapSettings.current()
     swings = 1 if landing_map.symmetric else 2
     return not any(
@@ -187,7 +203,7 @@ def _hardly_attracts(landing_map: LandingMap) -> bool:
 
 
 def _seen_on_map(mapped: Mapped, stage: int) -> Iterator[Swinging]:
-    """The attractors of the map of a stage as motions that were observed."""
+    """Yield the attractors of a stage's map as observed motions."""
     landing_map, length = mapped.maps[stage], float(mapped.stages.length[stage])
     for attractor in landing_map.attractors:
         distances, swings = np.abs(attractor.distances), len(attractor.distances)
@@ -206,7 +222,8 @@ _SEARCHES_ALONE = ContextVar("searches alone", default=False)
 
 @contextmanager
 def search_alone() -> Iterator[None]:
-    """Within, no return map is asked: a search from many starts tells all, which shows whether maps are right."""
+    """Search from many starts within the block, without return maps;
+    comparing both shows whether maps are right."""
     token = _SEARCHES_ALONE.set(True)
     try:
         yield
@@ -215,10 +232,12 @@ def search_alone() -> Iterator[None]:
 
 
 def has_a_map(stages: Ensemble) -> bool:
-    """Whether the distance at which stages stick may tell all that follows: not where a joint is free to swing while
-    the cart sticks, or a limiter chatters, where a force limit without anti-windup lets swings grow without bound,
-    where the integrals of several loops wind up by themselves, or where a stage may stand anywhere within a dead band
-    or a backlash."""
+    """Tell whether the sticking distance of stages may decide everything that follows.
+
+    It does not if a joint swings freely while the cart sticks, or a limiter chatters. A force limit without anti-windup
+    lets swings grow without bound. Integrals of several loops wind up on their own. Within a dead band or a backlash a
+    stage may stand anywhere.
+    """
     if _SEARCHES_ALONE.get():
         return False
     stands_anywhere = stages.structure.plays or bool(np.any(dead_band(stages.flat) > 0))

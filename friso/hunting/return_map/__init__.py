@@ -1,1 +1,2 @@
-"""Hunting by its return map: from the distance at which a stage lands to that at which it lands next."""
+"""Judge hunting by the return map: from the distance at which a stage lands to where it
+lands next."""

@@ -1,4 +1,5 @@
-"""What attracts stages, by their return maps: each attractor of a map is followed by a run, and closed as an orbit."""
+"""Find attractors of stages by their return maps: follow each attractor of a map by a run,
+and close it as an orbit."""
 
 from __future__ import annotations
 
@@ -25,9 +26,11 @@ SCATTERS = "landings at equal distances return differently: the stage remembers 
 
 @dataclass(frozen=True)
 class MapSurvey:
-    """What the return maps of stages show: the `mapped` runs; the `motions` that attract; orbits that were closed and
-    repel, `repelling`; and of which stages the map still has an attractor that was not closed as an orbit which
-    attracts, `undecided`, shape (count,)."""
+    """Result of surveying stages by their return maps.
+
+    `mapped` are the runs, `motions` the stable orbits, `repelling` the unstable ones. A stage is `undecided`, shape
+    (count,), if its map still has an attractor that was not closed as a stable orbit.
+    """
 
     mapped: Mapped
     motions: tuple[Swinging, ...]
@@ -36,7 +39,8 @@ class MapSurvey:
 
     @property
     def doubts(self) -> np.ndarray:
-        """Why it is not known what attracts stages, words of shape (count,), "" where it is."""
+        """Return why the map of a stage does not decide what attracts it, words of shape (count,),
+        "" if it does."""
         settings = ReturnMapSettings.current()
         why = np.full(self.mapped.stages.count, "", dtype=object)
         for stage, landing_map in enumerate(self.mapped.maps):
@@ -51,12 +55,12 @@ class MapSurvey:
 
     @property
     def resolved(self) -> np.ndarray:
-        """Which stages have a map that tells what attracts them, shape (count,)."""
+        """Return which stages have a map that decides what attracts them, shape (count,)."""
         return np.equal(self.doubts, "")
 
     @property
     def attracts(self) -> np.ndarray:
-        """Which stages something attracts, shape (count,)."""
+        """Return which stages have an attractor, shape (count,)."""
         attracted = np.zeros(self.mapped.stages.count, bool)
         attracted[[motion.stage for motion in self.motions]] = True
         return attracted
@@ -64,7 +68,7 @@ class MapSurvey:
 
 @dataclass(frozen=True)
 class _Proposal:
-    """An attractor of a stage's map, and the run that goes on beside it."""
+    """An attractor of a stage's map, and the run to continue near it."""
 
     stage: int
     attractor: MapAttractor
@@ -72,7 +76,8 @@ class _Proposal:
 
 
 def survey_maps(stages: Ensemble, rtol: float = RTOL) -> MapSurvey:
-    """What attracts stages, found by their return maps; orbits are closed to a relative tolerance."""
+    """Find the attractors of stages by their return maps;
+    orbits are closed to a relative tolerance."""
     settings = ReturnMapSettings.current()
     survey_settings = SurveySettings.current()
     mapped = map_stages(stages)
@@ -99,8 +104,8 @@ def survey_maps(stages: Ensemble, rtol: float = RTOL) -> MapSurvey:
 
 
 def _left(mapped: Mapped, motions: list[Swinging], repelling: list[Swinging]) -> list[_Proposal]:
-    """The attractors of all maps of which it is not known whether they attract, except those for which no run is left
-    that can be continued."""
+    """Return the attractors of all maps that were not closed as orbits yet,
+    if a run near them can be continued."""
     lengths = mapped.stages.length
 
     def is_any(new: _Proposal, closed: list[Swinging], exactly: bool) -> bool:
@@ -115,7 +120,8 @@ def _swings(attractor: MapAttractor) -> int:
 
 
 def _proposals(mapped: Mapped) -> list[_Proposal]:
-    """The attractors of all maps, each with the run in its basin that ended nearest to it."""
+    """Return the attractors of all maps, each with the run in its basin that ended nearest to
+    it."""
     proposals = []
     for stage, landing_map in enumerate(mapped.maps):
         for attractor in landing_map.attractors:
@@ -132,8 +138,12 @@ def _proposals(mapped: Mapped) -> list[_Proposal]:
 
 
 def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly: bool = False) -> bool:
-    """Whether an attractor of a map is a closed cycle of its stage: about as large, and `exactly` that if it takes as
-    many landings to return. `length` [m] is the deflection of the loop by the break-away force."""
+    """Tell whether an attractor of a map is a given closed cycle of its stage,
+    by size and number of landings.
+
+    With `exactly`, the numbers of landings must be equal; otherwise one may be a multiple. `length` [m] is the
+    deflection of the loop by the break-away force.
+    """
     distances = np.abs(attractor.distances) * length
     if exactly and not (attractor.periodic and motion.cycles and len(distances) == motion.cycles.swings):
         return False
@@ -148,7 +158,8 @@ def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly:
 
 
 def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging], repelling: list[Swinging]) -> None:
-    """Close orbits from runs that repeat themselves: those that attract join the motions, the others what repels."""
+    """Close orbits from runs that repeat themselves,
+    and add each to the stable or the unstable ones."""
     landings, owners = mapped.landings.take(runs), mapped.owners[runs]
     sizes, times, swings = np.zeros(len(runs)), np.zeros(len(runs)), np.zeros(len(runs), np.int64)
     for k, owner in enumerate(owners.tolist()):
@@ -173,8 +184,11 @@ def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging
 
 
 def _repeats(path: np.ndarray, symmetric: bool, least: int) -> int:
-    """The least number of swings, from the `least`, after which the last landings of a run, (landings,), about repeat
-    themselves; 0 if they do not."""
+    """Return the smallest number of swings, from `least` on, after which a run's last landings,
+    (landings,), about repeat.
+
+    Returns 0 if they do not.
+    """
     settings = ReturnMapSettings.current()
     sizes = np.abs(path) if symmetric else path
     for swings in range(1 if symmetric else 2, len(path) // 2 + 1, 1 if symmetric else 2):

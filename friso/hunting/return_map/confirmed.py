@@ -1,4 +1,5 @@
-"""Whether runs land where the return maps say: where a stage rests, where it goes on, and in the widest gap."""
+"""Check that runs land where the return maps predict: where a stage rests,
+where it swings on, and in the widest gap."""
 
 from __future__ import annotations
 
@@ -13,16 +14,17 @@ from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.hunting.settings import ToleranceSettings
 
 PLACES = np.array([1 / 6, 1 / 2, 5 / 6])
-"""Which of the starts from which a stage rests, or goes on, in order of distance, are followed."""
+"""Shares of the list of starts, in order of distance, at which runs are checked."""
 
 
 def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
-    """Which stages, by number, have runs that land where the map says, shape of the `numbers`.
+    """Return for which stages, by number, runs land where the map predicts,
+    in the shape of `numbers`.
 
-    Runs begin stuck at three distances from which the stage rests, at three from which it goes on, and in the widest
-    gap between the starts of the map. Each is followed for some landings, at the tolerance of the map and at a
-    hundredth of it; from the second on, each has to be where the map foretells it from the one before, up to the
-    scatter that a map may have.
+    Runs begin stuck at three distances from which the stage rests, at three from which it swings on, and in the widest
+    gap between starts of the map. Each is followed for some landings, at the tolerance of the map and at a hundredth of
+    it. From the second landing on, each must lie where the map predicts it from the one before, within the allowed
+    scatter.
     """
     begun = [_starts(survey, int(number)) for number in numbers]
     owners = np.repeat(np.arange(len(numbers)), [len(starts) for starts in begun])
@@ -34,7 +36,7 @@ def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
 
 
 def _starts(survey: MapSurvey, stage: int) -> np.ndarray:
-    """Where runs of a stage begin, in units of the deflection of the loop by the break-away force."""
+    """Return starts of runs of a stage, in deflections of the loop by the break-away force."""
     mapped = survey.mapped
     runs = np.flatnonzero((mapped.owners == stage) & np.isfinite(mapped.starts))
     runs = runs[np.argsort(mapped.starts[runs], kind="stable")]
@@ -52,7 +54,7 @@ def _starts(survey: MapSurvey, stage: int) -> np.ndarray:
 
 @np.errstate(all="ignore")  # landings that are not there are NaN
 def _land_as_foretold(survey: MapSurvey, owners: np.ndarray, starts: np.ndarray, rtol: float) -> np.ndarray:
-    """Which runs of stages, stuck at first at `starts`, land where the maps say, shape (runs,)."""
+    """Return which runs, stuck at first at `starts`, land where the maps predict, shape (runs,)."""
     settings = ReturnMapSettings.current()
     survey_settings = SurveySettings.current()
     stages = survey.mapped.stages.take(owners)

@@ -1,4 +1,5 @@
-"""Which motions go on for ever: a run shows where they land, the return map what follows."""
+"""Decide which motions swing for ever: a run shows where they land,
+the return map what follows."""
 
 from __future__ import annotations
 
@@ -20,11 +21,12 @@ from friso.hunting.return_map.settings import ReturnMapSettings
 def motions_go_on(
     flat: Mapping[str, Any], count: int, landing_map: LandingMap, starts: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which motions of one stage go on for ever, and of which that is known, both of shape (count,).
+    """Return which motions of one stage swing for ever, and for which this is known,
+    both of shape (count,).
 
-    The stage is given as flat keys to SI numbers or arrays (count,), its motions by these keys, or by the states in
-    which they begin at rest at the reference, `starts` (count, states). Nothing is known of those whose reference does
-    not come back to where it began.
+    The stage is given as flat keys to SI numbers or arrays (count,). Motions are given by these keys, or by the states
+    in which they begin at rest at the reference, `starts` (count, states). The result is unknown if the reference does
+    not come back to its start.
     """
     if starts is not None:
         return _go_on(Ensemble.held(flat, count), starts, landing_map)
@@ -41,7 +43,8 @@ def motions_go_on(
 
 @np.errstate(all="ignore")  # a stage that never lands is still at its reference
 def _go_on(stages: Ensemble, starts: np.ndarray, landing_map: LandingMap) -> tuple[np.ndarray, np.ndarray]:
-    """Which runs from states go on for ever, by where they land, and of which that is known, both (runs,)."""
+    """Return which runs from states swing for ever, by where they land,
+    and for which this is known, both (runs,)."""
     settings = ReturnMapSettings.current()
     count = len(starts)
     ends, decided, left = np.zeros(count, bool), np.zeros(count, bool), np.arange(count)

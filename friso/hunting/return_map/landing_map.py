@@ -1,4 +1,5 @@
-"""The return map of a stage: from one landing to the next, as landings of runs show it, and what it comes to."""
+"""Interpolate the return map of a stage, from one landing to the next,
+and iterate it to its attractors."""
 
 from __future__ import annotations
 
@@ -15,17 +16,20 @@ from friso.hunting.return_map.landings import Landings
 from friso.hunting.return_map.settings import ReturnMapSettings
 
 OTHER_SIDE = 1e3
-"""What places on the negative side are shifted by."""
+"""Shift of places on the negative side."""
 
 REST = -1e6
-"""The place of a stage that rests, or has run away."""
+"""Place of a stage that rests, or has diverged."""
 
 
 @dataclass(frozen=True)
 class MapAttractor:
-    """What landings come to: signed distances, shape (swings,), one after the other, in units of the deflection of the
-    loop by the break-away force, and the points of the map that come to it, `basin` (points,). It is a cycle if it is
-    `periodic`, after so many swings; else these are the last of its landings."""
+    """An attractor of a return map.
+
+    `distances`, shape (swings,), are signed distances of successive landings, in deflections of the loop by the
+    break-away force. `basin` (points,) are the points of the map that come to it. It is a cycle of so many swings if
+    `periodic`; otherwise the distances are the last landings of an irregular motion.
+    """
 
     distances: np.ndarray
     basin: np.ndarray
@@ -34,12 +38,15 @@ class MapAttractor:
 
 @dataclass(frozen=True)
 class LandingMap:
-    """The return map of one stage, points in ascending order of distance: signed distances of landings, `before`
-    (points,), and of the next ones, `after` (points,), 0 where the stage rests instead, infinite where it runs away.
+    """The return map of one stage, points in ascending order of distance.
 
-    Distances are in units of the deflection of the loop by the break-away force, without sign where the stage is
-    `symmetric`. `run` (points,) tells in which run each was, `final` (points,) whether that ended with the next
-    landing, so that it may go on. `lost` counts runs that were not completed.
+    - `before` (points,): signed distances of landings; without sign where the stage is `symmetric`.
+    - `after` (points,): distances of the next landings, 0 where the stage rests, infinite where it diverges.
+    - `run` (points,): number of the run of each point; `final` (points,): whether that run ended with the next landing,
+      so that it may be continued.
+    - `lost`: number of runs that were not completed.
+
+    Distances are in deflections of the loop by the break-away force.
     """
 
     before: np.ndarray
@@ -51,8 +58,11 @@ class LandingMap:
 
     @classmethod
     def of(cls, landings: Landings, length: float, symmetric: bool) -> LandingMap:
-        """The map from the landings of runs of one stage, but where they started: what follows that depends on how the
-        run began. `length` [m] is the deflection of the loop by the break-away force."""
+        """Make the map from the landings of runs of one stage.
+
+        The starts are left out, because the next landing depends on how the run began. `length` [m] is the deflection
+        of the loop by the break-away force.
+        """
         settings = SurveySettings.current()
         distances = landings.distances / length
         ended = np.where(landings.rest, 0.0, np.where(landings.away, np.inf, np.nan))
@@ -71,28 +81,29 @@ class LandingMap:
         return cls(before[order], after[order], run[order], final[order], symmetric, lost)
 
     def renumbered(self, runs: np.ndarray) -> LandingMap:
-        """The map, its runs having other numbers, shape (runs,)."""
+        """Return the map with other numbers of its runs, shape (runs,)."""
         return replace(self, run=runs[self.run])
 
     @property
     def sides(self) -> tuple[float, ...]:
-        """The signs of the sides on which landings are told apart."""
+        """Return the signs of the sides on which landings differ."""
         return (1.0,) if self.symmetric else (1.0, -1.0)
 
     def points(self, side: float) -> np.ndarray:
-        """The numbers of the points on a side, by ascending distance."""
+        """Return the numbers of the points on a side, by ascending distance."""
         return np.flatnonzero(self.before * side > 0)[:: int(side)]
 
     @property
     def gain(self) -> np.ndarray:
-        """How far the next landing is in units of the last one, shape (points,)."""
+        """Return the distance of the next landing over that of the last one, shape (points,)."""
         return np.abs(self.after / self.before)
 
     @cached_property
     def _lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Straight pieces over places (see `_place`), ascending: where each begins, and its value at place 0 and slope.
+        """Return straight pieces over places (see `_place`), ascending: begin, value at place 0,
+        and slope of each.
 
-        Between two points the logarithm of distance goes straight, or, where the map breaks off, with the gain of the
+        Between two points the logarithm of distance is linear. Where the map breaks off, each half has the gain of the
         nearer point.
         """
         settings = ReturnMapSettings.current()
@@ -133,8 +144,8 @@ class LandingMap:
         return np.array(begins), np.array(values), np.array(slopes)
 
     def next(self, places: np.ndarray) -> np.ndarray:
-        """The places of the next landings after those at places (see `_place`), shape (count,), straight between the
-        points of the map."""
+        """Return the places of the next landings after places (see `_place`), shape (count,),
+        by linear interpolation."""
         settings = SurveySettings.current()
         begins, values, slopes = self._lines
         pieces = np.searchsorted(begins, places, side="right") - 1
@@ -144,14 +155,14 @@ class LandingMap:
 
     @cached_property
     def attractors(self) -> tuple[MapAttractor, ...]:
-        """What landings come to that go on for ever, from the points of the map, by iteration."""
+        """Return the attractors of the map that swing for ever, by iteration from its points."""
         goes = np.isfinite(self.after) & (self.after != 0)
         at = np.where(goes, _place(np.where(goes, self.after, 1.0)), REST)
         return tuple(self._told_apart(self._followed(at)))
 
     def _followed(self, at: np.ndarray) -> np.ndarray:
-        """The last of the landings that follow places, shape (points, landings), once the map has come to what attracts
-        it."""
+        """Iterate the map from places until it is on an attractor, and return the last landings,
+        shape (points, landings)."""
         settings = ReturnMapSettings.current()
         survey_settings = SurveySettings.current()
         iterations, before, paths = settings.map_iterations, np.full(len(at), np.inf), at[:, None]
@@ -179,21 +190,22 @@ class LandingMap:
         return paths
 
     def foretold(self, distances: np.ndarray) -> np.ndarray:
-        """The signed distances of the next landings, shape (count,), 0 where the stage rests."""
+        """Predict the signed distances of the next landings, shape (count,),
+        0 where the stage rests."""
         return _distance(self.next(self._places(distances)))
 
     def goes_on(self, distances: np.ndarray) -> np.ndarray:
-        """Whether landings at signed distances go on for ever, shape (count,)."""
+        """Return which landings, given by signed distances, swing for ever, shape (count,)."""
         return np.all(self._followed(self._places(distances)) > REST, axis=1)
 
     def _places(self, distances: np.ndarray) -> np.ndarray:
-        """The places of landings at signed distances."""
+        """Return the places of landings at signed distances."""
         at = np.abs(distances) if self.symmetric else distances
         moves = np.isfinite(at) & (np.abs(at) >= SurveySettings.current().least_swing)
         return np.where(moves, _place(np.where(moves, at, 1.0)), REST)
 
     def _told_apart(self, paths: np.ndarray) -> Iterator[MapAttractor]:
-        """The attractors that paths of places, shape (points, landings), are on, each once."""
+        """Yield each attractor once, from paths of places on them, shape (points, landings)."""
         settings = ReturnMapSettings.current()
         left = np.all(paths > REST, axis=1)
         while left.any():
@@ -207,8 +219,11 @@ class LandingMap:
             left &= ~same
 
     def slope(self, attractor: MapAttractor) -> float:
-        """By which factor a small deviation from what landings come to grows until they repeat themselves, as far as
-        the map tells, without sign; infinite where they do not."""
+        """Return the growth of a small deviation from an attractor per repetition, by the map,
+        without sign.
+
+        It is infinite if the attractor does not repeat itself.
+        """
         if not attractor.periodic:
             return np.inf
         begins, _, slopes = self._lines
@@ -216,8 +231,11 @@ class LandingMap:
 
     @property
     def returns(self) -> bool:
-        """Whether the stage lands as far off again from somewhere, and less far from beyond: there is a fixed point of
-        the distance, attracting or not, of symmetric stages; of others there may be one."""
+        """Tell whether the map has a fixed point of distance: landings as far off,
+        and less far from beyond.
+
+        For symmetric stages this is a cycle, stable or not; for others it only may be one.
+        """
         for side in self.sides:
             gain = self.gain[self.points(side)]
             if len(gain) < 2 or not np.any((gain[:-1] > 1) & (gain[1:] <= 1) & (gain[1:] > 0)):
@@ -226,9 +244,12 @@ class LandingMap:
 
     @property
     def scatter(self) -> tuple[float, float]:
-        """By how much, at worst, a landing differs from what its neighbours predict, as a share of it, and at which
-        distance; infinite where a stage rests between two landings that go on alike, or the other way round; 0 where no
-        three points are close together. Only points that land at more than half of their distance count."""
+        """Return the largest relative difference of a landing from the prediction by its neighbours,
+        and its distance.
+
+        It is infinite if a stage rests between two landings that go on alike, or the reverse. It is 0 if no three
+        points are close together. Only points count whose next landing is at more than half of their distance.
+        """
         settings = ReturnMapSettings.current()
         worst, place = 0.0, np.nan
         for side in self.sides:
@@ -252,20 +273,21 @@ class LandingMap:
 
 
 def _place(distances: np.ndarray) -> np.ndarray:
-    """The logarithms of signed distances, those on the negative side shifted."""
+    """Return the logarithms of signed distances, shifted on the negative side."""
     return np.log(np.abs(distances)) + OTHER_SIDE * (distances < 0)
 
 
 def _distance(places: np.ndarray) -> np.ndarray:
-    """The signed distances at places."""
+    """Return the signed distances at places."""
     negative = places > OTHER_SIDE / 2
     return np.where(negative, -1.0, 1.0) * np.exp(np.where(negative, places - OTHER_SIDE, places))
 
 
 def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Leave out landings beyond `farthest_sticking` from which a run comes back, and count those left after the start.
+    """Leave out landings beyond `farthest_sticking` from which a run comes back,
+    and count the rest after the start.
 
-    From there a stage passes its reference without sticking, so that distance alone does not tell what follows.
+    From so far a stage passes its reference without sticking, so distance alone does not decide what follows.
     `distances` have the shape (runs, landings), the start first.
     """
     rows, order = np.arange(len(distances))[:, None], np.arange(distances.shape[1])
@@ -278,8 +300,8 @@ def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.nd
 
 
 def _strays(paths: np.ndarray) -> np.ndarray:
-    """By how much the places of paths, shape (points, landings), differ at least from those of a cycle before, shape
-    (points,)."""
+    """Return the smallest difference between places of paths, shape (points, landings),
+    and those a cycle before, (points,)."""
     settings = SurveySettings.current()
     return np.min(
         [np.abs(paths[:, n:] - paths[:, :-n]).max(axis=1) for n in range(1, settings.most_repeating_swings + 1)], axis=0
@@ -287,7 +309,7 @@ def _strays(paths: np.ndarray) -> np.ndarray:
 
 
 def _repeats_after(path: np.ndarray, symmetric: bool) -> int:
-    """The number of swings after which the places of landings repeat themselves, 0 if they do not."""
+    """Return the number of swings after which the places of landings repeat, 0 if they do not."""
     settings = ReturnMapSettings.current()
     survey_settings = SurveySettings.current()
     for swings in range(1 if symmetric else 2, survey_settings.most_repeating_swings + 1, 1 if symmetric else 2):
@@ -297,7 +319,7 @@ def _repeats_after(path: np.ndarray, symmetric: bool) -> int:
 
 
 def _mixed(paths: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """Which paths wander over the range of one, shape (points,)."""
+    """Return which paths wander over the range of the first one, shape (points,)."""
     settings = ReturnMapSettings.current()
     return (paths.min(axis=1) > first.min() - 10 * settings.same_attractor_share) & (
         paths.max(axis=1) < first.max() + 10 * settings.same_attractor_share

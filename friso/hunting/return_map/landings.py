@@ -1,4 +1,5 @@
-"""Landings of stages: how far from its reference a stage turns on either side, one swing after the other."""
+"""Find the landings of stages: how far from its reference a stage turns on either side,
+swing after swing."""
 
 from __future__ import annotations
 
@@ -21,9 +22,12 @@ RTOL = ToleranceSettings().landing_rtol
 
 @dataclass(frozen=True)
 class Landings(ArrayRows):
-    """Runs and their landings: signed distances from the reference [m] and times [s], shape (runs, landings), NaN after
-    the last, the start first; how many there are without the start, `count` (runs,); the states in which the runs
-    ended, shape (runs, states); which of them `rest` and which ran `away` or failed, `lost`, shape (runs,)."""
+    """Runs and their landings, the start first.
+
+    `distances` [m], signed, and `times` [s] have the shape (runs, landings), NaN after the last. `count` (runs,) is the
+    number of landings without the start. `ends` (runs, states) are the final states. Runs `rest`, ran `away`, or are
+    `lost` because they failed, shape (runs,).
+    """
 
     distances: np.ndarray
     times: np.ndarray
@@ -34,13 +38,13 @@ class Landings(ArrayRows):
     lost: np.ndarray
 
     def joined(self, more: Landings) -> Landings:
-        """Put these runs and more into one table."""
+        """Join these runs and more into one table."""
         room = max(self.distances.shape[1], more.distances.shape[1])
         pairs = ((getattr(part._with(room), entry.name) for part in (self, more)) for entry in fields(self))
         return Landings(*(np.concatenate([*pair]) for pair in pairs))
 
     def _with(self, room: int) -> Landings:
-        """The runs with room for so many landings."""
+        """Return the runs with room for so many landings."""
         wider = ((0, 0), (0, room - self.distances.shape[1]))
         distances, times = (np.pad(part, wider, constant_values=np.nan) for part in (self.distances, self.times))
         return replace(self, distances=distances, times=times)
@@ -48,10 +52,10 @@ class Landings(ArrayRows):
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float = RTOL) -> Landings:
-    """Follow stages from states, shape (runs, states), to a relative tolerance, each until it has landed `most` times,
+    """Follow stages from states, shape (runs, states), until each has landed `most` times,
     or rests.
 
-    A round of runs is as long as each stage may take to wind up where it sticks, or where it may stick if it moves, and
+    Runs have the relative tolerance `rtol`. A round lasts as long as a stage may take to wind up where it sticks, and
     to cross its reference.
     """
     orbit_settings = OrbitSettings.current()
@@ -101,9 +105,12 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
 
 
 def _landings(values: np.ndarray, times: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The farthest of the places [m] that runs pass on one side of the reference, one side after the other, when that
-    is [s], both (runs, landings), the start first, and how many there are without it, (runs,); from places and times of
-    shape (runs, places), NaN where there is none."""
+    """Return the farthest place [m] of each run on each side of the reference in turn,
+    and its time [s].
+
+    Both have the shape (runs, landings), the start first; the third result counts them without the start, (runs,).
+    `values` and `times` have the shape (runs, places), NaN for no place.
+    """
     count = len(values)
     rows = np.arange(count)
     where, when = np.full((count, most + 1), np.nan), np.full((count, most + 1), np.nan)

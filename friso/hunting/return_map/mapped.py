@@ -1,4 +1,5 @@
-"""Return maps of many stages at once: where runs begin, and where more are needed."""
+"""Sample the return maps of many stages at once: choose where runs begin,
+and add runs where a map is too coarse."""
 
 from __future__ import annotations
 
@@ -28,17 +29,16 @@ force limit begin."""
 
 
 WITHIN = np.array([0.2, 0.4, 0.6, 0.8])
-"""How closely a break between the landings of two starts is narrowed down, as a logarithm of their distances, and the
-shares of the way between them at which more runs begin."""
+"""Shares of the way between two starts at which more runs begin, to narrow down a break of the map between them."""
 
 
 @dataclass(frozen=True)
 class Mapped:
-    """Stages and runs of them.
+    """Stages and runs that sample their return maps.
 
-    Each run is of the stage with the number `owners` (runs,). It began stuck at `starts` (runs,), signed, in units of
-    the deflection of the loop by the break-away force, NaN where it goes on from another run; such another one was
-    `continued` (runs,). The `landings` are of all runs, which have a relative tolerance, `rtol`.
+    Each run belongs to the stage with the number `owners` (runs,). It began stuck at `starts` (runs,), signed, in
+    deflections of the loop by the break-away force. NaN marks a run that goes on from another; that other one is
+    `continued` (runs,). `landings` are the landings of all runs, to the relative tolerance `rtol`.
     """
 
     stages: Ensemble
@@ -50,29 +50,29 @@ class Mapped:
 
     @cached_property
     def maps(self) -> tuple[LandingMap, ...]:
-        """The return map of each stage."""
+        """Return the return map of each stage."""
         return tuple(self._map(k) for k in range(self.stages.count))
 
     def _map(self, stage: int) -> LandingMap:
-        """The return map of one stage, from its own runs."""
+        """Return the return map of one stage, from its own runs."""
         which = np.flatnonzero(self.owners == stage)
         length, symmetric = float(self.stages.length[stage]), bool(self.stages.symmetric[stage])
         return LandingMap.of(self.landings.take(which), length, symmetric).renumbered(which)
 
     @property
     def attracts(self) -> np.ndarray:
-        """On which maps landings go on for ever, shape (count,)."""
+        """Return on which maps landings go on for ever, shape (count,)."""
         return np.array([bool(landing_map.attractors) for landing_map in self.maps], bool)
 
     def take(self, numbers: np.ndarray) -> Mapped:
-        """The stages with these numbers, each once, and their runs."""
+        """Select the stages with these numbers, each once, and their runs."""
         which = np.flatnonzero(np.isin(self.owners, numbers))
         owners = np.array([np.flatnonzero(numbers == owner)[0] for owner in self.owners[which]], np.int64)
         runs = (self.starts[which], self.continued[which], self.landings.take(which))
         return Mapped(self.stages.take(numbers), owners, *runs, self.rtol)
 
     def joined(self, owners: np.ndarray, starts: np.ndarray, landings: Landings) -> Mapped:
-        """Add runs of these stages."""
+        """Add runs of the stages `owners` that have landed already."""
         together = self.landings.joined(landings)
         joined = Mapped(
             self.stages,
@@ -89,12 +89,12 @@ class Mapped:
         return joined
 
     def begun(self, owners: np.ndarray, starts: np.ndarray, most: int | None = None) -> Mapped:
-        """Add runs of the stages `owners` that are stuck at `starts` at first, both of shape (runs,)."""
+        """Add runs of the stages `owners` that stick at first at `starts`, both of shape (runs,)."""
         most = ReturnMapSettings.current().run_landings if most is None else most
         return self.joined(owners, starts, _stuck_at(self.stages, owners, starts, most, self.rtol))
 
     def gone_on(self, runs: np.ndarray, most: int) -> Mapped:
-        """Add runs that go on from the last landings of the runs with some numbers."""
+        """Add runs that go on from the last landings of the runs with these numbers."""
         owners, states = self.owners[runs], self.landings.ends[runs]
         more = find_landings(self.stages.take(owners), states, most, self.rtol)
         continued = self.continued.copy()
@@ -110,7 +110,8 @@ class Mapped:
         return self.begun(owners, np.concatenate(wanted)) if owners.size else self
 
     def _wanted(self, stage: int) -> np.ndarray:
-        """Where more runs of a stage begin: those that land between neighbouring points that are too far apart."""
+        """Return starts of more runs of a stage, which should land in gaps between neighbouring
+        points."""
         landing_map, starts = self.maps[stage], []
         which = np.flatnonzero((self.owners == stage) & np.isfinite(self.starts))
         which = which[np.argsort(self.starts[which], kind="stable")]
@@ -132,8 +133,11 @@ def map_stages(
     rtol: float = RTOL,
     sparse: bool = False,
 ) -> Mapped:
-    """The return maps of stages, from runs that begin stuck at distances `near` their reference and farther off, those
-    in every third place alone where a `sparse` map will do."""
+    """Sample the return maps of stages by runs that begin stuck at distances `near` their
+    reference, and farther off.
+
+    A `sparse` map has every third of the farther starts only.
+    """
     settings = ReturnMapSettings.current()
     limited = [LIMITED_DISTANCES] if FORCE_LIMIT in stages.flat else []
     far = np.concatenate([FAR_DISTANCES, *limited])
@@ -149,8 +153,11 @@ def map_stages(
 
 
 def remembered(mapped: Mapped, stage: int) -> str:
-    """The state in which two runs of a stage differ most that land equally far off, but return differently: what it has
-    not forgotten there, by name; "" where no landings show that."""
+    """Return the name of the state that differs most between runs that land equally far off but
+    return differently.
+
+    The stage still remembers this state from its past. Returns "" if no landings show one.
+    """
     settings = ReturnMapSettings.current()
     landing_map = mapped.maps[stage]
     _, place = landing_map.scatter
@@ -171,13 +178,15 @@ def remembered(mapped: Mapped, stage: int) -> str:
 
 
 def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: int, rtol: float) -> Landings:
-    """The landings of runs of the stages `owners` that are stuck at first at `starts`, both (runs,)."""
+    """Return the landings of runs of the stages `owners` that stick at first at `starts`,
+    both (runs,)."""
     several = stages.take(owners)
     return find_landings(several, stuck(several, starts * several.length), most, rtol)
 
 
 def gaps(landing_map: LandingMap) -> np.ndarray:
-    """Signed distances in the middle of gaps between points that are wider than they may be, the worst first."""
+    """Return signed distances in the middle of gaps between points that are too wide,
+    the worst first."""
     settings = ReturnMapSettings.current()
     places, excess = [], []
     for side in landing_map.sides:
@@ -206,7 +215,8 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
 
 
 def unclosed(landing_map: LandingMap) -> list[int]:
-    """The runs of the outermost points of a map that go on about as far: beyond them it is not known what follows."""
+    """Return the runs of the outermost points whose next landing is about as far:
+    the map must continue beyond them."""
     settings = ReturnMapSettings.current()
     runs = []
     for side in landing_map.sides:
@@ -218,8 +228,8 @@ def unclosed(landing_map: LandingMap) -> list[int]:
 
 
 def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[float]:
-    """Starts half-way from those of some runs to those next to them; `starts`, ascending, and the `numbers` of their
-    runs."""
+    """Return starts half-way from some runs to their neighbours; `starts` ascend,
+    `numbers` are those of their runs."""
     between = []
     for run in runs:
         for k in np.flatnonzero(numbers == run):
@@ -230,8 +240,11 @@ def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[fl
 
 
 def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
-    """Starts between neighbouring ones, ascending, of which one lands and the other does not, or far from there: beyond
-    what is known, landings may go on up to the break. `landings`, the first ones, (runs,)."""
+    """Return starts between neighbours, ascending, of which only one lands,
+    or lands far from the other.
+
+    An attractor may reach up to such a break of the map. `landings`, (runs,), are the first landings.
+    """
     settings = ReturnMapSettings.current()
     lands = np.abs(np.nan_to_num(landings)) >= SurveySettings.current().least_swing
     sizes = np.where(lands, np.abs(landings), 1.0)
@@ -246,8 +259,11 @@ def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
 
 
 def _start_that_lands(starts: np.ndarray, seen: np.ndarray, place: float) -> float | None:
-    """Where a run begins that lands at a place, between two neighbouring ones that land about it; None if none do.
-    `starts` (runs,), ascending, and landings, shape (runs, landings), the start first."""
+    """Return a start whose run should land at a place,
+    between two neighbours that land on either side; None if none do.
+
+    `starts` (runs,) ascend; `seen` (runs, landings) are landings with the start first.
+    """
     best, start = np.inf, None
     for k in range(1, ReturnMapSettings.current().run_landings):
         low, high = seen[:-1, k], seen[1:, k]
