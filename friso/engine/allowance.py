@@ -39,12 +39,13 @@ class Allowance:
 
     @property
     def left(self) -> float:
-        """What may still be used."""
+        """Return what may still be used."""
         own = self.work - self.used
         return own if self.around is None else min(own, self.around.left)
 
     def most_steps(self, runs: int, step: float) -> float:
-        """How many steps, of so much work, each of some runs may take. Raises Exhausted if nothing is left."""
+        """Return how many steps, of so much work, each of some runs may take.
+        Raises Exhausted if nothing is left."""
         left = self.left
         if left <= 0:
             self.exhaust()
@@ -73,7 +74,7 @@ _CURRENT: ContextVar[Allowance | None] = ContextVar("allowance", default=None)
 
 
 def current_allowance() -> Allowance | None:
-    """The allowance under which runs are done now, if any."""
+    """Return the allowance under which runs are done now, if any."""
     return _CURRENT.get()
 
 

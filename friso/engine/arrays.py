@@ -70,8 +70,8 @@ class Results(NamedTuple):
 
 
 def new_queue() -> np.ndarray:
-    """A queue from which threads take the numbers of their runs, one by one, so that all of them are busy to the end,
-    shape (1,): next comes run 0."""
+    """Return a queue from which threads take the numbers of their runs, one by one,
+    so that all of them are busy to the end, shape (1,): next comes run 0."""
     return np.zeros(1, np.int64)
 
 

@@ -68,12 +68,12 @@ class Runs:
         return self.results.statistics[:, STATISTICS.index(name)]
 
     def part(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """The flat keys of these runs alone."""
+        """Return the flat keys of these runs alone."""
         return part_of(flat, self.numbers)
 
 
 def part_of(flat: Mapping[str, Any], numbers: np.ndarray) -> dict[str, Any]:
-    """The flat keys of the stages with these numbers alone."""
+    """Return the flat keys of the stages with these numbers alone."""
     return {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
 
 
@@ -96,7 +96,8 @@ def run_chunks(
 def prepare(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, options: RunOptions, starts: np.ndarray | None = None
 ) -> Batch:
-    """The kernel's input for the runs of one chunk, from the states `starts` unless as the motion says."""
+    """Return the kernel's input for the runs of one chunk,
+    from the states `starts` unless as the motion says."""
     values = kernel.values({**flat, "motion.size": motion.size(flat)}, runs)
 
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
@@ -202,7 +203,7 @@ def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, res
 
 
 def _batch_of(batch: Batch, which: np.ndarray) -> Batch:
-    """The runs of a batch with some numbers; what all runs share stays."""
+    """Return the runs of a batch with some numbers; what all runs share stays."""
     if len(which) == len(batch.starts):
         return batch
     own = {
@@ -219,7 +220,7 @@ def _empty_like(results: Results, runs: int) -> Results:
 
 
 def options_of(options: RunOptions) -> BatchOptions:
-    """The options as the kernel takes them."""
+    """Return the options as the kernel takes them."""
     return BatchOptions(
         rtol=float(options.rtol),
         budget=float(options.budget),

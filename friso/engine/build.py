@@ -46,12 +46,12 @@ def _load(plug_in: PlugIn) -> None:
 
 
 def _loops_code(module: ModuleType) -> bytes:
-    """The machine code of the driver."""
+    """Return the machine code of the driver."""
     return object_code(scalar_code.scalar_llvm(module.run, driver_kinds()))
 
 
 def _code(module: ModuleType) -> bytes:
-    """The machine code of a kernel's module."""
+    """Return the machine code of a kernel's module."""
     functions = {name: getattr(module, name) for name in FUNCTIONS if hasattr(module, name)}
     return object_code(vector_code.vector_llvm(functions, module.LAYOUT["lanes"]))
 

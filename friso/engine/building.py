@@ -33,9 +33,10 @@ _AT_THE_END = 2.0
 
 
 def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
-    """The entries of what is requested; what is missing in the cache is built, and what is said about it logged.
-    Raises RuntimeError with the builder's message if that fails, OSError where no folder can be written, Overtaken
-    where nobody waits for them any more: what is being built is, to its end, for whoever asks next."""
+    """Return the entries of what is requested; what is missing in the cache is built,
+    and what is said about it logged. Raises RuntimeError with the builder's message if that fails, OSError where no
+    folder can be written, Overtaken where nobody waits for them any more: what is being built is, to its end, for
+    whoever asks next."""
     requests, folder = list(requests), cache_folder()
     compiled = {request: request.entry() for request in requests}
     if missing := [request for request, entry in compiled.items() if entry is None]:
@@ -85,7 +86,8 @@ class _Work:
         wait([job.met for job in jobs], _AT_THE_END)
 
     def _joined(self, request: CodeRequest, place: str) -> _Job:
-        """The job of a request, for which one more waits; begun where there is none, or one that was given up."""
+        """Return the job of a request, for which one more waits; begun where there is none,
+        or one that was given up."""
         with self._turn:
             job = self._jobs.get(request)
             if job is None or job.given_up:
@@ -124,7 +126,7 @@ _works: dict[int, _Work] = {}
 
 
 def _work() -> _Work:
-    """The work of this process: one that was forked has its own."""
+    """Return the work of this process: one that was forked has its own."""
     return _works.get(os.getpid()) or _works.setdefault(os.getpid(), _Work())
 
 
@@ -253,7 +255,8 @@ _waiting: list[_Builder] = []
 
 
 def _taken(surroundings: _Surroundings) -> _Builder | None:
-    """A builder that waits in these surroundings, and no longer does; None if there is none."""
+    """Return a builder that waits in these surroundings, and no longer does;
+    None if there is none."""
     with _taking:
         for builder in _waiting:
             if builder.surroundings == surroundings:

@@ -55,7 +55,8 @@ DAY = 86_400.0
 
 @cache
 def cache_folder() -> Path:
-    """The folder of compiled code, mode 0700; a temporary one, with a warning, where that cannot be had."""
+    """Return the folder of compiled code, mode 0700; a temporary one, with a warning,
+    where that cannot be had."""
     try:
         for error in _UNWRITABLE:
             raise error
@@ -96,7 +97,7 @@ _LEAVING = Lock()
 
 
 def _in_words(error: OSError | RuntimeError) -> str:
-    """Why a folder cannot be had, without a number of the system's."""
+    """Return why a folder cannot be had, without a number of the system's."""
     if not isinstance(error, OSError):
         return str(error)
     return f"{cause_of(error)} ({path_of(error)})".removesuffix(" ()")
@@ -107,7 +108,7 @@ _PASSING = "friso-kernels-"
 
 
 def is_passing(folder: Path) -> bool:
-    """Whether a cache is in a temporary folder."""
+    """Tell whether a cache is in a temporary folder."""
     return folder.parent.name.startswith(_PASSING)
 
 
@@ -119,7 +120,7 @@ def remove_if_passing(folder: Path) -> None:
 
 @cache
 def code_digest(*parts: str) -> str:
-    """A digest of the sources in these folders and files, paths from the package friso."""
+    """Return a digest of the sources in these folders and files, paths from the package friso."""
     code = hashlib.sha256()
     for part in parts:
         place = Path(__file__).parent.parent / part
@@ -130,13 +131,14 @@ def code_digest(*parts: str) -> str:
 
 @cache
 def machine() -> str:
-    """What decides on the last bits of a run besides friso's code: processor and compiler."""
+    """Return what decides on the last bits of a run besides friso's code:
+    processor and compiler."""
     return f"{processor().name}, llvmlite {llvmlite.__version__}, numpy {np.__version__}"
 
 
 @cache
 def environment() -> str:
-    """What machine code depends on besides its source: the compilers and the processor."""
+    """Return what machine code depends on besides its source: the compilers and the processor."""
     return repr((sys.version, np.__version__, llvmlite.__version__, processor()))
 
 
@@ -150,7 +152,7 @@ class Compiled:
     code: bytes
 
     def module(self) -> ModuleType:
-        """The module, run."""
+        """Return the module, run."""
         return _module(self.name, self.source, marshal.loads(self.bytecode))
 
 
@@ -168,7 +170,7 @@ class CodeRequest:
 
     @property
     def file(self) -> Path:
-        """The file that names the entry."""
+        """Return the file that names the entry."""
         asked = (self.name, VERSION, code_digest("equations", "engine"), version("sympy"), environment())
         return cache_folder() / f"{_digest(*asked)}{REQUEST}"
 
@@ -181,7 +183,7 @@ class CodeRequest:
         write_sealed(self.file, name.encode("ascii"))
 
     def entry(self) -> Compiled | None:
-        """The entry, intact; None where there is none. That it is in use is noted."""
+        """Return the entry, intact; None where there is none. That it is in use is noted."""
         file = self.file
         name = (read_sealed(file) or b"").decode("ascii")
         if not re.fullmatch("[0-9a-f]{24}", name):
@@ -203,7 +205,7 @@ def _note_use(*files: Path) -> None:
 
 
 def _stored(file: Path) -> Compiled | None:
-    """The entry in a file, None where there is none that friso wrote there."""
+    """Return the entry in a file, None where there is none that friso wrote there."""
     content = read_sealed(file)
     return None if content is None else Compiled(file.stem, *marshal.loads(content))
 
@@ -227,12 +229,13 @@ def entry_lock(file: Path) -> FileLock:
 
 
 def _without_words(source: str) -> str:
-    """What a module does: its bytecode, which has neither comments nor docstrings, without line numbers."""
+    """Return what a module does: its bytecode, which has neither comments nor docstrings,
+    without line numbers."""
     return repr(_plain(compile(source, "", "exec", dont_inherit=True, optimize=2)))
 
 
 def _plain(part: object) -> object:
-    """A piece of code, or a constant of it, as what is the same in every process."""
+    """Return a piece of code, or a constant of it, as what is the same in every process."""
     if isinstance(part, CodeType):
         names = (part.co_name, part.co_names, part.co_varnames, part.co_freevars, part.co_cellvars)
         takes = (part.co_argcount, part.co_posonlyargcount, part.co_kwonlyargcount, part.co_flags)
@@ -244,7 +247,7 @@ def _plain(part: object) -> object:
 
 @cache
 def _compiled_with() -> str:
-    """What compiled code takes from friso."""
+    """Return what compiled code takes from friso."""
     files = (Path(__file__).parent / f"{name}.py" for name in _INCLUDED)
     return _digest(*(_without_words(file.read_text(encoding="utf-8")) for file in files))
 
@@ -273,16 +276,16 @@ class _Loader(InspectLoader):
         self._source, self._compiled = source, compiled
 
     def get_source(self, fullname: str) -> str:
-        """The source, for what inspects functions of the module."""
+        """Return the source, for what inspects functions of the module."""
         return self._source
 
     def get_code(self, fullname: str) -> CodeType:
-        """The code that is run."""
+        """Return the code that is run."""
         return self._compiled
 
 
 def _module(name: str, source: str, compiled: CodeType) -> ModuleType:
-    """The module of an entry, run."""
+    """Return the module of an entry, run."""
     loader = _Loader(source, compiled)
     spec = spec_from_loader(Path(_file_name(name)).stem, loader)
     assert spec is not None

@@ -37,7 +37,7 @@ class Inputs:
 
     @property
     def segments(self) -> np.ndarray:
-        """The pieces of the engine, shape (1, n + 1, 6): a piece per sample, and the end."""
+        """Return the pieces of the engine, shape (1, n + 1, 6): a piece per sample, and the end."""
         n = len(self.reference)
         rows = np.zeros((1, n + 1, 6))
         rows[0, :, 0] = np.arange(n + 1) * self.sample_time
@@ -62,9 +62,9 @@ class DrivenRuns:
 def run_driven(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, inputs: Inputs, starts: np.ndarray, rtol: float = 1e-5
 ) -> Iterator[DrivenRuns]:
-    """Runs of stages of one structure, given as flat keys to SI numbers or arrays of shape (runs,), from the states
-    `starts`, shape (runs, kept); they come chunk by chunk. A failed run is NaN from there on, and has its status.
-    """
+    """Yield runs of stages of one structure, given as flat keys to SI numbers or arrays of shape
+    (runs,), from the states `starts`, shape (runs, kept); they come chunk by chunk. A failed run is NaN from there on,
+    and has its status."""
     count, segments = len(inputs.reference), inputs.segments
     options = RunOptions(
         rtol=rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, budget=BUDGET * count
@@ -86,7 +86,7 @@ def run_driven(
 
 
 def _as_motion(flat: Mapping[str, Any], numbers: np.ndarray, inputs: Inputs, size: float) -> dict[str, Any]:
-    """The flat keys of some runs, with a motion as long as the log, and as large [m]."""
+    """Return the flat keys of some runs, with a motion as long as the log, and as large [m]."""
     part = {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
     duration = len(inputs.reference) * inputs.sample_time
     return part | {"motion.kind": "step", "motion.size": size, "motion.duration": duration}

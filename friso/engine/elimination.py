@@ -99,7 +99,7 @@ def _cost(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int], s
 
 
 def _write(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int]) -> Elimination:
-    """The elimination in the given order."""
+    """Return the elimination in the given order."""
     pattern, untouched = set(nonzero), set(order) - diagonal
     code: list[str] = []
     lower: list[MatrixEntry] = []

@@ -56,7 +56,8 @@ class Kernel:
 
     @cached_property
     def work(self) -> float:
-        """The work of a step of a run, by what it computes, so that it is the same on every machine."""
+        """Return the work of a step of a run, by what it computes,
+        so that it is the same on every machine."""
         step = "".join(_STEP.findall(self.source))
         return STEP + OPERATION * len(_OPERATIONS.findall(step)) + CALL * len(_CALLS.findall(step))
 
@@ -78,46 +79,48 @@ class Kernel:
 
     @property
     def position(self) -> int:
-        """Which state is the position of the stage, the one that is measured."""
+        """Return which state is the position of the stage, the one that is measured."""
         return self.layout.position
 
     @property
     def velocity(self) -> int:
-        """Which state is the velocity of the stage."""
+        """Return which state is the velocity of the stage."""
         return self.layout.velocity
 
     @property
     def cart_position(self) -> int:
-        """Which state is the position of what the friction acts on; that of the stage where it is rigid."""
+        """Return which state is the position of what the friction acts on;
+        that of the stage where it is rigid."""
         return self.module.CART_POSITION
 
     @property
     def cart_velocity(self) -> int:
-        """Which state is the velocity of what the friction acts on."""
+        """Return which state is the velocity of what the friction acts on."""
         return self.module.CART_VELOCITY
 
     def having(self, role: Role) -> list[int]:
-        """Which of the states and of the numbers held have a role."""
+        """Return which of the states and of the numbers held have a role."""
         return [i for i, state_role in enumerate(self.module.ROLES) if state_role == role]
 
     @property
     def held(self) -> tuple[str, ...]:
-        """Numbers that are held between samples, and modes that remember, which come last."""
+        """Return numbers that are held between samples, and modes that remember, which come last."""
         return self.module.HELD_NAMES
 
     @property
     def full_state(self) -> tuple[str, ...]:
-        """All that a run has at an instant: states, then the numbers held."""
+        """Return all that a run has at an instant: states, then the numbers held."""
         return self.states + self.held
 
     @property
     def switches(self) -> tuple[int, ...]:
-        """The numbers of the modes that remember, among the kinks."""
+        """Return the numbers of the modes that remember, among the kinks."""
         return self.module.SWITCHES
 
     @property
     def initial_size(self) -> int:
-        """How many numbers of `full_state` a run starts from: the modes that remember follow from these if need be."""
+        """Return how many numbers of `full_state` a run starts from:
+        the modes that remember follow from these if need be."""
         return len(self.full_state) - len(self.switches)
 
     @property
@@ -134,8 +137,8 @@ class Kernel:
         return self.module.OUTPUTS
 
     def settled(self, flat: dict[str, Any], steady: Steady, runs: int) -> np.ndarray:
-        """States and numbers held in a steady motion that has lasted, shape (runs, initial_size); `flat` and the
-        numbers of the motion may be arrays of shape (runs,)."""
+        """Return states and numbers held in a steady motion that has lasted, shape (runs,
+        initial_size); `flat` and the numbers of the motion may be arrays of shape (runs,)."""
         return self.settled_at(self.values(flat, runs), steady, runs)
 
     def settled_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
@@ -172,7 +175,8 @@ class Kernel:
         return np.hstack([starts, modes.T])
 
     def values(self, flat: dict[str, Any], runs: int) -> list[np.ndarray]:
-        """The parameters of each run [SI], each of shape (runs,), from flat keys to numbers or arrays."""
+        """Return the parameters of each run [SI], each of shape (runs,),
+        from flat keys to numbers or arrays."""
         rows = np.empty((len(self.parameters), runs))
         for row, name in zip(rows, self.parameters, strict=True):
             row[:] = flat[name]
@@ -192,14 +196,14 @@ class KernelRequest:
 
     @property
     def sections(self) -> tuple[type[Section], ...]:
-        """The classes of the stage file's sections that declare equations of their own."""
+        """Return the classes of the stage file's sections that declare equations of their own."""
         form = self.structure if isinstance(self.structure, Structure | Imposed) else self.structure.structure
         controller = form.controller if isinstance(form, Structure) else None
         return (friction_law(form.friction), *((controller.section,) if controller else ()))
 
     @property
     def title(self) -> str:
-        """The form in a few words."""
+        """Return the form in a few words."""
         form = self.structure if isinstance(self.structure, Structure | Imposed) else self.structure.structure
         words = [form.title if isinstance(form, Structure) else f"{form.friction} friction"]
         words += [_CIRCUMSTANCES[type(self.structure)]] if type(self.structure) in _CIRCUMSTANCES else []
@@ -225,7 +229,7 @@ def kernel(
     lanes: int = LANES,
     along: tuple[str, ...] = (),
 ) -> Kernel:
-    """The kernel for a form, stepping by the named method in so many lanes.
+    """Return the kernel for a form, stepping by the named method in so many lanes.
 
     A variational one carries a small deviation beside every state, which may be `along` keys of the stage file too
     (`friso.equations.variational`).
@@ -252,7 +256,8 @@ DRIVER = CodeRequest("driver", "the loops that run any kernel", "friso.engine.bu
 
 
 def _request(request: KernelRequest) -> CodeRequest:
-    """What is wanted is pickled apart from the plug-ins, which the builder loads first: it may hold their classes."""
+    """Return what is wanted is pickled apart from the plug-ins, which the builder loads first:
+    it may hold their classes."""
     foreign = plug_ins(request.sections)
     digests = " ".join(plug_in.digest for plug_in in foreign)
     task = pickle.dumps((foreign, pickle.dumps(request)))
@@ -278,7 +283,8 @@ def _loops() -> Loops:
 
 
 def columns(rows: Iterable[Any], runs: int) -> np.ndarray:
-    """What a generated function says of runs, numbers or arrays of shape (runs,), as an array (runs, rows)."""
+    """Return what a generated function says of runs, numbers or arrays of shape (runs,),
+    as an array (runs, rows)."""
     rows = list(rows)
     full = np.empty((runs, len(rows)))
     for i, row in enumerate(rows):
@@ -300,7 +306,7 @@ def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Resul
 
 
 def driver_kinds() -> list[CompiledKind]:
-    """The kinds of the driver's arguments."""
+    """Return the kinds of the driver's arguments."""
     flat, square = np.zeros(1), np.zeros((1, 1))
     batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64), square, flat)
     settings = BatchOptions(1.0, 1.0, 1.0, 1.0, 0.0, 1.0, np.zeros(1, np.int64))

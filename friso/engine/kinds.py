@@ -43,7 +43,7 @@ class ArrayKind:
         return "q" * (1 + self.dimensions)
 
     def words(self, value: Any) -> list[Any]:
-        """Where it is, and its shape."""
+        """Return where it is, and its shape."""
         if not (value.dtype == _DTYPES[self.dtype] and value.ndim == self.dimensions and value.flags.c_contiguous):
             raise TypeError(f"an array of {value.dtype}, strides {value.strides}, where {self} is expected")
         return [value.__array_interface__["data"][0], *value.shape]
@@ -60,7 +60,7 @@ class RecordKind:
         return "".join(kind.form for _, kind in self.fields)
 
     def words(self, value: Any) -> list[Any]:
-        """Those of one field after another."""
+        """Return those of one field after another."""
         return [word for (_, kind), part in zip(self.fields, value, strict=True) for word in kind.words(part)]
 
 
@@ -69,7 +69,7 @@ INT, FLOAT, TRUTH = NumberKind("int"), NumberKind("float"), NumberKind("truth")
 
 
 def argument_kind(example: Any) -> CompiledKind:
-    """The kind of an argument. Raises TypeError for what compiled loops are not given."""
+    """Return the kind of an argument. Raises TypeError for what compiled loops are not given."""
     if isinstance(example, np.ndarray) and example.dtype.name in _DTYPES:
         return ArrayKind(example.dtype.name, example.ndim)
     names = getattr(example, "_fields", None)
@@ -87,6 +87,7 @@ class Packing:
         self._kinds, self._struct = tuple(kinds), struct.Struct("".join(kind.form for kind in kinds))
 
     def packed(self, arguments: Sequence[Any]) -> bytes:
-        """The words of the arguments. Arrays must outlive them. Raises TypeError for arguments of other kinds."""
+        """Return the words of the arguments. Arrays must outlive them.
+        Raises TypeError for arguments of other kinds."""
         words = (word for kind, argument in zip(self._kinds, arguments, strict=True) for word in kind.words(argument))
         return self._struct.pack(*words)

@@ -123,7 +123,7 @@ class Layout:
 
     @property
     def first_rows(self) -> dict[str, int]:
-        """The first row of each block, and how many `rows` there are."""
+        """Return the first row of each block, and how many `rows` there are."""
         axis, before = self.walks and 2 * len(AXES), self.walks and 4
         sizes = (self.states, self.states, self.states, self.dense * self.states, self.states)
         sizes += (self.constants, self.kinks, self.fixed, self.seen, axis, before, self.walks, self.tables, self.tables)

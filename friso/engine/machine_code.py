@@ -17,13 +17,13 @@ from friso.platform.system import HAS_JIT_LINK
 
 
 def object_code(module: ir.Module) -> bytes:
-    """The object file of a module, optimised for this processor."""
+    """Return the object file of a module, optimised for this processor."""
     machine = processor().target_machine()
     return machine.emit_object(optimised(module, machine))
 
 
 def optimised(module: ir.Module, machine: llvm.TargetMachine) -> llvm.ModuleRef:
-    """A module as LLVM has rewritten it for a processor."""
+    """Return a module as LLVM has rewritten it for a processor."""
     parsed = llvm.parse_assembly(str(module))
     parsed.triple, parsed.data_layout = machine.triple, str(machine.target_data)
     parsed.verify()

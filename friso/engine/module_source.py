@@ -36,7 +36,7 @@ _LOG = "from friso.engine.simd_math import log"
 
 
 def write_module(model: Model, tableau: Tableau, title: str, lanes: int = LANES) -> str:
-    """The source of the module for `model`, stepping by the method of `tableau`."""
+    """Return the source of the module for `model`, stepping by the method of `tableau`."""
     writer = StepWriter(model, tableau)
     straight = (writer.source(), writer.locate_source(), writer.update_source())
     head = _HEAD.format(title=title, method=tableau.name)
@@ -47,7 +47,7 @@ def write_module(model: Model, tableau: Tableau, title: str, lanes: int = LANES)
 
 
 def _numbers(model: Model, writer: StepWriter, lanes: int) -> str:
-    """The model's names, and the layout of its buffer."""
+    """Return the model's names, and the layout of its buffer."""
     places = _places(model, model.stage)
     layout = _sizes(model, writer) | writer.layout.first_rows
     layout |= {"lanes": lanes, "position": places[0], "velocity": places[1]}
@@ -83,12 +83,13 @@ def _sizes(model: Model, writer: StepWriter) -> dict[str, int]:
 
 
 def _places(model: Model, body: Body) -> tuple[int, int]:
-    """Which states are position and velocity of a body."""
+    """Return which states are position and velocity of a body."""
     return model.symbols.index(body.position), model.symbols.index(body.velocity)
 
 
 def _looked_up(model: Model, writer: StepWriter) -> dict[str, tuple[int, ...]]:
-    """Which states a drive with a clock measures and looks up over, and over which of these each table is."""
+    """Return which states a drive with a clock measures and looks up over,
+    and over which of these each table is."""
     clock, states = model.clock, list(model.symbols)
     seen = tuple(states.index(x) for x in clock.seen.values()) if clock else ()
     over = tuple(dict.fromkeys(states.index(x) for x in clock.places.values())) if clock else ()
@@ -118,7 +119,8 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
 
 
 def _function(head: str, expressions: Iterable[sp.Expr], names: Mapping[sp.Symbol, str]) -> str:
-    """A function of what stands in its head; what has cases is worked out once, however often it occurs."""
+    """Return a function of what stands in its head; what has cases is worked out once,
+    however often it occurs."""
     expressions = [sp.sympify(e) for e in expressions]
     cases = sorted({case for e in expressions for case in e.atoms(sp.Piecewise)}, key=sp.count_ops)
     shared = {case: sp.Symbol(f"w{k}") for k, case in enumerate(cases)}

@@ -28,7 +28,8 @@ ASKER: ContextVar[object] = ContextVar("asker", default=None)
 
 
 def current_flag() -> np.ndarray:
-    """The flag, shape (1,), by which runs are cancelled now: that of `ended_by`, or one that nobody sets."""
+    """Return the flag, shape (1,), by which runs are cancelled now: that of `ended_by`,
+    or one that nobody sets."""
     flag = _FLAG.get()
     return np.zeros(1, np.int64) if flag is None else flag
 
@@ -77,7 +78,7 @@ def going_first() -> Iterator[None]:
 
 
 def is_first() -> bool:
-    """Whether what runs now goes first."""
+    """Tell whether what runs now goes first."""
     return _FIRST.get()
 
 

@@ -24,15 +24,16 @@ class Processor:
 
     @property
     def lanes(self) -> int:
-        """Numbers of float64 that a register holds: 8 with AVX-512, 4 with AVX, 2 with SSE2 and NEON. More of them side
-        by side are no faster, and take longer to compile (docs/platforms.md)."""
+        """Return numbers of float64 that a register holds: 8 with AVX-512, 4 with AVX,
+        2 with SSE2 and NEON. More of them side by side are no faster, and take longer to compile (docs/platforms.md).
+        """
         features = self.features.split(",")
         if "+avx512f" in features or self.name == "x86-64-v4":
             return 8
         return 4 if "+avx" in features or self.name == "x86-64-v3" else 2
 
     def target_machine(self) -> llvm.TargetMachine:
-        """What writes code for it. Raises RuntimeError for a triple that LLVM does not know."""
+        """Return what writes code for it. Raises RuntimeError for a triple that LLVM does not know."""
         target = llvm.Target.from_triple(self.triple)
         return target.create_target_machine(self.name, self.features, opt=3, reloc="pic", codemodel="small")
 
@@ -49,6 +50,7 @@ def processor() -> Processor:
 
 
 def loadable(triple: str) -> str:
-    """The triple of a platform whose object files LLVM can load: on Windows those of Linux (ELF), since it fails to
-    place the constants of Windows' own (COFF); Numba does the same."""
+    """Return the triple of a platform whose object files LLVM can load:
+    on Windows those of Linux (ELF), since it fails to place the constants of Windows' own (COFF); Numba does the same.
+    """
     return f"{triple}-elf" if "windows" in triple else triple

@@ -32,7 +32,7 @@ def prune(folder: Path) -> None:
 
 
 def _used(folder: Path) -> Iterator[tuple[float, Path, int]]:
-    """When each entry, request and draft was used last [s], and its size [bytes]."""
+    """Yield when each entry, request and draft was used last [s], and its size [bytes]."""
     for file in folder.iterdir():
         if file.suffix in (ENTRY, REQUEST, PARTIAL):
             status = file.lstat()

@@ -30,7 +30,8 @@ _ELEMENTS = {"int64": _INT64, "float64": _DOUBLE, "bool": ir.IntType(8)}
 
 
 def _types(kind: CompiledKind) -> Sequence[ir.Type]:
-    """What a value of a kind consists of: a number, an array's address and shape, or a named tuple's address."""
+    """Return what a value of a kind consists of: a number, an array's address and shape,
+    or a named tuple's address."""
     if isinstance(kind, NumberKind):
         return [_NUMBERS[kind]]
     if isinstance(kind, RecordKind):
@@ -39,8 +40,8 @@ def _types(kind: CompiledKind) -> Sequence[ir.Type]:
 
 
 def scalar_llvm(function: Callable[..., None], kinds: Sequence[CompiledKind]) -> ir.Module:
-    """A function of arguments of these kinds as LLVM has it, called `run`. It takes the address at which the arguments
-    lie one after another (`friso.engine.kinds.Packing`)."""
+    """Return a function of arguments of these kinds as LLVM has it, called `run`.
+    It takes the address at which the arguments lie one after another (`friso.engine.kinds.Packing`)."""
     module = ir.Module()
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [ir.PointerType(_INT64)]), "run")
     builder: Any = ir.IRBuilder(entry.append_basic_block())
@@ -51,7 +52,8 @@ def scalar_llvm(function: Callable[..., None], kinds: Sequence[CompiledKind]) ->
 
 
 def take_next(queue: Any) -> Any:
-    """The number at the head of a queue, an array of one number, which no other thread gets too."""
+    """Return the number at the head of a queue, an array of one number,
+    which no other thread gets too."""
     queue[0] += 1
     return queue[0] - 1
 
@@ -383,7 +385,7 @@ class _Frame(ast.NodeVisitor):
         return _Value(loaded, INT if array.kind.dtype == "int64" else FLOAT)
 
     def _element(self, array: _ArrayValue, node: ast.expr) -> ir.Value:
-        """Where an element is, or where the part with this first index begins."""
+        """Return where an element is, or where the part with this first index begins."""
         index = node.elts if isinstance(node, ast.Tuple) else [node]
         if len(index) not in (1, len(array.shape)):
             self.generic_visit(node)
@@ -538,7 +540,8 @@ class _Frame(ast.NodeVisitor):
         return self._number(first, kind).value, self._number(second, kind).value, kind
 
     def _number(self, value: Any, kind: NumberKind | None = None) -> _Value:
-        """A number as one of a kind; a whole number may become a float64 number, and a truth either."""
+        """Return a number as one of a kind; a whole number may become a float64 number,
+        and a truth either."""
         if not isinstance(value, _Value):
             own_kind = argument_kind(value) if not isinstance(value, bool) else TRUTH
             if not isinstance(own_kind, NumberKind):
@@ -553,7 +556,7 @@ class _Frame(ast.NodeVisitor):
         raise TypeError(f"not in the language of plain loops: {value.kind.name} where {kind.name} is expected")
 
     def _truth(self, value: Any) -> ir.Value:
-        """Whether a number is not 0."""
+        """Tell whether a number is not 0."""
         number = self._number(value)
         return number.value if number.kind == TRUTH else self._compare("!=", number, 0).value
 

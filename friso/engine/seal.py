@@ -23,7 +23,8 @@ def write_sealed(path: Path, content: bytes) -> None:
 
 
 def read_sealed(path: Path) -> bytes | None:
-    """What `write_sealed` wrote under this name; None where it is missing, or anything of it is not so."""
+    """Return what `write_sealed` wrote under this name; None where it is missing,
+    or anything of it is not so."""
     try:
         sealed = read_private(path)
     except OSError:
@@ -38,7 +39,8 @@ def _authenticator(path: Path, content: bytes) -> bytes:
 
 @cache
 def _secret(folder: Path) -> bytes:
-    """The secret of a folder; a new one where there is none, or one that others can have read or written."""
+    """Return the secret of a folder; a new one where there is none,
+    or one that others can have read or written."""
     file = folder / SECRET
     if (secret := _stored(file)) is None:
         with FileLock(folder / f"{SECRET}.lock", mode=0o600):

@@ -31,7 +31,7 @@ class _Beside:
 
     @property
     def cores(self) -> int:
-        """The share of one of those that have not ended."""
+        """Return the share of one of those that have not ended."""
         cores = self.about.cores if self.about else usable_cores()
         return max(1, cores // (self.tasks - sum(job.done() for job in self.jobs)))
 
@@ -40,15 +40,16 @@ _BESIDE: ContextVar[_Beside | None] = ContextVar("beside", default=None)
 
 
 def cores_to_use() -> int:
-    """How many cores a batch of runs may take now: all, or its share beside the other tasks that have not ended. Fewer
-    threads keep more of their lanes busy."""
+    """Return how many cores a batch of runs may take now: all,
+    or its share beside the other tasks that have not ended. Fewer threads keep more of their lanes busy."""
     beside = _BESIDE.get()
     return beside.cores if beside else usable_cores()
 
 
 def results_of(jobs: Sequence[Future[_T]]) -> list[_T]:
-    """What jobs return, in their order; what ends one of them early is raised. Between waits it is looked whether
-    anybody waits for all of it still, and Ctrl-C is heard, which on Windows interrupts no wait."""
+    """Return what jobs return, in their order; what ends one of them early is raised.
+    Between waits it is looked whether anybody waits for all of it still, and Ctrl-C is heard, which on Windows
+    interrupts no wait."""
     while any(not job.done() for job in jobs):
         for job in wait(jobs, _PATIENCE, FIRST_EXCEPTION).done:
             job.result()
@@ -57,8 +58,9 @@ def results_of(jobs: Sequence[Future[_T]]) -> list[_T]:
 
 
 def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
-    """What the tasks return, in their order, as many of them at a time as there are cores. What ends one of them early
-    ends the others, too, at their next batch of runs, and is raised."""
+    """Return what the tasks return, in their order,
+    as many of them at a time as there are cores. What ends one of them early ends the others, too, at their next batch
+    of runs, and is raised."""
     at_once = min(len(tasks), usable_cores())
     if at_once < 2:
         return [task() for task in tasks]
@@ -81,7 +83,7 @@ def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
 
 
 def both(first: Callable[[], _T], second: Callable[[], _Other]) -> tuple[_T, _Other]:
-    """What two tasks return, one beside the other as `side_by_side`."""
+    """Return what two tasks return, one beside the other as `side_by_side`."""
     tasks: list[Callable[[], Any]] = [first, second]
     one, other = side_by_side(tasks)
     return one, other

@@ -54,7 +54,7 @@ def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None)
 
 
 def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
-    """The model's outputs from its states, shape (states, samples), at the times [s]."""
+    """Return the model's outputs from its states, shape (states, samples), at the times [s]."""
     parameters = [v[0] for v in shape.values({**flat, "motion.size": motion.size(flat)}, 1)]
     rows = motion.pieces(flat, 1)[0]
     active = rows[np.searchsorted(rows[:, 0], time, side="right") - 1]
@@ -65,7 +65,8 @@ def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, tim
 
 
 def output_variables(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> dict[str, Any]:
-    """The model's outputs from its states, shape (states, samples), at the times [s], as variables over "time"."""
+    """Return the model's outputs from its states, shape (states, samples), at the times [s],
+    as variables over "time"."""
     arrays, kind = sampled_outputs(shape, flat, states, time), axis_of(flat)
     return {
         name: ("time", array, {"units": kind.unit(unit), "long_name": label})
@@ -74,7 +75,7 @@ def output_variables(shape: Kernel, flat: dict[str, Any], states: np.ndarray, ti
 
 
 def time_axis(time: np.ndarray) -> dict[str, Any]:
-    """The coordinate "time" [s]."""
+    """Return the coordinate "time" [s]."""
     return {"time": ("time", time, {"units": "s", "long_name": "time"})}
 
 

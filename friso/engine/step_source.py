@@ -121,7 +121,7 @@ class StepWriter:
         self._rows = ROW._asdict() | self.layout.first_rows
 
     def _jumping(self, jumps: Mapping[sp.Symbol, sp.Expr]) -> tuple[Block, list[int]]:
-        """By how much states jump at a kink, and the numbers of these."""
+        """Return by how much states jump at a kink, and the numbers of these."""
         named = {f"jump{self._index[x]}_": jump for x, jump in jumps.items()}
         return Block(named, self.constants), [self._index[x] for x in jumps]
 
@@ -154,11 +154,12 @@ class StepWriter:
 
     @property
     def switches(self) -> tuple[int, ...]:
-        """The numbers of the modes that remember, among the kinks."""
+        """Return the numbers of the modes that remember, among the kinks."""
         return tuple(map(self.model.kinks.index, self.model.switches))
 
     def source(self) -> str:
-        """The function `step(B, rtol, inner, outer, budget)` of a lane: whether the lane wants attention."""
+        """Return the function `step(B, rtol, inner, outer, budget)` of a lane:
+        whether the lane wants attention."""
         body = [
             *self._load(),
             *self._choose_step(),
@@ -182,8 +183,9 @@ class StepWriter:
         return [self._walks.index(x) for x in (*clock.places.values(), *(TICK for _ in clock.times))] if clock else []
 
     def locate_source(self) -> str:
-        """The function `locate(B)` of a lane: whether it has `ticked` and a cell of a table has been `left`, or the
-        sample is to be `noted`; none without a clock."""
+        """Return the function `locate(B)` of a lane:
+        whether it has `ticked` and a cell of a table has been `left`, or the sample is to be `noted`; none without a
+        clock."""
         if not self.model.clock:
             return ""
         lines = [*self._clock.code("", self._in_buffer()), *self._offsets(), f"ticked = {self._row('ticked')} > 0.0"]
@@ -198,7 +200,7 @@ class StepWriter:
         return _function("locate", "B", lines)
 
     def _offsets(self) -> list[str]:
-        """How far each walk is from the point at which its cell begins, in cells."""
+        """Return how far each walk is from the point at which its cell begins, in cells."""
         lines = []
         for w, x in enumerate(self._walks):
             first, density, last = (self._row("axis", i + (len(AXES) if x == TICK else 0)) for i in range(len(AXES)))
@@ -207,9 +209,9 @@ class StepWriter:
         return lines
 
     def update_source(self) -> str:
-        """The function `update(B)` of a lane: tables are looked up, and the numbers that are held become what follows
-        from the sample just taken, where the lane has `ticked`; and when it will next. Modes that remember are kept as
-        they are at the beginning of the step."""
+        """Return the function `update(B)` of a lane: tables are looked up,
+        and the numbers that are held become what follows from the sample just taken, where the lane has `ticked`; and
+        when it will next. Modes that remember are kept as they are at the beginning of the step."""
         clock, name = self.model.clock, self._in_buffer()
         lines = [f"ticked, tick = {self._row('ticked')}, {self._row('tick')}", "instant = 0.0"]
         if clock:
@@ -232,14 +234,15 @@ class StepWriter:
         return _function("update", "B", [*lines, f"{self._row('ticked')} = 0.0"])
 
     def _piece_of_sample(self) -> list[str]:
-        """The piece of the reference in which the sample was taken: the one before, where a corner came in between."""
+        """Return the piece of the reference in which the sample was taken: the one before,
+        where a corner came in between."""
         length, *before = (self._row("piece_before", i) for i in range(1 + len(self.model.inputs)))
         lines = ["earlier = instant < -1e-6 * period_", f"instant = instant + {length} if earlier else instant"]
         now = (self._row("reference", i) for i in range(len(before)))
         return lines + [f"input{i} = {b} if earlier else {n}" for i, (b, n) in enumerate(zip(before, now, strict=True))]
 
     def _in_buffer(self) -> Rename:
-        """Names for what a sample is computed from, most of which is in the buffer."""
+        """Return names for what a sample is computed from, most of which is in the buffer."""
         clock = self.model.clock
         names = {x: self._row("x", i) for x, i in self._index.items()}
         names |= {x: self._row("reference", i) for i, x in enumerate(self.model.fixed)}
@@ -266,8 +269,8 @@ class StepWriter:
         return lines + [f"{'t' if name == 'time' else name} = {self._row(name)}" for name in (*SCALARS, "due")]
 
     def _choose_step(self) -> list[str]:
-        """The next step, at most to the corner of the reference, or to what follows from the next sample; the last two
-        before it are made equal."""
+        """Return the next step, at most to the corner of the reference,
+        or to what follows from the next sample; the last two before it are made equal."""
         return [
             *self._edge(),
             "rest = edge - t",
@@ -279,7 +282,8 @@ class StepWriter:
         ]
 
     def _edge(self) -> list[str]:
-        """Where the step ends at the latest; a corner and what follows from a sample fall together within rounding."""
+        """Return where the step ends at the latest;
+        a corner and what follows from a sample fall together within rounding."""
         if not self.model.clock:
             return ["edge = stop"]
         lines = [*self._clock.code("", self._rename("x", "t")), "together = abs(stop - due) < 1e-6 * period_"]
@@ -347,7 +351,8 @@ class StepWriter:
         return f"x{i} + {theta} * (end{i} - x{i} + (1.0 - {theta}) * ({inner}))"
 
     def _crossings(self) -> list[str]:
-        """Where in the step the first kink is crossed: `fraction`, 1 if none is; `astray`: a kink's mode is wrong."""
+        """Return where in the step the first kink is crossed: `fraction`, 1 if none is; `astray`:
+        a kink's mode is wrong."""
         lines = []
         for point, theta in enumerate(THIRDS):
             states = [f"p{point}_{i} = {self._between(i, repr(theta))}" for i in self._watched_states]
@@ -415,7 +420,7 @@ class StepWriter:
         ]
 
     def _passed_over(self) -> list[str]:
-        """Whether the step may have `passed_over` a narrow peak about a kink that it crosses."""
+        """Tell whether the step may have `passed_over` a narrow peak about a kink that it crosses."""
         lines = ["passed_over = False"]
         for k, kink in enumerate(self.model.kinks):
             if kink.narrow != 0:
@@ -479,7 +484,8 @@ class StepWriter:
         ]
 
     def _seen(self) -> list[str]:
-        """What the drive measures at the instant of its sample, which may lie inside the step."""
+        """Return what the drive measures at the instant of its sample,
+        which may lie inside the step."""
         clock = self.model.clock
         if not clock:
             return []
@@ -502,7 +508,7 @@ class StepWriter:
         return lines + [f"{self._row(name)} = {name}" for name in SCALARS if name not in unwritten]
 
     def _store_step(self) -> list[str]:
-        """What the states inside the step follow from."""
+        """Return what the states inside the step follow from."""
         lines = [f"{self._row('old', i)} = x{i}" for i in range(self.size)]
         lines += [f"{self._row('end', i)} = end{i}" for i in range(self.size)]
         for m in range(len(self.tableau.dense)):
@@ -511,6 +517,6 @@ class StepWriter:
 
 
 def _function(name: str, arguments: str, lines: list[str]) -> str:
-    """A function, for one lane; B is its column of the buffer."""
+    """Return a function, for one lane; B is its column of the buffer."""
     body = "".join(f"    {line}\n" for line in lines)
     return f"def {name}({arguments}):\n{body}"

@@ -141,7 +141,7 @@ class _Writer:
         return None
 
     def vector(self, value: Any, kind: _Kind) -> _Vector:
-        """What is given, the same in all lanes if it is a number."""
+        """Return what is given, the same in all lanes if it is a number."""
         if isinstance(value, _Vector):
             if value.kind is not kind:
                 raise TypeError(f"{value.kind} where {kind} is expected")
@@ -152,14 +152,15 @@ class _Writer:
         return _Vector(ir.Constant(self._type(kind), [ir.Constant(kind.element, constant)] * self.lanes), kind)
 
     def together(self, *operands: Any) -> tuple[list[ir.Value], _Kind]:
-        """The values of vectors and numbers, which become of the kind of the vectors; and the kind."""
+        """Return the values of vectors and numbers, which become of the kind of the vectors;
+        and the kind."""
         kinds = [operand.kind for operand in operands if isinstance(operand, _Vector)]
         truths = all(isinstance(operand, bool) for operand in operands)
         kind = kinds[0] if kinds else (_TRUTH if truths else _FLOAT)
         return [self.vector(operand, kind).value for operand in operands], kind
 
     def operate(self, sign: ast.AST, *operands: Any) -> Any:
-        """The result of an operator."""
+        """Return the result of an operator."""
         if not any(isinstance(operand, _Vector) for operand in operands):
             return _PYTHON[type(sign)](*operands)
         values, kind = self.together(*operands)
@@ -177,7 +178,7 @@ class _Writer:
         return _Vector(self.builder.select(self.truth(condition).value, *values), kind)
 
     def truth(self, value: Any) -> _Vector:
-        """Whether a number is not 0, as Python has it."""
+        """Tell whether a number is not 0, as Python has it."""
         if isinstance(value, _Vector) and value.kind is _FLOAT:
             zero = self.vector(0.0, _FLOAT).value
             return _Vector(self.builder.fcmp_unordered("!=", value.value, zero, flags=FASTMATH), _TRUTH)
@@ -329,14 +330,14 @@ class _Frame(ast.NodeVisitor):
 
 @cache
 def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
-    """The syntax of a function."""
+    """Return the syntax of a function."""
     (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
     assert isinstance(tree, ast.FunctionDef)
     return tree
 
 
 def _splat(builder: Any, scalar: Any, lanes: int) -> ir.Value:
-    """A register with one value in all lanes."""
+    """Return a register with one value in all lanes."""
     vector = ir.VectorType(scalar.type, lanes)
     first = builder.insert_element(ir.Constant(vector, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
     same = ir.Constant(ir.VectorType(ir.IntType(32), lanes), [0] * lanes)

@@ -47,13 +47,13 @@ class AsBuilt:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> AsBuilt:
-        """The form of a stage's drive, given as flat keys."""
+        """Return the form of a stage's drive, given as flat keys."""
         samples = round(flat.get("drive.velocity_samples", 1.0))
         return cls(structure(anywhere(flat)), whole_samples(flat), "drive.current_bandwidth" in flat, samples)
 
 
 def whole_samples(flat: Mapping[str, Any]) -> int:
-    """The delay of a drive in whole samples, the remainder being `drive.late`."""
+    """Return the delay of a drive in whole samples, the remainder being `drive.late`."""
     return int(flat.get("drive.delay", 0.0) / flat["drive.sample_time"] * (1 + 1e-9) + 1e-9)
 
 
@@ -74,7 +74,7 @@ NEUTRAL: Mapping[str, float] = {
 
 
 def as_built(form: AsBuilt) -> Model:
-    """The equations of the stage with its drive.
+    """Return the equations of the stage with its drive.
 
     Over a sample the factors of friction, the ripple of the motor and the acceleration of the floor are held.
     """
@@ -104,8 +104,8 @@ def as_built(form: AsBuilt) -> Model:
 
 
 def _kink_along_rail(kink: Kink, varied: Mapping[Any, Any]) -> Kink:
-    """A kink whose levels vary along the rail; on which side a run begins is told before anything is looked up, by the
-    levels as they are given."""
+    """Return a kink whose levels vary along the rail;
+    on which side a run begins is told before anything is looked up, by the levels as they are given."""
     from friso.equations.component import Kink, Switch
 
     there = kink.with_values(varied)
@@ -117,14 +117,14 @@ def _kink_along_rail(kink: Kink, varied: Mapping[Any, Any]) -> Kink:
 
 
 def _shaken(part: Any) -> sp.Expr:
-    """The derivative of a state in a frame that moves with the floor."""
+    """Return the derivative of a state in a frame that moves with the floor."""
     from friso.equations.component import Role, state
 
     return part.derivative - (state(FLOOR) if part.role == Role.VELOCITY else 0)
 
 
 def _cable(position: sp.Symbol, velocity: sp.Symbol) -> sp.Expr:
-    """The force of the cables on the stage [N]."""
+    """Return the force of the cables on the stage [N]."""
     from friso.equations.component import key
 
     return -key("cable.stiffness") * position - key("cable.drag") * velocity
@@ -158,7 +158,8 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
 
 
 def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...]]:
-    """What the encoder reads [m], what the controller commands [N], and what it keeps for the next sample."""
+    """Return what the encoder reads [m], what the controller commands [N],
+    and what it keeps for the next sample."""
     from dataclasses import replace
 
     import sympy as sp

@@ -40,7 +40,7 @@ class Loop:
 
 
 def sign_of_motion(*rates: sp.Expr) -> sp.Expr:
-    """The sign of the first of some rates that is not 0, as 1, -1 or 0."""
+    """Return the sign of the first of some rates that is not 0, as 1, -1 or 0."""
     cases = [case for rate in rates for case in ((sp.S.One, rate > 0), (sp.S.NegativeOne, rate < 0))]
     return Piecewise(*cases, (sp.S.Zero, True))
 
@@ -111,7 +111,8 @@ class Measured:
 
 
 def loop_signals(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
-    """The signals of a loop, which are as large as a length [m], and change at a rate [1/s]."""
+    """Return the signals of a loop, which are as large as a length [m],
+    and change at a rate [1/s]."""
     drift = STEADY.reference_velocity - STEADY.velocity
     position = Signal(loop.position, length, STEADY.position, STEADY.velocity, rate=loop.velocity)
     return Measured(
@@ -145,16 +146,16 @@ class Blocks(ABC):
         yield
 
     def handed_on(self, signal: Signal, name: str) -> Signal:
-        """What a loop hands to a faster one: held there until it is due again."""
+        """Return what a loop hands to a faster one: held there until it is due again."""
         return signal
 
     def key(self, name: str) -> sp.Symbol:
-        """The parameter with this name in the table [controller] [SI]."""
+        """Return the parameter with this name in the table [controller] [SI]."""
         return key(ControllerSection.key(name))
 
     @property
     def settings(self) -> FrictionSettings:
-        """Which settings against friction there are."""
+        """Return which settings against friction there are."""
         return self.form.settings if self.form else FrictionSettings()
 
     @abstractmethod
@@ -182,38 +183,40 @@ class Blocks(ABC):
     def biquad(
         self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
     ) -> Signal:
-        """A transfer function of the second order, whose lower polynomial begins with 1: a notch, for one."""
+        """Return a transfer function of the second order, whose lower polynomial begins with 1:
+        a notch, for one."""
 
     @abstractmethod
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
-        """The signal clamped to plus and minus a limit."""
+        """Return the signal clamped to plus and minus a limit."""
 
     @abstractmethod
     def dead_zone(self, error: Signal) -> Signal:
-        """The error less the deadband, 0 within that."""
+        """Return the error less the deadband, 0 within that."""
 
     @abstractmethod
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
-        """The force with the gains of standstill, where the error is small; what integrals hold stays."""
+        """Return the force with the gains of standstill, where the error is small;
+        what integrals hold stays."""
 
     @abstractmethod
     def push(self, error: Signal, direction: Signal) -> Signal:
-        """A force towards the reference, where that rests and the error is not small."""
+        """Return a force towards the reference, where that rests and the error is not small."""
 
     @abstractmethod
     def dither(self) -> Signal:
-        """A sinusoidal force."""
+        """Return a sinusoidal force."""
 
     def fed_back(self, signal: Signal) -> Signal:
-        """A signal that is measured, behind the filters of the feedback path."""
+        """Return a signal that is measured, behind the filters of the feedback path."""
         return self._filtered(signal, FEEDBACK)
 
     def fed_forward(self, signal: Signal) -> Signal:
-        """The force that is demanded, behind the filters of the forward path."""
+        """Return the force that is demanded, behind the filters of the forward path."""
         return self._filtered(signal, FORWARD)
 
     def _filtered(self, signal: Signal, path: str) -> Signal:
-        """A signal behind the filters of a path, in their order."""
+        """Return a signal behind the filters of a path, in their order."""
         for number, part in enumerate(self.form.filters if self.form else (), start=1):
             if part.path == path:
                 row = _Row(f"{FILTERS_KEY}.{number}")
@@ -224,7 +227,8 @@ class Blocks(ABC):
     def transfer(
         self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
     ) -> Signal:
-        """A transfer function of the first or the second order, whose lower polynomial begins with 1."""
+        """Return a transfer function of the first or the second order,
+        whose lower polynomial begins with 1."""
         if lower[2] != 0:
             return self.biquad(signal, upper, lower, name, rule)
         through = sp.sympify(upper[1]) / lower[1]
@@ -258,7 +262,7 @@ class Demand:
 
 
 def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
-    """What a controller demands for what it measures."""
+    """Return what a controller demands for what it measures."""
     error, settings = seen.error, form.settings
     if form.section.feeds_back == "position":
         position = blocks.fed_back(seen.position)
@@ -279,18 +283,19 @@ def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
 
 
 def force_limit() -> sp.Symbol:
-    """The limit of the controller's force [N]."""
+    """Return the limit of the controller's force [N]."""
     return key(FORCE_LIMIT)
 
 
 def unwinding_time() -> sp.Symbol:
-    """The time [s] in which back-calculation unwinds an integrator."""
+    """Return the time [s] in which back-calculation unwinds an integrator."""
     return key(ANTI_WINDUP_TIME)
 
 
 def wound_up(force: sp.Expr, integrals: list[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
-    """The integrals in a steady motion: the innermost, which is made last, such that the controller exerts the force of
-    `STEADY`, the others 0; `force` is its own in that motion, in terms of the integrals."""
+    """Return the integrals in a steady motion: the innermost, which is made last,
+    such that the controller exerts the force of `STEADY`, the others 0; `force` is its own in that motion, in terms of
+    the integrals."""
     if not integrals:
         return {}
     *outer, innermost = integrals

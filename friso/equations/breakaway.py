@@ -21,21 +21,22 @@ Force = Callable[[Mapping[str, Any]], Any]
 
 
 def breakaway(flat: Mapping[str, Any]) -> Any:
-    """The largest friction force at rest [N] of guide and motor together: a number, or an array where keys are. 0 for
-    laws that declare none."""
+    """Return the largest friction force at rest [N] of guide and motor together: a number,
+    or an array where keys are. 0 for laws that declare none."""
     return sum(_breakaway(keys) for keys in _tables(flat))
 
 
 def sliding(flat: Mapping[str, Any]) -> Any:
-    """The level of sliding friction [N] of guide and motor together: Coulomb friction where a law has that key, else
-    what it declares for the slowest motion."""
+    """Return the level of sliding friction [N] of guide and motor together:
+    Coulomb friction where a law has that key, else what it declares for the slowest motion."""
     named = "friction.coulomb"
     return sum(keys[named] if named in keys else np.maximum(*_slow(keys)) for keys in _tables(flat))
 
 
 def least_breakaway(flat: Mapping[str, Any]) -> Any:
-    """The force [N] at which the guide alone breaks away in its weaker direction, less what a bias force on the cart
-    takes of it. Laws declare the break-away force without what differs between the directions, as their mean."""
+    """Return the force [N] at which the guide alone breaks away in its weaker direction,
+    less what a bias force on the cart takes of it. Laws declare the break-away force without what differs between the
+    directions, as their mean."""
     forward, back = _slow(flat)
     total = forward + back
     weaker = np.divide(2 * np.minimum(forward, back), total, out=np.ones_like(total), where=total > 0)
@@ -43,7 +44,7 @@ def least_breakaway(flat: Mapping[str, Any]) -> Any:
 
 
 def _tables(flat: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The keys as the laws of guide and motor know them."""
+    """Return the keys as the laws of guide and motor know them."""
     at_motor = [as_friction(flat)] if f"{MOTOR_FRICTION}.model" in flat else []
     return [flat, *at_motor]
 
@@ -60,7 +61,8 @@ def _breakaway(flat: Mapping[str, Any]) -> Any:
 
 
 def _slow(flat: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """The forces [N] of one law against the slowest motion forward and back; 0 where it cannot say them."""
+    """Return the forces [N] of one law against the slowest motion forward and back;
+    0 where it cannot say them."""
     force = _steady_of(flat["friction.model"], _variant(flat))
     if force is None:
         return np.zeros(()), np.zeros(())
@@ -87,7 +89,7 @@ def _steady_of(name: str, variant: Hashable) -> Force | None:
 
 
 def _compiled(expression: sp.Expr) -> Force:
-    """An expression as a function of the values of its symbols by name."""
+    """Return an expression as a function of the values of its symbols by name."""
     import sympy as sp
 
     expression = sp.sympify(expression)

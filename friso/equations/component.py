@@ -16,12 +16,12 @@ from friso.equations.roles import Role, Steady
 
 
 def key(name: str) -> sp.Symbol:
-    """The parameter with the stage-file key `name`, such as ``masses.cart`` [SI]."""
+    """Return the parameter with the stage-file key `name`, such as ``masses.cart`` [SI]."""
     return sp.Symbol(name, real=True)
 
 
 def state(name: str) -> sp.Symbol:
-    """The state called `name` [SI]."""
+    """Return the state called `name` [SI]."""
     return sp.Symbol(name, real=True)
 
 
@@ -82,7 +82,7 @@ class Clock:
 
     @property
     def tabled(self) -> tuple[sp.Symbol, ...]:
-        """All that is looked up."""
+        """Return all that is looked up."""
         return (*self.places, *self.times)
 
 
@@ -145,7 +145,8 @@ class Kink:
         return self.surface if self.starts is None else self.starts
 
     def beginning(self, sides: Mapping[Any, Any]) -> Kink:
-        """The same, its surface beginning with conditions in the place of the sides of other kinks."""
+        """Return the same, its surface beginning with conditions in the place of the sides of other
+        kinks."""
         return Kink(self.name, self.surface, narrow=self.narrow, starts=cast(sp.Expr, self.surface.xreplace(sides)))
 
     def called(self, name: str) -> Self:
@@ -184,7 +185,7 @@ class Switch(Kink):
 
     @property
     def becomes(self) -> dict[sp.Symbol, sp.Expr]:
-        """What states become where the mode changes, `beyond` being what it was before."""
+        """Return what states become where the mode changes, `beyond` being what it was before."""
         changed = dict.fromkeys((*self.entered, *self.left))
         return {x: (1 - self.beyond) * self.entered.get(x, x) + self.beyond * self.left.get(x, x) for x in changed}
 

@@ -29,17 +29,17 @@ DECISIVE = (f"{CONDITIONS}.load_per_acceleration", f"{CONDITIONS}.load_share")
 
 
 def factor_key(level: str) -> str:
-    """The flat key of the factor of a level."""
+    """Return the flat key of the factor of a level."""
     return f"{CONDITIONS}.{level}_factor"
 
 
 def has_conditions(flat: Mapping[str, Any]) -> bool:
-    """Whether a stage given as flat keys states its conditions."""
+    """Tell whether a stage given as flat keys states its conditions."""
     return factor_key("static") in flat
 
 
 def load_follows(flat: Mapping[str, Any]) -> bool:
-    """Whether the load follows the acceleration of the reference."""
+    """Tell whether the load follows the acceleration of the reference."""
     return bool(np.any(flat.get(GROWTH, 0.0)))
 
 
@@ -57,7 +57,7 @@ def level_under_conditions(flat: Mapping[str, Any], name: str) -> Any:
 
 
 def under_acceleration(acceleration: sp.Expr) -> dict[Any, Any]:
-    """The factors while the reference accelerates [m/s^2], for those at constant speed."""
+    """Return the factors while the reference accelerates [m/s^2], for those at constant speed."""
     from sympy import Abs
 
     from friso.equations.component import key
@@ -82,7 +82,8 @@ def factors(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def anywhere(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """The flat keys for a machine that moves along its rail: the factors are not those of one place."""
+    """Return the flat keys for a machine that moves along its rail:
+    the factors are not those of one place."""
     if not has_conditions(flat):
         return dict(flat)
     free = {key: value for key, value in flat.items() if key != f"{CONDITIONS}.place"}
@@ -90,7 +91,7 @@ def anywhere(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _deviates(flat: Mapping[str, Any]) -> bool:
-    """Whether levels deviate at random along the rail."""
+    """Tell whether levels deviate at random along the rail."""
     return any(np.any(flat.get(f"rail.{level}_deviation", 0.0)) for level in LEVELS)
 
 

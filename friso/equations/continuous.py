@@ -35,7 +35,8 @@ switching for ever; over this narrow band the stop is continuous and the slide i
 
 
 def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
-    """The controller of the given form; `length` [m] and `rate` [1/s] are the scales of its states."""
+    """Return the controller of the given form;
+    `length` [m] and `rate` [1/s] are the scales of its states."""
     blocks = Continuous(rate, form)
     demand = demanded(form, loop_signals(loop, length, rate), blocks)
     bound = ForceLimit.of(demand.force, form.anti_windup) if form.anti_windup else None
@@ -57,8 +58,9 @@ FAR = 1e9
 
 
 def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
-    """What a controller does with an error that hardly changes, beyond all windows and deadbands: proportional gain
-    [N/m] and integral gain [N/(m s)]; of a stage given as flat keys, its reference at rest."""
+    """Return what a controller does with an error that hardly changes,
+    beyond all windows and deadbands: proportional gain [N/m] and integral gain [N/(m s)]; of a stage given as flat
+    keys, its reference at rest."""
     form = controller_form(flat)
     loop = Loop(STEADY.error, STEADY.position, sp.S.Zero, sp.S.Zero)
     blocks = Continuous(sp.S.One, form)
@@ -79,7 +81,8 @@ def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def _per_error(value: sp.Expr) -> sp.Expr:
-    """By how much a value changes with the error of a stage that is displaced the other way."""
+    """Return by how much a value changes with the error of a stage that is displaced the other
+    way."""
     return sp.diff(value, STEADY.error) - sp.diff(value, STEADY.position)
 
 
@@ -128,7 +131,7 @@ class Continuous(Blocks):
 
     @property
     def integrands(self) -> dict[sp.Symbol, sp.Expr]:
-        """What the integrators integrate in a steady motion."""
+        """Return what the integrators integrate in a steady motion."""
         return {integral.symbol: integral.settled for integral in self._integrals}
 
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str, rule: FilterRule | None = None) -> Signal:
@@ -225,7 +228,7 @@ class Continuous(Blocks):
         return Signal(amplitude * sine(frequency * TIME), amplitude, sp.S.Zero, sp.S.Zero)
 
     def _pausing(self, error: sp.Expr) -> tuple[sp.Expr, tuple[Kink, ...]]:
-        """The share by which integrals go on beside the deadband [0 or 1], and its kink."""
+        """Return the share by which integrals go on beside the deadband [0 or 1], and its kink."""
         if not self.settings.deadband:
             return sp.S.One, ()
         within = self.key("integral_deadband") ** 2 - error**2
@@ -235,13 +238,13 @@ class Continuous(Blocks):
         return 1 - pauses.beyond, (pauses,)
 
     def _begun_anew(self, error: sp.Expr) -> tuple[Kink, ...]:
-        """The mode in which the error is positive, at whose ends integrals begin anew."""
+        """Return the mode in which the error is positive, at whose ends integrals begin anew."""
         empty = {integral.symbol: sp.S.Zero for integral in self._integrals if self.settings.reset}
         return (Switch("positive_error", error, -error, error, empty, empty),) if empty else ()
 
     def finished(self, demand: Demand, bound: ForceLimit | None) -> tuple[tuple[State, ...], tuple[Kink, ...]]:
-        """All states, the integrators doing as they are to where the demand is beyond its bound, and resting where
-        their output is beyond a limit of its own; and the kinks of that."""
+        """Return all states, the integrators doing as they are to where the demand is beyond its
+        bound, and resting where their output is beyond a limit of its own; and the kinks of that."""
         steady = wound_up(demand.force.settled, [integral.symbol for integral in self._integrals])
         states = [replace(part, settled=part.settled.xreplace(steady)) for part in self.states]
         clamp = bound if bound and bound.anti_windup == "clamp" else None
@@ -274,7 +277,7 @@ class Continuous(Blocks):
         return tuple(states), (*far, *winding, *pauses, *self._begun_anew(error))
 
     def _limits(self, integral: _Integral, demand: Demand) -> list[tuple[sp.Expr, sp.Expr, str]]:
-        """What of an integral is limited, to what, and the name of that limit."""
+        """Return what of an integral is limited, to what, and the name of that limit."""
         limits = [] if integral.limit is None else [(integral.output, integral.limit, str(integral.symbol))]
         if self.settings.limit:
             force = sp.diff(demand.total.value, integral.symbol) * integral.symbol
@@ -283,21 +286,22 @@ class Continuous(Blocks):
 
 
 def _clamped(value: sp.Expr, limit: sp.Expr, name: str) -> tuple[sp.Expr, tuple[Kink, ...]]:
-    """A value clamped to its limit, and the kinks at the upper and the lower limit."""
+    """Return a value clamped to its limit, and the kinks at the upper and the lower limit."""
     upper = Kink(f"{name}_upper", value - limit)
     lower = Kink(f"{name}_lower", -value - limit)
     return value + upper.beyond * (limit - value) - lower.beyond * (limit + value), (upper, lower)
 
 
 def _far(limits: tuple[Kink, ...], limit: sp.Expr, name: str) -> tuple[Kink, ...]:
-    """The kinks where an integrator has come to rest: a band beyond the limits."""
+    """Return the kinks where an integrator has come to rest: a band beyond the limits."""
     upper, lower = limits
     band = UNWINDING_BAND * limit
     return Kink(f"{name}_upper", upper.surface - band), Kink(f"{name}_lower", lower.surface - band)
 
 
 def _resting(limits: tuple[Kink, ...], far: tuple[Kink, ...], winding: Kink, limit: sp.Expr) -> sp.Expr:
-    """The share by which an integrator rests: while the value is beyond its limit and would be driven further."""
+    """Return the share by which an integrator rests:
+    while the value is beyond its limit and would be driven further."""
     band, rest = UNWINDING_BAND * limit, sp.S.Zero
     for kink, end, inwards in zip(limits, far, (winding.beyond, 1 - winding.beyond), strict=True):
         rest += inwards * (kink.beyond * (1 - end.beyond) * kink.surface / band + end.beyond)

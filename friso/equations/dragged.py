@@ -25,8 +25,9 @@ class Dragged(Imposed):
 
 
 def dragged(form: Dragged) -> Model:
-    """The equations of the law on a body with the position [m], velocity [m/s] and acceleration [m/s^2] of a
-    reference, as `friso.engine.driven.run_driven` gives them at every sample."""
+    """Return the equations of the law on a body with the position [m],
+    velocity [m/s] and acceleration [m/s^2] of a reference, as `friso.engine.driven.run_driven` gives them at every
+    sample."""
     import sympy as sp
 
     from friso.equations.component import Output, Role, State, key, state

@@ -26,8 +26,9 @@ class Driven:
 
 
 def driven(form: Driven) -> Model:
-    """The equations of the stage with what it is given at every sample: position [m], velocity [m/s] and acceleration
-    [m/s^2] of the reference, and the force [N] besides the controller's with its rate [N/s]."""
+    """Return the equations of the stage with what it is given at every sample: position [m],
+    velocity [m/s] and acceleration [m/s^2] of the reference, and the force [N] besides the controller's with its rate
+    [N/s]."""
     from dataclasses import replace
 
     from friso.equations.component import TIME, key
@@ -39,7 +40,8 @@ def driven(form: Driven) -> Model:
 
 
 def _sampled(form: Driven) -> Control:
-    """The controller as a drive carries it out, whose samples are the corners of the reference."""
+    """Return the controller as a drive carries it out,
+    whose samples are the corners of the reference."""
     from dataclasses import replace
 
     from friso.equations.blocks import Controller, Loop

@@ -37,7 +37,7 @@ class Imposed:
 
 
 def imposed_form(flat: Mapping[str, Any]) -> Imposed:
-    """The law of a stage given as flat mapping. Raises InputError where it has no force."""
+    """Return the law of a stage given as flat mapping. Raises InputError where it has no force."""
     name = flat["friction.model"]
     law = friction_law(name)
     if law.declare is FrictionSection.declare:
@@ -46,7 +46,7 @@ def imposed_form(flat: Mapping[str, Any]) -> Imposed:
 
 
 def imposed(form: Imposed) -> Model:
-    """The equations of the law under the imposed motion."""
+    """Return the equations of the law under the imposed motion."""
     import sympy as sp
 
     from friso.equations.component import Output, Role, State, key, state
@@ -81,7 +81,8 @@ def imposed(form: Imposed) -> Model:
 
 
 def _per_period(inner: State, period: sp.Expr) -> State:
-    """A state of the law, its rate counted per period; one that is a length matters as the motion does."""
+    """Return a state of the law, its rate counted per period;
+    one that is a length matters as the motion does."""
     import sympy as sp
 
     from friso.equations.model import MOTION_SIZE

@@ -38,5 +38,5 @@ def joint_force(form: JointForm, deflection: sp.Expr, rate: sp.Expr) -> tuple[sp
 
 
 def touching(deflection: sp.Expr) -> tuple[Kink, Kink]:
-    """Where the limiter of a free joint touches, ahead and behind, for a deflection [m]."""
+    """Return where the limiter of a free joint touches, ahead and behind, for a deflection [m]."""
     return stops(deflection, key("joint.stroke"), "stroke")

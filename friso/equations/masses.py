@@ -19,7 +19,7 @@ class Body:
 
     @classmethod
     def named(cls, prefix: str, mass: sp.Expr) -> Body:
-        """A body of this mass [kg], its states named with a prefix."""
+        """Return a body of this mass [kg], its states named with a prefix."""
         return cls(mass, state(f"{prefix}position"), state(f"{prefix}velocity"))
 
     def under(self, force: sp.Expr, length: sp.Expr, rate: sp.Expr) -> tuple[State, State]:
@@ -52,7 +52,8 @@ def position_outputs(prefix: str, name: str, body: Body) -> Component:
 
 
 def stops(deflection: sp.Expr, reach: sp.Expr, name: str) -> tuple[Kink, Kink]:
-    """Where two bodies touch, ahead and behind, that may move against each other by a reach [m] to either side."""
+    """Return where two bodies touch, ahead and behind,
+    that may move against each other by a reach [m] to either side."""
     return Kink(f"{name}_ahead", deflection - reach), Kink(f"{name}_behind", -deflection - reach)
 
 

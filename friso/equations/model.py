@@ -81,22 +81,24 @@ class Model:
 
     @property
     def switches(self) -> tuple[Switch, ...]:
-        """The modes that remember."""
+        """Return the modes that remember."""
         return tuple(kink for kink in self.kinks if isinstance(kink, Switch))
 
     @property
     def discrete(self) -> tuple[sp.Symbol, ...]:
-        """What a run has besides its states: numbers held, and the modes that remember."""
+        """Return what a run has besides its states: numbers held, and the modes that remember."""
         return (*(held.symbol for held in self.held), *(switch.beyond for switch in self.switches))
 
     @property
     def fixed(self) -> tuple[sp.Symbol, ...]:
-        """What the right-hand side finds as it is during a step: inputs, discrete states, and what is looked up."""
+        """Return what the right-hand side finds as it is during a step: inputs, discrete states,
+        and what is looked up."""
         return (*self.inputs, *self.discrete, *(self.clock.tabled if self.clock else ()))
 
     @property
     def parameters(self) -> tuple[sp.Symbol, ...]:
-        """The stage-file keys (and the length of the motion) that the equations contain, sorted by name."""
+        """Return the stage-file keys (and the length of the motion) that the equations contain,
+        sorted by name."""
         expressions = [*self.rhs, *(k.surface for k in self.kinks), *(o.expression for o in self.outputs.values())]
         expressions += [*(part.scale for part in self.states), *(part.update for part in self.held), *self.settled]
         expressions += [*(k.at_start for k in self.kinks), *(e for jump in self.jumps.values() for e in jump.values())]
@@ -109,7 +111,7 @@ class Model:
 
 
 def resets(kinks: Iterable[Kink]) -> dict[Kink, dict[sp.Symbol, sp.Expr]]:
-    """By how much states jump where a mode that remembers changes (see `Model.jumps`)."""
+    """Return by how much states jump where a mode that remembers changes (see `Model.jumps`)."""
     switches = (kink for kink in kinks if isinstance(kink, Switch))
     return {switch: {x: new - x for x, new in becomes.items()} for switch in switches if (becomes := switch.becomes)}
 
@@ -123,7 +125,8 @@ External = Callable[[Body], sp.Expr]
 
 
 def assemble(structure: Structure, external: External | None = None, control: Control | None = None) -> Model:
-    """The equations of every stage with this structure, on which an `external` force acts besides the actuator's.
+    """Return the equations of every stage with this structure,
+    on which an `external` force acts besides the actuator's.
 
     Instead of the structure's controller in continuous time there may be another one.
     """
@@ -195,13 +198,13 @@ class Bodies:
 
     @property
     def mass(self) -> sp.Expr:
-        """All that moves [kg]."""
+        """Return all that moves [kg]."""
         mass = self.cart.mass + (self.stage.mass if self.stage is not self.cart else 0)
         mass += self.parasitic.mass if self.parasitic else 0
         return mass + (self.motor.mass if self.motor else 0)
 
     def measured(self, structure: Structure) -> tuple[Body, Body]:
-        """Those whose position and whose velocity the controller acts on."""
+        """Return those whose position and whose velocity the controller acts on."""
         form = structure.transmission
         sides = (form.position, form.velocity) if form else ("load", "load")
         on_position, on_velocity = (self.motor if side == "motor" and self.motor else self.stage for side in sides)
@@ -239,7 +242,7 @@ def _positions(structure: Structure, chain: Bodies) -> list[Component]:
 
 
 def _motor_friction(structure: Structure, chain: Bodies) -> Friction | None:
-    """The friction law at the motor."""
+    """Return the friction law at the motor."""
     form = structure.transmission
     if form is None or chain.motor is None:
         return None
@@ -249,8 +252,8 @@ def _motor_friction(structure: Structure, chain: Bodies) -> Friction | None:
 
 
 def _breakaway(structure: Structure, *frictions: Friction | None) -> sp.Expr:
-    """The largest force [N] with which the controller may pull while nothing moves that it measures: the friction
-    forces at rest, and what it exerts half a backlash off its reference."""
+    """Return the largest force [N] with which the controller may pull while nothing moves that
+    it measures: the friction forces at rest, and what it exerts half a backlash off its reference."""
     force = sum((friction.breakaway for friction in frictions if friction), start=sp.S.Zero)
     return force + (loop_stiffness(structure.controller) * BACKLASH / 2 if structure.plays else 0)
 

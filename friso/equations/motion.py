@@ -68,7 +68,8 @@ _SIZES: dict[str, Callable[[Mapping[str, Any]], Any]] = {
 
 
 def pieces(flat: Mapping[str, Any], runs: int) -> np.ndarray:
-    """The reference of each run, shape (runs, pieces, 4): start [s], position [m], velocity, acceleration."""
+    """Return the reference of each run, shape (runs, pieces, 4): start [s], position [m],
+    velocity, acceleration."""
     rows = _PIECES[flat["motion.kind"]](flat)
     full = np.empty((runs, len(rows), 4))
     for i, j in np.ndindex(len(rows), 4):
@@ -103,8 +104,9 @@ class Stand:
 
 
 def stands(flat: Mapping[str, Any]) -> list[Stand]:
-    """The places where the reference comes to stand, one after the other: both ends of a motion there and back, and of
-    any other motion where it ends; of one that never stands, from its last corner on."""
+    """Return the places where the reference comes to stand, one after the other:
+    both ends of a motion there and back, and of any other motion where it ends; of one that never stands, from its last
+    corner on."""
     last = Stand(last_corner(flat), flat["motion.duration"])
     if flat["motion.kind"] != "there_and_back":
         return [last]
@@ -118,13 +120,13 @@ def last_corner(flat: Mapping[str, Any]) -> Any:
 
 
 def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """The flat keys without those of the motion."""
+    """Return the flat keys without those of the motion."""
     return {key: value for key, value in flat.items() if not key.startswith("motion.")}
 
 
 def standing(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """The flat keys of a stage with a motion whose reference stands from the start where that of its own motion, which
-    comes to stand, does from its last corner on; magnitudes remain those of its own."""
+    """Return the flat keys of a stage with a motion whose reference stands from the start where
+    that of its own motion, which comes to stand, does from its last corner on; magnitudes remain those of its own."""
     if flat["motion.kind"] != "there_and_back":
         return dict(flat)
     return {**without_motion(flat), "motion.kind": "release", "motion.displacement": size(flat)}

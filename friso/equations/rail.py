@@ -48,7 +48,8 @@ def friction_factors(flat: Mapping[str, Any], places: np.ndarray, seed: int | No
 
 
 def gaussian_field(places: np.ndarray, length: float, seed: int) -> np.ndarray:
-    """A Gaussian field at places [m], shape (n,), of mean 0 and variance 1, correlated by exp(-(d / length)^2 / 2).
+    """Return a Gaussian field at places [m], shape (n,), of mean 0 and variance 1,
+    correlated by exp(-(d / length)^2 / 2).
 
     White noise in cells that are counted from place 0, smoothed by exp(-(d / length)^2). A random Fourier series needs
     many more terms than the 21 here until it is Gaussian, and its few longest waves repeat along a rail. Raises
@@ -80,7 +81,7 @@ def _white(first: int, count: int, seed: int, length: float) -> np.ndarray:
 
 
 def _rolling(rail: Mapping[str, Any], places: np.ndarray, seed: int) -> np.ndarray | float:
-    """What the rolling elements make of friction at places [m]."""
+    """Return what the rolling elements make of friction at places [m]."""
     if "rolling_pitch" not in rail:
         return 1.0
     phases = np.random.Generator(np.random.Philox(key=[seed, PHASES])).uniform(0, 2 * np.pi, len(HARMONICS))

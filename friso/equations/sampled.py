@@ -36,7 +36,7 @@ SAMPLE_TIME = key("drive.sample_time")
 
 
 def counter(loop: str) -> sp.Symbol:
-    """The samples that have passed since a loop, "position" or "velocity", was due."""
+    """Return the samples that have passed since a loop, "position" or "velocity", was due."""
     return state(f"samples_of_{loop}")
 
 
@@ -51,11 +51,13 @@ class Rest:
 def sampled_controller(
     form: ControllerForm, loop: Loop, velocity_samples: int, extra: sp.Expr = sp.S.Zero, rest: Rest = Rest()
 ) -> tuple[sp.Expr, tuple[Held, ...]]:
-    """The force [N] commanded at a sample, an `extra` one added before it is limited, and what is kept for the next.
+    """Return the force [N] commanded at a sample, an `extra` one added before it is limited,
+    and what is kept for the next.
 
     `loop` holds what is known at the sample. A derivative without a filter is a difference over `velocity_samples`. An
     integrator does at the limit of the force what its anti-windup prescribes: clamped, it rests for the sample in which
-    it would drive the force further beyond."""
+    it would drive the force further beyond.
+    """
     blocks = Sampled(velocity_samples, form)
     demand = demanded(form, loop_signals(loop, sp.S.One, sp.S.One), blocks)
     limit = force_limit() if form.anti_windup else None
@@ -95,11 +97,12 @@ class DiscreteRate:
         return cls(period, sp.S.One)
 
     def scale(self, period: sp.Expr) -> sp.Expr:
-        """By how much it is larger than s where all changes slowly: 1, if it is not prewarped."""
+        """Return by how much it is larger than s where all changes slowly: 1,
+        if it is not prewarped."""
         return 2 * period / (self.step * (1 + self.weight))
 
     def polynomial(self, polynomial: Polynomial) -> Polynomial:
-        """The coefficients of 1, 1/z and 1/z^2 of a polynomial in s, times (1 + weight/z)^2."""
+        """Return the coefficients of 1, 1/z and 1/z^2 of a polynomial in s, times (1 + weight/z)^2."""
         double, weight = 2 / self.step, self.weight
         p0, p1, p2 = polynomial[0], polynomial[1] * double, polynomial[2] * double**2
         return p0 + p1 + p2, 2 * weight * p0 + (weight - 1) * p1 - 2 * p2, weight**2 * p0 - weight * p1 + p2
@@ -144,7 +147,7 @@ class Sampled(Blocks):
         return replace(signal, value=Piecewise((signal.value, self.due), (kept, True)), rate=None, before=None)
 
     def _previous(self, name: str, value: sp.Expr, settled: sp.Expr) -> sp.Symbol:
-        """The number that a value was at the sample before."""
+        """Return the number that a value was at the sample before."""
         symbol = state(name)
         self.held.append(Held(symbol, value, settled))
         return symbol
@@ -162,7 +165,7 @@ class Sampled(Blocks):
 
     @property
     def _own_rule(self) -> FilterRule:
-        """The rule for a low-pass of the controller's own."""
+        """Return the rule for a low-pass of the controller's own."""
         return "backward_euler" if self.form and self.form.filter_rule == "backward_euler" else "bilinear"
 
     def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
@@ -184,7 +187,8 @@ class Sampled(Blocks):
         rule: IntegralRule = "bilinear",
         limit: sp.Expr | None = None,
     ) -> Signal:
-        """A number that a sample adds to; `gain` in N per unit of it. Raises ValueError for an unknown rule."""
+        """Return a number that a sample adds to; `gain` in N per unit of it.
+        Raises ValueError for an unknown rule."""
         if rule not in get_args(IntegralRule):
             raise ValueError(f"rule: {rule!r}; expected one of {', '.join(get_args(IntegralRule))}")
         symbol, following = state(name), state(f"next_{name}")
@@ -262,7 +266,7 @@ class Sampled(Blocks):
         return Signal(amplitude * sine(turn), amplitude, sp.S.Zero, sp.S.Zero)
 
     def _standstill(self, error: sp.Expr) -> Rest:
-        """When integrals pause, and when they begin anew, by the settings against friction."""
+        """Return when integrals pause, and when they begin anew, by the settings against friction."""
         rests: Any = sp.false
         restarts: Any = sp.false
         if self.settings.deadband:
@@ -281,8 +285,9 @@ class Sampled(Blocks):
         return Rest(rests, restarts)
 
     def finished(self, demand: Demand, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
-        """The force before it is limited, and all that is held, the integrators doing as they are to where the force
-        would be beyond its limit, and resting where their output would be beyond a limit of its own."""
+        """Return the force before it is limited, and all that is held,
+        the integrators doing as they are to where the force would be beyond its limit, and resting where their output
+        would be beyond a limit of its own."""
         settings = self._standstill(demand.error.value) if self._integrals else Rest()
         rest = Rest(sp.Or(rest.rests, settings.rests), sp.Or(rest.restarts, settings.restarts))
         new: dict[Any, Any] = {}

@@ -62,8 +62,8 @@ class Setting:
 
 
 def gain_states(flat: FlatMachine) -> list[FlatMachine]:
-    """The flat keys of a stage with the gains that its loop may have: its own, and where there is a window of
-    standstill those within it."""
+    """Return the flat keys of a stage with the gains that its loop may have: its own,
+    and where there is a window of standstill those within it."""
     factor, controller = flat.get(ControllerSection.key("standstill_factor")), controller_of(flat)
     if factor is None:
         return [flat]

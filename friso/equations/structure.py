@@ -49,12 +49,12 @@ class ControllerForm:
 
     @property
     def section(self) -> type[ControllerSection]:
-        """The class that declares its blocks."""
+        """Return the class that declares its blocks."""
         return CONTROLLERS.form(self.kind, self.form)
 
     @property
     def title(self) -> str:
-        """What it is, in a few words."""
+        """Return what it is, in a few words."""
         settings = [name for name, present in self.settings._asdict().items() if present]
         words = [
             *(["no integral"] if not self.integral else []),
@@ -98,12 +98,12 @@ class Structure:
 
     @property
     def plays(self) -> bool:
-        """Whether there is a backlash."""
+        """Tell whether there is a backlash."""
         return self.transmission is not None and self.transmission.backlash
 
     @property
     def title(self) -> str:
-        """What it is, in a few words."""
+        """Return what it is, in a few words."""
         axis = f"rigid {' and '.join(self.masses)}" if self.joint == "rigid" else f"{self.joint} joint"
         words = {
             axis: True,
@@ -119,7 +119,7 @@ class Structure:
 
 
 def structure(flat: Mapping[str, Any]) -> Structure:
-    """The structure of a stage given as flat mapping of keys to SI values."""
+    """Return the structure of a stage given as flat mapping of keys to SI values."""
     law = flat["friction.model"]
     return Structure(
         masses=tuple(name for name in ("cart", "stage") if f"masses.{name}" in flat),
@@ -135,12 +135,13 @@ def structure(flat: Mapping[str, Any]) -> Structure:
 
 
 def shared_structure(flat: Mapping[str, Any]) -> Structure:
-    """The structure of stages that all have the same, read off the first of them."""
+    """Return the structure of stages that all have the same, read off the first of them."""
     return structure({key: value[0] if np.ndim(value) else value for key, value in flat.items()})
 
 
 def decisive_keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
-    """The numeric keys on which the structure depends, by being zero or a whole number, for instance."""
+    """Return the numeric keys on which the structure depends, by being zero or a whole number,
+    for instance."""
     law, control = friction_law(flat["friction.model"]), controller_of(flat)
     of_stage = ("joint.stroke", "bias.cart", "bias.stage", BACKLASH, *DECISIVE)
     at_motor: tuple[str, ...] = ()
@@ -171,7 +172,7 @@ def _transmission_form(flat: Mapping[str, Any]) -> TransmissionForm:
 
 
 def controller_form(flat: Mapping[str, Any]) -> ControllerForm:
-    """The form of the controller of a stage given as flat mapping."""
+    """Return the form of the controller of a stage given as flat mapping."""
     controller = controller_of(flat)
     return ControllerForm(
         kind=flat[KIND],

@@ -37,12 +37,14 @@ def transmission(backlash: bool, motor: Body, load: Body) -> tuple[sp.Expr, Comp
 
 
 def flanks(deflection: sp.Expr) -> tuple[Kink, Kink]:
-    """Where the transmission begins to pull, ahead and behind, for a deflection [m] of the motor against the load."""
+    """Return where the transmission begins to pull, ahead and behind,
+    for a deflection [m] of the motor against the load."""
     return stops(deflection, BACKLASH / 2, "flank")
 
 
 def at_motor(friction: Friction, velocity: sp.Symbol, motor_velocity: sp.Symbol) -> Friction:
-    """A law that was declared for a body with a `velocity`, on the motor, with names and keys of its own."""
+    """Return a law that was declared for a body with a `velocity`, on the motor,
+    with names and keys of its own."""
     component = friction.component
     names = {x: _renamed(str(x)) for x in (part.symbol for part in component.states)}
     names |= {kink.beyond: _renamed(kink.name, "beyond_") for kink in component.kinks}
@@ -76,7 +78,7 @@ def _renamed(name: str, before: str = "") -> str:
 
 
 def _expressions(friction: Friction) -> list[sp.Expr]:
-    """All that a law declares."""
+    """Return all that a law declares."""
     component = friction.component
     expressions = [friction.force, friction.breakaway]
     expressions += [e for part in component.states for e in (part.derivative, part.scale, part.settled)]

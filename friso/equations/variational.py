@@ -23,12 +23,13 @@ PREFIX = "small_"
 
 
 def along(name: str) -> str:
-    """The parameter that holds by how much a key differs on the motion beside."""
+    """Return the parameter that holds by how much a key differs on the motion beside."""
     return f"along.{name}"
 
 
 def variational(model: Model, keys: Sequence[str] = ()) -> Model:
-    """The model with a deviation beside each state, the states first; it takes no part in the control of the step.
+    """Return the model with a deviation beside each state, the states first;
+    it takes no part in the control of the step.
 
     The motion beside may be that of a stage some of whose `keys` differ, each by its parameter `along` (times the unit
     of the deviation): then the deviations are the sensitivities to these keys.
@@ -62,7 +63,8 @@ def _directional_derivative(expression: sp.Expr, small: Small) -> sp.Expr:
 
 
 def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Expr]:
-    """By how much the deviations jump at a kink: (f+ - f-) times their share across it over the speed of crossing."""
+    """Return by how much the deviations jump at a kink:
+    (f+ - f-) times their share across it over the speed of crossing."""
     speed = sp.diff(kink.surface, TIME)
     speed += sum((sp.diff(kink.surface, part.symbol) * part.derivative for part in model.states), start=sp.S.Zero)
     share = _directional_derivative(kink.surface, small) / speed
@@ -93,8 +95,8 @@ def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.
 
 
 def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
-    """Whether a difference is zero all over the surface of a kink, tried at points of it; not, where the surface is
-    linear in no symbol: it bounds a window then, at which something is switched."""
+    """Tell whether a difference is zero all over the surface of a kink, tried at points of it;
+    not, where the surface is linear in no symbol: it bounds a window then, at which something is switched."""
     if gap == 0:
         return True
     linear = (s for s in sorted(kink.surface.free_symbols, key=str) if sp.diff(kink.surface, s, 2) == 0)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @check_arguments
 def linear(stage: Stage, case: str | Members | None = None, part: str = "plant", series: bool = False) -> StateSpace:
-    """A stage in one state as a `control.StateSpace` in SI units, its states, inputs and outputs named.
+    """Return a stage in one state as a `control.StateSpace` in SI units, its states, inputs and outputs named.
 
     `case` is the name of a limit case ("stuck", "sliding", "stuck-touched", "sliding-touched", or "given" for a stage
     that has just one; default: the first of them that the stage has), or a state such as
@@ -60,7 +60,7 @@ def linear(stage: Stage, case: str | Members | None = None, part: str = "plant",
 
 
 def _checked(flat: Mapping[str, Any], member: Members) -> Members:
-    """A single state, if the stage can be in it. Raises InputError."""
+    """Return a single state, if the stage can be in it. Raises InputError."""
     if len(member) != 1:
         raise InputError(
             "case", f"{len(member)} states", "a single one", "friso.linear(stage, friso.member(speed=1e-3))"

@@ -21,9 +21,9 @@ of the stage."""
 
 
 def loop_bandwidth(stage: Stage) -> float:
-    """The bandwidth [Hz] of a stage: the last frequency at which the gain of its open loop is 1 (0 dB) while the stage
-    slides (NaN: there is none): stuck, its bearing holds it, and the loop hardly moves it. With other gains at
-    standstill it is the larger one of both."""
+    """Return the bandwidth [Hz] of a stage: the last frequency at which the gain of its open
+    loop is 1 (0 dB) while the stage slides (NaN: there is none): stuck, its bearing holds it, and the loop hardly moves
+    it. With other gains at standstill it is the larger one of both."""
     return float(np.fmax.reduce([_last_crossing(flat) for flat in gain_states(stage.flat())]))
 
 
@@ -40,15 +40,16 @@ def _last_crossing(flat: Mapping[str, Any]) -> float:
 
 
 def bandwidths_at(stage: Stage, factors: Sequence[float] | np.ndarray) -> np.ndarray:
-    """The bandwidths [Hz] of a stage whose controller is faster as a whole by factors, as of `loop_bandwidths`."""
+    """Return the bandwidths [Hz] of a stage whose controller is faster as a whole by factors,
+    as of `loop_bandwidths`."""
     return loop_bandwidths(stage, sped_up(stage.flat(), np.array(factors)), len(factors))
 
 
 @np.errstate(all="ignore")
 def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.ndarray:
-    """The bandwidths [Hz] of a stage with changes, arrays of shape (count,), in continuous time: to a share of 1e-3, as
-    loops are looked at on a grid of frequencies and their gain is taken to be a power of it in between. With other
-    gains at standstill they are the larger ones of both."""
+    """Return the bandwidths [Hz] of a stage with changes, arrays of shape (count,),
+    in continuous time: to a share of 1e-3, as loops are looked at on a grid of frequencies and their gain is taken to
+    be a power of it in between. With other gains at standstill they are the larger ones of both."""
     flat, sliding = stage.flat(), _sliding(stage.flat())
     omega = with_resonances(2 * np.pi * GRID, [poles(flat, sliding, DriveTiming(0.0, 0.0)).cut])
     machines = sliding.repeated(count)
@@ -56,8 +57,8 @@ def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.
 
 
 def _last_falls(flat: Mapping[str, Any], machines: Members, omega: np.ndarray) -> np.ndarray:
-    """Where the gains of open loops fall through 1 for the last time on a grid of angular frequencies [rad/s]: at these
-    frequencies [Hz], shape (members,) (NaN: nowhere)."""
+    """Return where the gains of open loops fall through 1 for the last time on a grid of angular
+    frequencies [rad/s]: at these frequencies [Hz], shape (members,) (NaN: nowhere)."""
     loops = poles(flat, machines, DriveTiming(0.0, 0.0)).loop(omega)
     gain, frequency = np.log(np.abs(loops)), np.log(omega / (2 * np.pi))
     falls = (gain[:, :-1] >= 0) & (gain[:, 1:] < 0)
@@ -69,5 +70,5 @@ def _last_falls(flat: Mapping[str, Any], machines: Members, omega: np.ndarray) -
 
 
 def _sliding(flat: Mapping[str, Any]) -> Members:
-    """The limit case in which the stage slides."""
+    """Return the limit case in which the stage slides."""
     return next(case for name, case in limit_cases(flat).items() if not name.startswith("stuck"))

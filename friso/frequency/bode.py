@@ -78,43 +78,45 @@ class Bode:
 
     @cached_property
     def scan(self) -> Scan:
-        """The stability of the family."""
+        """Return the stability of the family."""
         flat = self.stage.flat()
         return scan_stability(flat, family(flat))
 
     @cached_property
     def prescribed(self) -> tuple[Prescribed, ...]:
-        """The loops at prescribed speeds of the cart, the limiter free."""
+        """Return the loops at prescribed speeds of the cart, the limiter free."""
         return _prescribed(self.stage.flat(), self.omega)
 
     @property
     def stable(self) -> bool:
-        """Whether the one controller is stable in every state of the family."""
+        """Tell whether the one controller is stable in every state of the family."""
         return bool(self.scan.stable.all())
 
     @cached_property
     def loops(self) -> np.ndarray:
-        """The loops L of the family over `omega`, complex, shape (members, k)."""
+        """Return the loops L of the family over `omega`, complex, shape (members, k)."""
         return loops(self.scan.flat, self.scan.members, self.omega)
 
     @cached_property
     def worst(self) -> tuple[Members, Margins]:
-        """The worst member of the family, with its margins."""
+        """Return the worst member of the family, with its margins."""
         return self._with_margins(self.scan.worst())
 
     @cached_property
     def settled(self) -> tuple[Members, Margins]:
-        """The worst of the settled members (limit cases, and stuck under any bias), with its margins."""
+        """Return the worst of the settled members (limit cases, and stuck under any bias),
+        with its margins."""
         return self._with_margins(self.scan.worst(self.scan.members.settled))
 
     @cached_property
     def unstable(self) -> tuple[Unstable, ...]:
-        """The ranges of speed at which the stage is not stable."""
+        """Return the ranges of speed at which the stage is not stable."""
         return _unstable(self.scan.flat, self.scan.members)
 
     @cached_property
     def limits(self) -> Mapping[str, Limits]:
-        """How fast the controller may be, by joint: "locked" and "free", or "given" without one."""
+        """Return how fast the controller may be, by joint: "locked" and "free",
+        or "given" without one."""
         stages = _by_joint(self.stage)
         return dict(zip(stages, side_by_side([partial(limits, flat) for flat in stages.values()]), strict=True))
 
@@ -124,9 +126,10 @@ class Bode:
 
 
 def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
-    """The linear analysis of a stage, its curves over frequencies `band` [Hz] (default: those that matter); with
-    `series`, the thesis's formula for a touched limiter is added. Raises InputError for frequencies that are not
-    usable, a controller that exerts no force, and a delay that is too long (see `DriveTiming`)."""
+    """Return the linear analysis of a stage, its curves over frequencies `band` [Hz] (default:
+    those that matter); with `series`, the thesis's formula for a touched limiter is added. Raises InputError for
+    frequencies that are not usable, a controller that exerts no force, and a delay that is too long (see
+    `DriveTiming`)."""
     settings = FrequencySettings.current()
     if band is not None and not 0 < band[0] < band[1] < np.inf:
         raise InputError("band", repr(band), "two rising frequencies [Hz]", "friso.bode(stage, (0.1, 1000.0))")
@@ -156,7 +159,7 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
 
 
 def _by_joint(stage: Stage) -> dict[str, Mapping[str, Any]]:
-    """The stage with its joint "locked" and "free", or as it is "given" without one."""
+    """Return the stage with its joint "locked" and "free", or as it is "given" without one."""
     variants = stage.variants()
     return {name: member.flat() for name, member in variants.items() if name != "given" or len(variants) == 1}
 
@@ -167,7 +170,8 @@ def _plant(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> Compl
 
 
 def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Members]]:
-    """The cases with a touched limiter by the formula of Table 1: as stages whose limiter is not touched."""
+    """Return the cases with a touched limiter by the formula of Table 1:
+    as stages whose limiter is not touched."""
     touched = {name: member for name, member in limit_cases(flat).items() if member.touched[0]}
     return {f"{name}-series": (limiter_in_series(flat), member.with_limiter(False)) for name, member in touched.items()}
 
@@ -187,7 +191,7 @@ def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range
 
 
 def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed, ...]:
-    """The loop at prescribed speeds of the cart, its limiter free where it can be."""
+    """Return the loop at prescribed speeds of the cart, its limiter free where it can be."""
     if flat["friction.model"] == "none":
         return ()
     touched = bool(next(iter(limit_cases(flat).values())).touched[0])
@@ -200,7 +204,8 @@ def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed,
 
 
 def _unstable(flat: Mapping[str, Any], members: Members) -> tuple[Unstable, ...]:
-    """The ranges of speed at which the stage is not stable, for each state of the limiter and direction."""
+    """Return the ranges of speed at which the stage is not stable,
+    for each state of the limiter and direction."""
     sliding = members[~members.stuck]
     ranges = []
     for touched, backward in sorted({*zip(sliding.touched.tolist(), (~sliding.forward).tolist(), strict=True)}):

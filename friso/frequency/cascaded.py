@@ -41,12 +41,13 @@ class CascadeLoops:
 
 
 def is_cascade(flat: Mapping[str, Any]) -> bool:
-    """Whether the controller of a stage given as flat keys closes a velocity loop within its position loop."""
+    """Tell whether the controller of a stage given as flat keys closes a velocity loop within
+    its position loop."""
     return controller_of(flat).feeds_back == "velocity"
 
 
 def cascade_loops(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> CascadeLoops:
-    """The loops of a cascade in one state at angular frequencies [rad/s]."""
+    """Return the loops of a cascade in one state at angular frequencies [rad/s]."""
     drive = DriveTiming.of(flat)
     moved = plant(flat, member).take((FORCE,), (VELOCITY,)).at(1j * omega)[0, :, 0, 0]
     alone = {key: value for key, value in flat.items() if key != POSITION_TIME}  # the position loop is open
@@ -66,14 +67,15 @@ def cascade_loops(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -
 
 
 def _seen(rates: Complex) -> np.ndarray:
-    """Which of the poles [rad/s] of a velocity loop (1, n) it sees, shape (n,)."""
+    """Return which of the poles [rad/s] of a velocity loop (1, n) it sees, shape (n,)."""
     settings = FrequencySettings.current()
     sizes = np.abs(rates[0])
     return sizes > settings.unseen_pole * sizes[np.isfinite(sizes)].max(initial=0.0)
 
 
 def _position_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming) -> Callable[[np.ndarray], Complex]:
-    """The position loop over angular frequencies [rad/s], the velocity loop within it closed."""
+    """Return the position loop over angular frequencies [rad/s],
+    the velocity loop within it closed."""
     if not drive.sample_time:
         outer, inner = (response(flat, member, drive, cut=channel) for channel in (VELOCITY, STAGE))
         return lambda omega: outer(omega) / (1 + inner(omega))

@@ -50,12 +50,12 @@ class Limits:
 
     @property
     def open_ended(self) -> bool:
-        """Whether the stage is still stable where the search ends."""
+        """Tell whether the stage is still stable where the search ends."""
         return self.highest_stable == self.searched[1]
 
 
 def limits(flat: Mapping[str, Any]) -> Limits:
-    """The crossovers at which a stage is stable, and comfortably so."""
+    """Return the crossovers at which a stage is stable, and comfortably so."""
     settings = FrequencySettings.current()
     search = _Search(flat, settled_members(flat))
     ends, crossover = search.ends, _stated(flat)
@@ -76,7 +76,7 @@ def limits(flat: Mapping[str, Any]) -> Limits:
 
 
 def stable_crossovers(flat: Mapping[str, Any], members: Members) -> tuple[Range, ...]:
-    """The crossovers [Hz] (or factors of the bandwidth) at which all members are stable."""
+    """Return the crossovers [Hz] (or factors of the bandwidth) at which all members are stable."""
     return _Search(flat, members).stable()
 
 
@@ -88,7 +88,8 @@ def range_end(ranges: Sequence[Range], crossover: float) -> float | None:
 
 
 def searched_crossovers(flat: Mapping[str, Any]) -> Range:
-    """The crossovers that are searched; those of a sampled drive end below half the sampling frequency."""
+    """Return the crossovers that are searched;
+    those of a sampled drive end below half the sampling frequency."""
     settings = FrequencySettings.current()
     drive = DriveTiming.of(flat)
     if bandwidth(flat) is None:
@@ -97,7 +98,8 @@ def searched_crossovers(flat: Mapping[str, Any]) -> Range:
 
 
 def settled_margin(flat: Mapping[str, Any]) -> float:
-    """The least modulus margin of the settled states of a stage; 0 if one of them is not stable."""
+    """Return the least modulus margin of the settled states of a stage;
+    0 if one of them is not stable."""
     loops = scan_stability(flat, settled_members(flat))
     return float(loops.distance.min()) if loops.stable.all() else 0.0
 
@@ -111,7 +113,7 @@ def settled_members(flat: Mapping[str, Any]) -> Members:
 
 
 def _stated(flat: Mapping[str, Any]) -> float:
-    """The crossover of a stage [Hz]; 1 where its controller states none."""
+    """Return the crossover of a stage [Hz]; 1 where its controller states none."""
     named = bandwidth(flat)
     return 1.0 if named is None else named
 
@@ -134,12 +136,12 @@ class _Search:
 
     @cached_property
     def at(self) -> np.ndarray:
-        """The crossovers between which ends of ranges are looked for."""
+        """Return the crossovers between which ends of ranges are looked for."""
         settings = FrequencySettings.current()
         return np.geomspace(*self.ends, settings.crossover_steps)
 
     def stable(self) -> tuple[Range, ...]:
-        """The crossovers at which all members are stable."""
+        """Return the crossovers at which all members are stable."""
         return ranges_below(self.at, lambda f: self.abscissa(f).max(axis=1))
 
     def abscissa(self, crossover: np.ndarray) -> np.ndarray:
@@ -170,6 +172,6 @@ class _Search:
         return self._looked_at(self.at)
 
     def _looked_at(self, crossover: np.ndarray) -> PoleStability:
-        """All members at the first crossover, then at the second, and so on."""
+        """Return all members at the first crossover, then at the second, and so on."""
         keys = _at(self.flat, np.repeat(crossover, len(self.members)))
         return stability_by_poles(keys, self.members.repeated(len(crossover)))

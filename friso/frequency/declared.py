@@ -35,7 +35,8 @@ class Declared:
         return list(entries), function, [str(symbol) for symbol in symbols]
 
     def at(self, values: Mapping[str, Any], members: int) -> System:
-        """The linear systems where the symbols have these values, numbers or arrays of shape (members,), by name."""
+        """Return the linear systems where the symbols have these values,
+        numbers or arrays of shape (members,), by name."""
         places, function, names = self._entries
         n, m, p = len(self.states), len(self.inputs), len(self.outputs)
         matrices = np.zeros((members, n + p, n + m))

@@ -36,8 +36,8 @@ class DriveTiming:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> DriveTiming:
-        """The drive of a stage. Raises InputError for a delay of more samples than are followed, and for a loop that is
-        due as rarely."""
+        """Return the drive of a stage. Raises InputError for a delay of more samples than are
+        followed, and for a loop that is due as rarely."""
         settings = FrequencySettings.current()
         sample_time = flat.get("drive.sample_time", 0.0)
         slow = {key: flat[key] for key in SLOW_LOOPS if key in flat}
@@ -62,12 +62,13 @@ class DriveTiming:
 
     @property
     def samples_late(self) -> tuple[int, float]:
-        """The delay as whole samples, and the rest [s]."""
+        """Return the delay as whole samples, and the rest [s]."""
         samples = int(self.delay / self.sample_time + 1e-9)
         return samples, max(0.0, self.delay - samples * self.sample_time)
 
     def transfer(self, omega: np.ndarray) -> np.ndarray:
-        """What hold, delay and current loop do to angular frequencies [rad/s], all but their aliases."""
+        """Return what hold, delay and current loop do to angular frequencies [rad/s],
+        all but their aliases."""
         half = omega * self.sample_time / 2
         return np.sinc(half / np.pi) * np.exp(-1j * (half + omega * self.delay)) / (1 + 1j * omega * self.lag)
 
@@ -82,13 +83,13 @@ class DriveTiming:
 
 
 def resonances(poles: Complex) -> Complex:
-    """Those of the poles [rad/s] that are lightly damped."""
+    """Return those of the poles [rad/s] that are lightly damped."""
     settings = FrequencySettings.current()
     return poles[np.abs(poles.real) < settings.light_damping * np.abs(poles.imag)]
 
 
 def behind_current_loop(machine: System, lag: float) -> System:
-    """A plant with one input whose force follows with a first-order lag [s], 0 for none."""
+    """Return a plant with one input whose force follows with a first-order lag [s], 0 for none."""
     if not lag:
         return machine
     pole = np.full((1, 1), 1 / lag)
@@ -96,8 +97,8 @@ def behind_current_loop(machine: System, lag: float) -> System:
 
 
 def zero_order_hold(machine: System, sample_time: float, late: float) -> System:
-    """A plant with one input in discrete time behind a hold and a delay `late` [s] of less than a sample: exact, the
-    force that still acts being a further state."""
+    """Return a plant with one input in discrete time behind a hold and a delay `late` [s] of
+    less than a sample: exact, the force that still acts being a further state."""
     members, n, waiting = len(machine.a), len(machine.states), int(late > 0)
     rest, before = _transition(machine, late)
     ahead, after = _transition(machine, sample_time - late)
@@ -111,7 +112,7 @@ def zero_order_hold(machine: System, sample_time: float, late: float) -> System:
 
 
 def waited(machine: System, samples: int) -> System:
-    """A plant with one input in discrete time whose force waits for some samples."""
+    """Return a plant with one input in discrete time whose force waits for some samples."""
     if not samples:
         return machine
     register = np.eye(samples, k=-1)
@@ -121,8 +122,9 @@ def waited(machine: System, samples: int) -> System:
 
 
 def delayed(machine: System, delay: float, loop: float) -> System:
-    """A plant with one input behind a delay [s], as a row of rational functions (Pade), whose closed loop without delay
-    has resonances of up to `loop` [rad/s]. Raises InputError where the plant's own turn too often in the delay."""
+    """Return a plant with one input behind a delay [s], as a row of rational functions (Pade),
+    whose closed loop without delay has resonances of up to `loop` [rad/s]. Raises InputError where the plant's own turn
+    too often in the delay."""
     settings = FrequencySettings.current()
     turn = fastest(np.linalg.eigvals(machine.a).astype(complex)) * delay
     sections = int(
@@ -149,7 +151,8 @@ def fastest(poles: Complex) -> float:
 
 
 def _behind(machine: System, first: tuple[np.ndarray, ...], name: str) -> System:
-    """A plant with one input behind another system with one input and output, given by its four matrices."""
+    """Return a plant with one input behind another system with one input and output,
+    given by its four matrices."""
     la, lb, lc, ld = first
     members, n, k = len(machine.a), len(machine.states), len(la)
     a = np.zeros((members, n + k, n + k))
@@ -161,7 +164,7 @@ def _behind(machine: System, first: tuple[np.ndarray, ...], name: str) -> System
 
 
 def _transition(machine: System, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """How states and a constant force act on the states a time [s] later."""
+    """Return how states and a constant force act on the states a time [s] later."""
     n = len(machine.states)
     matrices = np.zeros((len(machine.a), n + 1, n + 1))
     matrices[:, :n, :n], matrices[:, :n, n:] = machine.a * time, machine.b * time

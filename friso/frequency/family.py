@@ -71,8 +71,8 @@ class Scan:
         return distance
 
     def worst(self, among: np.ndarray | None = None) -> int:
-        """The number of the worst (of those that `among` marks): the least stable if any is unstable, else the one
-        whose loop comes closest to -1."""
+        """Return the number of the worst (of those that `among` marks):
+        the least stable if any is unstable, else the one whose loop comes closest to -1."""
         among = np.ones(len(self.members), bool) if among is None else among
         if not self.stable[among].all():
             return int(np.where(among, self.abscissa, -np.inf).argmax())
@@ -108,8 +108,8 @@ def stability_by_poles(flat: Mapping[str, Any], members: Members) -> PoleStabili
 def for_poles(
     flat: Mapping[str, Any], members: Members, function: Callable[[Poles], _T]
 ) -> list[tuple[np.ndarray, _T]]:
-    """A function of the poles of every member, a few at a time, side by side: their numbers, and what it returns;
-    `flat` may hold arrays of shape (members,), except in the drive's keys."""
+    """Return a function of the poles of every member, a few at a time, side by side:
+    their numbers, and what it returns; `flat` may hold arrays of shape (members,), except in the drive's keys."""
     drive = DriveTiming.of(flat)
 
     def of_part(which: np.ndarray) -> tuple[np.ndarray, _T]:

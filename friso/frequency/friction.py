@@ -46,13 +46,14 @@ class LinearFriction:
 
 
 def law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
-    """The law of a stage; None without friction."""
+    """Return the law of a stage; None without friction."""
     form = shared_structure(flat)
     return _law(form.friction, form.friction_variant)
 
 
 def motor_law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
-    """The law of the friction at the motor, its states under the names that they have there; None without any."""
+    """Return the law of the friction at the motor,
+    its states under the names that they have there; None without any."""
     form = shared_structure(flat).transmission
     law = _law(form.friction, form.friction_variant) if form else None
     if law is None:
@@ -86,7 +87,8 @@ def _law(name: str, variant: Hashable) -> LinearFriction | None:
 
 
 def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
-    """The internal states that bear the bias at rest: all pulled as far as the cart, from where they bear nothing."""
+    """Return the internal states that bear the bias at rest: all pulled as far as the cart,
+    from where they bear nothing."""
     pulled = sp.Symbol("pulled", real=True)
     relaxed: dict[Any, Any] = {VELOCITY: 0, **dict.fromkeys(states, 0)}
     ways: dict[Any, Any] = {
@@ -99,7 +101,8 @@ def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr
 
 
 def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[Any]]:
-    """The expressions as a function of the values of their symbols by name; what no float holds is infinite or NaN."""
+    """Return the expressions as a function of the values of their symbols by name;
+    what no float holds is infinite or NaN."""
     symbols = sorted(set[Any]().union(*(expression.free_symbols for expression in expressions)), key=str)
     function = sp.lambdify(symbols, expressions, [{"sine": sine}, "numpy"])
 

@@ -31,14 +31,16 @@ ROUNDING = 50 * float(np.finfo(float).eps)
 
 
 def open_loop(flat: Mapping[str, Any], members: Members) -> System:
-    """The loop cut at the actuator force, in continuous time: from the force on the stage to the force with which the
-    controller answers, its sign reversed, so that 1 + L = 0 at the poles of the closed loop."""
+    """Return the loop cut at the actuator force, in continuous time:
+    from the force on the stage to the force with which the controller answers, its sign reversed, so that 1 + L = 0 at
+    the poles of the closed loop."""
     return _cut(plant(flat, members), compensator(flat, len(members)))
 
 
 def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
-    """The closed loop in continuous time: from a force on the stage, reference, disturbance on the cart, noise of the
-    sensor and what is fed forward of the reference to all that the plant shows and the actuator force."""
+    """Return the closed loop in continuous time: from a force on the stage, reference,
+    disturbance on the cart, noise of the sensor and what is fed forward of the reference to all that the plant shows
+    and the actuator force."""
     machine, control = plant(flat, members), compensator(flat, len(members))
     ahead = reference_derivatives(control)
     n, k = len(machine.states), len(control.states)
@@ -151,7 +153,7 @@ def response(
 
 
 def lifted_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming, cut: str = "") -> Lifted:
-    """The loop of a sampled drive over its period, cut at the actuator."""
+    """Return the loop of a sampled drive over its period, cut at the actuator."""
     return cut_over_period(_held(_driven(flat, member, drive), drive), _controls(flat, len(member), drive, cut))
 
 
@@ -168,13 +170,13 @@ def _held(machine: System, drive: DriveTiming) -> System:
 
 
 def _continuous(flat: Mapping[str, Any], members: int, cut: str) -> System:
-    """The controller in continuous time, a channel cut."""
+    """Return the controller in continuous time, a channel cut."""
     control = compensator(flat, members)
     return unseen(control, cut) if cut else control
 
 
 def _controls(flat: Mapping[str, Any], members: int, drive: DriveTiming, cut: str) -> tuple[System, ...]:
-    """The controller at the samples of a period, a channel cut."""
+    """Return the controller at the samples of a period, a channel cut."""
     controls = samples_controller({**flat, "drive.sample_time": drive.sample_time}, members, drive.period)
     sampled = {VELOCITY: RATED}.get(cut, cut)
     return tuple(unseen(control, sampled) for control in controls) if cut else controls

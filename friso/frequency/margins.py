@@ -53,7 +53,8 @@ class Margins:
 
     @property
     def on_the_edge(self) -> bool:
-        """Whether a deviation neither dies out nor grows: a position that is not controlled, an undamped swing."""
+        """Tell whether a deviation neither dies out nor grows: a position that is not controlled,
+        an undamped swing."""
         return self.abscissa == 0
 
     @property
@@ -63,13 +64,14 @@ class Margins:
 
 
 def margins(flat: Mapping[str, Any], member: Members) -> Margins:
-    """The margins of a stage in one of its states. Raises InputError for too long a delay (see `DriveTiming`)."""
+    """Return the margins of a stage in one of its states.
+    Raises InputError for too long a delay (see `DriveTiming`)."""
     drive = DriveTiming.of(flat)
     return margins_of(response(flat, member, drive), flat, member, poles(flat, member, drive))
 
 
 def margins_of(at: LoopResponse, flat: Mapping[str, Any], member: Members, loop_poles: Poles) -> Margins:
-    """The margins of one loop of a stage from its response and its poles."""
+    """Return the margins of one loop of a stage from its response and its poles."""
     settings = FrequencySettings.current()
     drive, closed = loop_poles.drive, loop_poles.in_s[0]
     resonant = [closed, drive.to_s(loop_poles.cut[0]), *([loop_poles.continuous] if drive.period > 1 else [])]
@@ -104,7 +106,7 @@ def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray
 
 
 def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
-    """The loop at rest, if it is finite there: real, and the same on the way there."""
+    """Return the loop at rest, if it is finite there: real, and the same on the way there."""
     settings = FrequencySettings.current()
     low, lower = at(np.array([2 * settings.rest_frequency, settings.rest_frequency]) * slow)
     flat = np.abs(low - lower) < settings.rest_frequency * np.abs(lower) and np.abs(
@@ -114,9 +116,9 @@ def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
 
 
 def of_loop(response: LoopResponse, poles: Complex, abscissa: float, omega: np.ndarray, ends: Complex) -> Margins:
-    """The margins of a loop from its response, the poles of the closed loop with the real part of the rightmost,
-    frequencies [rad/s] that show it, and its values where it is real at any gain: at rest, and at half the sampling
-    frequency."""
+    """Return the margins of a loop from its response,
+    the poles of the closed loop with the real part of the rightmost, frequencies [rad/s] that show it, and its values
+    where it is real at any gain: at rest, and at half the sampling frequency."""
     seen = response(omega)
     crossovers = _roots(lambda w: _decades(response(np.array([w])))[0], omega, _decades(seen))
     if abscissa >= 0:
@@ -147,8 +149,8 @@ def _decades(loop: Complex) -> np.ndarray:
 
 
 def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Where a function of the frequency, known at some, passes zero; not where it jumps, as a locus does that goes over
-    to an alias."""
+    """Return where a function of the frequency, known at some, passes zero; not where it jumps,
+    as a locus does that goes over to an alias."""
     settings = FrequencySettings.current()
     with np.errstate(invalid="ignore"):
         passes = np.flatnonzero(values[:-1] * values[1:] < 0)
@@ -170,7 +172,7 @@ def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Comp
 
 
 def _closest(response: LoopResponse, omega: np.ndarray, distance: np.ndarray) -> tuple[float, float]:
-    """Where L comes closest to -1 [rad/s], and how close."""
+    """Return where L comes closest to -1 [rad/s], and how close."""
     inner = np.flatnonzero((distance[1:-1] <= distance[:-2]) & (distance[1:-1] <= distance[2:])) + 1
     least = int(distance.argmin())
     best = float(omega[least]), float(distance[least])

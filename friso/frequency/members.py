@@ -43,12 +43,13 @@ class Members:
         return len(self.speed)
 
     def __getitem__(self, which: Any) -> Members:
-        """Those at the numbers given, or in a boolean array."""
+        """Return those at the numbers given, or in a boolean array."""
         return Members(*(np.atleast_1d(getattr(self, field.name)[which]) for field in fields(self)))
 
     @property
     def kinds(self) -> list[Members]:
-        """Those that are stuck and those that are not, as far as there are any: they have different states."""
+        """Return those that are stuck and those that are not, as far as there are any:
+        they have different states."""
         return [self[mask] for mask in (self.stuck, ~self.stuck) if mask.any()]
 
     @property
@@ -57,7 +58,7 @@ class Members:
 
     @property
     def settled(self) -> np.ndarray:
-        """Which of a family are stuck, or slide the fastest."""
+        """Return which of a family are stuck, or slide the fastest."""
         return self.stuck | (self.speed == self.speed.max())
 
     def with_limiter(self, touched: bool) -> Members:
@@ -65,7 +66,7 @@ class Members:
         return replace(self, touched=np.full(len(self), touched))
 
     def repeated(self, times: int) -> Members:
-        """All of them, so many times one after the other."""
+        """Return all of them, so many times one after the other."""
         return Members(*(np.tile(getattr(self, field.name), times) for field in fields(self)))
 
 
@@ -88,13 +89,13 @@ def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward
 
 
 def concatenate_families(parts: list[Members]) -> Members:
-    """All members of several families, one after the other."""
+    """Return all members of several families, one after the other."""
     return Members(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Members)))
 
 
 def limit_cases(flat: Mapping[str, Any]) -> dict[str, Members]:
-    """The limit cases by name: "stuck" and "sliding" (fast), and both with "-touched" behind where the limiter is
-    touched (Table 1); "given" for a stage that has just one."""
+    """Return the limit cases by name: "stuck" and "sliding" (fast),
+    and both with "-touched" behind where the limiter is touched (Table 1); "given" for a stage that has just one."""
     flat = leading_friction(flat)
     moves = ["sliding"] if flat["friction.model"] == "none" else ["stuck", "sliding"]
     limits = limiter_states(flat)
@@ -135,5 +136,5 @@ def _fast(flat: Mapping[str, Any]) -> float:
 
 
 def limiter_states(flat: Mapping[str, Any]) -> tuple[bool, ...]:
-    """Whether the limiter may be free, touched, or both."""
+    """Tell whether the limiter may be free, touched, or both."""
     return {"free": (False, True), "touching": (True,)}.get(structure(flat).joint, (False,))

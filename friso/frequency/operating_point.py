@@ -14,8 +14,8 @@ from friso.stage.transmission import STATE_PREFIX, of_motor
 
 
 def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
-    """Values of the internal states of the law, of its modes that remember, of the sides of its kinks and of its
-    direction, by name, each of shape (members,)."""
+    """Return values of the internal states of the law, of its modes that remember,
+    of the sides of its kinks and of its direction, by name, each of shape (members,)."""
     law, forward = law_of(flat), members.forward.astype(float)
     if law is None:
         return {}

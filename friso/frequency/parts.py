@@ -68,8 +68,9 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
 
 
 def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
-    """The masses without friction: from the forces on stage and cart to their positions, shape of `touched`. Raises
-    InputError for a transmission with another nonlinearity than the friction of the guide."""
+    """Return the masses without friction: from the forces on stage and cart to their positions,
+    shape of `touched`. Raises InputError for a transmission with another nonlinearity than the friction of the guide.
+    """
     drive = shared_structure(flat).transmission
     if drive is not None and (drive.backlash or drive.friction != "none"):
         actual = "a backlash" if drive.backlash else "friction at the motor"
@@ -79,20 +80,21 @@ def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
 
 
 def _limiter(touched: np.ndarray) -> dict[str, Any]:
-    """The modes of the limiter by name: free, or touched ahead."""
+    """Return the modes of the limiter by name: free, or touched ahead."""
     ahead, behind = (str(kink.beyond) for kink in touching(sp.S.Zero))
     return {ahead: touched.astype(float), behind: 0.0}
 
 
 def _on_flank() -> dict[str, Any]:
-    """The modes of a backlash by name: the transmission pulls."""
+    """Return the modes of a backlash by name: the transmission pulls."""
     ahead, behind = (str(kink.beyond) for kink in flanks(sp.S.Zero))
     return {ahead: 1.0, behind: 0.0}
 
 
 def compensator(flat: Mapping[str, Any], members: int) -> System:
-    """The controller: from reference, position [m] and velocity [m/s] of the stage, velocity [m/s] and acceleration
-    [m/s^2] of the reference to the force [N]. Raises InputError for one that exerts none."""
+    """Return the controller: from reference, position [m] and velocity [m/s] of the stage,
+    velocity [m/s] and acceleration [m/s^2] of the reference to the force [N]. Raises InputError for one that exerts
+    none."""
     form = shared_structure(flat).controller
     assert form is not None  # a stage file has a controller
     system = _compensator(replace(form, anti_windup=None)).at(flat, members)
@@ -102,7 +104,7 @@ def compensator(flat: Mapping[str, Any], members: int) -> System:
 
 
 def reference_derivatives(control: System) -> tuple[str, ...]:
-    """Names of the derivatives of the reference that a controller takes."""
+    """Return names of the derivatives of the reference that a controller takes."""
     return tuple(name for name in FEEDFORWARD if control.sees(name))
 
 
@@ -141,7 +143,8 @@ def _plant(form: Structure) -> _Plant:
 
 
 def cart_states(flat: Mapping[str, Any]) -> tuple[str, str]:
-    """Names of position and velocity of what the friction acts on, in the plant's systems."""
+    """Return names of position and velocity of what the friction acts on,
+    in the plant's systems."""
     return _plant(shared_structure(flat)).cart
 
 
@@ -157,7 +160,8 @@ def _compensator(form: ControllerForm) -> Declared:
 
 
 def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...]) -> System:
-    """The system with the internal states of the friction law following the cart, which is stuck.
+    """Return the system with the internal states of the friction law following the cart,
+    which is stuck.
 
     At rest their rate is proportional to the velocity of the cart alone, so that they differ from a multiple of its
     position by a constant: where on the rail it got stuck. Nothing controls that, nor does it matter; it would be a
@@ -177,8 +181,8 @@ def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...])
 
 
 def _without_constants(system: System, internal: tuple[str, ...]) -> System:
-    """The system without those internal states of the friction law that stay as they are, such as the force of an
-    element that slips: each would be a pole at 0."""
+    """Return the system without those internal states of the friction law that stay as they are,
+    such as the force of an element that slips: each would be a pole at 0."""
     unmoved = [z for z in map(system.states.index, internal) if not (system.a[:, z].any() or system.b[:, z].any())]
     moving = [i for i in range(len(system.states)) if i not in unmoved]
     states = tuple(system.states[i] for i in moving)

@@ -15,7 +15,8 @@ Range = tuple[float, float]
 
 
 def ranges_below(at: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> tuple[Range, ...]:
-    """The ranges of positive ascending places (n,) in which a function of them is below 0."""
+    """Return the ranges of positive ascending places (n,) in which a function of them is below
+    0."""
     values = excess(at)
     below = values < 0
     changes = np.flatnonzero(below[1:] != below[:-1])
@@ -25,13 +26,13 @@ def ranges_below(at: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> 
 
 
 def shared(first: tuple[Range, ...], second: tuple[Range, ...]) -> tuple[Range, ...]:
-    """What two lists of ranges have in common."""
+    """Return what two lists of ranges have in common."""
     pairs = [(max(a[0], b[0]), min(a[1], b[1])) for a in first for b in second]
     return tuple(pair for pair in pairs if pair[0] < pair[1])
 
 
 def _end(at: np.ndarray, values: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> float:
-    """The zero of the function between two places, at which it has these values."""
+    """Return the zero of the function between two places, at which it has these values."""
     settings = FrequencySettings.current()
     precise = settings.end_precision * np.log(at[-1] / at[0])
     while np.log(at[-1] / at[0]) > precise:

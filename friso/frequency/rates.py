@@ -46,28 +46,30 @@ class Lifted:
         return self.c[:, None].astype(complex) @ states + self.d[:, None]
 
     def over(self, turn: np.ndarray) -> Complex:
-        """The matrices where a signal turns by an angle (k,) [rad] in a sample."""
+        """Return the matrices where a signal turns by an angle (k,) [rad] in a sample."""
         return self.at(np.exp(1j * turn * self.d.shape[-1]))
 
     def fundamental(self, turn: np.ndarray) -> Complex:
-        """The part of the answer to a harmonic signal that has its frequency, shape (members, k), for the angle (k,)
-        [rad] by which it turns in a sample."""
+        """Return the part of the answer to a harmonic signal that has its frequency,
+        shape (members, k), for the angle (k,) [rad] by which it turns in a sample."""
         return _fundamental(self.over(turn), turn)
 
     def locus(self, turn: np.ndarray) -> Complex:
-        """The characteristic locus that is the loop at that frequency, shape (members, k)."""
+        """Return the characteristic locus that is the loop at that frequency, shape (members, k)."""
         return locus_of(self.over(turn), turn)
 
 
 def _fundamental(matrices: Complex, turn: np.ndarray) -> Complex:
-    """What lifted matrices (members, k, N, N) leave of a harmonic signal at its own frequency."""
+    """Return what lifted matrices (members, k, N,
+    N) leave of a harmonic signal at its own frequency."""
     turns = np.exp(1j * turn[:, None] * np.arange(matrices.shape[-1]))  # (k, N)
     answers = (matrices @ turns[..., None])[..., 0]
     return np.asarray((answers * turns.conj()).mean(axis=-1), dtype=complex)
 
 
 def locus_of(matrices: Complex, turn: np.ndarray) -> Complex:
-    """The eigenvalue of lifted matrices (members, k, N, N) that is closest to the fundamental, shape (members, k)."""
+    """Return the eigenvalue of lifted matrices (members, k, N,
+    N) that is closest to the fundamental, shape (members, k)."""
     if matrices.shape[-1] == 1:
         return matrices[..., 0, 0]
     eigenvalues = np.linalg.eigvals(matrices)
@@ -76,9 +78,9 @@ def locus_of(matrices: Complex, turn: np.ndarray) -> Complex:
 
 
 def samples_controller(flat: Mapping[str, Any], members: int, period: int) -> tuple[System, ...]:
-    """The controller at each sample of a period: from the position measured, and that of which the velocity is the rate
-    [m], to the force [N], and what is held for the next sample. A controller that feeds back a position alone, of one
-    encoder, does not see the second."""
+    """Return the controller at each sample of a period: from the position measured,
+    and that of which the velocity is the rate [m], to the force [N], and what is held for the next sample. A controller
+    that feeds back a position alone, of one encoder, does not see the second."""
     form = shared_structure(flat)
     assert form.controller is not None
     both = form.controller.section.feeds_back == "velocity"
@@ -104,8 +106,8 @@ def _samples(flat: Mapping[str, Any], name: str) -> int:
 
 @cache
 def _declared(form: ControllerForm, due: tuple[bool, ...], both: bool, velocity_samples: int) -> Declared:
-    """The controller at a sample at which some loops are due, of small motions away from the reference; with `both`
-    positions told apart."""
+    """Return the controller at a sample at which some loops are due,
+    of small motions away from the reference; with `both` positions told apart."""
     bare = replace(form, anti_windup=None, settings=FrictionSettings(leak=form.settings.leak))
     y, rated = sp.symbols("measured_position measured_rated", real=True)
     seen = Loop(-y, y, sp.S.Zero, sp.S.Zero, rated=rated if both else None)
@@ -118,7 +120,8 @@ def _declared(form: ControllerForm, due: tuple[bool, ...], both: bool, velocity_
 
 
 def closed_over_period(machine: System, controls: tuple[System, ...]) -> np.ndarray:
-    """How a period takes the states of plant and controller along, shape (members, n, n), the loop being closed."""
+    """Return how a period takes the states of plant and controller along, shape (members, n,
+    n), the loop being closed."""
     whole = _identity(machine, controls[0])
     for control in controls:
         whole = _step(machine, control, 1.0) @ whole
@@ -126,7 +129,8 @@ def closed_over_period(machine: System, controls: tuple[System, ...]) -> np.ndar
 
 
 def cut_over_period(machine: System, controls: tuple[System, ...]) -> Lifted:
-    """The loop cut at the actuator: from the forces of a period to those that answer, their sign reversed."""
+    """Return the loop cut at the actuator: from the forces of a period to those that answer,
+    their sign reversed."""
     steps = [_step(machine, control, 0.0) for control in controls]
     held = np.zeros((len(machine.a), controls[0].a.shape[-1], 1))
     push = np.concatenate([machine.b, held], axis=1)
@@ -135,7 +139,8 @@ def cut_over_period(machine: System, controls: tuple[System, ...]) -> Lifted:
 
 
 def controller_over_period(controls: tuple[System, ...], measured: str) -> Lifted:
-    """The controller alone: from what is measured, STAGE or RATED, over a period to the forces."""
+    """Return the controller alone: from what is measured, STAGE or RATED,
+    over a period to the forces."""
     seen = [control.take((measured,), (FORCE,)) for control in controls]
     lifted = _lifted([control.a for control in seen], [control.b for control in seen], [control.c for control in seen])
     direct = np.zeros_like(lifted.d)
@@ -145,7 +150,7 @@ def controller_over_period(controls: tuple[System, ...], measured: str) -> Lifte
 
 
 def unseen(control: System, measured: str) -> System:
-    """The controller of which one of its inputs is cut."""
+    """Return the controller of which one of its inputs is cut."""
     column = control.inputs.index(measured)
     b, d = control.b.copy(), control.d.copy()
     b[..., column] = d[..., column] = 0.0
@@ -153,7 +158,7 @@ def unseen(control: System, measured: str) -> System:
 
 
 def _lifted(steps: list[np.ndarray], pushes: list[np.ndarray], answers: list[np.ndarray]) -> Lifted:
-    """What repeats after a period, from its samples: x' = step x + push u, y = answer x."""
+    """Return what repeats after a period, from its samples: x' = step x + push u, y = answer x."""
     count, (members, n) = len(steps), steps[0].shape[:2]
     along = np.broadcast_to(np.eye(n), (members, n, n))
     inputs = np.zeros((members, n, count))  # from the inputs so far to the state
@@ -166,7 +171,8 @@ def _lifted(steps: list[np.ndarray], pushes: list[np.ndarray], answers: list[np.
 
 
 def _step(machine: System, control: System, shut: float) -> np.ndarray:
-    """How a sample takes the states of plant and controller along; `shut` is 1 where the controller's force acts."""
+    """Return how a sample takes the states of plant and controller along;
+    `shut` is 1 where the controller's force acts."""
     n, k = machine.a.shape[-1], control.a.shape[-1]
     step = np.zeros((len(machine.a), n + k, n + k))
     step[:, :n, :n] = machine.a + shut * (machine.b @ control.d @ machine.c)

@@ -25,14 +25,14 @@ class System:
     outputs: tuple[str, ...]
 
     def take(self, inputs: Sequence[str], outputs: Sequence[str]) -> System:
-        """The system with these inputs and outputs alone, in this order."""
+        """Return the system with these inputs and outputs alone, in this order."""
         columns = [self.inputs.index(name) for name in inputs]
         rows = [self.outputs.index(name) for name in outputs]
         b, c, d = self.b[..., columns], self.c[..., rows, :], self.d[..., rows, :][..., columns]
         return System(self.a, b, c, d, self.states, tuple(inputs), tuple(outputs))
 
     def sees(self, name: str) -> bool:
-        """Whether anything depends on an input."""
+        """Tell whether anything depends on an input."""
         column = self.inputs.index(name)
         return bool(self.b[..., column].any() or self.d[..., column].any())
 

@@ -38,7 +38,7 @@ class Tuning:
 
     @property
     def true_crossover(self) -> float:
-        """Where the loop crosses 0 dB [Hz]: somewhat above the crossover it is tuned for."""
+        """Return where the loop crosses 0 dB [Hz]: somewhat above the crossover it is tuned for."""
         return self.margins.crossovers[-1]
 
 

@@ -187,5 +187,5 @@ class _Side:
         self.certain[numbers] = np.where(survey.attracts, closed, surely)
 
     def _stages(self, factors: np.ndarray) -> Ensemble:
-        """The stage with its parameter multiplied by factors."""
+        """Return the stage with its parameter multiplied by factors."""
         return Ensemble.held(self.scaled(factors), len(factors))

@@ -20,7 +20,8 @@ class LargeFileError(OSError):
 
 
 def content_of(path: Path, most: int, follow: bool = True) -> bytes:
-    """What is in a file of `most` bytes or fewer; a symbolic link is followed if `follow`.
+    """Return what is in a file of `most` bytes or fewer;
+    a symbolic link is followed if `follow`.
 
     Raises LargeFileError, or another OSError where it cannot be read or is a device, a pipe or a socket.
     """

@@ -9,7 +9,8 @@ import sys
 
 
 def _module() -> str:
-    """What Python was started with by -m, in whatever way that was written; empty without."""
+    """Return what Python was started with by -m, in whatever way that was written;
+    empty without."""
     if sys.argv[:1] != ["-m"]:  # as it is until the module itself runs
         return ""
     for word, following in zip(sys.orig_argv[1:], [*sys.orig_argv[2:], ""], strict=True):

@@ -12,12 +12,12 @@ with the log (`friso.identification.logs.libraries`)."""
 
 
 def install(extra: str) -> str:
-    """What installs an extra."""
+    """Return what installs an extra."""
     return f'pip install "friso[{extra}]"'
 
 
 def is_installed(package: str) -> bool:
-    """Whether a package is there, without importing it."""
+    """Tell whether a package is there, without importing it."""
     try:
         return find_spec(package) is not None
     except ValueError:  # a module of that name that was made by hand
@@ -25,7 +25,7 @@ def is_installed(package: str) -> bool:
 
 
 def missing(extra: str) -> list[str]:
-    """The packages of an extra that are not there."""
+    """Return the packages of an extra that are not there."""
     return [package for package in EXTRAS[extra] if not is_installed(package)]
 
 

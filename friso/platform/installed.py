@@ -25,8 +25,8 @@ RENAMED = {"friso.commands": "friso.questions", "friso.functions": "friso.questi
 
 @cache
 def installed_modules(group: str, taken: frozenset[str] = frozenset()) -> Mapping[str, str]:
-    """The modules that packages name in the entry points of a group, by name. Names that friso has `taken`, or that
-    several packages give, are told and left out."""
+    """Return the modules that packages name in the entry points of a group, by name.
+    Names that friso has `taken`, or that several packages give, are told and left out."""
     modules: dict[str, list[str]] = {}
     for name, module in _entry_points().get(group, ()):
         modules.setdefault(name, []).append(module)
@@ -38,7 +38,7 @@ def installed_modules(group: str, taken: frozenset[str] = frozenset()) -> Mappin
 
 @cache
 def _entry_points() -> Mapping[str, list[tuple[str, str]]]:
-    """Names and modules of all entry points that are about friso, by group."""
+    """Return names and modules of all entry points that are about friso, by group."""
     from importlib.metadata import entry_points  # costs as much as all of friso's stage file
 
     points = entry_points()
@@ -65,8 +65,8 @@ def load_module(group: str, name: str, module: str) -> ModuleType:
 
 
 def load_declared(group: str, name: str, module: str, attribute: str, kind: Any = object) -> Any:
-    """What the module that a package names declares as an `attribute`. Raises InputError where the module cannot be
-    imported, or declares nothing of this `kind`."""
+    """Return what the module that a package names declares as an `attribute`.
+    Raises InputError where the module cannot be imported, or declares nothing of this `kind`."""
     declared = getattr(load_module(group, name, module), attribute, None)
     if declared is None or not isinstance(declared, kind):
         actual = f"{module}, whose {attribute} is {'missing' if declared is None else type(declared).__name__}"

@@ -41,12 +41,12 @@ _whole = threading.RLock()
 
 
 def came() -> int:
-    """The signal that came first, 0 for none."""
+    """Return the signal that came first, 0 for none."""
     return early.came[0] if early.came else 0
 
 
 def last_word(number: int) -> str:
-    """How a command says what ended it, its last line."""
+    """Return how a command says what ended it, its last line."""
     global _said
     _said = True
     return "interrupted" if number in (0, signal.SIGINT) else "terminated"
@@ -60,8 +60,8 @@ def answers_interrupts() -> None:
 
 @contextmanager
 def raising() -> Iterator[None]:
-    """Signals raise KeyboardInterrupt within, one that came before at once. In another thread than the main one they
-    are as they were."""
+    """Return signals raise KeyboardInterrupt within, one that came before at once.
+    In another thread than the main one they are as they were."""
     global _raising, _waits
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -167,7 +167,7 @@ def _lost(otherwise: Callable[[Any], object], what: Any) -> None:
 
 
 def _imports(frame: FrameType | None) -> bool:
-    """Whether an import is under way."""
+    """Tell whether an import is under way."""
     while frame is not None:
         if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
             return True

@@ -21,8 +21,8 @@ _TRIES = 3
 
 @contextmanager
 def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
-    """A new folder that only this user may open, locked and thus no leftover within, and removed in the end. Raises
-    OSError. What killed processes left of such folders is removed first."""
+    """Return a new folder that only this user may open, locked and thus no leftover within,
+    and removed in the end. Raises OSError. What killed processes left of such folders is removed first."""
     remove_leftovers(root, prefix, lock)
     folder, held = _made_and_locked(root, prefix, lock, _TRIES)
     try:
@@ -38,8 +38,8 @@ def temporary_folder(prefix: str) -> AbstractContextManager[Path]:
 
 
 def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Path, FileLock]:
-    """The folder and its lock. Before that is held another process may remove the folder, and filelock makes it again,
-    for others to read: then it is another folder that is tried."""
+    """Return the folder and its lock. Before that is held another process may remove the folder,
+    and filelock makes it again, for others to read: then it is another folder that is tried."""
     folder = root / f"{prefix}{uuid.uuid4().hex[:12]}"
     folder.mkdir(mode=DRAFT_MODE)  # mkdtemp tries for ever where Windows lets no folder be made (python/cpython#66305)
     held = FileLock(folder / lock)
@@ -59,7 +59,7 @@ def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Pa
 
 
 def is_leftover(folder: Path, lock: str) -> bool:
-    """Whether nobody holds the file called `lock` in a folder, which is no link to one."""
+    """Tell whether nobody holds the file called `lock` in a folder, which is no link to one."""
     with _unless_locked(folder, lock) as free:
         return free
 
@@ -86,8 +86,8 @@ def remove_leftovers(root: Path, prefix: str, lock: str) -> None:
 
 @contextmanager
 def _unless_locked(folder: Path, lock: str) -> Iterator[bool]:
-    """Whether nobody else held the lock of a folder, which is held within; never that of another user's folder, or of
-    a link to one."""
+    """Tell whether nobody else held the lock of a folder, which is held within;
+    never that of another user's folder, or of a link to one."""
     try:
         status = folder.lstat()
         if not (stat.S_ISDIR(status.st_mode) and is_users_own(status)):

@@ -20,7 +20,7 @@ EXPECTED = f"a path with names of at most {LONGEST_NAME} bytes, and of at most {
 
 
 def flaw_of(path: str | os.PathLike[str], longest_name: int = LONGEST_NAME) -> str:
-    """Why a path is none of a file or a folder, in words; "" where it may be one."""
+    """Return why a path is none of a file or a folder, in words; "" where it may be one."""
     text = os.fspath(path)
     if not text:
         return "an empty path"
@@ -38,8 +38,8 @@ def flaw_of(path: str | os.PathLike[str], longest_name: int = LONGEST_NAME) -> s
 
 
 def unwritable(path: Path) -> tuple[str, str] | None:
-    """Why nothing can be written to a path, whatever is there, and what can, in words; None where it may be: it has no
-    name, one that is too long, or one that Windows does not take."""
+    """Return why nothing can be written to a path, whatever is there, and what can, in words;
+    None where it may be: it has no name, one that is too long, or one that Windows does not take."""
     if flaw := flaw_of(path, LONGEST_WRITTEN):
         return flaw, f"names of at most {LONGEST_WRITTEN} bytes"
     if why := name_refused(path):

@@ -26,12 +26,13 @@ file that appears."""
 
 
 def _quoted(word: str) -> str:
-    """A word of a command in quotes, of KEY=VALUE the value alone."""
+    """Return a word of a command in quotes, of KEY=VALUE the value alone."""
     return re.sub(r"([\w.]+=)?(.*)", r'\1"\2"', word, count=1, flags=re.DOTALL)
 
 
 def path_of(error: OSError) -> str:
-    """The path at which an error arose, of two the one to be written; "" where there is none."""
+    """Return the path at which an error arose, of two the one to be written;
+    "" where there is none."""
     return next(iter(_paths_of(error)), "")
 
 
@@ -75,14 +76,16 @@ if sys.platform == "win32":
         """Nothing: the timer ends with the process."""
 
     def signals_told() -> int:
-        """A descriptor from which the numbers of signals can be read as they come, a byte each."""
+        """Return a descriptor from which the numbers of signals can be read as they come,
+        a byte each."""
         outlet, inlet = os.pipe()
         signal.set_wakeup_fd(inlet, warn_on_full_buffer=False)
         return outlet
 
     def _may_be_held(error: OSError) -> bool:
-        """Whether another program may hold what is refused: Windows gives the same reason for what may not be used. A
-        file that was deleted while another program reads it stays in its folder for as long."""
+        """Tell whether another program may hold what is refused:
+        Windows gives the same reason for what may not be used. A file that was deleted while another program reads it
+        stays in its folder for as long."""
         refused = isinstance(error, PermissionError) and any(os.path.exists(path) for path in _paths_of(error))
         return refused or error.errno == errno.ENOTEMPTY
 
@@ -105,7 +108,8 @@ if sys.platform == "win32":
         once_free(partial(folder.rename, path))
 
     def name_refused(path: Path) -> str:
-        """Why Windows makes no file, or none of this name, at a path, in words; "" where it does."""
+        """Return why Windows makes no file, or none of this name, at a path, in words;
+        "" where it does."""
         pure = PureWindowsPath(path)
         for name in pure.relative_to(pure.anchor).parts:
             if name.split(".")[0].rstrip().upper() in _DEVICES:
@@ -115,8 +119,9 @@ if sys.platform == "win32":
         return ""
 
     def shell_word(word: str) -> str:
-        """A word of a command as cmd and PowerShell take it: cmd knows no quotes but "...". Within these cmd still
-        replaces %NAME%, and PowerShell $NAME and what follows a backtick: no quotes keep such a word in both."""
+        """Return a word of a command as cmd and PowerShell take it: cmd knows no quotes but "...".
+        Within these cmd still replaces %NAME%, and PowerShell $NAME and what follows a backtick: no quotes keep such a
+        word in both."""
         if re.fullmatch(r"[\w.:/\\=+-]+", word):
             return word
         return _quoted(re.sub(r'(\\*)(?="|\Z)', r"\1\1", word).replace('"', '\\"'))
@@ -133,7 +138,8 @@ if sys.platform == "win32":
             raise
 
     def cause_of(error: OSError) -> str:
-        """Why a file or a folder could not be used. Of a path that is too long Windows says that it is not there."""
+        """Return why a file or a folder could not be used.
+        Of a path that is too long Windows says that it is not there."""
         cause, path = error.strerror or str(error), path_of(error)
         if _may_be_held(error):
             return f"{cause}; it may be open in another program"
@@ -155,7 +161,7 @@ if sys.platform == "win32":
         return False
 
     def closed_to_others(folder: Path) -> os.stat_result:
-        """The status of a folder, as it is: see `foreign_writers`."""
+        """Return the status of a folder, as it is: see `foreign_writers`."""
         return folder.lstat()
 
 else:
@@ -257,8 +263,8 @@ else:
 
 
 def once_free(use: Callable[[], _T]) -> _T:
-    """What `use` returns: where another program holds the file open, it is tried again for as long as `PATIENCE`.
-    Raises what `use` raises."""
+    """Return what `use` returns: where another program holds the file open,
+    it is tried again for as long as `PATIENCE`. Raises what `use` raises."""
     end = time.monotonic() + PATIENCE
     while True:
         try:
@@ -270,7 +276,8 @@ def once_free(use: Callable[[], _T]) -> _T:
 
 
 def open_file(path: Path, flags: int) -> int:
-    """The descriptor of a file that is opened, once no other program holds it. Raises OSError, for a folder too."""
+    """Return the descriptor of a file that is opened, once no other program holds it.
+    Raises OSError, for a folder too."""
     if path.is_dir():  # which Windows calls one that may not be read
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     return once_free(partial(os.open, path, flags))
@@ -302,8 +309,8 @@ if sys.platform == "linux":
 
     @cache  # reading it takes half a millisecond, and many short batches ask for it
     def _share_of_time(proc: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")) -> float:
-        """How many cores' time the control groups of this process leave it, of either version; infinite without a
-        limit."""
+        """Return how many cores' time the control groups of this process leave it,
+        of either version; infinite without a limit."""
         try:
             lines = [line.split(":", 2) for line in proc.read_text(encoding="utf-8").splitlines()]
         except OSError:

@@ -72,7 +72,7 @@ def _is_whole(value: Any) -> bool:
 
 
 def _is_number(value: Any) -> bool:
-    """Whether a value is one number that a float can be."""
+    """Tell whether a value is one number that a float can be."""
     if not isinstance(value, Real) or isinstance(value, bool):
         return False
     try:
@@ -211,9 +211,9 @@ def alternatives(annotation: str) -> list[str]:
 
 
 def check_arguments(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
-    """A function that raises InputError for an argument of another type than is annotated, and for a path that is none,
-    and TypeError for a keyword that it lacks; where it takes a Stage, it takes its file or tables as well. Raises
-    KeyError for an annotation that is no kind of argument."""
+    """Return a function that raises InputError for an argument of another type than is
+    annotated, and for a path that is none, and TypeError for a keyword that it lacks; where it takes a Stage, it takes
+    its file or tables as well. Raises KeyError for an annotation that is no kind of argument."""
     parameters = signature(function)
     kinds = {
         name: {part: KINDS[part] for part in alternatives(str(parameter.annotation))}
@@ -242,7 +242,7 @@ def check_arguments(function: Callable[Arguments, Returned]) -> Callable[Argumen
 
 
 def near_words(word: str, words: Iterable[str]) -> str:
-    """What to say of a word that is none of some words: which is nearest, or all of them."""
+    """Return what to say of a word that is none of some words: which is nearest, or all of them."""
     from difflib import get_close_matches
 
     near = get_close_matches(word, words := [*words], 1)
@@ -250,7 +250,7 @@ def near_words(word: str, words: Iterable[str]) -> str:
 
 
 def _read_stage(source: Any) -> Stage:
-    """The stage of a file, or of tables."""
+    """Return the stage of a file, or of tables."""
     from friso.stage.files import load
 
     return Stage(**source) if isinstance(source, Mapping) else load(source)

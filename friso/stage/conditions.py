@@ -15,7 +15,8 @@ from_0_to_1 = Bound("from 0 to 1", lambda value: (value >= 0) & (value <= 1))
 
 
 def _falls(flat: Mapping[str, Any]) -> Any:
-    """Whether static friction is no smaller than Coulomb friction, under a law that has both, there and then."""
+    """Tell whether static friction is no smaller than Coulomb friction,
+    under a law that has both, there and then."""
     if not {"friction.static", "friction.coulomb"} <= {*flat}:
         return True
     static, coulomb = (flat[f"friction.{x}"] * flat.get(f"{CONDITIONS}.{x}_factor", 1.0) for x in ("static", "coulomb"))

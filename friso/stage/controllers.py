@@ -99,27 +99,30 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def pick(cls, forms: "Sequence[type[ControllerSection]]", table: Mapping[str, Any]) -> "type[ControllerSection]":
-        """The form of a [controller] table of this kind. Raises StageError."""
+        """Return the form of a [controller] table of this kind. Raises StageError."""
         return forms[0]
 
     @classmethod
     def with_defaults(cls, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Keys that follow other keys of the stage where its file leaves them out, to their values."""
+        """Return keys that follow other keys of the stage where its file leaves them out,
+        to their values."""
         return {}
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> Hashable:
-        """What else than the form the equations depend on, such as terms that are absent."""
+        """Return what else than the form the equations depend on, such as terms that are absent."""
         return None
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
-        """Whether there is integral action, which winds up while a stage sticks off its reference."""
+        """Tell whether there is integral action, which winds up while a stage sticks off its
+        reference."""
         raise NotImplementedError
 
     @classmethod
     def takes_velocity(cls, flat: Mapping[str, Any]) -> bool:
-        """Whether it acts on a measured velocity, which may come from another encoder than the position."""
+        """Tell whether it acts on a measured velocity,
+        which may come from another encoder than the position."""
         return cls.feeds_back == "velocity"
 
     @classmethod
@@ -129,8 +132,8 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def declare(cls, measured: Any, blocks: Any, variant: Any) -> Mapping[str, Any]:
-        """The shares of the force [N], each a signal made by the `blocks` (`friso.equations.blocks`) from what is
-        `measured`."""
+        """Return the shares of the force [N], each a signal made by the `blocks`
+        (`friso.equations.blocks`) from what is `measured`."""
         raise NotImplementedError
 
     @classmethod
@@ -142,7 +145,8 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """The numbers for a drive: its keys that are not 0, then those that every controller has."""
+        """Return the numbers for a drive: its keys that are not 0,
+        then those that every controller has."""
         fields = numeric_fields(cls)
         names = sorted(fields, key=lambda name: name in ControllerSection.model_fields)
         return tuple(
@@ -153,7 +157,7 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def _called(cls, name: str) -> tuple[str, str]:
-        """What a key is called in a table of gains, and its symbol."""
+        """Return what a key is called in a table of gains, and its symbol."""
         return {**SYMBOLS, **cls.symbols}.get(name, (name.replace("_", " "), name))
 
     @classmethod
@@ -164,7 +168,7 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def key(cls, name: str) -> str:
-        """The stage-file key of a name in the table."""
+        """Return the stage-file key of a name in the table."""
         return f"{CONTROLLER}.{name}"
 
 
@@ -177,7 +181,7 @@ class Controllers(Variants):
 
     @property
     def forms(self) -> dict[str, list[type[ControllerSection]]]:
-        """The forms of each kind."""
+        """Return the forms of each kind."""
         load_own(self.group)
         return self._forms
 
@@ -190,28 +194,29 @@ class Controllers(Variants):
         return cls
 
     def pick(self, table: dict[str, Any]) -> type[Section]:
-        """The class for a [controller] table. Raises InputError for an unknown kind, StageError for an unclear form."""
+        """Return the class for a [controller] table. Raises InputError for an unknown kind,
+        StageError for an unclear form."""
         owner = cast(type[ControllerSection], super().pick(table))
         return owner.pick(self.forms[table[self.tag]], table)
 
     def of(self, flat: Mapping[str, Any]) -> type[ControllerSection]:
-        """The class of the controller of a stage given as flat keys."""
+        """Return the class of the controller of a stage given as flat keys."""
         forms = self._forms_of(flat[KIND])
         recognised = (form for form in forms if any(form.key(name) in flat for name in form.recognised_by))
         return next(recognised, None) or next(form for form in forms if not form.recognised_by)
 
     @property
     def words(self) -> dict[str, str]:
-        """What keys are called on the axes of maps."""
+        """Return what keys are called on the axes of maps."""
         forms_of_all = (form for forms in self.forms.values() for form in forms)
         return {form.key(name): word for form in forms_of_all for name, word in form.words.items()}
 
     def form(self, kind: str, name: str) -> type[ControllerSection]:
-        """The form of a kind whose class has this name."""
+        """Return the form of a kind whose class has this name."""
         return next(form for form in self._forms_of(kind) if form.__name__ == name)
 
     def _forms_of(self, kind: str) -> list[type[ControllerSection]]:
-        """The forms of a kind, which an installed package may declare."""
+        """Return the forms of a kind, which an installed package may declare."""
         self.named(kind)
         return self.forms[kind]
 
@@ -221,11 +226,11 @@ register_controller = CONTROLLERS.register
 
 
 def controller_of(flat: Mapping[str, Any]) -> type[ControllerSection]:
-    """The class of the controller of a stage given as flat keys."""
+    """Return the class of the controller of a stage given as flat keys."""
     return CONTROLLERS.of(flat)
 
 
 def as_tuned(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """The keys of a controller that follow other keys of the stage, with their present values: it is tuned once, for
-    the machine of the stage file."""
+    """Return the keys of a controller that follow other keys of the stage,
+    with their present values: it is tuned once, for the machine of the stage file."""
     return {key: flat[key] for key in controller_of(flat).with_defaults(flat)}

@@ -53,12 +53,13 @@ class Correlations:
             raise StageError("matrix", problem, "a correlation matrix, one row and one column per key", _EXAMPLE)
 
     def among(self, keys: Iterable[str]) -> Correlations:
-        """Those of some of the keys."""
+        """Return those of some of the keys."""
         places = [k for k, key in enumerate(self.keys) if key in [*keys]]
         return Correlations(tuple(self.keys[k] for k in places), self.matrix[np.ix_(places, places)])
 
     def over(self, keys: list[str]) -> np.ndarray:
-        """The matrix of all `keys`, shape (keys, keys); those that this does not name are independent."""
+        """Return the matrix of all `keys`, shape (keys, keys);
+        those that this does not name are independent."""
         matrix = np.eye(len(keys))
         places = [keys.index(key) for key in self.keys]
         matrix[np.ix_(places, places)] = self.matrix
@@ -66,7 +67,7 @@ class Correlations:
 
 
 def _problem(matrix: np.ndarray, size: int) -> str:
-    """Why this is no correlation matrix of so many keys; "" if it is one."""
+    """Return why this is no correlation matrix of so many keys; "" if it is one."""
     if matrix.shape != (size, size):
         return f"{' x '.join(map(str, matrix.shape))} numbers for {size} keys"
     if not np.isfinite(matrix).all():
@@ -81,12 +82,14 @@ def _problem(matrix: np.ndarray, size: int) -> str:
 
 
 def correlations_file(path: str | os.PathLike[str]) -> Path:
-    """Where the correlations of a stage file stand: stage.toml has stage.correlations.toml."""
+    """Return where the correlations of a stage file stand:
+    stage.toml has stage.correlations.toml."""
     return Path(path).with_suffix(".correlations.toml")
 
 
 def read_correlations(path: str | os.PathLike[str], stage: Stage) -> Correlations:
-    """The correlations of a file, which are to be of uncertain keys of the stage. Raises StageError."""
+    """Return the correlations of a file, which are to be of uncertain keys of the stage.
+    Raises StageError."""
     try:
         correlations = _from(parsed(text_of(Path(path), _EXPECTED, _EXAMPLE), _EXPECTED, _EXAMPLE))
         _belongs(correlations, stage)
@@ -96,7 +99,8 @@ def read_correlations(path: str | os.PathLike[str], stage: Stage) -> Correlation
 
 
 def correlations_text(correlations: Correlations, stage: Stage) -> str:
-    """The file of the correlations of uncertain keys of the stage. Raises StageError where they are not of it."""
+    """Return the file of the correlations of uncertain keys of the stage.
+    Raises StageError where they are not of it."""
     _belongs(correlations, stage)
     rows = [f"  [{', '.join(repr(float(value)) for value in row)}]," for row in correlations.matrix]
     names = [f"  {as_toml(key)}," for key in correlations.keys]
@@ -181,7 +185,8 @@ def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sam
 
 
 def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, np.ndarray]:
-    """The uncertain keys at shares, shape (count, keys), of independent uniform distributions."""
+    """Return the uncertain keys at shares, shape (count, keys),
+    of independent uniform distributions."""
     from scipy.special import ndtr, ndtri
 
     sizes, directions = np.linalg.eigh(matrix)
@@ -198,7 +203,8 @@ def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, n
 
 
 def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which draws a stage may have, and which rule between keys ("" none) the others break, both of shape (count,)."""
+    """Return which draws a stage may have, and which rule between keys ("" none) the others
+    break, both of shape (count,)."""
     fields = stage.numeric_keys()
     within = np.all([fields[key].bound.holds(values) for key, values in keys.items()], axis=0)
     why = np.full(count, "", dtype=object)
@@ -210,6 +216,7 @@ def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[
 
 
 def laid_over(stage: Stage, keys: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """The flat keys of drawn stages. The controller stays as tuned: it does not know the mass that was drawn."""
+    """Return the flat keys of drawn stages. The controller stays as tuned:
+    it does not know the mass that was drawn."""
     flat = stage.flat()
     return stage.flat(as_tuned(flat) | dict(keys))

@@ -41,7 +41,7 @@ _EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
 
 @check_arguments
 def load(path: str | os.PathLike[str]) -> Stage:
-    """The stage of the TOML file at `path`. Raises StageError.
+    """Return the stage of the TOML file at `path`. Raises StageError.
 
     Examples
     --------
@@ -53,12 +53,13 @@ def load(path: str | os.PathLike[str]) -> Stage:
 
 
 def load_tables(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The tables of a stage file, which need not make a whole stage. Raises StageError."""
+    """Return the tables of a stage file, which need not make a whole stage. Raises StageError."""
     return _hinted(path, lambda text: parsed(text, _EXPECTED))
 
 
 def _hinted(path: str | os.PathLike[str], read: Callable[[str], Read]) -> Read:
-    """What a stage file is read as; an error says what a file of another kind is for. Raises StageError."""
+    """Return what a stage file is read as; an error says what a file of another kind is for.
+    Raises StageError."""
     try:
         return read(text_of(Path(path), _EXPECTED))
     except InputError as error:
@@ -71,7 +72,8 @@ def _hinted(path: str | os.PathLike[str], read: Callable[[str], Read]) -> Read:
 
 
 def load_changed(path: Path, changes: Mapping[str, Any]) -> Stage:
-    """The stage of a file with dotted keys set, which the file may lack. Raises StageError."""
+    """Return the stage of a file with dotted keys set, which the file may lack.
+    Raises StageError."""
     try:
         return changed(parsed(text_of(path, _EXPECTED), _EXPECTED), changes)
     except InputError as error:
@@ -80,7 +82,7 @@ def load_changed(path: Path, changes: Mapping[str, Any]) -> Stage:
 
 @check_arguments
 def loads(text: str, origin: str = "stage file") -> Stage:
-    """The stage of a TOML text; `origin` names it in errors. Raises StageError.
+    """Return the stage of a TOML text; `origin` names it in errors. Raises StageError.
 
     Examples
     --------
@@ -147,7 +149,8 @@ def parse_set(text: str) -> tuple[str, Any]:
 
 
 def _value(text: str) -> Any:
-    """A TOML value, or the text itself; an inline table holds neither comments nor a second line."""
+    """Return a TOML value, or the text itself;
+    an inline table holds neither comments nor a second line."""
     if _MANY_PARTS.search(text):
         return text
     try:
@@ -159,9 +162,9 @@ def _value(text: str) -> Any:
 
 
 def text_of(path: Path, expected: str, example: str = _EXAMPLE, latin: bool = False) -> str:
-    """What stands in a text file, which is to be what is `expected`; where it may be Latin-1 (`latin`), as older
-    programs write it, that is read too. Raises InputError, also for a device, for a pipe and for more than MOST_BYTES.
-    """
+    """Return what stands in a text file, which is to be what is `expected`;
+    where it may be Latin-1 (`latin`), as older programs write it, that is read too. Raises InputError, also for a
+    device, for a pipe and for more than MOST_BYTES."""
     try:
         content = content_of(path, MOST_BYTES)
         return _utf_8_or_latin(content) if latin and not _NO_TEXT.search(content) else content.decode("utf-8-sig")
@@ -194,7 +197,7 @@ def _reason(error: OSError | ValueError) -> str:
 
 
 def parsed(text: str, expected: str, example: str = _EXAMPLE) -> dict[str, Any]:
-    """The tables of a TOML text that is to be what is `expected`. Raises InputError."""
+    """Return the tables of a TOML text that is to be what is `expected`. Raises InputError."""
     if not text.strip():
         raise InputError("", "an empty file", expected, example)
     if key := _MANY_PARTS.search(text):
@@ -235,7 +238,7 @@ _WIDTH = 100
 
 
 def _syntax_error(text: str, message: str) -> str:
-    """What is wrong with a TOML text, and the line with a caret below the place."""
+    """Return what is wrong with a TOML text, and the line with a caret below the place."""
     place = _PLACE.search(message)
     if place is None:
         return message
@@ -257,7 +260,7 @@ _INDENT = " " * 12
 
 
 def _open_quote(line: str) -> int | None:
-    """Where the quote stands that is not closed in a line, None for none."""
+    """Return where the quote stands that is not closed in a line, None for none."""
     opened, escaped = None, False
     for place, sign in enumerate(line):
         if escaped:

@@ -45,12 +45,12 @@ class FilterSection(UncertainSection):
 
     @classmethod
     def variant(cls, row: Mapping[str, Any]) -> Hashable:
-        """What else its equations depend on, such as its order; `row` are its keys."""
+        """Return what else its equations depend on, such as its order; `row` are its keys."""
         return None
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: Any) -> Transfer:
-        """The transfer function from its keys, numbers or symbols."""
+        """Return the transfer function from its keys, numbers or symbols."""
         raise NotImplementedError
 
 
@@ -82,7 +82,7 @@ class NotchFilter(ContinuousFilter):
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
-        """The formula of the class."""
+        """Return the formula of the class."""
         omega, width = _omega(row["frequency"]), _omega(row["width"])
         damping, bend = width / omega**2, 1 / omega**2
         return Transfer((1, (1 - row["depth"]) * damping, bend), (1, damping, bend))
@@ -100,12 +100,12 @@ class LowPassFilter(ContinuousFilter):
 
     @classmethod
     def variant(cls, row: Mapping[str, Any]) -> int:
-        """The order."""
+        """Return the order."""
         return int(row["order"])
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: int) -> Transfer:
-        """The formula of the class."""
+        """Return the formula of the class."""
         omega = _omega(row["frequency"])
         lower = (1, 1 / omega, 0) if variant == 1 else _second_order(omega, row["damping_ratio"])
         return Transfer((1, 0, 0), lower)
@@ -121,7 +121,7 @@ class LeadLagFilter(ContinuousFilter):
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
-        """The formula of the class."""
+        """Return the formula of the class."""
         zero, pole = (_omega(row[f"{place}_frequency"]) for place in ("zero", "pole"))
         return Transfer((1, 1 / zero, 0), (1, 1 / pole, 0))
 
@@ -147,7 +147,7 @@ class BiquadFilter(ContinuousFilter):
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
-        """The formula of the class."""
+        """Return the formula of the class."""
         zeros, poles = (
             _second_order(_omega(row[f"{place}_frequency"]), row[f"{place}_damping"]) for place in ("zero", "pole")
         )
@@ -180,7 +180,7 @@ class SampledBiquadFilter(FilterSection):
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
-        """The formula of the class."""
+        """Return the formula of the class."""
         half = row["sample_time"] / 2
         b0, b1, b2 = (row[f"numerator.{n}"] for n in (1, 2, 3))
         a1, a2 = (row[f"denominator.{n}"] for n in (1, 2))
@@ -213,12 +213,12 @@ class FilterForm(NamedTuple):
 
     @property
     def section(self) -> type[FilterSection]:
-        """The class that declares its transfer function."""
+        """Return the class that declares its transfer function."""
         return FILTERS.classes[self.kind]  # type: ignore[return-value]
 
 
 def filter_forms(flat: Mapping[str, Any], key: str) -> tuple[FilterForm, ...]:
-    """The filters of a stage given as flat keys, the array having a `key`."""
+    """Return the filters of a stage given as flat keys, the array having a `key`."""
     forms = []
     for place in row_keys(flat, key):
         row = keys_below(flat, place)

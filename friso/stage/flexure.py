@@ -31,7 +31,7 @@ def register_derivation(table: str) -> Callable[[Derivation], Derivation]:
 
 
 def derived(flat: dict[str, Any]) -> dict[str, Any]:
-    """The flat keys with all that follow from their tables."""
+    """Return the flat keys with all that follow from their tables."""
     load_own("friso.derivations")
     tables = {key.split(".")[0] for key in flat}
     for table, derivation in DERIVATIONS.items():
@@ -145,7 +145,7 @@ Flexure = create_model(
 
 
 def unknown_material(name: str) -> StageError:
-    """The error for a material that is not known, naming the nearest that is."""
+    """Return the error for a material that is not known, naming the nearest that is."""
     near = nearest_name(name, materials()) or next(
         (material for material in materials() if name.lower() in material), None
     )
@@ -155,7 +155,7 @@ def unknown_material(name: str) -> StageError:
 
 
 def with_material(flat: dict[str, Any]) -> dict[str, Any]:
-    """The flat keys of leaves with the numbers of their material."""
+    """Return the flat keys of leaves with the numbers of their material."""
     name = flat.get("flexure.material")
     if not name:
         return flat

@@ -25,7 +25,7 @@ class Values(tuple[Any, ...]):
 
     @property
     def text(self) -> list[Any]:
-        """What the user wrote."""
+        """Return what the user wrote."""
         return [getattr(value, "text", value) for value in self]
 
 
@@ -34,7 +34,7 @@ class Rows(tuple[Any, ...]):
 
     @property
     def text(self) -> list[Any]:
-        """What the user wrote."""
+        """Return what the user wrote."""
         return [row.as_written() for row in self]
 
 
@@ -48,25 +48,25 @@ class Several:
     most: int | None = None
 
     def on(self, kind: AxisKind) -> Self:
-        """What the key takes on an axis of that kind."""
+        """Return what the key takes on an axis of that kind."""
         examples = tuple(replace(self.of, example=text).on(kind).example for text in self.examples)
         return replace(self, of=self.of.on(kind), examples=examples)
 
     @property
     def expected(self) -> str:
-        """What the key takes, in words."""
+        """Return what the key takes, in words."""
         count = f"{_WORDS[self.least]} or more" if self.most is None else f"{self.least} to {self.most}"
         return f"an array of {count}, each {self.of.expected}"
 
     @property
     def written_example(self) -> str:
-        """The example as it stands in a file."""
+        """Return the example as it stands in a file."""
         quote = '"' if isinstance(self.of, Quantity) else ""
         return f"[{', '.join(f'{quote}{example}{quote}' for example in self.examples)}]"
 
     def read(self, raw: Any, read_one: Callable[[Any], Any] | None = None) -> Values:
-        """The values of an array, each read by `read_one` or as the key's kind is. Raises InputError, under the number
-        of the element that is wrong."""
+        """Return the values of an array, each read by `read_one` or as the key's kind is.
+        Raises InputError, under the number of the element that is wrong."""
         size = len(raw) if isinstance(raw, list | tuple) else None
         if size is None or size < self.least or size > (self.most or size):
             hint = "not an array" if size is None else f"of {size}"
@@ -87,11 +87,13 @@ class Several:
 
 
 def element_keys(flat: Mapping[str, Any], key: str) -> list[str]:
-    """The flat keys of the elements of an array, in order; none where the stage does not have it."""
+    """Return the flat keys of the elements of an array, in order;
+    none where the stage does not have it."""
     return [*takewhile(flat.__contains__, (f"{key}.{number}" for number in count(1)))]
 
 
 def row_keys(flat: Mapping[str, Any], key: str) -> list[str]:
-    """The beginnings of the flat keys of an array's tables, in order; none where the stage does not have it."""
+    """Return the beginnings of the flat keys of an array's tables, in order;
+    none where the stage does not have it."""
     places = (f"{key}.{number}" for number in count(1))
     return [*takewhile(lambda place: any(name.startswith(f"{place}.") for name in flat), places)]

@@ -81,7 +81,8 @@ _ROTARY: Mapping[str, _Usual] = {
 
 
 def idle_encoder(stage: Stage) -> Iterator[str]:
-    """A sentence where the velocity is to come from another encoder than the position, and no velocity is taken."""
+    """Yield a sentence where the velocity is to come from another encoder than the position,
+    and no velocity is taken."""
     sides, controller = stage.encoder, stage.controller
     if sides and controller and sides.velocity != sides.position and not controller.takes_velocity(stage.flat()):
         yield (
@@ -91,7 +92,8 @@ def idle_encoder(stage: Stage) -> Iterator[str]:
 
 
 def implausible_values(stage: Stage) -> Iterator[str]:
-    """A sentence on each implausible value: key, value, and the unit that probably was meant.
+    """Yield a sentence on each implausible value: key, value,
+    and the unit that probably was meant.
 
     Friction and gains are judged by the mass: where a mass in another unit would make several of them usual, the mass
     is named instead.
@@ -113,7 +115,7 @@ def implausible_values(stage: Stage) -> Iterator[str]:
 
 
 def _other_units(stage: Stage, key: str) -> Iterator[tuple[str, float]]:
-    """The units in which a mass may have been meant, and by what it changes then."""
+    """Yield the units in which a mass may have been meant, and by what it changes then."""
     written = _written(stage, key)
     unit = written.partition(" ")[2].strip()
     if stage.axis_kind == ROTARY or unit not in _MASS.units:
@@ -123,7 +125,7 @@ def _other_units(stage: Stage, key: str) -> Iterator[tuple[str, float]]:
 
 
 def _complaints(stage: Stage, flat: Mapping[str, Any]) -> dict[str, str]:
-    """A sentence on each implausible value of a stage, given as flat keys, by key."""
+    """Return a sentence on each implausible value of a stage, given as flat keys, by key."""
     return dict(_judged(stage, flat))
 
 
@@ -152,7 +154,8 @@ _OF_FILTER = re.compile(r"controller\.filters\.\d+\.(frequency|width)")
 
 
 def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
-    """What is usual: friction follows the weight, and what gives way before it slides follows friction."""
+    """Return what is usual: friction follows the weight,
+    and what gives way before it slides follows friction."""
     carried, moving = sum(flat.get(f"masses.{body}", 0.0) for body in ("cart", "stage")), moving_mass(flat)
     usual = dict(_USUAL)
     for table, mass in {"friction": carried, MOTOR_FRICTION: moving}.items():
@@ -170,13 +173,14 @@ def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
 
 
 def _presliding(force: float) -> _Usual:
-    """What is usual for the stiffness with which a contact takes a force before it slides."""
+    """Return what is usual for the stiffness with which a contact takes a force before it
+    slides."""
     low, high = (force / way for way in reversed(PRESLIDING))
     return _Usual(low, high or inf, "N/m", _STIFFNESSES)
 
 
 def _written(stage: Stage, key: str) -> str:
-    """What the user wrote; "" for what follows from other keys."""
+    """Return what the user wrote; "" for what follows from other keys."""
     here: Any = stage.as_written()
     for name in key.split("."):
         here = here[int(name) - 1] if isinstance(here, list) else here.get(name, "")
@@ -186,7 +190,7 @@ def _written(stage: Stage, key: str) -> str:
 
 
 def _question(written: str, usual: _Usual) -> str:
-    """Which unit was probably meant: one with which the same number is usual."""
+    """Return which unit was probably meant: one with which the same number is usual."""
     number, _, unit = written.partition(" ")
     for other in usual.units:
         factor = Quantity(usual.unit, any_sign, "").factor(other)

@@ -34,7 +34,7 @@ class PlugIn:
 
     @property
     def digest(self) -> str:
-        """A digest of the module's source."""
+        """Return a digest of the module's source."""
         return hashlib.sha256(Path(self.file).read_bytes() if self.file else b"").hexdigest()
 
     def load(self) -> None:
@@ -58,7 +58,7 @@ class PlugIn:
 
 
 def plug_in_of(cls: type) -> PlugIn | None:
-    """The plug-in that a class comes from; None for friso's own."""
+    """Return the plug-in that a class comes from; None for friso's own."""
     if cls.__module__.split(".")[0] == OWN:
         return None
     file = getattr(sys.modules.get(cls.__module__), "__file__", None)
@@ -66,7 +66,7 @@ def plug_in_of(cls: type) -> PlugIn | None:
 
 
 def plug_ins(classes: Iterable[type]) -> tuple[PlugIn, ...]:
-    """The plug-ins that these classes come from, each once."""
+    """Return the plug-ins that these classes come from, each once."""
     return tuple(dict.fromkeys(plug_in for cls in classes if (plug_in := plug_in_of(cls))))
 
 

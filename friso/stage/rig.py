@@ -41,7 +41,7 @@ LOOPS = ("velocity", "position")
 
 
 def _multiple(slow: str, fast: str, longer: str, shorter: str) -> Rule:
-    """The rule that one sample time is a whole multiple of another."""
+    """Return the rule that one sample time is a whole multiple of another."""
     optional = "velocity" in fast
 
     def holds(flat: Mapping[str, Any]) -> Any:
@@ -57,7 +57,7 @@ def _multiple(slow: str, fast: str, longer: str, shorter: str) -> Rule:
 
 
 def _one_travel(flat: Mapping[str, Any]) -> Any:
-    """Whether what a turn moves is told once, or twice the same."""
+    """Tell whether what a turn moves is told once, or twice the same."""
     of_drive, lead, ratio = (
         flat.get(key) for key in ("drive.travel_per_turn", "transmission.lead", "transmission.ratio")
     )
@@ -66,7 +66,8 @@ def _one_travel(flat: Mapping[str, Any]) -> Any:
 
 
 def _below_half_the_rate(flat: Mapping[str, Any]) -> Any:
-    """Whether the filters that are exact at a frequency, which sampling allows below half its own, keep to that."""
+    """Tell whether the filters that are exact at a frequency,
+    which sampling allows below half its own, keep to that."""
     fine: Any = True
     for place in row_keys(flat, FILTERS_KEY) if "drive.sample_time" in flat else ():
         law: Any = FILTERS.classes[flat[f"{place}.kind"]]
@@ -154,7 +155,7 @@ _HARMONICS = ("rail.first_harmonic", "rail.second_harmonic", "rail.third_harmoni
 
 
 def _total(flat: Mapping[str, Any], keys: tuple[str, ...]) -> Any:
-    """The sum of some keys."""
+    """Return the sum of some keys."""
     return sum(flat[key] for key in keys)
 
 
@@ -214,11 +215,11 @@ class Density(Quantity):
 
     @property
     def expected(self) -> str:
-        """What the key takes, in words."""
+        """Return what the key takes, in words."""
         return f"number and unit in quotes, convertible to {self.unit}, and /Hz^0.5, {self.bound.text}"
 
     def read(self, entry: Any) -> Value:
-        """The SI value of a text (or of the text of a Value). Raises StageError."""
+        """Return the SI value of a text (or of the text of a Value). Raises StageError."""
         text = getattr(entry, "text", entry)
         amplitude = _PER_ROOT_HERTZ.sub("", text) if isinstance(text, str) else text
         if amplitude == text and isinstance(text, str):

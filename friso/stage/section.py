@@ -42,7 +42,7 @@ class Rule:
 
 
 def keys_below(flat: Mapping[str, Any], place: str) -> dict[str, Any]:
-    """The flat keys of a table, without its place."""
+    """Return the flat keys of a table, without its place."""
     return {key.removeprefix(f"{place}."): value for key, value in flat.items() if key.startswith(f"{place}.")}
 
 
@@ -64,7 +64,8 @@ class Section(BaseModel):
 
     @classmethod
     def on(cls, kind: AxisKind, data: Mapping[str, Any]) -> Self:
-        """The section of a stage with that kind of axis, which decides on the units of its keys."""
+        """Return the section of a stage with that kind of axis,
+        which decides on the units of its keys."""
         section = cls.__new__(cls)
         section._take(data, kind)
         return section
@@ -89,7 +90,7 @@ class Section(BaseModel):
         super().__setattr__(name, value)
 
     def as_written(self) -> dict[str, Any]:
-        """The keys that the user gave, with the values as written."""
+        """Return the keys that the user gave, with the values as written."""
         values = {key: getattr(self, key) for key in type(self).model_fields if key in self.model_fields_set}
         return {key: getattr(value, "text", value) for key, value in values.items()}
 
@@ -110,7 +111,8 @@ class UncertainSection(Section):
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """The values by key; those of an array by key and number, from 1, and those of tables in it by theirs."""
+        """Return the values by key; those of an array by key and number, from 1,
+        and those of tables in it by theirs."""
         values: dict[str, Any] = {}
         for key, value in self:
             if isinstance(value, Values):
@@ -123,13 +125,13 @@ class UncertainSection(Section):
         return values
 
     def uncertain(self) -> dict[str, Interval]:
-        """The intervals of the uncertain quantities by key, those without width left out."""
+        """Return the intervals of the uncertain quantities by key, those without width left out."""
         values = {key: value.interval for key, value in self.numbers.items() if isinstance(value, UncertainValue)}
         return {key: interval for key, interval in values.items() if interval.low < interval.high}
 
 
 def _perhaps_uncertain(value: Any, field: Quantity | Number) -> Any:
-    """The value of an element, uncertain where its text has a range. Raises InputError."""
+    """Return the value of an element, uncertain where its text has a range. Raises InputError."""
     text = getattr(value, "text", value)
     return uncertain_value(text, field) if is_range(text) else field.read(value)
 
@@ -145,7 +147,7 @@ class Table:
     example: str
 
     def read(self, entry: Any, info: ValidationInfo) -> Any:
-        """The section for a table; a section is left as it is. Raises InputError."""
+        """Return the section for a table; a section is left as it is. Raises InputError."""
         if isinstance(entry, Section):
             return entry
         if not isinstance(entry, dict):
@@ -168,13 +170,13 @@ class Variants:
 
     @property
     def classes(self) -> dict[str, type[Section]]:
-        """The variants by name; of those of modules of their own first friso's, alphabetically, whichever was imported
-        first."""
+        """Return the variants by name; of those of modules of their own first friso's,
+        alphabetically, whichever was imported first."""
         load_own(self.group)
         return self._classes
 
     def name_of(self, cls: type[Section]) -> str:
-        """The name that a variant declares as `kind: Literal["step"]`."""
+        """Return the name that a variant declares as `kind: Literal["step"]`."""
         return get_args(cls.model_fields[self.tag].annotation)[0]
 
     def register(self, cls: SectionClass) -> SectionClass:
@@ -197,13 +199,13 @@ class Variants:
         return cls
 
     def named(self, name: Any) -> type[Section] | None:
-        """The class of a variant; None for a name that nobody declares."""
+        """Return the class of a variant; None for a name that nobody declares."""
         if name not in self.classes and self.group:
             load_installed(self.group)
         return self.classes.get(name)
 
     def pick(self, table: dict[str, Any]) -> type[Section]:
-        """The class for a table. Raises InputError when the tag is missing or unknown."""
+        """Return the class for a table. Raises InputError when the tag is missing or unknown."""
         name = table.get(self.tag)
         if isinstance(name, str) and (cls := self.named(name)):
             return cls
@@ -221,7 +223,8 @@ class TableArray:
     most: int
 
     def read(self, entries: Any, info: ValidationInfo) -> Rows:
-        """The sections for an array of tables. Raises InputError, under the number of the one that is wrong."""
+        """Return the sections for an array of tables. Raises InputError,
+        under the number of the one that is wrong."""
         size = len(entries) if isinstance(entries, list | tuple) else None
         if size is None or size > self.most:
             text = quoted(entries) if size is None else f"{size} tables"
@@ -235,7 +238,7 @@ class TableArray:
         return Rows(rows)
 
     def rows(self, flat: Mapping[str, Any], key: str) -> dict[str, type[Section]]:
-        """The places of an array's tables in a stage given as flat keys, and their classes."""
+        """Return the places of an array's tables in a stage given as flat keys, and their classes."""
         return {place: self.variants.pick(keys_below(flat, place)) for place in row_keys(flat, key)}
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -244,7 +247,7 @@ class TableArray:
 
 @cache
 def table_arrays(cls: type[Section]) -> Mapping[str, TableArray]:
-    """The keys of a table that take an array of tables."""
+    """Return the keys of a table that take an array of tables."""
     items = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
     return {key: item for key, item in items if isinstance(item, TableArray)}
 
@@ -258,18 +261,18 @@ def numeric_fields(cls: type[Section]) -> Mapping[str, Quantity | Number]:
 
 @cache
 def list_fields(cls: type[Section]) -> Mapping[str, Several]:
-    """The keys of a table that take an array, and what of."""
+    """Return the keys of a table that take an array, and what of."""
     items = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
     return {key: item for key, item in items if isinstance(item, Several)}
 
 
 def nearest_name(name: Any, names: Iterable[str]) -> str | None:
-    """The known name most like `name`, if one is like it."""
+    """Return the known name most like `name`, if one is like it."""
     return next(iter(difflib.get_close_matches(str(name).lower(), [*names], n=1, cutoff=0.7)), None)
 
 
 def unknown_key(key: str, names: Iterable[str], example: str = "") -> InputError:
-    """The error for a key that does not exist, naming the nearest that does."""
+    """Return the error for a key that does not exist, naming the nearest that does."""
     near = nearest_name(key, names)
     hint = f"an unknown key; did you mean {near}?" if near else "an unknown key"
     return InputError(key, hint, f"one of {', '.join(names)}", example)
@@ -293,7 +296,7 @@ def _problems(cls: type[Section], error: ValidationError, kind: AxisKind) -> Inp
 
 
 def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
-    """The error for one entry of pydantic's list."""
+    """Return the error for one entry of pydantic's list."""
     key = ".".join(map(str, problem["loc"]))
     cause = problem.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
@@ -305,20 +308,21 @@ def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
 
 
 def _own_first(cls: type[Section]) -> list[str]:
-    """The keys of a table, its own before those that it shares with others."""
+    """Return the keys of a table, its own before those that it shares with others."""
     declared = (name for base in cls.__mro__ for name in vars(base).get("__annotations__", ()))
     return [name for name in dict.fromkeys(declared) if name in cls.model_fields]
 
 
 def _complete(error: InputError, key: str) -> InputError:
-    """The error seen from the table: below `key`, which also goes before an example that is a mere value."""
+    """Return the error seen from the table: below `key`,
+    which also goes before an example that is a mere value."""
     is_value = not error.key and error.example and "=" not in error.example
     example = f"{key} = {error.example}" if is_value else error.example
     return InputError(error.key, error.actual, error.expected, example, also=error.also).under(key)
 
 
 def _described(cls: type[Section], key: str, kind: AxisKind) -> tuple[str, str]:
-    """What a key takes, and an example of it."""
+    """Return what a key takes, and an example of it."""
     field = cls.model_fields[key]
     for item in field.metadata:
         if isinstance(item, Table):

@@ -132,7 +132,7 @@ class Stage(Section):
         self._take(data, axis_written(data))
 
     def __getstate__(self) -> dict[Any, Any]:
-        """What is pickled: the tables, without what has been worked out from them."""
+        """Return what is pickled: the tables, without what has been worked out from them."""
         state = super().__getstate__()
         return state | {"__dict__": {key: item for key, item in state["__dict__"].items() if not key.startswith("_")}}
 
@@ -218,12 +218,13 @@ class Stage(Section):
             raise StageError("flexure", text, "sizes of leaf springs", 'length = "70 mm", width = "45 mm"')
 
     def _written(self, rule: Rule) -> str:
-        """The values that a rule is about, as the user wrote them."""
+        """Return the values that a rule is about, as the user wrote them."""
         values = [(key.split(".")[-1], _at(self, key)) for key in rule.keys if getattr(self, key.split(".")[0])]
         return ", ".join(f"{name} = {_written(getattr(value, 'text', value))}" for name, value in values)
 
     def as_written(self) -> dict[str, Any]:
-        """The stage file as nested tables: the keys that the user gave, with the values as written."""
+        """Return the stage file as nested tables: the keys that the user gave,
+        with the values as written."""
         texts = super().as_written()
         return {key: item.as_written() if isinstance(item, Section) else item for key, item in texts.items()}
 
@@ -247,7 +248,7 @@ class Stage(Section):
 
     @cached_property
     def _declared(self) -> dict[str, Any]:
-        """The flat keys that the stage file gives."""
+        """Return the flat keys that the stage file gives."""
         flat: dict[str, Any] = {"friction.model": "none"}
         for table, section in self:
             if isinstance(section, UncertainSection):
@@ -265,7 +266,8 @@ class Stage(Section):
 
     @cached_property
     def _sweepable(self) -> Mapping[str, Quantity | Number]:
-        """The numeric keys that may be laid over the stage: not those that follow from the leaf springs."""
+        """Return the numeric keys that may be laid over the stage:
+        not those that follow from the leaf springs."""
         keys = numeric_keys(self._declared)
         if not self.flexure:
             return keys
@@ -280,7 +282,8 @@ class Stage(Section):
         return {f"{name}.{key}": interval for name, table in tables.items() for key, interval in table.items()}
 
     def replace(self, changes: Mapping[str, Any]) -> "Stage":
-        """The stage with dotted keys set, or removed by None; checked like a file. Raises StageError."""
+        """Return the stage with dotted keys set, or removed by None; checked like a file.
+        Raises StageError."""
         if not (isinstance(changes, Mapping) and all(isinstance(key, str) for key in changes)):
             expected = "a dictionary of keys to new values"
             raise StageError("", quoted(changes), expected, 'stage.replace({"masses.stage": "0.6 kg"})')
@@ -296,14 +299,15 @@ class Stage(Section):
         }
 
     def with_numbers(self, numbers: Mapping[str, float], without: Iterable[str] = ()) -> "Stage":
-        """The stage with SI numbers for dotted keys, written such that they are read again as the same ones, and
-        without some tables. Raises StageError."""
+        """Return the stage with SI numbers for dotted keys,
+        written such that they are read again as the same ones, and without some tables. Raises StageError."""
         keys = numeric_keys({**self.flat(), **numbers})
         texts = {key: exactly(value, keys[key].unit) if keys[key].unit else value for key, value in numbers.items()}
         return self.replace(texts | dict.fromkeys(without))
 
     def variants(self) -> "Mapping[str, Stage]":
-        """The stage as "given" and, if it has a joint, with that "locked" and (if the file tells all of it) "free"."""
+        """Return the stage as "given" and, if it has a joint,
+        with that "locked" and (if the file tells all of it) "free"."""
         variants: dict[str, Stage | Self] = {"given": self}
         if self.joint:
             variants["locked"] = self.replace({"joint.locked": True})
@@ -312,7 +316,7 @@ class Stage(Section):
         return variants
 
     def to_toml(self) -> str:
-        """The text of a stage file that gives this stage again."""
+        """Return the text of a stage file that gives this stage again."""
         texts = self.as_written()
         lines = [f"{key} = {as_toml(text)}" for key, text in texts.items() if isinstance(text, str)]
         for name, table in texts.items():
@@ -322,8 +326,8 @@ class Stage(Section):
 
 
 def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
-    """The stage of tables in which dotted keys are set, or removed by None; they themselves stay as they are. Raises
-    StageError."""
+    """Return the stage of tables in which dotted keys are set, or removed by None;
+    they themselves stay as they are. Raises StageError."""
     own, tables = {*tables}, deepcopy(dict(tables))
     for key, value in changes.items():
         _put(tables, key, getattr(value, "text", value))
@@ -340,8 +344,8 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
 
 
 def axis_written(tables: Mapping[str, Any]) -> AxisKind:
-    """The axis that tables of a stage file are of, with what an ampere exerts there; what is wrong with the tables
-    [axis] and [actuator] is found later."""
+    """Return the axis that tables of a stage file are of, with what an ampere exerts there;
+    what is wrong with the tables [axis] and [actuator] is found later."""
     name = _of_table(tables, "axis", "kind")
     kind = KINDS.get(name, LINEAR) if isinstance(name, str) else LINEAR
     if tables.get("actuator") is None:
@@ -354,7 +358,8 @@ def axis_written(tables: Mapping[str, Any]) -> AxisKind:
 
 
 def _of_table(tables: Mapping[str, Any], name: str, key: str) -> Any:
-    """What stands at a key of a table, which may be a section or not be one at all; None for nothing."""
+    """Return what stands at a key of a table, which may be a section or not be one at all;
+    None for nothing."""
     table = tables.get(name)
     return table.get(key) if isinstance(table, dict) else getattr(table, key, None)
 
@@ -376,7 +381,7 @@ def declared_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
 
 
 def _numeric_keys_of(flat: Mapping[str, Any], name: str, cls: type[Section]) -> dict[str, Quantity | Number]:
-    """Those of a table, and of the tables in it."""
+    """Return those of a table, and of the tables in it."""
     keys: dict[str, Quantity | Number] = {f"{name}.{key}": field for key, field in numeric_fields(cls).items()}
     for key, several in list_fields(cls).items():
         keys |= dict.fromkeys(element_keys(flat, f"{name}.{key}"), several.of)
@@ -386,13 +391,15 @@ def _numeric_keys_of(flat: Mapping[str, Any], name: str, cls: type[Section]) -> 
 
 
 def _rows(flat: Mapping[str, Any], name: str, cls: type[Section]) -> Iterator[tuple[str, type[Section]]]:
-    """The tables in the arrays of a table: their places in the stage file, and their classes."""
+    """Yield the tables in the arrays of a table: their places in the stage file,
+    and their classes."""
     for key, array in table_arrays(cls).items():
         yield from array.rows(flat, f"{name}.{key}").items()
 
 
 def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
-    """What is wrong with a flat SI mapping, arrays allowed: where (a boolean or an array), and why."""
+    """Return what is wrong with a flat SI mapping, arrays allowed:
+    where (a boolean or an array), and why."""
     bounds = [
         (np.logical_not(field.bound.holds(flat[key])), f"{key} must be {field.bound.text}")
         for key, field in numeric_keys(flat).items()
@@ -416,7 +423,7 @@ def _broken_rules(flat: Mapping[str, Any]) -> Iterator[tuple[Rule, Any]]:
 
 
 def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
-    """The classes of the tables in a flat mapping."""
+    """Return the classes of the tables in a flat mapping."""
     classes = {
         "axis": AxisTable,
         "masses": Masses,
@@ -440,7 +447,7 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
 
 
 def _table_lines(name: str, table: Mapping[str, Any]) -> list[str]:
-    """How a table is written in TOML: its own keys, then the arrays of tables in it."""
+    """Return how a table is written in TOML: its own keys, then the arrays of tables in it."""
     arrays = {
         key: value
         for key, value in table.items()
@@ -454,7 +461,7 @@ def _table_lines(name: str, table: Mapping[str, Any]) -> list[str]:
 
 
 def _at(stage: Stage, key: str) -> Any:
-    """What stands at a dotted key; None for nothing."""
+    """Return what stands at a dotted key; None for nothing."""
     value: Any = stage
     for name in key.split("."):
         value = value[int(name) - 1] if isinstance(value, tuple) else getattr(value, name)
@@ -462,17 +469,17 @@ def _at(stage: Stage, key: str) -> Any:
 
 
 def _toml(value: Any) -> str:
-    """How a key's value, a scalar or a list of them, is written in TOML."""
+    """Return how a key's value, a scalar or a list of them, is written in TOML."""
     return f"[{', '.join(map(as_toml, value))}]" if isinstance(value, list) else as_toml(value)
 
 
 def _written(value: Any) -> str:
-    """A key's value in an error message."""
+    """Return a key's value in an error message."""
     return f"[{', '.join(map(quoted, value))}]" if isinstance(value, list) else quoted(value)
 
 
 def _plain(value: Any) -> Any:
-    """Numbers as plain floats; texts and booleans as they are."""
+    """Return numbers as plain floats; texts and booleans as they are."""
     return value if isinstance(value, bool | str) else float(value)
 
 
@@ -488,7 +495,7 @@ def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
 
 
 def _under(tables: Mapping[str, Any], key: str) -> Any:
-    """The value of a dotted key of nested tables; None where there is none."""
+    """Return the value of a dotted key of nested tables; None where there is none."""
     place: Any = tables
     for name in key.split("."):
         place = place.get(name) if isinstance(place, Mapping) else None
@@ -516,7 +523,8 @@ def _put(tables: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _number(values: list[Any], key: str, depth: int) -> int:
-    """Which element of an array the part of a dotted key at a depth means. Raises StageError."""
+    """Return which element of an array the part of a dotted key at a depth means.
+    Raises StageError."""
     parts = key.split(".")
     number, array = parts[depth], ".".join(parts[:depth])
     if not (number.isascii() and number.isdigit() and 1 <= int(number) <= len(values)):

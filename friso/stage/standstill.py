@@ -86,7 +86,7 @@ NO_SETTINGS = FrictionSettings()
 
 
 def settings_of(flat: Mapping[str, Any]) -> FrictionSettings:
-    """Those of a stage given as flat keys."""
+    """Return those of a stage given as flat keys."""
     names = ("integral_limit", "integral_leak", "integral_deadband", "integral_deadband_exit")
     limit, leak, deadband, hysteresis = (f"controller.{name}" in flat for name in names)
     gains, push, dither = (f"controller.{first}" in flat for first, _ in PAIRS)
@@ -96,10 +96,12 @@ def settings_of(flat: Mapping[str, Any]) -> FrictionSettings:
 
 
 def dead_band(flat: Mapping[str, Any]) -> Any:
-    """The error [m] up to which the controller does nothing, of stages given as flat keys; 0 without a dead zone."""
+    """Return the error [m] up to which the controller does nothing,
+    of stages given as flat keys; 0 without a dead zone."""
     return flat.get("controller.error_deadband", 0.0)
 
 
 def integral_leak(flat: Mapping[str, Any]) -> Any:
-    """The frequency of the leak of integrals [Hz], of stages given as flat keys; 0 without one."""
+    """Return the frequency of the leak of integrals [Hz], of stages given as flat keys;
+    0 without one."""
     return flat.get("controller.integral_leak", 0.0)

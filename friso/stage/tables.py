@@ -31,7 +31,7 @@ class MotorConstant(Quantity):
 
     @property
     def expected(self) -> str:
-        """What the key takes, in words."""
+        """Return what the key takes, in words."""
         at_load = "at the load: of a motor of 0.5 N*m/A, 2 pi / lead times as much"
         return f"{super().expected}, {at_load if self.unit == 'N/A' else 'behind any gear'}"
 
@@ -78,22 +78,24 @@ class FrictionSection(UncertainSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Hashable:
-        """What else than the law's name its equations depend on, such as a whole exponent."""
+        """Return what else than the law's name its equations depend on, such as a whole exponent."""
         return None
 
     @staticmethod
     def declare(velocity: Any, variant: Any) -> Any:
-        """The equations of the law for a body moving at `velocity`, or None if there is no force."""
+        """Return the equations of the law for a body moving at `velocity`,
+        or None if there is no force."""
         return None
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> Any:
-        """What measurements show of the law (`friso.equations.friction.measured.MeasuredFriction`)."""
+        """Return what measurements show of the law
+        (`friso.equations.friction.measured.MeasuredFriction`)."""
 
     @staticmethod
     def keeping(measured: Any, elements: int) -> dict[str, Any]:
-        """Keys of the law, as flat SI values, with which it shows what was measured, as nearly as it can; `elements`
-        side by side, of a law that has several."""
+        """Return keys of the law, as flat SI values, with which it shows what was measured,
+        as nearly as it can; `elements` side by side, of a law that has several."""
         return {}
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {}
@@ -102,19 +104,20 @@ class FrictionSection(UncertainSection):
 
     @staticmethod
     def shaped(measured: Any, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Keys of the law, as flat SI values, with the steady friction, stiffness and damping measured and numbers of
-        its `shape`; a law that declares it can be fitted (`friso.identification.laws`)."""
+        """Return keys of the law, as flat SI values, with the steady friction,
+        stiffness and damping measured and numbers of its `shape`; a law that declares it can be fitted
+        (`friso.identification.laws`)."""
         return {}
 
     @staticmethod
     def left_open(measured: Any) -> dict[str, tuple[float, float]]:
-        """The keys on which the measurements do not decide, and their ranges."""
+        """Return the keys on which the measurements do not decide, and their ranges."""
         return {}
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Why the law may give energy back, which no friction does: the condition for passivity that the stage does
-        not meet; "" where it is passive or does not say."""
+        """Return why the law may give energy back, which no friction does:
+        the condition for passivity that the stage does not meet; "" where it is passive or does not say."""
         return ""
 
 
@@ -123,18 +126,18 @@ register_friction = FRICTION.register
 
 
 def friction_law(name: str) -> type[FrictionSection]:
-    """The class of the registered law called `name`."""
+    """Return the class of the registered law called `name`."""
     return cast(type[FrictionSection], FRICTION.named(name))
 
 
 def passive_where(flat: Mapping[str, Any]) -> str:
-    """The condition of passivity that the friction law of a stage, given as flat SI values, does not meet; "" where it
-    is passive, or does not say; in the units of its axis."""
+    """Return the condition of passivity that the friction law of a stage,
+    given as flat SI values, does not meet; "" where it is passive, or does not say; in the units of its axis."""
     return axis_of(flat).text(friction_law(flat["friction.model"]).active(flat))
 
 
 def friction_laws() -> dict[str, type[FrictionSection]]:
-    """The registered laws by name."""
+    """Return the registered laws by name."""
     return cast(dict[str, type[FrictionSection]], FRICTION.classes)
 
 

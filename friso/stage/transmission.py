@@ -67,29 +67,32 @@ class Encoder(UncertainSection):
 
 
 def motor_mass(flat: Mapping[str, Any]) -> Any:
-    """The mass of the motor at the load [kg] that follows from its inertia; None where none does."""
+    """Return the mass of the motor at the load [kg] that follows from its inertia;
+    None where none does."""
     lead = flat[LEAD] if LEAD in flat else 2 * pi / flat[RATIO] if RATIO in flat else None
     return None if INERTIA not in flat or lead is None else flat[INERTIA] * (2 * pi / lead) ** 2
 
 
 def leading_friction(flat: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The keys with the friction at the motor in the place of that of the guide, where it alone is there."""
+    """Return the keys with the friction at the motor in the place of that of the guide,
+    where it alone is there."""
     alone = flat["friction.model"] == "none" and f"{MOTOR_FRICTION}.model" in flat
     return of_motor(flat) if alone else flat
 
 
 def moving_mass(flat: Mapping[str, Any]) -> Any:
-    """All that the controller moves [kg], at the load."""
+    """Return all that the controller moves [kg], at the load."""
     return sum(flat.get(key, 0.0) for key in ("masses.cart", "masses.stage", MOTOR_MASS))
 
 
 def of_motor(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """The keys with the friction at the motor in the place of that of the guide, whose conditions are not its."""
+    """Return the keys with the friction at the motor in the place of that of the guide,
+    whose conditions are not its."""
     kept = {key: value for key, value in flat.items() if not key.startswith(("friction.", f"{CONDITIONS}."))}
     return {**kept, "friction.model": "none", **as_friction(flat)}
 
 
 def as_friction(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """The keys of [motor_friction] as a friction law knows them."""
+    """Return the keys of [motor_friction] as a friction law knows them."""
     before = f"{MOTOR_FRICTION}."
     return {f"friction.{key.removeprefix(before)}": value for key, value in flat.items() if key.startswith(before)}

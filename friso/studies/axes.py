@@ -50,23 +50,23 @@ class SweptRange:
     scale: Scale
 
     def at(self, share: np.ndarray) -> np.ndarray:
-        """The values at shares of the way from the first to the last, each from 0 to 1."""
+        """Return the values at shares of the way from the first to the last, each from 0 to 1."""
         if self.scale == "log":
             return np.exp(np.log(self.first) + share * (np.log(self.last) - np.log(self.first)))
         return self.first + share * (self.last - self.first)
 
     def axis(self) -> SweptAxis:
-        """The axis with `count` points, both ends exactly as given."""
+        """Return the axis with `count` points, both ends exactly as given."""
         space = np.geomspace if self.scale == "log" else np.linspace
         return SweptAxis(self.name, space(self.first, self.last, cast(int, self.count)), self.unit, self.scale)
 
 
 def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool = False) -> SweptAxis | SweptRange:
-    """An axis of a stage, a key or a scaling, from a text, a list or an array with a unit; a range stays a
-    `SweptRange`.
+    """Return an axis of a stage, a key or a scaling, from a text,
+    a list or an array with a unit; a range stays a `SweptRange`.
 
-    `free`: links use the name, so it need not be a key. With `log` a range that does not say how
-    it is spaced is logarithmic. Raises InputError.
+    `free`: links use the name, so it need not be a key. With `log` a range that does not say how it is spaced is
+    logarithmic. Raises InputError.
     """
     field, scales = stage.numeric_keys().get(name), name in SCALINGS and not free
     if field is None and not free and not scales:
@@ -100,7 +100,7 @@ class _Reader:
         return "" if self.field is None else self.field.unit
 
     def text(self, entry: Any) -> float:
-        """The SI value of a text such as "8 Hz" or, without unit, "0.1"."""
+        """Return the SI value of a text such as "8 Hz" or, without unit, "0.1"."""
         entry = entry.strip() if isinstance(entry, str) else entry
         bare = _number(entry)
         if self.field is None:
@@ -128,7 +128,7 @@ class _Reader:
 
 
 def _number(value: Any) -> float | None:
-    """The bare number that was given, None if it is none."""
+    """Return the bare number that was given, None if it is none."""
     if isinstance(value, int | float | np.number) and not isinstance(value, bool):
         return float(value)
     try:
@@ -180,7 +180,7 @@ def _axis_of_values(name: str, values: AxisValues, reader: _Reader) -> SweptAxis
 
 
 def _items(values: Any) -> list[Any]:
-    """The values of a list. Raises InputError for what is none."""
+    """Return the values of a list. Raises InputError for what is none."""
     try:
         return list(values)
     except TypeError:
@@ -188,7 +188,7 @@ def _items(values: Any) -> list[Any]:
 
 
 def _words(stage: Stage, key: str, values: AxisValues) -> SweptAxis:
-    """An axis of words or booleans, each of which the stage takes."""
+    """Return an axis of words or booleans, each of which the stage takes."""
     options = (
         [parse_set(f"{key}={word}")[1] for word in values.split(",")] if isinstance(values, str) else _items(values)
     )
@@ -209,5 +209,5 @@ def _words(stage: Stage, key: str, values: AxisValues) -> SweptAxis:
 def read_axes(
     stage: Stage, axes: Mapping[str, AxisValues], free: frozenset[str], log: bool = False
 ) -> tuple[SweptAxis | SweptRange, ...]:
-    """All axes, as `read_axis` reads them. Raises InputError."""
+    """Return all axes, as `read_axis` reads them. Raises InputError."""
     return tuple(read_axis(stage, name, values, name in free, log) for name, values in axes.items())

@@ -26,10 +26,10 @@ def boundary(
     begins: Callable[[], None] = lambda: None,
     progress: Progress = silent,
 ) -> Diagram | Plane:
-    """Where the hunting cycle of a stage stops attracting, over one key or two.
+    """Return where the hunting cycle of a stage stops attracting, over one key or two.
 
-    `axes` are keys with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``, logarithmic if ":log" is behind
-    or with `log`; `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is a
+    `axes` are keys with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``, logarithmic if ":log" is behind or with
+    `log`; `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is a
     `Diagram`: all branches of cycles over the range and the points at which they flip or fold; with two it is a
     `Plane`: the curves on which they do. The motion of the stage file plays no part. `begins` is called once nothing of
     the input is wrong, `progress` as cycles are followed. Raises InputError for a wrong range, link, tolerance or stage

@@ -38,17 +38,17 @@ class Line:
 
     @property
     def special(self) -> np.ndarray:
-        """The numbers of the special points."""
+        """Return the numbers of the special points."""
         return np.flatnonzero([bool(kind) for kind in self.kinds])
 
     @property
     def ordinary(self) -> np.ndarray:
-        """The numbers of the others."""
+        """Return the numbers of the others."""
         return np.flatnonzero([not kind for kind in self.kinds])
 
     @property
     def attracts(self) -> np.ndarray:
-        """Whether the cycle attracts from each point to the next, shape (n - 1,)."""
+        """Tell whether the cycle attracts from each point to the next, shape (n - 1,)."""
         return np.abs(self.multiplier[1:] + self.multiplier[:-1]) < 2
 
 
@@ -62,7 +62,8 @@ class _Row(NamedTuple):
 
 
 def lines(result: Diagram | Plane) -> tuple[Line, ...]:
-    """All branches of a diagram, each with its special points where they lie on it; or all curves of a plane."""
+    """Return all branches of a diagram, each with its special points where they lie on it;
+    or all curves of a plane."""
     if isinstance(result, Diagram):
         pairs = zip(result.branches, result.special, strict=True)
         return tuple(_line(result, branch, _of_branch(branch, special)) for branch, special in pairs)
@@ -74,8 +75,8 @@ def lines(result: Diagram | Plane) -> tuple[Line, ...]:
 
 
 def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
-    """The points of a branch with those of its special points that are inside the range, in order, but for those within
-    the error of one: there it is not known whether they attract."""
+    """Return the points of a branch with those of its special points that are inside the range,
+    in order, but for those within the error of one: there it is not known whether they attract."""
     path = np.array([point.vector for point in branch.points])
     ordinary = [
         (k, point) for k, point in enumerate(branch.points) if not any(spot.in_doubt(point) for spot in special)
@@ -93,7 +94,7 @@ def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
 
 
 def _path_coordinate(path: np.ndarray, vector: np.ndarray) -> float:
-    """How far along a path, in legs, a point on it lies."""
+    """Return how far along a path, in legs, a point on it lies."""
     before, after = (np.linalg.norm(end - vector, axis=1) for end in (path[:-1], path[1:]))
     leg = int(np.argmin(before + after - np.linalg.norm(path[1:] - path[:-1], axis=1)))
     return leg + before[leg] / (before[leg] + after[leg])
@@ -119,7 +120,8 @@ def _values(space: Space, at: np.ndarray) -> np.ndarray:
 
 
 def place_verdicts(result: Diagram) -> list[str]:
-    """The verdicts at the stages evenly over the range, by simulations and by all branches that reach them."""
+    """Return the verdicts at the stages evenly over the range,
+    by simulations and by all branches that reach them."""
     verdicts = _verdicts(result)
     return [
         ATTRACTS if _attracts_at(result, place) else verdict
@@ -128,7 +130,7 @@ def place_verdicts(result: Diagram) -> list[str]:
 
 
 def end_verdicts(result: Diagram) -> tuple[str, str]:
-    """The verdicts at both ends of the range."""
+    """Return the verdicts at both ends of the range."""
     verdict_at = dict(zip(result.places.tolist(), place_verdicts(result), strict=True))
     return verdict_at.get(0.0, INVALID), verdict_at.get(1.0, INVALID)
 
@@ -144,9 +146,9 @@ class StabilityChange(NamedTuple):
 
 
 def stability_changes(result: Diagram) -> list[StabilityChange]:
-    """Where hunting begins and ends over the range, in order. Verdicts within the error of a special point do not tell
-    where: there cycles repel so little that runs may stay on them. They do tell that there is hunting between stages
-    that nothing attracts."""
+    """Return where hunting begins and ends over the range, in order.
+    Verdicts within the error of a special point do not tell where: there cycles repel so little that runs may stay on
+    them. They do tell that there is hunting between stages that nothing attracts."""
     special = [spot for own in result.special for spot in own if np.isfinite(spot.error)]
     doubtful = np.any([np.abs(result.places - spot.point.place) < spot.error for spot in special], axis=0)
     values = _values(result.space, result.places[:, None])[:, 0].tolist()
@@ -168,7 +170,8 @@ def stability_changes(result: Diagram) -> list[StabilityChange]:
 
 
 def followed_changes(result: Diagram) -> list[tuple[float, bool]]:
-    """The values [SI] at which a cycle that was followed begins to attract (true), or ceases to, as the key rises."""
+    """Return the values [SI] at which a cycle that was followed begins to attract (true),
+    or ceases to, as the key rises."""
     return sorted(
         (float(line.at[k, 0]), begins)
         for line in lines(result)
@@ -178,8 +181,8 @@ def followed_changes(result: Diagram) -> list[tuple[float, bool]]:
 
 
 def begins_at(line: Line, k: int) -> bool | None:
-    """Whether a cycle begins to attract at a special point as the key rises; None if it attracts on both sides of the
-    point along its branch, or on neither."""
+    """Tell whether a cycle begins to attract at a special point as the key rises;
+    None if it attracts on both sides of the point along its branch, or on neither."""
     beside = [bool(0 <= j < len(line.attracts) and line.attracts[j]) for j in (k - 1, k)]
     if beside[0] == beside[1]:
         return None
@@ -188,7 +191,7 @@ def begins_at(line: Line, k: int) -> bool | None:
 
 
 def _attracts_at(result: Diagram, place: float) -> bool:
-    """Whether any cycle attracts on both sides of a place, and none is in doubt there."""
+    """Tell whether any cycle attracts on both sides of a place, and none is in doubt there."""
     if result.in_doubt(np.array([place]))[0]:
         return False
     pairs = [pair for branch in result.branches for pair in pairwise(branch.points)]
@@ -197,7 +200,8 @@ def _attracts_at(result: Diagram, place: float) -> bool:
 
 
 def node_verdicts(result: Plane) -> list[tuple[float, float, str]]:
-    """The values [SI] of both keys at every node of the grid, the first key the slowest, and the verdict there."""
+    """Return the values [SI] of both keys at every node of the grid, the first key the slowest,
+    and the verdict there."""
     verdicts = np.full(result.nodes**2, INVALID, object)
     verdicts[result.allowed] = _verdicts(result)
     values = _values(result.space, result.space.grid(result.nodes)).tolist()
@@ -205,7 +209,8 @@ def node_verdicts(result: Plane) -> list[tuple[float, float, str]]:
 
 
 def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
-    """The values [SI] of both keys, and the verdict, at the corners: both low, second high, first high, both high."""
+    """Return the values [SI] of both keys, and the verdict, at the corners: both low,
+    second high, first high, both high."""
     nodes, last = node_verdicts(result), result.nodes - 1
     return [nodes[k] for k in (0, last, result.nodes * last, -1)]
 
@@ -223,8 +228,9 @@ class PlaneEdge(NamedTuple):
 
 
 def plane_edge(result: Plane) -> PlaneEdge | None:
-    """Where hunting ends, if along one of the keys, the first if it may be, it does so once and on the same side
-    whatever the value of the other; None elsewhere, and where the verdict at a node is not known."""
+    """Return where hunting ends, if along one of the keys, the first if it may be,
+    it does so once and on the same side whatever the value of the other; None elsewhere, and where the verdict at a
+    node is not known."""
     nodes = node_verdicts(result)
     if any(verdict not in (ATTRACTS, REPELS) for _, _, verdict in nodes):
         return None
@@ -249,7 +255,8 @@ def plane_edge(result: Plane) -> PlaneEdge | None:
 
 
 def _crossings(result: Plane, along: int, value: float) -> list[float]:
-    """The values [SI] of the key with a number at which curves pass the `value` [SI] of the other one."""
+    """Return the values [SI] of the key with a number at which curves pass the `value` [SI] of
+    the other one."""
     crossings = []
     for line in lines(result):
         at, other = line.at[:, along], line.at[:, 1 - along] - value
@@ -295,10 +302,10 @@ def curve_meetings(result: Plane) -> list[Meeting]:
 
 
 def lost_places(result: Plane) -> np.ndarray:
-    """Where a change was seen that no curve could be begun at [SI], shape (places, 2)."""
+    """Return where a change was seen that no curve could be begun at [SI], shape (places, 2)."""
     return _values(result.space, np.reshape(result.gaps, (-1, 2)))
 
 
 def _verdicts(result: Diagram | Plane) -> list[str]:
-    """The verdicts of stages by what simulations of them end in."""
+    """Return the verdicts of stages by what simulations of them end in."""
     return np.select([result.attracts, ~result.decided], [ATTRACTS, UNKNOWN], REPELS).tolist()

@@ -89,8 +89,9 @@ def cell_attractors(
     threads: int | None = None,
     cancel: np.ndarray | None = None,
 ) -> Iterator[tuple[dict[str, Any], np.ndarray, StageAttractors]]:
-    """What attracts the stages of the cells that are chosen, shape (cells,), by the equations they need: their flat SI
-    form, their numbers, and what attracts them, by a function as `find_attractors`.
+    """Yield what attracts the stages of the cells that are chosen, shape (cells,),
+    by the equations they need: their flat SI form, their numbers, and what attracts them, by a function as
+    `find_attractors`.
 
     The motion plays no part: of cells that differ in it alone one is surveyed.
     """
@@ -105,7 +106,8 @@ def _once(
     threads: int | None,
     cancel: np.ndarray | None,
 ) -> StageAttractors:
-    """What attracts stages of one structure, looked for once for all that differ in their motion alone."""
+    """Return what attracts stages of one structure,
+    looked for once for all that differ in their motion alone."""
     varied = [np.zeros(count)]
     varied += [value for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")]
     _, first, again = np.unique(np.stack(varied), axis=1, return_index=True, return_inverse=True)
@@ -116,7 +118,7 @@ def _once(
 
 
 def allowed_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Which cells a stage may have, shape (cells,)."""
+    """Return which cells a stage may have, shape (cells,)."""
     table = _Table(len(next(iter(columns.values()))), ("outcome", STATUS))
     for flat, cells in by_words(stage, links, columns):
         table.invalidate(cells, flat)
@@ -124,7 +126,7 @@ def allowed_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, 
 
 
 def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """The flat SI form of all cells, links followed, then scalings; numeric columns only."""
+    """Return the flat SI form of all cells, links followed, then scalings; numeric columns only."""
     numeric = stage.numeric_keys()
     keys = {name: column for name, column in columns.items() if name in numeric}
     keys |= linked(links, stage.flat(keys) | dict(columns)) if links else {}
@@ -132,7 +134,8 @@ def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.
 
 
 def by_equations(parts: Parts, chosen: np.ndarray) -> Iterator[tuple[dict[str, Any], np.ndarray, Structure]]:
-    """The cells that are chosen, shape (cells,), by the equations they need: their flat SI form, numbers, structure."""
+    """Yield the cells that are chosen, shape (cells,), by the equations they need:
+    their flat SI form, numbers, structure."""
     for flat, cells in parts:
         for shape, members in _by_structure(flat, chosen[cells], len(cells)):
             of_group = {key: value[members] if np.ndim(value) else value for key, value in flat.items()}
@@ -157,7 +160,7 @@ def by_words(
 
 
 def _by_structure(flat: Mapping[str, Any], valid: np.ndarray, count: int) -> Iterator[tuple[Structure, np.ndarray]]:
-    """The places of the valid cells, grouped by the equations they need.
+    """Yield the places of the valid cells, grouped by the equations they need.
 
     Only a few keys determine the structure; cells are grouped by those.
     """
@@ -201,16 +204,16 @@ class _Table:
 
     @property
     def valid(self) -> np.ndarray:
-        """Which cells a stage may have, shape (cells,)."""
+        """Return which cells a stage may have, shape (cells,)."""
         return self.columns["outcome"] != "invalid"
 
     @property
     def ran(self) -> np.ndarray:
-        """Which cells were run, to their end or not, shape (cells,)."""
+        """Return which cells were run, to their end or not, shape (cells,)."""
         return ~np.isin(self.columns["outcome"], ("invalid", ""))
 
     def motions(self, cells: np.ndarray) -> Motions:
-        """How the motions of the cells went."""
+        """Return how the motions of the cells went."""
         peaks, swing = (self.columns[name][cells] for name in ("peaks", "peak_to_peak"))
         away = self.columns[STATUS][cells] == Status.DIVERGED.text
         return Motions(self.columns["outcome"][cells] != FAILED, away, peaks, swing, self.settled[cells])

@@ -23,7 +23,8 @@ logger = logging.getLogger("friso")
 
 @contextmanager
 def connected(scheduler: str) -> Iterator[Crew]:
-    """A crew made of the workers of the scheduler at an address such as "tls://10.0.0.1:8786".
+    """Return a crew made of the workers of the scheduler at an address such as
+    "tls://10.0.0.1:8786".
 
     Every thread of a worker computes one block at a time, in that thread alone. Certificates are those of Dask's
     configuration (distributed.comm.tls). Without TLS, whoever reaches the address can run code: that is logged. Raises

@@ -36,7 +36,8 @@ class DoctorCheck:
 
 
 def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
-    """All that is looked at, one by one; folders below the user's own begin with ~ unless `full_paths`."""
+    """Yield all that is looked at, one by one;
+    folders below the user's own begin with ~ unless `full_paths`."""
     yield DoctorCheck("friso", VERSION)
     yield DoctorCheck(
         "Python", f"{platform.python_implementation()} {platform.python_version()}, {8 * struct.calcsize('P')} bit"
@@ -58,7 +59,7 @@ def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
 
 
 def _packages() -> Iterator[DoctorCheck]:
-    """The versions of what friso needs, and of what it reads further formats with."""
+    """Yield the versions of what friso needs, and of what it reads further formats with."""
     try:
         needed = requires("friso") or []
     except PackageNotFoundError:
@@ -90,7 +91,7 @@ DEVELOPMENT = ("test", "docs", "bench")
 
 
 def _processor() -> str:
-    """The processor that code is compiled for, and how wide its registers are."""
+    """Return the processor that code is compiled for, and how wide its registers are."""
     from friso.engine.processor import processor
 
     chosen = processor()
@@ -98,7 +99,8 @@ def _processor() -> str:
 
 
 def _kept_code(full_paths: bool) -> str:
-    """The folder of compiled code: how much is in it, whether it stays, and where modes tell it, who may look in."""
+    """Return the folder of compiled code: how much is in it, whether it stays,
+    and where modes tell it, who may look in."""
     from friso.engine.cache import ENTRY, cache_folder, is_passing
 
     folder = cache_folder()
@@ -152,7 +154,7 @@ def _stage() -> Stage:
 
 
 def _without_names(text: str, full_paths: bool) -> str:
-    """The text with homes as ~, and the name of the user elsewhere in paths as USER."""
+    """Return the text with homes as ~, and the name of the user elsewhere in paths as USER."""
     if full_paths:
         return text
     home = user = ""

@@ -29,15 +29,16 @@ class Fates:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How often each verdict occurs."""
+        """Return how often each verdict occurs."""
         return {word: int(np.count_nonzero(self.verdicts == word)) for word in VERDICTS}
 
     def share(self, words: tuple[str, ...]) -> Share:
-        """The probability of any of these verdicts."""
+        """Return the probability of any of these verdicts."""
         return share(np.isin(self.verdicts, words), self.verdicts != "failed")
 
     def separations(self, keys: Mapping[str, np.ndarray]) -> dict[str, float]:
-        """How well each key separates stages with an attracting cycle from those without, the most decisive first.
+        """Return how well each key separates stages with an attracting cycle from those without,
+        the most decisive first.
 
         It is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1): 1 where all that hunt have the larger
         values, -1 where all have the smaller ones, 0 where the key separates nothing. Empty where all share one fate.
@@ -57,7 +58,7 @@ class Fates:
 
 
 def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent) -> dict[str, Fates]:
-    """The fates of the drawn stages as given and, with a joint, locked and free."""
+    """Return the fates of the drawn stages as given and, with a joint, locked and free."""
     variants = different(stage)
     structures = [shared_structure(laid_over(variant, sample.keys)) for variant in variants.values()]
     kernels(set[KernelRequest]().union(*map(kernels_to_judge, structures)))
@@ -70,7 +71,8 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
 
 
 def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float) -> int:
-    """How many stages may be drawn for a fixed work, a power of two (Sobol' points are even then)."""
+    """Return how many stages may be drawn for a fixed work,
+    a power of two (Sobol' points are even then)."""
     settings = StudySettings.current()
     with allowance() as spent:
         fates(stage, draw(stage, correlations, settings.trial_draws, seed), rtol)
@@ -88,12 +90,12 @@ class Draws:
     fates: Mapping[str, Fates]
 
     def unit(self, key: str) -> str:
-        """The SI unit of a key."""
+        """Return the SI unit of a key."""
         return self.stage.numeric_keys()[key].unit
 
 
 def different(stage: Stage) -> dict[str, Stage]:
-    """The variants of a stage, each once."""
+    """Return the variants of a stage, each once."""
     variants: dict[str, Stage] = {}
     for name, variant in stage.variants().items():
         if variant not in variants.values():

@@ -42,10 +42,10 @@ class Crew:
         self.executor.shutdown(wait=True, cancel_futures=True)
 
     def compute(self, jobs: Iterable[tuple[Study, CellBlock]]) -> Iterator[tuple[Study, CellBlock, Columns]]:
-        """The measures of blocks of studies, in the order in which they are done.
+        """Yield the measures of blocks of studies, in the order in which they are done.
 
-        No more blocks are in flight than keep the crew busy, so that a study of any length streams. Whatever ends
-        this early (Ctrl-C among it) cancels the blocks in flight. Raises Overtaken once nobody waits for them.
+        No more blocks are in flight than keep the crew busy, so that a study of any length streams. Whatever ends this
+        early (Ctrl-C among it) cancels the blocks in flight. Raises Overtaken once nobody waits for them.
         """
         settings = StudySettings.current()
         self.cancel[0] = 0
@@ -68,7 +68,8 @@ class Crew:
                 wait(flying, timeout=settings.block_timeout)
 
     def jobs(self, studies: Sequence[Study]) -> Iterator[tuple[Study, CellBlock]]:
-        """The blocks of studies, as large as memory allows, but enough of them for the whole crew."""
+        """Yield the blocks of studies, as large as memory allows,
+        but enough of them for the whole crew."""
         settings = StudySettings.current()
         for study in studies:
             largest = settings.largest_survey_block if study.cycles else settings.largest_memory_block
@@ -103,7 +104,8 @@ class _Threads(ThreadPoolExecutor):
 
 
 def local_crew(threads: int | None = None) -> Crew:
-    """The threads of this process, by default one per processor; all of them work on one block.
+    """Return the threads of this process, by default one per processor;
+    all of them work on one block.
 
     A second block is prepared, or its results written, while they do.
     """
@@ -113,7 +115,7 @@ def local_crew(threads: int | None = None) -> Crew:
 
 
 def run_scattered(study: Study, cells: np.ndarray, crew: Crew) -> Columns:
-    """The measures of single cells, by their numbers in C order."""
+    """Return the measures of single cells, by their numbers in C order."""
     picked = study.at(cells)
     parts: dict[int, Columns] = {}
     for _, block, columns in crew.compute(crew.jobs([picked])):

@@ -31,7 +31,7 @@ def export(runs: xr.Dataset, path: Path) -> None:
 
 
 def _bytes(texts: np.ndarray) -> np.ndarray:
-    """The texts in UTF-8, as long as the longest of them."""
+    """Return the texts in UTF-8, as long as the longest of them."""
     import pandas as pd
 
     codes, words = pd.factorize(texts.ravel())

@@ -38,7 +38,7 @@ def harmonic_balance(
     harmonics: Sequence[int] = HARMONICS,
     rtol: float = CYCLE_RTOL,
 ) -> xr.Dataset:
-    """The symmetric hunting cycle of a stage at crossovers [Hz], by simulation and by harmonic balance.
+    """Return the symmetric hunting cycle of a stage at crossovers [Hz], by simulation and by harmonic balance.
 
     Over "crossover": `period` [s], `amplitude` [m] and `multiplier` of that cycle, attracting or not, found by shooting
     (what attracts the stage is another question: see `friso.check`); `solutions`, the
@@ -89,7 +89,8 @@ def harmonic_balance(
 
 
 def _symmetric(stages: Ensemble, rtol: float) -> Cycles:
-    """The cycle of every stage that is its own mirror image. Raises InputError where one has none."""
+    """Return the cycle of every stage that is its own mirror image.
+    Raises InputError where one has none."""
     cycles = find_cycles(stages, rtol)
     if cycles.sign >= 0 or not cycles.closed.all():
         why = "; ".join({str(reason) for reason in cycles.reasons if reason}) or "a cycle that is not symmetric"

@@ -22,11 +22,11 @@ class Ledger:
     metrics: tuple[str, ...]
 
     def has(self, number: str) -> bool:
-        """Whether the block with this number was written."""
+        """Tell whether the block with this number was written."""
         return self._file(number).exists()
 
     def entered(self) -> list[str]:
-        """The names in the folder of blocks that were written. Raises OSError."""
+        """Return the names in the folder of blocks that were written. Raises OSError."""
         return [] if not self._file("").exists() else sorted(file.name for file in self._file("").iterdir())
 
     def enter(self, number: str) -> None:
@@ -35,7 +35,8 @@ class Ledger:
         put(self._file(number), self._entry(number))
 
     def is_whole(self, number: str) -> bool:
-        """Whether all chunks of a block are what was written. Raises PermissionError where they cannot be read."""
+        """Tell whether all chunks of a block are what was written.
+        Raises PermissionError where they cannot be read."""
         try:
             return stored(self._file(number)) == self._entry(number)
         except PermissionError:
@@ -44,8 +45,8 @@ class Ledger:
             return False
 
     def digest(self, number: str, name: str) -> str | None:
-        """The digest of a chunk as it was entered; None where its block was not, "" where the entry is damaged. Raises
-        PermissionError."""
+        """Return the digest of a chunk as it was entered; None where its block was not,
+        "" where the entry is damaged. Raises PermissionError."""
         try:
             entry = json.loads(stored(self._file(number)))
             return entry["sha256"][name] if (entry["study"], entry["block"]) == (self.study, number) else ""

@@ -60,7 +60,8 @@ def check_links(stage: Stage, links: Mapping[str, str], axes: frozenset[str]) ->
 
 
 def linked(links: Mapping[str, str], values: Mapping[str, Any]) -> dict[str, Any]:
-    """The SI values of the linked keys from those of keys and axes (numbers or arrays); a link sees those before it."""
+    """Return the SI values of the linked keys from those of keys and axes (numbers or arrays);
+    a link sees those before it."""
     numbers = dict(values)
     for key, text in links.items():
         with np.errstate(all="ignore"):  # what comes out as no number makes the cell invalid
@@ -115,7 +116,7 @@ def _value(node: ast.expr, numbers: Mapping[str, Any]) -> Any:
 
 
 def _name(node: ast.expr) -> str:
-    """The name of a key or an axis, as a stage file has it."""
+    """Return the name of a key or an axis, as a stage file has it."""
     match node:
         case ast.Subscript(owner, part):
             return f"{_name(owner)}.{ast.unparse(part)}"

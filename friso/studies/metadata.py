@@ -58,7 +58,7 @@ class Metadata:
 
     @property
     def files(self) -> dict[str, Any]:
-        """What stands in the files of Zarr's, by their paths in the store."""
+        """Return what stands in the files of Zarr's, by their paths in the store."""
         return self.document["metadata"]
 
     @property
@@ -68,15 +68,15 @@ class Metadata:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """The attributes of the study."""
+        """Return the attributes of the study."""
         return dict(self.files[_ATTRIBUTES])
 
     def damaged_files(self, path: Path) -> list[str]:
-        """The files of metadata of the store at `path` that do not say the same."""
+        """Return the files of metadata of the store at `path` that do not say the same."""
         return [name for name, content in self.all_files.items() if not _says(path / name, content)]
 
     def damaged_axes(self, path: Path) -> list[str]:
-        """The files of the axes that are not what was written."""
+        """Return the files of the axes that are not what was written."""
         return [name for name, written in self.axes.items() if digest_of(path / name) != written]
 
     def mend(self, path: Path) -> None:
@@ -119,13 +119,13 @@ def _write(path: Path, metadata: Metadata) -> None:
 
 
 def _text(content: Any) -> bytes:
-    """What stands in a file of metadata."""
+    """Return what stands in a file of metadata."""
     return json.dumps(content, indent=1, sort_keys=True).encode()
 
 
 def checked_metadata(path: Path) -> Metadata:
-    """What the metadata of the store at `path` say. Raises StoreError where there is no store, or it is damaged or of
-    another version."""
+    """Return what the metadata of the store at `path` say.
+    Raises StoreError where there is no store, or it is damaged or of another version."""
     if not path.exists():
         raise StoreError("", "nothing there", _EXPECTED, _EXAMPLE, str(path))
     if not path.is_dir():
@@ -143,7 +143,7 @@ class _DamagedError(StoreError):
 
 
 def _metadata_in(path: Path, file: str) -> Metadata:
-    """What the metadata in this file of the store at `path` say. Raises StoreError."""
+    """Return what the metadata in this file of the store at `path` say. Raises StoreError."""
     try:
         document = json.loads(stored(path / file))
         entry, metadata = document.get(_OWN), document["metadata"]
@@ -182,12 +182,12 @@ _WORDS = (b'"equations"', f'"{_OWN}"'.encode())
 
 
 def is_store(path: Path) -> bool:
-    """Whether friso made the folder, as far as its metadata tell, damaged or not."""
+    """Tell whether friso made the folder, as far as its metadata tell, damaged or not."""
     return any(all(_mentions(path / name, words) for words in _WORDS) for name in (_FILE, _COPY, _ATTRIBUTES))
 
 
 def _says(file: Path, content: Any) -> bool:
-    """Whether a file of JSON says just this: 1 is neither 1.0 nor true."""
+    """Tell whether a file of JSON says just this: 1 is neither 1.0 nor true."""
     try:
         return digest(json.loads(stored(file))) == digest(content)
     except (OSError, ValueError, RecursionError):
@@ -195,7 +195,7 @@ def _says(file: Path, content: Any) -> bool:
 
 
 def _mentions(file: Path, words: bytes) -> bool:
-    """Whether some words are in a file."""
+    """Tell whether some words are in a file."""
     try:
         return words in stored(file)
     except OSError:
@@ -203,8 +203,9 @@ def _mentions(file: Path, words: bytes) -> bool:
 
 
 def _are_of_a_store(files: Mapping[str, Any], axes: Mapping[str, Any]) -> bool:
-    """Whether the files that metadata name are such as a store has, none elsewhere; the arrays hold numbers or texts as
-    friso writes them, for other codecs may run code; and all of each axis is there."""
+    """Tell whether the files that metadata name are such as a store has, none elsewhere;
+    the arrays hold numbers or texts as friso writes them, for other codecs may run code; and all of each axis is there.
+    """
     if not all(name.fullmatch(file) for name, group in zip(_NAMES, (files, axes), strict=True) for file in group):
         return False
     try:
@@ -226,7 +227,8 @@ def _are_of_a_store(files: Mapping[str, Any], axes: Mapping[str, Any]) -> bool:
 
 
 def _is_plain(array: Mapping[str, Any]) -> bool:
-    """Whether chunks decode to numbers or texts, compressed and checked as friso does, of a size that it writes."""
+    """Tell whether chunks decode to numbers or texts, compressed and checked as friso does,
+    of a size that it writes."""
     kind = _KIND.fullmatch(array["dtype"])
     codecs = {codec["id"] for codec in [array["compressor"], *(array["filters"] or ())] if codec}
     laid_out = (array["order"], array.get("dimension_separator", "."))
@@ -237,7 +239,7 @@ def _is_plain(array: Mapping[str, Any]) -> bool:
 
 
 def _chunks(array: Mapping[str, Any]) -> int:
-    """How many chunks an array has."""
+    """Return how many chunks an array has."""
     return math.prod(-(-length // size) for length, size in zip(array["shape"], array["chunks"], strict=True))
 
 
@@ -247,5 +249,5 @@ def _damaged(path: Path, damage: str) -> _DamagedError:
 
 
 def digest(content: Any) -> str:
-    """The SHA-256 of what JSON holds."""
+    """Return the SHA-256 of what JSON holds."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

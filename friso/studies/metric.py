@@ -140,7 +140,8 @@ class Metric:
 
     @property
     def form(self) -> str:
-        """The NumPy type in which it is stored; words have room for "invalid" and all of friso's own."""
+        """Return the NumPy type in which it is stored;
+        words have room for "invalid" and all of friso's own."""
         return f"<U{max(9, *(len(word.text) for word in self.words))}" if self.words else "f8"
 
     def attributes(self, kind: AxisKind) -> dict[str, Any]:

@@ -28,8 +28,8 @@ _cancel = np.zeros(1, np.int64)
 
 @contextmanager
 def processes(workers: int) -> Iterator[Crew]:
-    """A crew of so many processes on this machine, each of which computes one block at a time, in one thread. They end
-    with this process, however it ends."""
+    """Return a crew of so many processes on this machine,
+    each of which computes one block at a time, in one thread. They end with this process, however it ends."""
     context = get_context("spawn")
     with interrupts_held(), _modules_of_this_folder_ignored():
         shared: Any = context.RawArray("q", 1)

@@ -30,7 +30,7 @@ Ask = Callable[[np.ndarray], Columns]
 
 
 def finer(study: Study) -> Study:
-    """The study on the fine grid. Raises InputError where there is no such grid."""
+    """Return the study on the fine grid. Raises InputError where there is no such grid."""
     if len(study.shape) > 3 or not all(axis.numeric for axis in study.axes) or SAMPLE in study.names:
         expected = "one to three axes of numbers on a grid"
         raise InputError("--refine", f"axes: {', '.join(study.names)}", expected)
@@ -39,7 +39,8 @@ def finer(study: Study) -> Study:
 
 
 def _finer(axis: SweptAxis) -> SweptAxis:
-    """The axis with cells between its own: those of a range as if it had been given so many points."""
+    """Return the axis with cells between its own:
+    those of a range as if it had been given so many points."""
     settings = StudySettings.current()
     log = axis.scale == "log"
     space, ends = np.geomspace if log else np.linspace, (axis.values[0], axis.values[-1])
@@ -54,12 +55,13 @@ def _finer(axis: SweptAxis) -> SweptAxis:
 
 
 def asked_for(study: Study) -> Study:
-    """The study of what is asked about cells: refining it takes what is usually known of them."""
+    """Return the study of what is asked about cells:
+    refining it takes what is usually known of them."""
     return replace(study, metrics=in_order((*usual_metrics(), *study.metrics)))
 
 
 def refine_cells(study: Study, ask: Ask) -> Columns:
-    """The measures of a fine study, each of shape (cells,), from the cells computed.
+    """Return the measures of a fine study, each of shape (cells,), from the cells computed.
 
     A cell that was not computed has the outcome (and the verdict) of the nearest one that was, a status that says so,
     and no numbers.
@@ -79,7 +81,7 @@ def refine_cells(study: Study, ask: Ask) -> Columns:
 
 
 def _lattice(shape: tuple[int, ...]) -> np.ndarray:
-    """Numbers of the cells of the coarse lattice, the ends of the axes among them."""
+    """Return numbers of the cells of the coarse lattice, the ends of the axes among them."""
     settings = StudySettings.current()
     lines = [np.unique(np.append(np.arange(0, size, settings.lattice_step), size - 1)) for size in shape]
     return np.ravel_multi_index(np.meshgrid(*lines, indexing="ij"), shape).ravel()
@@ -115,7 +117,8 @@ class _Grid:
         return distance, np.asarray(np.ravel_multi_index(tuple(places), self.shape))
 
     def _changes(self, nearest: np.ndarray) -> np.ndarray:
-        """Which cells have a neighbour with other words, where each has those of the nearest cell computed."""
+        """Return which cells have a neighbour with other words,
+        where each has those of the nearest cell computed."""
         both = np.sum([self.columns[name] + " " for name in self.words], axis=0).astype(str)
         words = np.unique(both, return_inverse=True)[1].ravel()[nearest]
         changes = np.zeros(self.shape, bool)
@@ -127,12 +130,12 @@ class _Grid:
         return changes
 
     def unseen_changes(self) -> np.ndarray:
-        """Numbers of the cells at a change of words that were not yet computed."""
+        """Return numbers of the cells at a change of words that were not yet computed."""
         _, nearest = self._nearest()
         return np.flatnonzero(self._changes(nearest) & ~self.computed)
 
     def likely_surprises(self, count: int) -> np.ndarray:
-        """Numbers of up to `count` cells that are most worth a run."""
+        """Return numbers of up to `count` cells that are most worth a run."""
         settings = StudySettings.current()
         from scipy.ndimage import distance_transform_edt
 
@@ -146,7 +149,7 @@ class _Grid:
         return best[worth.flat[best] > 0]
 
     def filled(self) -> Columns:
-        """The measures of all cells, those not computed inferred."""
+        """Return the measures of all cells, those not computed inferred."""
         _, nearest = self._nearest()
         guessed = ~self.computed.ravel()
         words = {name: self.columns[name][nearest.ravel()] for name in self.words}

@@ -36,12 +36,14 @@ class Request:
         return read_axes(self.stage, axes, linking.names(self.links), self.log)
 
     def size(self) -> int:
-        """The number of cells, without any array being made. Raises InputError as `study` does."""
+        """Return the number of cells, without any array being made.
+        Raises InputError as `study` does."""
         samples = 1 if self.samples is None or self.samples.count is None else self.samples.count
         return math.prod(_points(axis) for axis in self._read(self.axes)) * samples
 
     def trial(self) -> Study:
-        """A few cells drawn evenly from a study that may be too large to be made. Raises InputError."""
+        """Return a few cells drawn evenly from a study that may be too large to be made.
+        Raises InputError."""
         rng = np.random.default_rng(0)
         axes = []
         for axis in self._read({**self.axes, **(self.samples.ranges if self.samples else {})}):
@@ -52,7 +54,7 @@ class Request:
         return Study(self.stage, (Dimension(SAMPLE, tuple(axes)),), dict(self.links), usual_metrics(), 1e-6)
 
     def study(self, metrics: Sequence[str] | None = None, rtol: float = 1e-6) -> Study:
-        """The study. Raises InputError."""
+        """Return the study. Raises InputError."""
         checked_rtol(rtol)
         read = self._read(self.axes)
         if not read and self.samples is None:

@@ -60,7 +60,7 @@ class Samples:
 
 
 def sample_axes(stage: Stage, samples: Samples, free: frozenset[str], log: bool = False) -> tuple[SweptAxis, ...]:
-    """The sampled axes, all of one length. Raises InputError."""
+    """Return the sampled axes, all of one length. Raises InputError."""
     read = read_axes(stage, samples.ranges, free, log)
     ranges = [axis for axis in read if isinstance(axis, SweptRange)]
     if not ranges:
@@ -83,7 +83,7 @@ def _values(read: tuple[SweptAxis | SweptRange, ...]) -> tuple[SweptAxis, ...]:
 
 
 def _points(dimensions: int, samples: Samples) -> np.ndarray:
-    """Points of the unit cube, shape (count, dimensions)."""
+    """Return points of the unit cube, shape (count, dimensions)."""
     from scipy.stats import qmc
 
     if samples.count is None:

@@ -33,7 +33,7 @@ class SealedStore(WrapperStore[LocalStore]):
 
     @classmethod
     def at(cls, path: Path, metadata: Metadata) -> SealedStore:
-        """The store at `path`, to be read alone."""
+        """Return the store at `path`, to be read alone."""
         return cls(LocalStore(path, read_only=True), metadata)
 
     def _with_store(self, store: LocalStore) -> SealedStore:
@@ -59,7 +59,7 @@ class SealedStore(WrapperStore[LocalStore]):
         return chunk
 
     def _unread(self, variable: str, number: str, problem: str) -> StoreError:
-        """The error of cells of a variable that are damaged, or cannot be read."""
+        """Return the error of cells of a variable that are damaged, or cannot be read."""
         array, names = (self.files[f"{variable}/{name}"] for name in (".zarray", ".zattrs"))
         cells = ", ".join(
             f"{int(part) * size}:{min((int(part) + 1) * size, length)}"

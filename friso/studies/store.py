@@ -74,8 +74,8 @@ class Store:
     @classmethod
     @contextmanager
     def opened(cls, path: Path, study: Study, overwrite: bool = False) -> Iterator[Store]:
-        """The store of a study, made if it is not there; with `overwrite` in place of that of another study, or of a
-        damaged one.
+        """Return the store of a study, made if it is not there;
+        with `overwrite` in place of that of another study, or of a damaged one.
 
         Raises StoreError if the folder holds anything else, another study, or is in use by another process.
         """
@@ -150,11 +150,11 @@ class Store:
 
     @property
     def ledger(self) -> Ledger:
-        """What was written of each block."""
+        """Return what was written of each block."""
         return Ledger(self.path, checked_metadata(self.path).study, self.study.metrics)
 
     def missing(self) -> Iterator[CellBlock]:
-        """The blocks not yet done, and those that are damaged, which is logged."""
+        """Yield the blocks not yet done, and those that are damaged, which is logged."""
         ledger = self.ledger
         for block in self.study.blocks(self.blocks):
             number = self._number(block)
@@ -165,16 +165,17 @@ class Store:
                 yield block
 
     def done(self) -> list[str]:
-        """The numbers of the blocks that are done. Only what is there is counted: a store may state any size."""
+        """Return the numbers of the blocks that are done. Only what is there is counted:
+        a store may state any size."""
         return [number for number in self.ledger.entered() if self._is_of_block(number)]
 
     @property
     def is_done(self) -> bool:
-        """Whether all blocks are done, as far as is entered."""
+        """Tell whether all blocks are done, as far as is entered."""
         return len(self.done()) == self._count
 
     def state(self) -> StoreState:
-        """How far the study is, what is damaged, and what cannot be read."""
+        """Return how far the study is, what is damaged, and what cannot be read."""
         ledger, done = self.ledger, self.done()
         damaged: list[str] = []
         unreadable: list[str] = []
@@ -189,7 +190,7 @@ class Store:
 
     @property
     def _counts(self) -> list[int]:
-        """How many blocks there are along each axis."""
+        """Return how many blocks there are along each axis."""
         return [-(-length // size) for length, size in zip(self.study.shape, self.blocks, strict=True)]
 
     @property
@@ -197,7 +198,7 @@ class Store:
         return math.prod(self._counts)
 
     def _is_of_block(self, number: str) -> bool:
-        """Whether a name is that of the files of a block."""
+        """Tell whether a name is that of the files of a block."""
         parts = number.split(".")
         return len(parts) == len(self._counts) and all(
             re.fullmatch("0|[1-9][0-9]{0,17}", part) and int(part) < count
@@ -205,7 +206,7 @@ class Store:
         )
 
     def _number(self, block: CellBlock) -> str:
-        """The name of the files of a block."""
+        """Return the name of the files of a block."""
         return ".".join(str(part.start // size) for part, size in zip(block, self.blocks, strict=True))
 
     def write(self, block: CellBlock, columns: Mapping[str, np.ndarray]) -> None:
@@ -223,7 +224,7 @@ class Store:
 
     @property
     def answers(self) -> KeptCells:
-        """What a refined study keeps until it is done."""
+        """Return what a refined study keeps until it is done."""
         return KeptCells(self.path / ANSWERS, self.study, checked_metadata(self.path).study)
 
     def annotate(self, attributes: Mapping[str, Any]) -> None:
@@ -232,7 +233,7 @@ class Store:
 
     @property
     def notes(self) -> Mapping[str, Any]:
-        """What friso noted of the store for itself."""
+        """Return what friso noted of the store for itself."""
         return checked_metadata(self.path).notes
 
     def note(self, **notes: Any) -> None:
@@ -240,7 +241,7 @@ class Store:
         annotate_metadata(self.path, notes=notes)
 
     def read(self) -> xr.Dataset:
-        """The store as a dataset whose values are read when they are looked at."""
+        """Return the store as a dataset whose values are read when they are looked at."""
         return read_store(self.path)
 
 
@@ -294,7 +295,7 @@ class StoreState:
 
     @property
     def is_whole(self) -> bool:
-        """Whether all blocks are done and can be read."""
+        """Tell whether all blocks are done and can be read."""
         return self.done == self.blocks and not (self.damaged or self.unreadable)
 
 
@@ -305,7 +306,7 @@ def check_store(path: Path) -> StoreState:
 
 
 def holds_all(path: Path, study: Study) -> bool:
-    """Whether the store at `path` is whole, and of this study."""
+    """Tell whether the store at `path` is whole, and of this study."""
     try:
         refuse_other(path, study)
         return check_store(path).is_whole
@@ -314,14 +315,15 @@ def holds_all(path: Path, study: Study) -> bool:
 
 
 def in_memory(runs: xr.Dataset) -> xr.Dataset:
-    """The study of an opened store in memory, each text once: as stored, a status takes a hundred times the room."""
+    """Return the study of an opened store in memory, each text once: as stored,
+    a status takes a hundred times the room."""
     words = [name for name in every_variable() if name in runs and is_text(name)]
     loaded = runs.drop_vars(words).load()
     return loaded.assign({name: (runs[name].dims, _shared(runs[name]), runs[name].attrs) for name in words})
 
 
 def _shared(texts: xr.DataArray) -> np.ndarray:
-    """The texts as objects, equal ones being one object."""
+    """Return the texts as objects, equal ones being one object."""
     settings = StudySettings.current()
     import pandas as pd
 

@@ -29,13 +29,14 @@ MOST_EXPANDED = 1 << 30
 
 
 def stored(file: Path) -> bytes:
-    """What is in a file of a store. Raises OSError, also for a link, a device, a pipe and more than MOST_BYTES."""
+    """Return what is in a file of a store. Raises OSError, also for a link, a device,
+    a pipe and more than MOST_BYTES."""
     return content_of(file, MOST_BYTES, follow=False)
 
 
 def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
-    """The SHA-256 of a file of a store, or beside it; None where there is none, no file, or one of more than `most`
-    bytes. Raises PermissionError where it cannot be read, which does not tell of damage."""
+    """Return the SHA-256 of a file of a store, or beside it; None where there is none, no file,
+    or one of more than `most` bytes. Raises PermissionError where it cannot be read, which does not tell of damage."""
     try:
         return hashlib.sha256(content_of(file, most, follow=False)).hexdigest()
     except PermissionError:
@@ -45,8 +46,8 @@ def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
 
 
 def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[str, np.ndarray] | None:
-    """The arrays that `keep_arrays` wrote into this file `about` the same; None where they are damaged, another's, or
-    of more than `most` bytes, of which none is expanded then."""
+    """Return the arrays that `keep_arrays` wrote into this file `about` the same;
+    None where they are damaged, another's, or of more than `most` bytes, of which none is expanded then."""
     try:
         content = stored(file)
         digest, archive = content[:_DIGEST], io.BytesIO(content[_DIGEST:])
@@ -93,7 +94,7 @@ _OF_ARRAY = re.compile(rf"\.z[a-z]+(\.copy)?|[0-9]+(\.[0-9]+)*|.*{re.escape(PART
 
 
 def is_of_store(name: str) -> bool:
-    """Whether a file of this name within a store is one that friso or Zarr writes."""
+    """Tell whether a file of this name within a store is one that friso or Zarr writes."""
     folder, _, own = name.rpartition("/")
     return _OF_ARRAY(own.removesuffix(".npz") if folder == ANSWERS else own) is not None
 
@@ -128,8 +129,8 @@ def refuse_foreign(path: Path, files: Collection[str]) -> None:
 
 
 def _entries(folder: Path | str, levels: int = 2) -> Iterator[os.DirEntry[str]]:
-    """All that is in a folder and in those below it, as deep as a store has files, each folder before what is in it; no
-    link is followed."""
+    """Yield all that is in a folder and in those below it, as deep as a store has files,
+    each folder before what is in it; no link is followed."""
     with os.scandir(folder) as entries:
         for entry in entries:
             yield entry

@@ -36,8 +36,8 @@ class ReadOnlyStoreError(StoreError):
 
 
 def where_links_lead(path: Path) -> Path:
-    """Where a store is: what is made aside, and what is replaced, is there, not at a link to it. Raises StoreError for
-    a link that leads nowhere, as to a disk that is missing."""
+    """Return where a store is: what is made aside, and what is replaced, is there,
+    not at a link to it. Raises StoreError for a link that leads nowhere, as to a disk that is missing."""
     if path.is_symlink() and not path.exists():
         actual = f"a link to {os.path.realpath(path)}, where nothing is"
         raise StoreError("", actual, "a store, or a new name", "--out study.zarr", str(path))
@@ -134,8 +134,8 @@ def lock_store(path: Path, patience: float = 0.0) -> Iterator[FileLock]:
 
 @contextmanager
 def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
-    """What `fill` has written, to be moved away. Ctrl-C waits for its end: else the threads of Zarr would go on writing
-    into what is deleted here."""
+    """Return what `fill` has written, to be moved away. Ctrl-C waits for its end:
+    else the threads of Zarr would go on writing into what is deleted here."""
     draft = _free_name(path)
     try:
         draft.mkdir(mode=DRAFT_MODE, parents=True)
@@ -149,5 +149,5 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
 
 
 def _free_name(path: Path, suffix: str = "") -> Path:
-    """A name that is free."""
+    """Return a name that is free."""
     return path.with_name(f".{path.name}.{uuid.uuid4().hex}{suffix}")

@@ -62,22 +62,22 @@ class Study:
 
     @property
     def cycles(self) -> bool:
-        """Whether anything is wanted that needs a survey of what attracts."""
+        """Tell whether anything is wanted that needs a survey of what attracts."""
         every = metrics()
         return any(name in every and every[name].source == "survey" for name in self.metrics)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the dimensions."""
+        """Return names of the dimensions."""
         return tuple(dimension.name for dimension in self.dimensions)
 
     @property
     def axes(self) -> tuple[SweptAxis, ...]:
-        """The axes of all dimensions."""
+        """Return the axes of all dimensions."""
         return tuple(axis for dimension in self.dimensions for axis in dimension.axes)
 
     def columns(self, cells: np.ndarray) -> dict[str, np.ndarray]:
-        """The value of every axis at the cells with these numbers."""
+        """Return the value of every axis at the cells with these numbers."""
         places = np.unravel_index(cells, self.shape)
         return {
             axis.name: axis.values[place]
@@ -86,7 +86,7 @@ class Study:
         }
 
     def block_columns(self, block: CellBlock) -> dict[str, np.ndarray]:
-        """The value of every axis at the cells of a block, in C order."""
+        """Return the value of every axis at the cells of a block, in C order."""
         picked = [np.arange(len(dimension))[part] for dimension, part in zip(self.dimensions, block, strict=True)]
         places = [place.ravel() for place in np.meshgrid(*picked, indexing="ij")]
         return {
@@ -96,7 +96,8 @@ class Study:
         }
 
     def block_shape(self, target: int) -> tuple[int, ...]:
-        """The shape of blocks of about `target` cells: whole trailing dimensions, an equal share of the one before."""
+        """Return the shape of blocks of about `target` cells: whole trailing dimensions,
+        an equal share of the one before."""
         shape = [1] * len(self.shape)
         for i in reversed(range(len(shape))):
             room = max(1, target // math.prod(shape))
@@ -106,13 +107,14 @@ class Study:
         return tuple(shape)
 
     def blocks(self, shape: Sequence[int]) -> Iterator[CellBlock]:
-        """All blocks of a shape, those at the ends cut to fit."""
+        """Yield all blocks of a shape, those at the ends cut to fit."""
         starts = (range(0, size, step) for size, step in zip(self.shape, shape, strict=True))
         for corner in product(*starts):
             yield tuple(slice(k, min(k + step, size)) for k, step, size in zip(corner, shape, self.shape, strict=True))
 
     def cell_stage(self, index: Sequence[int]) -> Stage:
-        """The stage of one cell, which run alone gives the same numbers. Raises InputError for an invalid cell."""
+        """Return the stage of one cell, which run alone gives the same numbers.
+        Raises InputError for an invalid cell."""
         columns = self.columns(np.array([np.ravel_multi_index(tuple(index), self.shape)]))
         numeric = {axis.name: axis for axis in self.axes if axis.numeric}
         words = {name: column[0].item() for name, column in columns.items() if name not in numeric}
@@ -125,7 +127,7 @@ class Study:
         return stage.with_numbers({key: float(np.ravel(flat[key])[0]) for key in sorted(changed)})
 
     def at(self, cells: np.ndarray) -> Study:
-        """A study of just these cells, side by side."""
+        """Return a study of just these cells, side by side."""
         columns = self.columns(cells)
         axes = tuple(
             SweptAxis(axis.name, columns[axis.name], axis.unit, axis.scale, axis.numeric) for axis in self.axes
@@ -143,7 +145,7 @@ class Study:
         return coordinates
 
     def attributes(self) -> dict[str, Any]:
-        """What is stored with the numbers, so that any cell can be run again on its own."""
+        """Return what is stored with the numbers, so that any cell can be run again on its own."""
         return {
             "name": self.stage.name,
             "stage": self.stage.to_toml(),
@@ -157,7 +159,7 @@ class Study:
         }
 
     def _named(self) -> str:
-        """The axes, dimension by dimension, by name."""
+        """Return the axes, dimension by dimension, by name."""
         return ", ".join(" with ".join(axis.name for axis in dimension.axes) for dimension in self.dimensions)
 
     def differences(self, other: Study, its_equations: str) -> list[str]:
@@ -187,7 +189,7 @@ class Study:
 
 
 def cells_of(block: CellBlock) -> int:
-    """The number of cells of a block."""
+    """Return the number of cells of a block."""
     return math.prod(part.stop - part.start for part in block)
 
 
@@ -200,12 +202,12 @@ _DECISIVE = (
 
 
 def equations_version() -> str:
-    """A digest of friso's own code that decides on the numbers of a cell."""
+    """Return a digest of friso's own code that decides on the numbers of a cell."""
     return f"{VERSION} ({code_digest(*_DECISIVE)[:12]})"
 
 
 def study_of(runs: xr.Dataset) -> Study:
-    """The study that a dataset or an opened store holds the results of."""
+    """Return the study that a dataset or an opened store holds the results of."""
     dimensions, order = [], json.loads(runs.attrs["axes"])
     for name in runs["outcome"].dims:
         axes = tuple(_stored_axis(runs[axis]) for axis in order if runs[axis].dims == (name,))
@@ -225,7 +227,7 @@ def _stored_axis(coordinate: xr.DataArray) -> SweptAxis:
 
 
 def _described(axis: SweptAxis) -> str:
-    """An axis in short; equal texts mean equal values."""
+    """Return an axis in short; equal texts mean equal values."""
     digest = hashlib.sha256(np.ascontiguousarray(axis.values).tobytes()).hexdigest()[:8]
     first, last = axis.values[0], axis.values[-1]
     ends = f"{first:g}..{last:g} {axis.unit}" if axis.numeric else f"{first}..{last}"
@@ -233,7 +235,7 @@ def _described(axis: SweptAxis) -> str:
 
 
 def _links(study: Study) -> str:
-    """The links as they were given."""
+    """Return the links as they were given."""
     return ", ".join(f"{key}={expression}" for key, expression in study.links.items()) or "none"
 
 

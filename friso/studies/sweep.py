@@ -124,7 +124,8 @@ def fill(store: Store, crew: Crew, verify: float = 0.0, progress: Progress = sil
 
 
 def _refined(study: Study, crew: Crew, tally: Tally, keeping: Callable[[Ask], Ask] = lambda ask: ask) -> Columns:
-    """The measures of a refined study, each of its shape; `keeping` may keep the answers of a resumed one."""
+    """Return the measures of a refined study, each of its shape;
+    `keeping` may keep the answers of a resumed one."""
     everything = asked_for(study)
 
     def ask(cells: np.ndarray) -> Columns:
@@ -137,7 +138,7 @@ def _refined(study: Study, crew: Crew, tally: Tally, keeping: Callable[[Ask], As
 
 
 def dataset(study: Study, columns: Columns) -> xr.Dataset:
-    """The dataset of a study from its measures, each of the study's shape."""
+    """Return the dataset of a study from its measures, each of the study's shape."""
     import xarray as xr
 
     variables = {

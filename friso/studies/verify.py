@@ -26,7 +26,7 @@ TRIED = 400
 
 
 def checked_share(share: float) -> float:
-    """The share of cells to verify. Raises InputError for one that is none."""
+    """Return the share of cells to verify. Raises InputError for one that is none."""
     if not 0 <= share <= 1:
         raise InputError("verify", f"{share:g}", "a share of the cells, from 0 to 1", "--verify 0.05")
     return share
@@ -76,8 +76,9 @@ def check_verified(attributes: Mapping[str, Any], cells: int) -> None:
 
 
 def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], int]:
-    """The loosest tolerance at which `WANTED` of the outcomes survive, the surviving share at each one tried, and on
-    how many cells that was found (none, and the tightest, where no cell has a stage).
+    """Return the loosest tolerance at which `WANTED` of the outcomes survive,
+    the surviving share at each one tried, and on how many cells that was found (none, and the tightest, where no cell
+    has a stage).
 
     If no tolerance is good enough it is the one at which most survive.
     """
@@ -117,7 +118,8 @@ def random_cells(study: Study, count: int, condition: Callable[[np.ndarray], np.
 
 
 def _at(values: xr.DataArray, study: Study, cells: np.ndarray) -> np.ndarray:
-    """The values of single cells, of which a store reads those blocks only that they lie in."""
+    """Return the values of single cells, of which a store reads those blocks only that they lie
+    in."""
     import xarray as xr
 
     places = np.unravel_index(cells, study.shape)

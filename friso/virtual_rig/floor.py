@@ -15,11 +15,12 @@ FLOOR = int.from_bytes(b"floor")
 
 
 def floor_acceleration(floor: Floor, duration: float, interval: float, seed: int) -> np.ndarray:
-    """A Gaussian realisation of the floor's acceleration [m/s^2] at 0, `interval`, ... up to `duration` [s].
+    """Return a Gaussian realisation of the floor's acceleration [m/s^2] at 0, `interval`, ...
+    up to `duration` [s].
 
     Shape (n,). One wave per frequency of the Fourier transform, with the variance that the spectrum has in the band
-    around it; so the variance is that of the spectrum however short the record is. Raises InputError for a
-    spectrum that reaches beyond half the sampling frequency.
+    around it; so the variance is that of the spectrum however short the record is. Raises InputError for a spectrum
+    that reaches beyond half the sampling frequency.
     """
     highest = floor.frequency[-1]
     if highest * interval > 0.5:

@@ -50,8 +50,8 @@ class RecordedRuns:
 
 
 def as_built_keys(stage: Stage, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """The flat keys of a stage with a complete drive: what it does not tell is ideal. `changes` are SI numbers, or
-    arrays with one for each run."""
+    """Return the flat keys of a stage with a complete drive: what it does not tell is ideal.
+    `changes` are SI numbers, or arrays with one for each run."""
     flat = anywhere(stage.flat(changes))
     flat.setdefault("drive.sample_time", SAMPLE_TIME)
     flat = {**NEUTRAL, **flat, "drive.integrator_reset": float(flat.get("drive.integrator_reset", False))}
@@ -68,7 +68,8 @@ def run(
     changes: Mapping[str, Any] | None = None,
     threads: int | None = None,
 ) -> Iterator[RecordedRuns]:
-    """Runs of a stage, each with noise of its own seed, logged every `interval` [s], a whole number of samples.
+    """Yield runs of a stage, each with noise of its own seed, logged every `interval` [s],
+    a whole number of samples.
 
     `changes` are flat keys to SI numbers, or arrays of one for each run: of a sweep, or of machines drawn at random.
     The runs come chunk by chunk; they are the same for any number of threads. Raises InputError for an interval that
@@ -150,7 +151,7 @@ def _recorded(
 def _signals(
     shape: Kernel, samples: np.ndarray, flat: Mapping[str, Any], task: MoveTask, seeds: np.ndarray, interval: float
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """What the drive logs, and what is true."""
+    """Return what the drive logs, and what is true."""
     time = np.arange(samples.shape[1]) * interval
     position, reading, commanded = (
         samples[:, :, i] for i in (shape.position, shape.full_state.index(READING), shape.full_state.index(COMMANDED))
@@ -178,14 +179,14 @@ def _signals(
 
 
 def reference(task: MoveTask, time: np.ndarray) -> np.ndarray:
-    """The reference [m] at times [s]."""
+    """Return the reference [m] at times [s]."""
     rows = task.pieces[np.searchsorted(task.pieces[:, 0], time * (1 + 1e-12), side="right") - 1]
     since = time - rows[:, 0]
     return rows[:, 1] + rows[:, 2] * since + rows[:, 3] * since**2 / 2
 
 
 def failures(recorded: RecordedRuns) -> list[tuple[int, str]]:
-    """Numbers of the runs that failed, and why."""
+    """Return numbers of the runs that failed, and why."""
     failed = recorded.statuses != Status.DONE
     return [
         (int(n), Status(int(s)).text) for n, s in zip(recorded.numbers[failed], recorded.statuses[failed], strict=True)

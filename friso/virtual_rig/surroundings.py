@@ -16,7 +16,8 @@ from friso.virtual_rig.task import MoveTask
 
 
 def tables(flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> Tables:
-    """The tables of the runs whose noise has these seeds, from flat keys to SI numbers or arrays of shape (runs,).
+    """Return the tables of the runs whose noise has these seeds,
+    from flat keys to SI numbers or arrays of shape (runs,).
 
     The rails are the machines': their seeds are "rail.seed". All runs share one table where they do not differ.
     """
@@ -32,7 +33,8 @@ def _of_run(flat: Mapping[str, Any], run: int) -> dict[str, Any]:
 
 
 def _places(flat: Mapping[str, Any], task: MoveTask) -> tuple[np.ndarray, np.ndarray]:
-    """The places [m] of the tables, evenly spaced, and their grid, shape (1, 2): first place, points per metre."""
+    """Return the places [m] of the tables, evenly spaced, and their grid, shape (1, 2):
+    first place, points per metre."""
     settings = RigSettings.current()
     low, high = task.span
     margin = max(settings.table_margin, settings.table_share * (high - low))

@@ -33,7 +33,7 @@ class MoveTask:
 
     @property
     def span(self) -> tuple[float, float]:
-        """The lowest and highest position of the reference [m]."""
+        """Return the lowest and highest position of the reference [m]."""
         ends = [*self.pieces[1:, 0], self.duration]
         places = [*self.pieces[:, 1]]
         for (start, place, velocity, acceleration), end in zip(self.pieces, ends, strict=True):
@@ -44,8 +44,8 @@ class MoveTask:
 
 
 def own_motion(stage: Stage) -> MoveTask:
-    """The motion of the stage file, at whose start the stage stands at 0 (or displaced from there): the reference of a
-    step has been there too, and leaves it after one sample of the drive."""
+    """Return the motion of the stage file, at whose start the stage stands at 0 (or displaced
+    from there): the reference of a step has been there too, and leaves it after one sample of the drive."""
     flat = stage.flat()
     pieces, duration = motion.pieces(flat, 1)[0], flat["motion.duration"]
     if pieces[0, 1]:
@@ -55,7 +55,7 @@ def own_motion(stage: Stage) -> MoveTask:
 
 
 def standing(place: float, duration: float) -> MoveTask:
-    """A reference that stays at a place [m]."""
+    """Return a reference that stays at a place [m]."""
     return MoveTask(np.array([[0.0, place, 0.0, 0.0]]), duration)
 
 

@@ -19,7 +19,7 @@ class UnfinishedWork(Protocol):
 
     @property
     def count(self) -> int:
-        """How many pieces are kept."""
+        """Return how many pieces are kept."""
         ...
 
     def clear(self) -> None:

@@ -30,7 +30,7 @@ class KeptWork:
 
     @property
     def count(self) -> int:
-        """How many pieces are kept."""
+        """Return how many pieces are kept."""
         if self.folder is None or not self.folder.exists():
             return 0
         return sum(1 for file in self.folder.iterdir() if file.suffix in (".npz", ".json"))
@@ -46,7 +46,8 @@ class KeptWork:
         make: Callable[[], Mapping[str, np.ndarray]],
         names: Collection[str] | None = None,
     ) -> Mapping[str, np.ndarray]:
-        """Arrays by name `about` something, as they were kept, with just those `names`, or made now."""
+        """Return arrays by name `about` something, as they were kept, with just those `names`,
+        or made now."""
         file = self._file("npz", *about)
         columns = None if file is None else kept_arrays(file)
         if columns is not None and (names is None or columns.keys() == {*names}):
@@ -65,5 +66,5 @@ class KeptWork:
 
 @cache
 def _built_on() -> str:
-    """What decides on a result besides friso's code."""
+    """Return what decides on a result besides friso's code."""
     return f"{machine()}, scipy {version('scipy')}"

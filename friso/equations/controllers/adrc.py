@@ -123,13 +123,13 @@ class DisturbanceRejection(ControllerSection):
 
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: None) -> sp.Expr:
-        """What the filter comes to beside the integral [N/m]."""
+        """Return what the filter comes to beside the integral [N/m]."""
         parts = _parts(blocks)
         return parts.proportional / parts.d0
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: None) -> Mapping[str, Signal]:
-        """The two shares [N]."""
+        """Return the two shares [N]."""
         integral, lead, proportional, d1, d0 = _parts(blocks)
         upper, lower = (proportional / d0, lead / d0, 0), (1, d1 / d0, 1 / d0)
         return {

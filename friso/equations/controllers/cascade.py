@@ -113,7 +113,7 @@ class Cascade(ControllerSection):
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> CascadeTerms:
-        """Which terms there are."""
+        """Return which terms there are."""
         return CascadeTerms(
             position_integral=POSITION_TIME in flat,
             velocity_integral=VELOCITY_TIME in flat,
@@ -124,7 +124,8 @@ class Cascade(ControllerSection):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """The integral in the other loop, pseudo-derivative feedback or none, feedforward, and no integral."""
+        """Return the integral in the other loop, pseudo-derivative feedback or none, feedforward,
+        and no integral."""
         listed: dict[str, Mapping[str, Any]] = {}
         outer, inner = flat.get(POSITION_TIME), flat.get(VELOCITY_TIME)
         if inner and not outer:
@@ -175,20 +176,21 @@ class Cascade(ControllerSection):
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
-        """Whether either loop has an integral."""
+        """Tell whether either loop has an integral."""
         return POSITION_TIME in flat or VELOCITY_TIME in flat
 
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: CascadeTerms) -> sp.Expr:
-        """The force on a stage that is displaced quickly [N/m]: the integral of its velocity is its displacement."""
+        """Return the force on a stage that is displaced quickly [N/m]:
+        the integral of its velocity is its displacement."""
         rate = blocks.key("kv") if variant.proportional_on == "error" else 0
         rate = rate + (1 / blocks.key("velocity_integral_time") if variant.velocity_integral else 0)
         return blocks.key("kp") * rate
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: CascadeTerms) -> Mapping[str, Signal]:
-        """The shares [N] of the position loop's command, of the velocity that opposes it, of the velocity loop's
-        integral, and of the feedforward."""
+        """Return the shares [N] of the position loop's command, of the velocity that opposes it,
+        of the velocity loop's integral, and of the feedforward."""
         ahead = {name: blocks.key(name) for name in variant.feedforward}
         kv, kp = blocks.key("kv"), blocks.key("kp")
         with blocks.loop("position"):

@@ -25,13 +25,13 @@ TERMS = {
 
 
 def fed_forward(flat: Mapping[str, Any]) -> str:
-    """The terms that there are; empty without any."""
+    """Return the terms that there are; empty without any."""
     return " + ".join(term for name, term in TERMS.items() if flat.get(ControllerSection.key(name)))
 
 
 def feedforward_of_moves(flat: Mapping[str, Any], *names: str) -> dict[str, float]:
-    """Keys and values [SI] of the feedforward that the moving mass and its viscous friction need, of those `names` of
-    it that a controller has not got."""
+    """Return keys and values [SI] of the feedforward that the moving mass and its viscous
+    friction need, of those `names` of it that a controller has not got."""
     needed = {"acceleration_feedforward": moving_mass(flat), "viscous_feedforward": flat.get("friction.viscous", 0.0)}
     return {
         ControllerSection.key(name): float(value)

@@ -37,7 +37,7 @@ class Terms(NamedTuple):
 
 
 def proportional_derivative(stiffness: float, damping: float) -> dict[str, Any]:
-    """The flat keys of a controller with a stiffness [N/m] and a damping [N s/m]."""
+    """Return the flat keys of a controller with a stiffness [N/m] and a damping [N s/m]."""
     return {KIND: "pid", KP: stiffness, KI: 0.0, KD: damping, TAU: 0.0, DERIVATIVE_ON: "error"}
 
 
@@ -84,7 +84,7 @@ class PidGains(Pid):
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> Terms:
-        """Which terms there are."""
+        """Return which terms there are."""
         derived = flat[KD] > 0
         return Terms(
             integral=bool(flat[KI] > 0),
@@ -95,12 +95,12 @@ class PidGains(Pid):
 
     @classmethod
     def takes_velocity(cls, flat: Mapping[str, Any]) -> bool:
-        """Where the derivative is that of the measurement."""
+        """Return where the derivative is that of the measurement."""
         return bool(flat[KD] > 0 and flat[DERIVATIVE_ON] == "measurement")
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """The derivative of the other signal, feedforward, and no integral."""
+        """Return the derivative of the other signal, feedforward, and no integral."""
         listed: dict[str, Mapping[str, Any]] = {}
         if flat[KD] and flat[DERIVATIVE_ON] == "error":
             listed["derivative of the measurement"] = {DERIVATIVE_ON: "measurement"}
@@ -145,17 +145,17 @@ class PidGains(Pid):
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
-        """Whether the gain of the integral is not 0."""
+        """Tell whether the gain of the integral is not 0."""
         return bool(flat[KI] > 0)
 
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: Terms) -> sp.Expr:
-        """The proportional gain [N/m]."""
+        """Return the proportional gain [N/m]."""
         return blocks.key("kp")
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: Terms) -> Mapping[str, Signal]:
-        """The three shares [N] of Eq. 6, and that of the feedforward where there is any."""
+        """Return the three shares [N] of Eq. 6, and that of the feedforward where there is any."""
         kp, ki, kd, tau = map(blocks.key, ("kp", "ki", "kd", "tau"))
         lag = tau if variant.filtered else None
         derivative = {

@@ -61,14 +61,15 @@ class VanDijk(Pid):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """A PID by its gains, as large as those of the rules, its derivative that of the measurement."""
+        """Return a PID by its gains, as large as those of the rules,
+        its derivative that of the measurement."""
         gone = dict.fromkeys((CROSSOVER, ALPHA, BETA, TUNED_MASS))
         written = {cls.key(name): value for name, value in as_gains(**numbers(flat)).items()}
         return {"derivative of the measurement": {**gone, **written, cls.key("derivative_on"): "measurement"}}
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Those of Eq. 7 that follow from its keys, and the keys that every controller has."""
+        """Return those of Eq. 7 that follow from its keys, and the keys that every controller has."""
         values = numbers(flat)
         times = {"tau_z": "lead", "tau_i": "integral", "tau_p": "low-pass, before all terms"}
         return (
@@ -90,12 +91,12 @@ class VanDijk(Pid):
 
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: None) -> sp.Expr:
-        """The gain k_p of Eq. 8 [N/m]."""
+        """Return the gain k_p of Eq. 8 [N/m]."""
         return rules(blocks)["k_p"]
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: None) -> Mapping[str, Signal]:
-        """The three shares [N] of Eq. 7."""
+        """Return the three shares [N] of Eq. 7."""
         k_p, tau_z, tau_i, tau_p = rules(blocks).values()
         passed = blocks.low_pass(measured.error, tau_p, "error")
         return {
@@ -106,12 +107,13 @@ class VanDijk(Pid):
 
 
 def controller_table(crossover: str) -> dict[str, Any]:
-    """The table [controller] of a stage file for a crossover such as "8 Hz"; alpha and beta as in the examples."""
+    """Return the table [controller] of a stage file for a crossover such as "8 Hz";
+    alpha and beta as in the examples."""
     return {"kind": "pid", "crossover": crossover, "alpha": 0.1, "beta": 2}
 
 
 def tuned(crossover: Any, alpha: Any, beta: Any, mass: Any) -> dict[str, Any]:
-    """The flat keys of a controller for a crossover [Hz] and a mass [kg]."""
+    """Return the flat keys of a controller for a crossover [Hz] and a mass [kg]."""
     return {KIND: "pid", CROSSOVER: crossover, ALPHA: alpha, BETA: beta, TUNED_MASS: mass}
 
 
@@ -128,7 +130,8 @@ def numbers(flat: Mapping[str, Any]) -> dict[str, float]:
 
 
 def as_gains(k_p: float, tau_z: float, tau_i: float, tau_p: float) -> dict[str, float]:
-    """The gains of Eq. 6 that are as large as those of the rules: kp [N/m], ki [N/(m s)], kd [N s/m]; and tau [s]."""
+    """Return the gains of Eq. 6 that are as large as those of the rules: kp [N/m],
+    ki [N/(m s)], kd [N s/m]; and tau [s]."""
     return {"kp": k_p * (1 + tau_z / tau_i), "ki": k_p / tau_i, "kd": k_p * tau_z, "tau": tau_p}
 
 

@@ -39,7 +39,8 @@ def bristle_friction(
 
 
 def keeping_bristle(measured: MeasuredFriction, **shape: float) -> dict[str, Any]:
-    """Keys of a law whose bristle is as stiff and damped as measured, with those of the `shape` of its virgin curve."""
+    """Return keys of a law whose bristle is as stiff and damped as measured,
+    with those of the `shape` of its virgin curve."""
     return {
         **measured.levels.keys,
         "friction.bristle_stiffness": measured.stiffness,
@@ -49,8 +50,9 @@ def keeping_bristle(measured: MeasuredFriction, **shape: float) -> dict[str, Any
 
 
 def bristles_active(flat: Mapping[str, Any], softer: float = 1.0, power: str = "") -> str:
-    """The condition under which damped bristles on a Stribeck curve are passive, where it is not met. Those bent most
-    give way `softer` times as fast as LuGre's; `power` writes that in the condition."""
+    """Return the condition under which damped bristles on a Stribeck curve are passive,
+    where it is not met. Those bent most give way `softer` times as fast as LuGre's; `power` writes that in the
+    condition."""
     levels, damping = levels_under_conditions(flat), flat["friction.bristle_damping"]
     least = damping * (levels.static / levels.coulomb - 1) * softer
     viscous = levels.viscous * (1 - abs(levels.viscous_asymmetry))  # in the direction in which it damps less

@@ -54,7 +54,8 @@ class Friction:
         self.force, self.breakaway, self.component, self.sliding = force, breakaway, component, sliding
 
     def with_values(self, values: Mapping[Any, Any]) -> Friction:
-        """The law with expressions in the place of others, but for its scales and its steady motion."""
+        """Return the law with expressions in the place of others,
+        but for its scales and its steady motion."""
         part, force = self.component, cast(Any, self.force.xreplace(values))
         states = tuple(replace(x, derivative=x.derivative.xreplace(values)) for x in part.states)
         outputs = {name: replace(x, expression=x.expression.xreplace(values)) for name, x in part.outputs.items()}
@@ -64,8 +65,9 @@ class Friction:
         return Friction(force, self.breakaway, component, self.sliding)
 
     def slid(self) -> dict[sp.Symbol, sp.Expr]:
-        """The law's own states, and the sides of its kinks but the direction, in a steady motion at the velocity.
-        Raises ValueError where the law does not declare them and its rates are not linear in its states."""
+        """Return the law's own states, and the sides of its kinks but the direction,
+        in a steady motion at the velocity. Raises ValueError where the law does not declare them and its rates are not
+        linear in its states."""
         import sympy as sp
 
         from friso.equations.component import Switch
@@ -82,7 +84,7 @@ class Friction:
         return slid | modes | sides | stated
 
     def steady(self, velocity: sp.Symbol) -> sp.Expr | None:
-        """The force [N] in a steady motion at the velocity; None where it cannot be said."""
+        """Return the force [N] in a steady motion at the velocity; None where it cannot be said."""
         from friso.equations.cases import Piecewise
 
         try:
@@ -105,8 +107,8 @@ class Friction:
 
 
 def solve_linear(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> list[sp.Expr]:
-    """What the unknowns are where all equations, which are linear in them, are zero. Raises ValueError if they are not
-    linear."""
+    """Return what the unknowns are where all equations, which are linear in them, are zero.
+    Raises ValueError if they are not linear."""
     import sympy as sp
 
     matrix, right = sp.linear_eq_to_matrix(list(equations), list(unknowns))
@@ -114,8 +116,9 @@ def solve_linear(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) ->
 
 
 def direction(velocity: sp.Symbol, narrow: sp.Expr | None = None) -> Kink:
-    """The kink of every law that depends on the direction of the motion, beyond which the velocity [m/s] is positive;
-    shared with modules that prescribe a direction. About it friction may have a peak that is `narrow` [m/s]."""
+    """Return the kink of every law that depends on the direction of the motion,
+    beyond which the velocity [m/s] is positive; shared with modules that prescribe a direction. About it friction may
+    have a peak that is `narrow` [m/s]."""
     from friso.equations.component import Kink
 
     return Kink(DIRECTION, velocity) if narrow is None else Kink(DIRECTION, velocity, narrow=narrow)
@@ -126,7 +129,7 @@ DIRECTION = "forward"
 
 
 def _is_direction(kink: Kink) -> bool:
-    """Whether a kink is that of the direction, at the guide or at the motor."""
+    """Tell whether a kink is that of the direction, at the guide or at the motor."""
     return kink.name.removeprefix(STATE_PREFIX) == DIRECTION
 
 
@@ -163,7 +166,8 @@ class StribeckSection(FrictionSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Any:
-        """What of the curve decides on its code: the exponent where it is a small whole number, and asymmetries."""
+        """Return what of the curve decides on its code:
+        the exponent where it is a small whole number, and asymmetries."""
         exponent = float(flat["friction.stribeck_exponent"])
         return StribeckCurve(
             int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None,
@@ -206,7 +210,7 @@ TINY = 1e-60
 
 
 def viscous_force(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp.Expr:
-    """The viscous share [N], smooth in v while the sign is held."""
+    """Return the viscous share [N], smooth in v while the sign is held."""
     from friso.equations.component import key
 
     force = key("friction.viscous") * velocity

@@ -32,7 +32,7 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Any:
-        """Whether there are conditions that multiply the level."""
+        """Tell whether there are conditions that multiply the level."""
         return has_conditions(flat)
 
     @staticmethod
@@ -62,7 +62,7 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """The stiffness, and friction at speed: break-away is lost."""
+        """Return the stiffness, and friction at speed: break-away is lost."""
         return {
             "friction.coulomb": measured.levels.coulomb,
             "friction.viscous": measured.levels.viscous,
@@ -71,7 +71,7 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """All that there is."""
+        """Return all that there is."""
         return Dahl.keeping(measured, 1)
 
 

@@ -116,7 +116,8 @@ class ElastoPlastic(StribeckSection):
 
 
 def _most(measured: MeasuredFriction) -> float:
-    """The break-away deflection [m] at which bristles hold Coulomb friction in the weaker direction."""
+    """Return the break-away deflection [m] at which bristles hold Coulomb friction in the weaker
+    direction."""
     levels = measured.levels
     return levels.coulomb * (1 - abs(levels.asymmetry)) / measured.stiffness
 

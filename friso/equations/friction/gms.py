@@ -60,7 +60,8 @@ class Elements(NamedTuple):
 
 
 def _as_many(key: str, what: str, two: str) -> Rule:
-    """The rule that a list is as long as that of the stiffnesses; `two` are values of two elements."""
+    """Return the rule that a list is as long as that of the stiffnesses;
+    `two` are values of two elements."""
     example = f'element_stiffness = ["70 N/mm", "30 N/mm"], {key.removeprefix("friction.")} = {two}'
     return Rule(
         (STIFFNESS, key),
@@ -104,7 +105,8 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Any:
-        """What decides on the code: the curve, the number of elements, and whether these are damped."""
+        """Return what decides on the code: the curve, the number of elements,
+        and whether these are damped."""
         return Elements(
             StribeckSection.variant(flat), len(element_keys(flat, STIFFNESS)), bool(element_keys(flat, DAMPING))
         )
@@ -162,8 +164,9 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """The virgin curve as a polygon of its tangents: the first stiffness and break-away are kept exactly. The
-        attraction lets friction lag as LuGre's does at the Stribeck velocity, s/C = g/(sigma_0 v_s)."""
+        """Return the virgin curve as a polygon of its tangents:
+        the first stiffness and break-away are kept exactly. The attraction lets friction lag as LuGre's does at the
+        Stribeck velocity, s/C = g/(sigma_0 v_s)."""
         return _elements_with(measured, *polygon(measured, elements)) | {
             "friction.attraction": measured.stiffness * measured.levels.stribeck_velocity
         }
@@ -192,7 +195,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
-        """How far friction lags behind a changing speed: a decade to either side."""
+        """Return how far friction lags behind a changing speed: a decade to either side."""
         usual = measured.stiffness * measured.levels.stribeck_velocity
         return {"friction.attraction": (usual / 10, usual * 10)}
 
@@ -208,7 +211,8 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
 
 def _elements_with(measured: MeasuredFriction, stiffness: np.ndarray, slips: np.ndarray) -> dict[str, Any]:
-    """The keys of elements by stiffness [N/m] and the deflection at which they slip [m], of shape (elements,)."""
+    """Return the keys of elements by stiffness [N/m] and the deflection at which they slip [m],
+    of shape (elements,)."""
     strength = stiffness * slips
     damped = {f"{DAMPING}.{n}": measured.damping * k / measured.stiffness for n, k in enumerate(stiffness, 1)}
     return {
@@ -220,7 +224,7 @@ def _elements_with(measured: MeasuredFriction, stiffness: np.ndarray, slips: np.
 
 
 def _elements(flat: Mapping[str, Any], key: str) -> np.ndarray:
-    """The values of a list, shape (elements,)."""
+    """Return the values of a list, shape (elements,)."""
     return np.array([flat[name] for name in element_keys(flat, key)])
 
 
@@ -245,8 +249,8 @@ def polygon(measured: MeasuredFriction, elements: int) -> tuple[np.ndarray, np.n
 
 
 def _tangents(measured: MeasuredFriction, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The elements of the polygon of tangents with the slopes `levels`, in units of the first stiffness, from 1 to
-    0."""
+    """Return the elements of the polygon of tangents with the slopes `levels`,
+    in units of the first stiffness, from 1 to 0."""
     slope = measured.stiffness * levels
     touched = np.interp(-slope, -measured.slope, measured.displacement)
     force = np.interp(touched, measured.displacement, measured.force)

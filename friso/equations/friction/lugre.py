@@ -57,7 +57,7 @@ class LuGre(StribeckSection):
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """All that there is."""
+        """Return all that there is."""
         return keeping_bristle(measured)
 
     @staticmethod

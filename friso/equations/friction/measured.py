@@ -58,8 +58,8 @@ class MeasuredFriction:
         return np.minimum.accumulate(np.clip(slopes, 0.0, self.stiffness))
 
     def misfit(self, force: np.ndarray) -> float:
-        """How far another virgin curve [N], over the same displacements, is off at most, as a share of static
-        friction."""
+        """Return how far another virgin curve [N], over the same displacements, is off at most,
+        as a share of static friction."""
         return float(np.max(np.abs(force - self.force)) / self.levels.static)
 
 
@@ -76,7 +76,8 @@ def virgin_displacements(static: float, stiffness: float, corners: Sequence[floa
 
 
 def levels_of(flat: Mapping[str, Any]) -> Levels:
-    """The Stribeck curve of a law that has one, as it was measured: without what [conditions] make of it."""
+    """Return the Stribeck curve of a law that has one, as it was measured:
+    without what [conditions] make of it."""
     values = {field.name: flat.get(f"friction.{field.name}", field.default) for field in fields(Levels)}
     return Levels(**{name: float(value) for name, value in values.items()})
 
@@ -87,22 +88,23 @@ def levels_under_conditions(flat: Mapping[str, Any]) -> Levels:
 
 
 def on_bristles(flat: Mapping[str, Any], displacement: np.ndarray, force: np.ndarray) -> MeasuredFriction:
-    """What is measured of a law with a Stribeck curve whose bristles, as stiff and damped as those of LuGre, give the
-    virgin curve `force` [N] over `displacement` [m]."""
+    """Return what is measured of a law with a Stribeck curve whose bristles,
+    as stiff and damped as those of LuGre, give the virgin curve `force` [N] over `displacement` [m]."""
     stiffness, damping = (float(flat[f"friction.bristle_{name}"]) for name in ("stiffness", "damping"))
     return MeasuredFriction(levels_of(flat), stiffness, damping, displacement, force)
 
 
 def power_law(static: float, stiffness: float, exponent: float, displacement: np.ndarray) -> np.ndarray:
-    """A virgin curve whose slope falls by a power of the force that is lacking, Dahl's exponent: force [N] over
-    displacement [m] from rest, both of shape (n,). Below 1 it ends at static friction, at 0 straight."""
+    """Return a virgin curve whose slope falls by a power of the force that is lacking,
+    Dahl's exponent: force [N] over displacement [m] from rest, both of shape (n,). Below 1 it ends at static friction,
+    at 0 straight."""
     way, more = stiffness * displacement / static, exponent - 1
     lacking = np.exp(-way) if more == 0 else np.maximum(1 + more * way, 0.0) ** (-1 / more)
     return static * (1 - lacking)
 
 
 def best(candidates: np.ndarray, misfits: np.ndarray) -> float:
-    """The candidate whose misfit is the smallest."""
+    """Return the candidate whose misfit is the smallest."""
     return float(candidates[int(np.argmin(misfits))])
 
 
@@ -111,6 +113,6 @@ SLACK = 0.02
 
 
 def as_good(candidates: np.ndarray, misfits: np.ndarray) -> tuple[float, float]:
-    """The range of the candidates that a measurement could not tell from the best."""
+    """Return the range of the candidates that a measurement could not tell from the best."""
     good = candidates[misfits <= np.min(misfits) + SLACK]
     return float(good.min()), float(good.max())

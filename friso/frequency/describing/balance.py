@@ -88,8 +88,9 @@ def single_harmonic(
 
 
 def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How often a complex function on a grid turns round zero along the edges of each cell: its zeros inside, those at
-    which it is mirrored counted as -1; and whether that is unknown (and given as 0), for a corner that is NaN."""
+    """Return how often a complex function on a grid turns round zero along the edges of each
+    cell: its zeros inside, those at which it is mirrored counted as -1; and whether that is unknown (and given as 0),
+    for a corner that is NaN."""
     along = np.angle(left[1:] * np.conj(left[:-1]))
     across = np.angle(left[:, 1:] * np.conj(left[:, :-1]))
     turns = (along[:, :-1] + across[1:] - along[:, 1:] - across[:-1]) / (2 * np.pi)
@@ -98,7 +99,8 @@ def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _near(axes: tuple[np.ndarray, np.ndarray], cells: np.ndarray, solutions: np.ndarray) -> np.ndarray:
-    """Whether places (2, count) are inside their cells (count, 2), or inside one next to them."""
+    """Tell whether places (2, count) are inside their cells (count, 2),
+    or inside one next to them."""
     near = np.ones(len(cells), bool)
     for axis, cell, place in zip(axes, cells.T, solutions, strict=True):
         low, high = axis[np.maximum(cell - 1, 0)], axis[np.minimum(cell + 2, len(axis) - 1)]

@@ -35,7 +35,7 @@ class DrivenPlant:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], frequencies: np.ndarray, rtol: float = RTOL) -> DrivenPlant:
-        """The plant of a stage whose limiter is not touched, at frequencies [Hz]."""
+        """Return the plant of a stage whose limiter is not touched, at frequencies [Hz]."""
         (compliances,) = mechanics(flat, np.zeros(1, bool)).at(2j * np.pi * frequencies)
         return cls(flat, frequencies, compliances, rtol)
 
@@ -51,7 +51,7 @@ class DrivenPlant:
 
     @cached_property
     def stuck(self) -> float:
-        """An amplitude [m] at which bristles do not slip."""
+        """Return an amplitude [m] at which bristles do not slip."""
         settings = FrequencySettings.current()
         friction = Imposition.of(self.flat, np.ones(1), np.ones(1), self.rtol)
         return float(
@@ -126,7 +126,7 @@ class Roots:
 
 
 def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
-    """All amplitudes at which forces [N] move the cart, as far as the grid resolves them."""
+    """Return all amplitudes at which forces [N] move the cart, as far as the grid resolves them."""
     amplitudes, reached, inside = driven.grid(forces)
     above = reached >= forces[:, None, None]
     computed = np.isfinite(reached[:, :-1] + reached[:, 1:])

@@ -30,7 +30,7 @@ def receptance(flat: Mapping[str, Any], frequencies: np.ndarray) -> tuple[np.nda
 
 @cache
 def _loop(form: Structure) -> Declared:
-    """The stage's own equations with a force in the place of friction."""
+    """Return the stage's own equations with a force in the place of friction."""
     control = replace(form.controller, anti_windup=None) if form.controller else None
     linear = replace(form, friction="none", friction_variant=None, controller=control, biased=("cart",))
     model = assemble(linear)
@@ -41,6 +41,7 @@ def _loop(form: Structure) -> Declared:
 
 
 def beyond_stroke(flat: Mapping[str, Any], deflections: np.ndarray) -> np.ndarray:
-    """Whether the limiter would be touched at largest deflections [m] of the joint, of their shape."""
+    """Tell whether the limiter would be touched at largest deflections [m] of the joint,
+    of their shape."""
     free = "joint.stroke" in flat and not flat["joint.locked"]
     return deflections > flat["joint.stroke"] if free else np.zeros(np.shape(deflections), bool)

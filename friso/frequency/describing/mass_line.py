@@ -24,7 +24,7 @@ def mass_line(
     frequencies: Sequence[float] | np.ndarray,
     rtol: float = RTOL,
 ) -> xr.Dataset:
-    """How far the measured plant lies off the line 1/(m omega^2) of its whole mass, place by place.
+    """Return how far the measured plant lies off the line 1/(m omega^2) of its whole mass, place by place.
 
     `places` lists what differs there, as keys of the stage file with their values, such as {"friction.static": "2 N"};
     `forces` [N] and `frequencies` [Hz] are those of the measurement, `rtol` the tolerance of its friction.

@@ -45,7 +45,7 @@ class HarmonicSeries:
         return float(np.ptp(self.over_period(self.stage)) / 2)
 
     def over_period(self, harmonics: np.ndarray) -> np.ndarray:
-        """The signal with these harmonics at many times of a period."""
+        """Return the signal with these harmonics at many times of a period."""
         settings = FrequencySettings.current()
         angles = np.linspace(
             0,
@@ -93,7 +93,7 @@ def balanced(
     mirrored: bool = True,
     intervals: int | None = None,
 ) -> HarmonicSeries:
-    """The periodic motion near a known one, with harmonics up to the order `harmonics`.
+    """Return the periodic motion near a known one, with harmonics up to the order `harmonics`.
 
     `time` [s] and `position` [m] of the cart, shape (samples,), are one period of the known motion, the last sample one
     interval before the first comes again. A `mirrored` motion is its own mirror image after half a period. Raises
@@ -119,7 +119,7 @@ def balanced(
 
 
 def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> str:
-    """What became of a series that was to be found near a motion of this amplitude [m]."""
+    """Return what became of a series that was to be found near a motion of this amplitude [m]."""
     settings = FrequencySettings.current()
     if series.amplitude < settings.resting_share * length:
         return REST
@@ -155,7 +155,7 @@ class _Problem:
         return receptance(self.flat, self.basis.orders * speed / (2 * np.pi))[0]
 
     def residual(self, state: np.ndarray) -> np.ndarray:
-        """What is left of the equations, the last one that of the phase."""
+        """Return what is left of the equations, the last one that of the phase."""
         cart, speed = self.split(state)
         force = self.basis.harmonics(self.answer(state).force[:, None])[:, 0]
         left = (cart - self.receptances(speed) * force) / self.length
@@ -186,7 +186,7 @@ class _Problem:
         return jacobian
 
     def solve(self) -> tuple[np.ndarray, float]:
-        """The state that solves the equations, and the last step."""
+        """Return the state that solves the equations, and the last step."""
         settings = FrequencySettings.current()
         state, size = np.append(self.start, 0.0), np.inf
         for _ in range(settings.series_newton_steps):
@@ -200,7 +200,7 @@ class _Problem:
         return state, size
 
     def _share(self, state: np.ndarray, step: np.ndarray, left: float) -> float:
-        """The share of a step that leads closer."""
+        """Return the share of a step that leads closer."""
         settings = FrequencySettings.current()
         shares = [0.5**halving for halving in range(settings.series_halvings)]
         return next((s for s in shares if np.linalg.norm(self.residual(state + s * step)) < left), shares[-1])

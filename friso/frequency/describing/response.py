@@ -80,7 +80,7 @@ def plant_response(
 
 
 def _columns(driven: DrivenPlant, branch_points: Roots) -> dict[str, tuple[np.ndarray, str, str]]:
-    """The columns for every root, with units and text."""
+    """Return the columns for every root, with units and text."""
     _, positions, stiffness = driven.answer(branch_points.amplitude, branch_points.frequency)
     return {
         "response": (positions[:, 0], "m/N", "stage position over force"),
@@ -97,7 +97,8 @@ def _words(unit: str, text: str) -> dict[str, str]:
 
 
 def _branches(branch_points: Roots, shape: tuple[int, int]) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-    """The place of every root: force, frequency and number among those there, by rising amplitude; and how many."""
+    """Return the place of every root: force, frequency and number among those there,
+    by rising amplitude; and how many."""
     cell = branch_points.force * shape[1] + branch_points.frequency
     count = np.bincount(cell, minlength=shape[0] * shape[1])
     order = np.lexsort((branch_points.amplitude, cell))
@@ -107,22 +108,24 @@ def _branches(branch_points: Roots, shape: tuple[int, int]) -> tuple[tuple[np.nd
 
 
 def _spread(values: np.ndarray, place: tuple[np.ndarray, ...], shape: tuple[int, int]) -> np.ndarray:
-    """The roots' values in an array over force, frequency and branch."""
+    """Return the roots' values in an array over force, frequency and branch."""
     array = np.full((*shape, int(place[2].max(initial=0)) + 1), np.nan, values.dtype)
     array[place] = values
     return array
 
 
 def _on_branch(branches: dict[str, np.ndarray], order: int) -> np.ndarray:
-    """The response [m/N] that shows, shape (forces, frequencies), NaN where no branch lasts."""
+    """Return the response [m/N] that shows, shape (forces, frequencies),
+    NaN where no branch lasts."""
     chosen = _followed(branches["amplitude"], branches["lasting"], order)[:, :, None]
     answer, lasting = (np.take_along_axis(branches[name], chosen, axis=2)[:, :, 0] for name in ("response", "lasting"))
     return np.where(lasting == 1, answer, np.nan)
 
 
 def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.ndarray:
-    """The number of the branch that shows at every frequency, stepping up (order 1) or down (-1), shape (forces,
-    frequencies): the lasting one that is nearest in amplitude to the one before, the least at the start."""
+    """Return the number of the branch that shows at every frequency,
+    stepping up (order 1) or down (-1), shape (forces, frequencies): the lasting one that is nearest in amplitude to the
+    one before, the least at the start."""
     sizes = np.where(lasting == 1, np.log(amplitudes), np.inf)
     chosen = np.zeros(sizes.shape[:2], np.int64)
     before = np.full(len(sizes), -np.inf)
@@ -136,7 +139,7 @@ def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.nda
 
 
 def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray, unknown: np.ndarray) -> np.ndarray:
-    """What is wrong with the answers to every force at every frequency, or "done"."""
+    """Return what is wrong with the answers to every force at every frequency, or "done"."""
     settings = FrequencySettings.current()
     present, lasting = ~np.isnan(branches["amplitude"]), branches["lasting"]
     count = np.sum(present, axis=2)

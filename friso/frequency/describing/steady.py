@@ -37,7 +37,8 @@ class Imposition:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float) -> Imposition:
-        """The friction of stages at amplitudes [m] and frequencies [Hz], both of shape (count,)."""
+        """Return the friction of stages at amplitudes [m] and frequencies [Hz],
+        both of shape (count,)."""
         friction = {key: value for key, value in flat.items() if key.startswith("friction.")}
         motion = {"motion.kind": "release", "motion.displacement": amplitudes, "motion.duration": 1.0}
         return cls({**friction, **motion, FREQUENCY: frequencies}, len(amplitudes), rtol)
@@ -63,7 +64,8 @@ class Imposition:
 
     @cached_property
     def symmetric(self) -> bool:
-        """Whether the force is odd: the mirror image of every motion has the mirrored force; tried at random states."""
+        """Tell whether the force is odd: the mirror image of every motion has the mirrored force;
+        tried at random states."""
         states = np.random.default_rng(0).normal(size=(8, *self.scales.shape)) * self.scales
         pairs = ((self._reaction(states_of.T), self._reaction(-states_of.T)) for states_of in states)
         return all(bool(np.all(np.abs(a + b) <= 1e-9 * np.abs(a))) for a, b in pairs)
@@ -83,7 +85,7 @@ class Imposition:
         return np.broadcast_to(force, states.shape[1:])
 
     def take(self, numbers: np.ndarray) -> Imposition:
-        """Those with these numbers, any of them as often as wanted."""
+        """Return those with these numbers, any of them as often as wanted."""
         flat = {key: value[numbers] if np.ndim(value) else value for key, value in self.flat.items()}
         return Imposition(flat, len(numbers), self.rtol)
 
@@ -121,7 +123,7 @@ class PeriodicStates:
 
 
 def steady(friction: Imposition) -> PeriodicStates:
-    """The periodic steady states; half a period does where the law is symmetric."""
+    """Return the periodic steady states; half a period does where the law is symmetric."""
     settings = FrequencySettings.current()
     count, size = friction.count, len(friction.inner)
     inner, gap, done = np.zeros((count, size)), np.zeros(count), np.ones(count, bool)
@@ -141,13 +143,15 @@ def steady(friction: Imposition) -> PeriodicStates:
 
 
 def share_of_period(friction: Imposition) -> tuple[float, float]:
-    """How much of a period has to be followed, and the sign with which the law's states come back."""
+    """Return how much of a period has to be followed,
+    and the sign with which the law's states come back."""
     return (0.5, -1.0) if friction.symmetric else (1.0, 1.0)
 
 
 def _secant(friction: Imposition, inner: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The step to the fixed point of the map's secant, by how much the states miss themselves, and which runs were
-    completed, from the states and the widths of the secants (count, inner)."""
+    """Return the step to the fixed point of the map's secant,
+    by how much the states miss themselves, and which runs were completed, from the states and the widths of the secants
+    (count, inner)."""
     share, sign = share_of_period(friction)
     count, size = inner.shape
     rows = np.repeat(np.arange(count), size + 1)

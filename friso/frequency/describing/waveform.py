@@ -37,8 +37,8 @@ class OneStateLaw:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> OneStateLaw:
-        """The law of a stage. Raises InputError for a stage without friction, or a law with more
-        states or with modes that remember."""
+        """Return the law of a stage. Raises InputError for a stage without friction,
+        or a law with more states or with modes that remember."""
         form = imposed_form(flat)
         function, names, remembers = _compiled(form)
         return cls({name: flat[name] for name in names}, function, names, remembers)
@@ -100,7 +100,7 @@ class Chain:
     sign: float
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """The states, shape (M + 1, columns), for given differences (M, columns)."""
+        """Return the states, shape (M + 1, columns), for given differences (M, columns)."""
         count = len(self.after)
         bands = np.zeros((2, count + 1))
         bands[0, 0], bands[0, 1:], bands[1, :-1] = 1.0, self.after, -self.before
@@ -116,8 +116,8 @@ def _middles(z: np.ndarray) -> np.ndarray:
 
 
 def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> FrictionAnswer:
-    """The friction on a motion with these velocities [m/s] at the middles (M,) of intervals [s], after which it comes
-    back (sign 1) or comes to its mirror image (-1)."""
+    """Return the friction on a motion with these velocities [m/s] at the middles (M,) of
+    intervals [s], after which it comes back (sign 1) or comes to its mirror image (-1)."""
     settings = FrequencySettings.current()
     z = np.zeros(len(velocity) + 1)
     chain, pushed = None, np.zeros(0)

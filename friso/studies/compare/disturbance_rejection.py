@@ -24,9 +24,10 @@ class Rejection(NamedTuple):
 
 
 def rejecting(stage: Stage, crossings: Sequence[float]) -> Stage:
-    """The stage with active disturbance rejection, its limit of the force and its filters kept: as fast, in that the
-    loop of the sliding machine crosses 0 dB at the first of the present `crossings` [Hz], and for the mass believed
-    now. Raises InputError where there is none, or the drive is too slow for it."""
+    """Return the stage with active disturbance rejection,
+    its limit of the force and its filters kept: as fast, in that the loop of the sliding machine crosses 0 dB at the
+    first of the present `crossings` [Hz], and for the mass believed now. Raises InputError where there is none, or the
+    drive is too slow for it."""
     if not crossings:
         raise InputError(CONTROLLER, "a loop that crosses 0 dB nowhere", "one that does", 'crossover = "8 Hz"')
     kept = {

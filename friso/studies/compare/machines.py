@@ -92,12 +92,12 @@ class Machines:
         return len(self.seeds)
 
     def flat(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Keys of all machines as an option has them, its stage and changes being given; the controller is tuned as it
-        is and does not know the masses that were drawn."""
+        """Return keys of all machines as an option has them, its stage and changes being given;
+        the controller is tuned as it is and does not know the masses that were drawn."""
         return stage.flat(self.changes(stage, changes))
 
     def changes(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """What an option changes, and what the machines do, of the keys of its stage."""
+        """Return what an option changes, and what the machines do, of the keys of its stage."""
         return {**as_tuned(stage.flat()), **self.keys, **changes}
 
 
@@ -133,7 +133,8 @@ def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: in
 
 
 def _with_clock(stage: Stage) -> tuple[Stage, list[str]]:
-    """The stage with a sample time, and whether it had to be chosen. Raises InputError where it is too long."""
+    """Return the stage with a sample time, and whether it had to be chosen.
+    Raises InputError where it is too long."""
     if "drive.sample_time" in stage.flat():
         return stage, []
     chosen = stage.with_numbers({"drive.sample_time": SAMPLE_TIME})
@@ -155,7 +156,7 @@ def _spreads(stage: Stage) -> dict[str, float]:
 
 
 def _slipping(flat: Mapping[str, Any], keys: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The deflections [m] at which drawn bristles begin to slip."""
+    """Return the deflections [m] at which drawn bristles begin to slip."""
 
     def most(values: Mapping[str, Any]) -> Any:
         weaker = 1 - np.abs(values.get("friction.asymmetry", 0.0))
@@ -167,7 +168,7 @@ def _slipping(flat: Mapping[str, Any], keys: Mapping[str, np.ndarray]) -> np.nda
 
 
 def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
-    """The stage with these spreads [%] written into it."""
+    """Return the stage with these spreads [%] written into it."""
     flat = stage.flat()
     if SLIP in spreads:
         flat[SLIP] *= TINY
@@ -178,7 +179,7 @@ def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
 
 
 def _with_default_correlations(correlations: Correlations, spreads: Mapping[str, float]) -> Correlations:
-    """Those given, and those of the keys with default spreads."""
+    """Return those given, and those of the keys with default spreads."""
     arrays = [tuple(key for key in spreads if key.startswith(f"{array}.")) for array in ELEMENTS]
     levels = TOGETHER if all(key in spreads for key in TOGETHER) else ()
     groups = [(levels, TOGETHER_BY), *((array, 1.0) for array in arrays)]

@@ -42,17 +42,17 @@ class MachineMeasures:
 
     @property
     def done(self) -> np.ndarray:
-        """Which runs were completed, shape (count,)."""
+        """Return which runs were completed, shape (count,)."""
         return self.outcome != FAILED
 
     @property
     def swings(self) -> np.ndarray:
-        """Which runs swing at their end, shape (count,)."""
+        """Return which runs swing at their end, shape (count,)."""
         return self.outcome == SWINGS
 
     @property
     def rests(self) -> np.ndarray:
-        """Which runs are in position at their end, shape (count,)."""
+        """Return which runs are in position at their end, shape (count,)."""
         return self.outcome == RESTS
 
 
@@ -67,8 +67,8 @@ def concatenate_chunks(parts: Sequence[AnyMeasures]) -> AnyMeasures:
 
 @np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
 def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) -> MachineMeasures:
-    """The measures of a chunk of runs whose reference comes to stand at `stands`; in position is `within` [m]. What
-    the drive logs counts for the peaks, what really moves for the rest."""
+    """Return the measures of a chunk of runs whose reference comes to stand at `stands`;
+    in position is `within` [m]. What the drive logs counts for the peaks, what really moves for the rest."""
     time, reference = recorded.time, recorded.logged["reference"]
     deviation = recorded.true["position"] - reference
     done = recorded.statuses == Status.DONE
@@ -116,7 +116,8 @@ class LoopRobustness:
 
 
 def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> LoopRobustness:
-    """The loops of machines, given as flat keys to SI numbers or arrays; the limit cases are those of the stage."""
+    """Return the loops of machines, given as flat keys to SI numbers or arrays;
+    the limit cases are those of the stage."""
     stable, margin = np.ones(count, bool), np.full(count, np.inf)
     for limit_case in limit_cases(stage.flat()).values():
         for which, (settles, distance) in for_poles(flat, limit_case.repeated(count), _robustness):
@@ -126,7 +127,8 @@ def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> LoopRobus
 
 
 def _robustness(loops: Poles) -> tuple[np.ndarray, np.ndarray]:
-    """Which loops are stable, and the least distance of each from -1, both of shape (members,)."""
+    """Return which loops are stable, and the least distance of each from -1,
+    both of shape (members,)."""
     size, rows = np.abs(loops.continuous), np.arange(len(loops.closed))
     low = SLOWEST * float(np.median(size.min(axis=1)))
     high = min(loops.drive.highest, FASTEST * float(size.max()))

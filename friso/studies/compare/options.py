@@ -46,12 +46,12 @@ class Situation:
 
     @property
     def locked(self) -> Stage:
-        """The stage with its joint locked; as it is if it has none."""
+        """Return the stage with its joint locked; as it is if it has none."""
         return self.machines.stage.variants().get("locked", self.machines.stage)
 
     @property
     def free(self) -> Stage:
-        """The stage on its free joint. Raises UnavailableError where it has none."""
+        """Return the stage on its free joint. Raises UnavailableError where it has none."""
         free = self.machines.stage.variants().get("free")
         if free is None:
             raise UnavailableError("the stage file has no joint with stiffness, damping and stroke")
@@ -59,7 +59,8 @@ class Situation:
 
     @property
     def integrating(self) -> Stage:
-        """The stage with its joint locked. Raises UnavailableError where its controller does not integrate."""
+        """Return the stage with its joint locked.
+        Raises UnavailableError where its controller does not integrate."""
         flat = self.machines.stage.flat()
         if not controller_of(flat).integrates(flat):
             raise UnavailableError("the controller does not integrate")
@@ -130,7 +131,7 @@ class Option:
 
     @property
     def label(self) -> str:
-        """What a table calls it: "c isolator"."""
+        """Return what a table calls it: "c isolator"."""
         return f"{self.kind.letter} {self.kind.title}"
 
 
@@ -145,8 +146,8 @@ class CompareOptions:
 
 
 def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys for the linear loop: the current loop is that of the stage for all machines, and the motor's constant over
-    the one believed is part of the controller's gains. The cable is left out."""
+    """Return keys for the linear loop: the current loop is that of the stage for all machines,
+    and the motor's constant over the one believed is part of the controller's gains. The cable is left out."""
     current_loop = {key: value for key, value in stage.flat().items() if key == "drive.current_bandwidth"}
     ratio, controller = flat.get("drive.motor_constant_ratio", 1.0), controller_of(flat)
     return {

@@ -20,7 +20,7 @@ class EstimatedValue:
 
 
 def median(values: np.ndarray) -> EstimatedValue:
-    """The median; infinite values are allowed, NaN are left out."""
+    """Return the median; infinite values are allowed, NaN are left out."""
     ranked = np.sort(values[~np.isnan(values)])
     if not ranked.size:
         return EstimatedValue(np.nan, np.nan, np.nan)
@@ -28,23 +28,23 @@ def median(values: np.ndarray) -> EstimatedValue:
 
 
 def quantile_interval(values: np.ndarray, share: float) -> tuple[float, float]:
-    """The 95 % interval of what a share of all there are does not exceed, by values, shape (n,), that were drawn of
-    them: that of order statistics (David, Nagaraja 2003, Order Statistics, Sec. 7.1), which holds for any distribution.
-    Infinite where there are too few."""
+    """Return the 95 % interval of what a share of all there are does not exceed, by values,
+    shape (n,), that were drawn of them: that of order statistics (David, Nagaraja 2003, Order Statistics, Sec. 7.1),
+    which holds for any distribution. Infinite where there are too few."""
     ranked = np.concatenate([[-np.inf], np.sort(values), [np.inf]])
     low, high = (int(binom.ppf(tail, values.size, share)) for tail in (0.025, 0.975))
     return float(ranked[low]), float(ranked[high + 1])
 
 
 def _middle(ordered: np.ndarray) -> float:
-    """The median of ordered values, also of infinite ones."""
+    """Return the median of ordered values, also of infinite ones."""
     low, high = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
     return float(low if low == high else (low + high) / 2)
 
 
 def difference(flags: np.ndarray, before: np.ndarray) -> EstimatedValue:
-    """How much more probable something is than before, on the same machines (Agresti, Min 2005,
-    doi:10.1002/sim.1781: the interval of Wald, half a machine being added to every cell)."""
+    """Return how much more probable something is than before, on the same machines (Agresti,
+    Min 2005, doi:10.1002/sim.1781: the interval of Wald, half a machine being added to every cell)."""
     count = len(flags)
     if not count:
         return EstimatedValue(np.nan, np.nan, np.nan)

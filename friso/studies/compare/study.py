@@ -59,22 +59,23 @@ class OptionResult:
 
     @property
     def swinging(self) -> Share:
-        """The probability of swinging at the end of the run."""
+        """Return the probability of swinging at the end of the run."""
         return share(self.measures.swings, self.measures.done)
 
     @property
     def counted(self) -> Share:
-        """The probability of a distinct peak (see `friso.hunting.criteria.peak_count`)."""
+        """Return the probability of a distinct peak (see `friso.hunting.criteria.peak_count`)."""
         return share(self.measures.counted > 0, self.measures.done)
 
     @property
     def settled(self) -> Share:
-        """The probability of being in position to stay by the end of the run."""
+        """Return the probability of being in position to stay by the end of the run."""
         return share(self.measures.rests, self.measures.done)
 
     @property
     def stays(self) -> Share:
-        """The probability of staying in position throughout the last half of a run that is `LONGER`."""
+        """Return the probability of staying in position throughout the last half of a run that is
+        `LONGER`."""
         return share(self.later.stays, self.later.done)
 
     @property
@@ -109,7 +110,8 @@ class OptionResult:
 
     @property
     def rests(self) -> bool:
-        """Whether `ENOUGH` of the machines are in position by the end, and of those that are followed stay there."""
+        """Tell whether `ENOUGH` of the machines are in position by the end,
+        and of those that are followed stay there."""
         return self.in_position_count >= ENOUGH * len(self.measures.settling) and bool(
             self.later.stays.mean() >= ENOUGH
         )
@@ -146,11 +148,12 @@ class Comparison:
 
     @property
     def shaken(self) -> bool:
-        """Whether a floor shakes the machines: without, their standstill shows whether they rest, and not how still."""
+        """Tell whether a floor shakes the machines: without,
+        their standstill shows whether they rest, and not how still."""
         return self.stage.floor is not None
 
     def paired(self, result: OptionResult) -> Paired:
-        """An option against a, on the machines whose runs were completed with both."""
+        """Return an option against a, on the machines whose runs were completed with both."""
         runs, base = result.measures, self.results[0].measures
         both = runs.done & base.done
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -204,7 +207,8 @@ def compare(
 
 
 def _places(stage: Stage) -> list[Stand]:
-    """Where the reference comes to stand. Raises InputError where that is too late, or never."""
+    """Return where the reference comes to stand. Raises InputError where that is too late,
+    or never."""
     flat = stage.flat()
     corner, duration = float(last_corner(flat)), flat["motion.duration"]
     if flat["motion.kind"] == "ramp":
@@ -229,7 +233,7 @@ class _Work:
     options: int
 
     def runs(self, option: Option, before: int) -> MachineMeasures:
-        """An option on all machines, after some other options."""
+        """Return an option on all machines, after some other options."""
         count, parts = self.machines.count, []
         label, total = option.label, count * self.options
         self.progress(before * count, total, label)
@@ -239,7 +243,7 @@ class _Work:
         return concatenate_chunks(parts)
 
     def longer(self, option: Option) -> Later:
-        """An option on the first machines, for longer."""
+        """Return an option on the first machines, for longer."""
         task = replace(self.task, duration=LONGER * self.task.duration)
         count = min(FOLLOWED, self.machines.count)
         return concatenate_chunks(
@@ -247,7 +251,7 @@ class _Work:
         )
 
     def _recorded(self, option: Option, task: MoveTask, count: int, coarser: int) -> Iterator[RecordedRuns]:
-        """The runs of the first machines, chunk by chunk."""
+        """Yield the runs of the first machines, chunk by chunk."""
         sample = self.machines.stage.flat()["drive.sample_time"]
         interval = coarser * max(1, int(np.ceil(INTERVAL / sample * (1 - 1e-9)))) * sample
         drawn = self.machines.changes(option.stage, option.changes)
@@ -261,7 +265,8 @@ def _loops(machines: Machines, option: Option) -> LoopRobustness:
 
 
 def _missing(stage: Stage) -> list[str]:
-    """What acts on machines in a real room and not on these, and what the linear loops leave out."""
+    """Return what acts on machines in a real room and not on these,
+    and what the linear loops leave out."""
     notes = []
     if stage.floor is None:
         notes.append(

@@ -27,7 +27,7 @@ class ConcaveFit:
 
     @property
     def corners(self) -> np.ndarray:
-        """The knots at which something ends, shape (at most n,)."""
+        """Return the knots at which something ends, shape (at most n,)."""
         return self.knots[self.strength.any(axis=0)]
 
     @property
@@ -41,7 +41,7 @@ class ConcaveFit:
         return float(np.sum(self.strength * _SLOPES[:, None] / self.knots))
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
-        """The curve at x, of its shape (m,): level from the last knot on."""
+        """Return the curve at x, of its shape (m,): level from the last knot on."""
         return _shapes(x, self.knots) @ self.strength.ravel()
 
 
@@ -56,8 +56,8 @@ def _shapes(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
 
 
 def knots_of(x: np.ndarray) -> np.ndarray:
-    """Where points, of shape (m,), let a curve bend: at each of them but 0, or at some, the closer the nearer to 0, but
-    not as near as x itself scatters."""
+    """Return where points, of shape (m,), let a curve bend: at each of them but 0, or at some,
+    the closer the nearer to 0, but not as near as x itself scatters."""
     settings = StudySettings.current()
     back = np.minimum(np.diff(x), 0.0)
     places = np.unique(x[x > settings.blurred_scatters * np.sqrt(np.mean(back**2))])
@@ -73,9 +73,9 @@ def knots_of(x: np.ndarray) -> np.ndarray:
 
 
 def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFit]:
-    """The nearest curves to points x and y, both of shape (m,), that reach `end`: straight between their knots, or
-    bent too if there are many, and with the first few knots left out. Beyond the points they go on as these end, as far
-    again at most."""
+    """Yield the nearest curves to points x and y, both of shape (m,), that reach `end`:
+    straight between their knots, or bent too if there are many, and with the first few knots left out. Beyond the
+    points they go on as these end, as far again at most."""
     settings = StudySettings.current()
     knots = knots_of(x)
     rows = _rows(x, y, knots)

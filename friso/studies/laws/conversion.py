@@ -70,23 +70,24 @@ class LawConversion:
 
     @property
     def law(self) -> str:
-        """The name of the law."""
+        """Return the name of the law."""
         return self.stage.flat()["friction.model"]
 
     @property
     def lost(self) -> tuple[MeasuredChange, ...]:
-        """What could not be kept."""
+        """Return what could not be kept."""
         return tuple(item for item in self.compared if not item.kept)
 
 
 def convertible() -> list[str]:
-    """The laws that can be made from measurements, in the order of their names, whatever is imported first."""
+    """Return the laws that can be made from measurements, in the order of their names,
+    whatever is imported first."""
     return sorted(name for name, law in friction_laws().items() if law.keeping is not FrictionSection.keeping)
 
 
 def measure_friction(flat: Mapping[str, Any]) -> MeasuredFriction:
-    """What measurements would show of the friction of a stage given as flat keys, moving forward. Raises InputError for
-    a law that does not declare it."""
+    """Return what measurements would show of the friction of a stage given as flat keys,
+    moving forward. Raises InputError for a law that does not declare it."""
     name = flat["friction.model"]
     law = friction_law(name)
     if law.shown is FrictionSection.shown:
@@ -100,10 +101,11 @@ def measure_friction(flat: Mapping[str, Any]) -> MeasuredFriction:
 def convert(
     stage: Stage, law: str, elements: int = ELEMENTS, virgin: str | os.PathLike[str] | None = None
 ) -> LawConversion:
-    """The stage with the named law in the place of its own, which shows the same in measurements as nearly as the law
-    can; `elements` side by side, of a law that has several. Before sliding, what was measured is that of the stage's
-    law, or the points in the file `virgin`. Raises InputError for a law that cannot be made from measurements, for a
-    stage whose own does not stick, and for a file that holds no virgin curve of it."""
+    """Return the stage with the named law in the place of its own,
+    which shows the same in measurements as nearly as the law can; `elements` side by side, of a law that has several.
+    Before sliding, what was measured is that of the stage's law, or the points in the file `virgin`. Raises InputError
+    for a law that cannot be made from measurements, for a stage whose own does not stick, and for a file that holds no
+    virgin curve of it."""
     if law not in convertible():
         near = nearest_name(law, convertible()) or "gms"
         raise InputError("--friction", f'"{law}"', f"one of {', '.join(convertible())}", f"--friction {near}")
@@ -125,13 +127,13 @@ def convert(
 
 
 def _shows_the_same(stage: Stage, law: str, keys: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Whether two sets of keys have the same virgin curve."""
+    """Tell whether two sets of keys have the same virgin curve."""
     one, two = (measure_friction(with_friction(stage, law, chosen).flat()) for chosen in (keys, other))
     return bool(np.array_equal(one.force, two.force))
 
 
 def with_friction(stage: Stage, law: str, keys: Mapping[str, Any]) -> Stage:
-    """The stage with the named law in the place of its own, with such keys [SI]."""
+    """Return the stage with the named law in the place of its own, with such keys [SI]."""
     return stage.replace({"friction": _table(stage, law, keys)})
 
 
@@ -142,8 +144,8 @@ def compared(
     left_open: Mapping[str, tuple[float, float]] = MappingProxyType({}),
     points: VirginPoints | None = None,
 ) -> LawConversion:
-    """A stage `made` from another, whose friction was measured `before`, if need be by `points`; and what that leaves
-    open in it."""
+    """Return a stage `made` from another, whose friction was measured `before`,
+    if need be by `points`; and what that leaves open in it."""
     flat = made.flat()
     after = measure_friction(flat)
     items = (
@@ -158,7 +160,8 @@ def compared(
 
 
 def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
-    """The table [friction] with such keys, as a stage file has it, in the units of the stage's axis."""
+    """Return the table [friction] with such keys, as a stage file has it,
+    in the units of the stage's axis."""
     cls, kind = friction_law(law), stage.axis_kind
     table: dict[str, Any] = {"model": law}
     for name, field in numeric_fields(cls).items():
@@ -172,13 +175,14 @@ def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _elements_of(law: str, flat: Mapping[str, Any]) -> set[str]:
-    """The keys of the law's lists among flat keys, but those that are 0, as if they were not there."""
+    """Return the keys of the law's lists among flat keys, but those that are 0,
+    as if they were not there."""
     lists = tuple(f"friction.{name}." for name in list_fields(friction_law(law)))
     return {key for key in flat if key.startswith(lists) and flat[key]}
 
 
 def _text(value: float, unit: str) -> Any:
-    """A value as a stage file has it, read again as the same number."""
+    """Return a value as a stage file has it, read again as the same number."""
     return exactly(value, unit) if unit else value
 
 
@@ -199,7 +203,7 @@ def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChan
 
 
 def _virgin_change(before: MeasuredFriction, after: MeasuredFriction, points: VirginPoints | None) -> MeasuredChange:
-    """The virgin curve, where the two are farthest apart; or the points, which scatter."""
+    """Return the virgin curve, where the two are farthest apart; or the points, which scatter."""
     settings = StudySettings.current()
     if not after.stiffness:
         return MeasuredChange(

@@ -41,16 +41,17 @@ class Trial:
     cases: Mapping[str, Case]
 
     def attracted(self, case: str) -> bool:
-        """Whether something attracts the stage that hunts, in a case."""
+        """Tell whether something attracts the stage that hunts, in a case."""
         return self.cases[case].verdict in ATTRACTED
 
     def certain(self, case: str) -> bool:
-        """Whether the verdict in a case is certain."""
+        """Tell whether the verdict in a case is certain."""
         shown = self.cases[case]
         return shown.verdict != "failed" and shown.judgement.hunting.certain
 
     def edge_sought(self, case: str) -> bool:
-        """Whether the search for the edge of hunting in a case found one, or came to its end without."""
+        """Tell whether the search for the edge of hunting in a case found one,
+        or came to its end without."""
         shown = self.cases[case]
         judgement = shown.judgement
         unsought = shown.verdict == "failed" or CheckPart.BANDWIDTHS in judgement.given_up
@@ -67,24 +68,25 @@ class LawVerdict:
 
     @property
     def law(self) -> str:
-        """The name of the law."""
+        """Return the name of the law."""
         return self.conversion.law
 
     def verdicts(self, case: str) -> tuple[str, ...]:
-        """The verdicts in a case, each once."""
+        """Return the verdicts in a case, each once."""
         return tuple(dict.fromkeys(trial.cases[case].verdict for trial in self.trials))
 
     def answers(self, case: str) -> set[bool]:
-        """Whether the stage hunts under the law in a case, by the trials whose verdict is certain: both where that
-        depends on what is open."""
+        """Tell whether the stage hunts under the law in a case,
+        by the trials whose verdict is certain: both where that depends on what is open."""
         return {trial.attracted(case) for trial in self.trials if trial.certain(case)}
 
     def certain(self, case: str) -> bool:
-        """Whether the verdicts of all trials in a case are certain."""
+        """Tell whether the verdicts of all trials in a case are certain."""
         return all(trial.certain(case) for trial in self.trials)
 
     def hunts(self, case: str) -> bool | None:
-        """Whether the stage hunts under the law in a case; None if that is not certain, or depends on what is open."""
+        """Tell whether the stage hunts under the law in a case; None if that is not certain,
+        or depends on what is open."""
         answers = self.answers(case)
         return answers.pop() if len(answers) == 1 and self.certain(case) else None
 
@@ -105,12 +107,12 @@ class LawVerdict:
         return (min(lowest), max(highest)) if margins else None
 
     def edges_certain(self, case: str) -> bool:
-        """Whether the edges of hunting that were found in a case are certain."""
+        """Tell whether the edges of hunting that were found in a case are certain."""
         margins = [trial.cases[case].judgement.margin for trial in self.trials]
         return all(edge.certain for edge in margins if edge)
 
     def edges_sought(self, case: str) -> bool:
-        """Whether the search for the edge in a case came to its end in every trial."""
+        """Tell whether the search for the edge in a case came to its end in every trial."""
         return all(trial.edge_sought(case) for trial in self.trials)
 
     def amplitudes(self, case: str) -> tuple[float, float] | None:
@@ -130,30 +132,32 @@ class VerdictsByLaw:
 
     @property
     def in_hertz(self) -> bool:
-        """Whether edges are crossovers [Hz]; else they are factors of the bandwidth."""
+        """Tell whether edges are crossovers [Hz]; else they are factors of the bandwidth."""
         return bandwidth(self.stage.flat()) is not None
 
     def hunts(self, case: str) -> bool | None:
-        """Whether the stage hunts in a case, whatever the law; None where that depends on the law or is not certain."""
+        """Tell whether the stage hunts in a case, whatever the law;
+        None where that depends on the law or is not certain."""
         answers = {verdict.hunts(case) for verdict in self.verdicts}
         return answers.pop() if len(answers) == 1 else None
 
     def answers(self, case: str) -> set[bool]:
-        """Whether the stage hunts in a case, by all verdicts that are certain."""
+        """Tell whether the stage hunts in a case, by all verdicts that are certain."""
         return set().union(*(verdict.answers(case) for verdict in self.verdicts))
 
     def depends_on_law(self, case: str) -> bool:
-        """Whether verdicts that are certain disagree in a case."""
+        """Tell whether verdicts that are certain disagree in a case."""
         return len(self.answers(case)) > 1
 
     def uncertain(self, case: str) -> list[str]:
-        """The laws under which not every verdict in a case is certain."""
+        """Return the laws under which not every verdict in a case is certain."""
         return [verdict.law for verdict in self.verdicts if not verdict.certain(case)]
 
     def deciding(self, case: str) -> list[str]:
-        """The experiments that would decide, where the verdict depends on the law or is not certain under all: those
-        that tell what is open in a law under which the answer depends on that, else those that tell the laws that
-        disagree, or are not certain, from the others."""
+        """Return the experiments that would decide,
+        where the verdict depends on the law or is not certain under all: those that tell what is open in a law under
+        which the answer depends on that, else those that tell the laws that disagree, or are not certain, from the
+        others."""
         if self.hunts(case) is not None or not self.answers(case):
             return []
         depends = self.depends_on_law(case)
@@ -177,8 +181,8 @@ class VerdictsByLaw:
 def verdicts_by_law(
     stage: Stage, rtol: float = LONG_RUN_RTOL, elements: int = ELEMENTS, progress: Progress = silent
 ) -> VerdictsByLaw:
-    """What becomes of a stage under each law that keeps what is measured of its own. Raises InputError for a law that
-    does not declare what that is."""
+    """Return what becomes of a stage under each law that keeps what is measured of its own.
+    Raises InputError for a law that does not declare what that is."""
     conversions, left_out = kept_laws(stage, elements)
     planned = [(conversion, [*trials_left_open(conversion).values()]) for conversion in conversions]
     total, done = sum(len(draws) for _, draws in planned), 0
@@ -197,7 +201,8 @@ def verdicts_by_law(
 
 
 def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[MeasuredKind, ...]]]:
-    """The stage as it is, and under the other laws that keep what is measured of it; and what the others lose."""
+    """Return the stage as it is, and under the other laws that keep what is measured of it;
+    and what the others lose."""
     own = stage.flat()["friction.model"]
     kept = [compared(stage, stage, measure_friction(stage.flat()))]
     left_out: dict[str, tuple[MeasuredKind, ...]] = {}
@@ -220,9 +225,10 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
 
 
 def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> OtherLaws:
-    """The friction of stages that differ in its numbers under every other law that keeps what is measured of each of
-    them: as converted and at both ends of what that leaves open, by the name of the law and of what is open. Laws that
-    keep it of some alone are lost. Raises InputError for a law that does not declare what is measured of it."""
+    """Return the friction of stages that differ in its numbers under every other law that keeps
+    what is measured of each of them: as converted and at both ends of what that leaves open, by the name of the law and
+    of what is open. Laws that keep it of some alone are lost. Raises InputError for a law that does not declare what is
+    measured of it."""
     kept = [{conversion.law: conversion for conversion in kept_laws(stage, elements)[0][1:]} for stage in stages]
     frictions, lost = {}, {}
     for law in dict.fromkeys(law for conversions in kept for law in conversions):
@@ -242,13 +248,13 @@ def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> Ot
 
 
 def _together(values: Sequence[Any]) -> Any:
-    """A value that all have, or else an array of them."""
+    """Return a value that all have, or else an array of them."""
     return values[0] if all(value == values[0] for value in values) else np.array(values)
 
 
 def trials_left_open(conversion: LawConversion) -> dict[str, dict[str, float]]:
-    """What the measurements leave open [SI]: as the conversion has it, "", and at the "least" and "most" of the ranges;
-    as it is for the stage's own law."""
+    """Return what the measurements leave open [SI]: as the conversion has it, "",
+    and at the "least" and "most" of the ranges; as it is for the stage's own law."""
     trials: dict[str, dict[str, float]] = {"": {}}
     if conversion.stage == conversion.source:
         return trials

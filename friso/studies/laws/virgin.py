@@ -42,14 +42,14 @@ class VirginPoints:
 
     @property
     def together(self) -> int:
-        """How many points a mean is of."""
+        """Return how many points a mean is of."""
         settings = StudySettings.current()
         wanted = (self.usual / (settings.curve_error * max(self.force))) ** 2
         return int(np.clip(np.ceil(wanted), 1, max(len(self.force) // settings.most_knots, 1)))
 
     @property
     def usual(self) -> float:
-        """How far the farthest of so many points is off by scatter alone [N]."""
+        """Return how far the farthest of so many points is off by scatter alone [N]."""
         return self.scatter * float(np.sqrt(2 * np.log(len(self.force))))
 
 
@@ -83,7 +83,7 @@ def read_virgin_curve(path: str | os.PathLike[str], kind: AxisKind) -> tuple[np.
 
 
 def _channel(path: str | os.PathLike[str], candidates: list[tuple[np.ndarray, float | None]], unit: str) -> np.ndarray:
-    """The one channel that can be turned into this unit, in it."""
+    """Return the one channel that can be turned into this unit, in it."""
     in_unit = [values * factor for values, factor in candidates if factor is not None]
     if len(in_unit) != 1:
         raise _refused(
@@ -142,5 +142,5 @@ def with_virgin_curve(
 
 
 def _scatter(residual: np.ndarray) -> float:
-    """The standard deviation of what is not smooth in it, shape (n,)."""
+    """Return the standard deviation of what is not smooth in it, shape (n,)."""
     return float(np.sqrt(np.mean(np.diff(residual) ** 2) / 2))

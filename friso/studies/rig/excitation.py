@@ -51,7 +51,8 @@ def excite(
     changes: Mapping[str, Any] | None = None,
     kind: Excitation = SLIDING,
 ) -> RecordedRuns:
-    """Runs at a standstill at a place [m] with the multisine of a seed; `changes` are arrays of shape (runs,)."""
+    """Return runs at a standstill at a place [m] with the multisine of a seed;
+    `changes` are arrays of shape (runs,)."""
     step, slow = as_built_keys(stage)["drive.sample_time"], interval(stage, 1 / (kind.samples * pace(stage)))
     period = round(PERIOD / pace(stage) / slow) * slow
     lines = np.geomspace(1, min(kind.top * PERIOD, FINEST * period / slow), kind.lines)
@@ -81,7 +82,8 @@ def estimate_plant(logs: Sequence[RigLog]) -> FrequencyResponse:
 
 
 def loop(log: RigLog) -> FrequencyResponse:
-    """The open loop: what the controller answers to the force that is commanded in all, turned round."""
+    """Return the open loop: what the controller answers to the force that is commanded in all,
+    turned round."""
     injected, commanded = log.logged["disturbance"], log.logged["force"]
     record = ResponseRecord(commanded, injected - commanded, log.interval, injected)
     return multisine([record], None, Channels("error", "1", "loop", "1"))

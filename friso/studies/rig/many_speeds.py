@@ -77,7 +77,7 @@ class ManySpeeds:
 
 
 def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
-    """The passes of a stage whose joint is locked, or which has none."""
+    """Return the passes of a stage whose joint is locked, or which has none."""
     logs, places = many_speeds_logs(stage, seed), []
     for log, begin in zip(logs, _begins(stage), strict=True):
         velocity = friction_velocity(log.log, moving_mass(stage.flat()))
@@ -91,8 +91,8 @@ def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
 
 
 def many_speeds_logs(stage: Stage, seed: int) -> tuple[RigLog, ...]:
-    """The logs, one for each place, at the fastest setting at which most of the passes are steady; if there is none, at
-    that with the most."""
+    """Return the logs, one for each place, at the fastest setting at which most of the passes
+    are steady; if there is none, at that with the most."""
     tried = []
     for factor in FASTER:
         quick = stage.with_numbers(quicker(stage, factor))
@@ -113,19 +113,19 @@ def mean_friction(stage: Stage, speeds: np.ndarray, places: np.ndarray) -> np.nd
 
 
 def _begins(stage: Stage) -> np.ndarray:
-    """Where the stretches begin [m]."""
+    """Return where the stretches begin [m]."""
     low, high = travel(stage)
     return np.linspace(low, high - SHARED * longest_travel(stage), PLACES)
 
 
 def controller_speeds(stage: Stage) -> np.ndarray:
-    """The speeds [m/s], shape (`SPEEDS`,), of a stage with its controller made faster."""
+    """Return the speeds [m/s], shape (`SPEEDS`,), of a stage with its controller made faster."""
     top = longest_travel(stage) * pace(stage) / SHORTEST
     return np.geomspace(top / RATIO, top, SPEEDS)
 
 
 def _log(stage: Stage, own_pace: float, number: int, low: float, seed: int) -> RigLog:
-    """The passes over the stretch that begins at a place [m], ever faster."""
+    """Return the passes over the stretch that begins at a place [m], ever faster."""
     period, shared = 1 / pace(stage), SHARED * longest_travel(stage)
     parts, before = [(0.0, STANDS * period)], 0.0
     for speed in controller_speeds(stage):

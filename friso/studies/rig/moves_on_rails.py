@@ -54,8 +54,9 @@ def duration(stage: Stage) -> float:
 
 
 def move(stage: Stage) -> MoveTask:
-    """The move from 0 with the acceleration of the stage's motion, after which it stands; of a motion that states none,
-    with one that the loop can just follow (a move then takes two of its time constants)."""
+    """Return the move from 0 with the acceleration of the stage's motion,
+    after which it stands; of a motion that states none, with one that the loop can just follow (a move then takes two
+    of its time constants)."""
     flat, travel = stage.flat(), distance(stage)
     rate = 2 * np.pi * (bandwidth(flat) or 1.0)
     acceleration = flat.get("motion.acceleration", travel * rate**2)
@@ -64,12 +65,13 @@ def move(stage: Stage) -> MoveTask:
 
 
 def released(stage: Stage, displacement: float) -> MoveTask:
-    """A release at the end of the move, `displacement` [m] beside it."""
+    """Return a release at the end of the move, `displacement` [m] beside it."""
     return MoveTask(np.array([[0.0, distance(stage), 0.0, 0.0]]), duration(stage), displacement=displacement)
 
 
 def with_joint(stage: Stage, locked: bool) -> Stage:
-    """The stage with its joint locked or free. Raises InputError where it has none that can be so."""
+    """Return the stage with its joint locked or free.
+    Raises InputError where it has none that can be so."""
     return locked_stage(stage) if locked else free_stage(stage)
 
 
@@ -79,7 +81,8 @@ def crossover(stage: Stage) -> float:
 
 
 def crossover_key(stage: Stage) -> str:
-    """The key that states it. Raises InputError for a controller that is given by its gains."""
+    """Return the key that states it. Raises InputError for a controller that is given by its
+    gains."""
     key = stage.controller.bandwidth_key
     if key is None:
         actual, expected = "gains", "a controller tuned by its crossover, which the experiment varies"
@@ -88,8 +91,9 @@ def crossover_key(stage: Stage) -> str:
 
 
 def at_crossovers(stage: Stage, frequencies: np.ndarray) -> dict[str, np.ndarray]:
-    """The keys of the controller at crossovers [Hz], their values of the same shape: one that states none is made
-    faster as a whole, from that of a van Dijk controller of the same proportional gain (`pace`)."""
+    """Return the keys of the controller at crossovers [Hz], their values of the same shape:
+    one that states none is made faster as a whole, from that of a van Dijk controller of the same proportional gain
+    (`pace`)."""
     key = stage.controller.bandwidth_key
     return quicker(stage, frequencies / pace(stage)) if key is None else {key: frequencies}
 
@@ -138,17 +142,17 @@ class RailRuns:
 
     @property
     def swings(self) -> np.ndarray:
-        """Which runs swing at their end."""
+        """Return which runs swing at their end."""
         return self.outcome == SWINGS
 
     @property
     def failed(self) -> np.ndarray:
-        """Which runs failed."""
+        """Return which runs failed."""
         return self.outcome == FAILED
 
     @property
     def counted(self) -> np.ndarray:
-        """Which runs have a peak that counts."""
+        """Return which runs have a peak that counts."""
         return self.peaks > 0
 
     def shaped(self, *shape: int) -> RailRuns:
@@ -156,18 +160,18 @@ class RailRuns:
         return RailRuns(**{entry.name: getattr(self, entry.name).reshape(shape) for entry in fields(self)})
 
     def share(self, which: Any = ...) -> Share:
-        """The share of some runs that have a peak that counts, with its 95 % interval."""
+        """Return the share of some runs that have a peak that counts, with its 95 % interval."""
         return share(self.counted[which], ~self.failed[which])
 
 
 def once(stage: Stage, task: MoveTask, seeds: Sequence[int], changes: Mapping[str, Any] | None = None) -> RecordedRuns:
-    """A few runs, all samples of which are kept."""
+    """Return a few runs, all samples of which are kept."""
     (recorded,) = run(stage, task, seeds, interval(stage, INTERVAL), changes)
     return recorded
 
 
 def concatenate_runs(parts: list[RailRuns]) -> RailRuns:
-    """What became of several lots of runs, one after the other."""
+    """Return what became of several lots of runs, one after the other."""
     return RailRuns(
         **{entry.name: np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(RailRuns)}
     )
@@ -181,7 +185,7 @@ def run_moves(
     progress: Progress = silent,
     label: str = "",
 ) -> RailRuns:
-    """Runs of a task and what became of them; the samples are forgotten chunk by chunk."""
+    """Return runs of a task and what became of them; the samples are forgotten chunk by chunk."""
     parts: list[RailRuns] = []
     progress(0, len(seeds), label)
     for chunk in run(stage, task, seeds, interval(stage, INTERVAL), changes):
@@ -191,7 +195,7 @@ def run_moves(
 
 
 def rail_runs(recorded: RecordedRuns) -> RailRuns:
-    """What became of the runs of a chunk, by the position as the drive logs it."""
+    """Return what became of the runs of a chunk, by the position as the drive logs it."""
     time, failed = recorded.time, recorded.statuses != Status.DONE
     deviation = recorded.logged["position"] - recorded.logged["reference"]
     deviation[failed] = 0.0
@@ -221,8 +225,8 @@ def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 
 
 def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: float) -> tuple[float, ...]:
-    """The swings in the last half of a run, from its turning points, times [s] and values [m]: above, below,
-    rising, scatter of period and of height, as in `RailRuns`."""
+    """Return the swings in the last half of a run, from its turning points,
+    times [s] and values [m]: above, below, rising, scatter of period and of height, as in `RailRuns`."""
     nothing = (np.nan,) * 5
     if not lasts(np.asarray(swing), 0.0, BAND):
         return nothing

@@ -69,7 +69,7 @@ def rig_log(recorded: RecordedRuns, row: int, name: str, kind: str | None, stage
 
 
 def stopped(log: RigLog) -> InputError:
-    """The error of a log that stopped before it shows anything."""
+    """Return the error of a log that stopped before it shows anything."""
     return InputError("controller", f"a loop that stopped {log.failure}", "a stable one", 'crossover = "8 Hz"')
 
 
@@ -79,8 +79,8 @@ either limit where it is not."""
 
 
 def _swings_between_limits(force: np.ndarray, stage: Stage) -> int:
-    """The number of samples after which a command [N] of shape (n,) does nothing but swing between its limits; 0 where
-    it comes to rest, or has none."""
+    """Return the number of samples after which a command [N] of shape (n,) does nothing but
+    swing between its limits; 0 where it comes to rest, or has none."""
     limit = stage.flat().get(FORCE_LIMIT, np.inf)
     parts = np.array_split(force, WINDOWS)
     ways = [(np.mean(part >= 0.999 * limit), np.mean(part <= -0.999 * limit)) for part in parts]

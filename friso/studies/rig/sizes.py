@@ -35,15 +35,15 @@ _FREE = 'stiffness = "2.4 N/mm", damping = "0.5 N*s/m", stroke = "1 mm"'
 
 
 def jointed(stage: Stage) -> Stage:
-    """The stage itself. Raises InputError for one without a joint."""
+    """Return the stage itself. Raises InputError for one without a joint."""
     if stage.joint is None:
         raise InputError("joint", "no [joint]", "a stage with a joint", '[joint] stiffness = "2.4 N/mm"')
     return stage
 
 
 def freed(stage: Stage) -> Stage:
-    """The stage with its joint free and its limiters far off. Raises InputError where it has no joint that can be free,
-    or no stroke."""
+    """Return the stage with its joint free and its limiters far off.
+    Raises InputError where it has no joint that can be free, or no stroke."""
     free = free_stage(stage)
     stroke = free.flat()["joint.stroke"]
     if not stroke > 0:
@@ -52,7 +52,8 @@ def freed(stage: Stage) -> Stage:
 
 
 def free_stage(stage: Stage) -> Stage:
-    """The stage with its joint free. Raises InputError where it has none, or does not tell what that takes."""
+    """Return the stage with its joint free. Raises InputError where it has none,
+    or does not tell what that takes."""
     free = jointed(stage).variants().get("free")
     if free is None:
         expected = "a joint with stiffness (or a [flexure]), damping and stroke, which this experiment frees"
@@ -61,12 +62,13 @@ def free_stage(stage: Stage) -> Stage:
 
 
 def locked_stage(stage: Stage) -> Stage:
-    """The stage with its joint held. Raises InputError where it has none."""
+    """Return the stage with its joint held. Raises InputError where it has none."""
     return jointed(stage).replace({"joint.locked": True})
 
 
 def pace(stage: Stage) -> float:
-    """The controller's crossover [Hz]; for plain gains, that of a van Dijk controller of the same proportional gain."""
+    """Return the controller's crossover [Hz]; for plain gains,
+    that of a van Dijk controller of the same proportional gain."""
     flat = stage.flat()
     named = bandwidth(flat)
     if named is not None:
@@ -75,25 +77,27 @@ def pace(stage: Stage) -> float:
 
 
 def friction(stage: Stage) -> float:
-    """The break-away friction [N]; without any, what moves the mass at 1 m/s^2, our choice."""
+    """Return the break-away friction [N]; without any, what moves the mass at 1 m/s^2,
+    our choice."""
     return float(breakaway(stage.flat())) or float(moving_mass(stage.flat()))
 
 
 def travel(stage: Stage) -> tuple[float, float]:
-    """The ends [m] of the stage's own motion; one that does not move has a hundred strokes to either side."""
+    """Return the ends [m] of the stage's own motion;
+    one that does not move has a hundred strokes to either side."""
     low, high = own_motion(stage).span
     reach = 0.0 if high > low else 100 * stage.flat().get("joint.stroke", 1e-3)
     return low - reach, high + reach
 
 
 def longest_travel(stage: Stage) -> float:
-    """The way at constant speed [m]."""
+    """Return the way at constant speed [m]."""
     low, high = travel(stage)
     return WAY * (high - low)
 
 
 def quicker(stage: Stage, factors: Any) -> dict[str, Any]:
-    """The keys of a controller made faster by factors."""
+    """Return the keys of a controller made faster by factors."""
     return sped_up(stage.flat(), factors)
 
 

@@ -55,8 +55,8 @@ def slow_sliding(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[Slo
 
 
 def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[RigLog, ...]:
-    """The logs, one for each place; none where the friction has no bristles and Stribeck curve, or no loop was
-    stable."""
+    """Return the logs, one for each place; none where the friction has no bristles and Stribeck
+    curve, or no loop was stable."""
     speeds, quick = _edge(passed), passed[0].stage
     falling_bristles = {"friction.bristle_stiffness", "friction.stribeck_velocity"} <= quick.flat().keys()
     if not falling_bristles or all(run_passes.failure for run_passes in passed):

@@ -48,7 +48,7 @@ FINER = 10
 
 
 def guideline_figures(guideline: Guideline) -> tuple[Figure, ...]:
-    """All charts, in the order of the page."""
+    """Return all charts, in the order of the page."""
     return (
         _edge_of_rigid_masses(guideline),
         _free(guideline),
@@ -59,7 +59,7 @@ def guideline_figures(guideline: Guideline) -> tuple[Figure, ...]:
 
 
 def _edge_of_rigid_masses(guideline: Guideline) -> Figure:
-    """The edge of rigid masses over the ratio of their two rates."""
+    """Return the edge of rigid masses over the ratio of their two rates."""
     sweep = guideline.locked.test.usable
     slip, drop = np.exp(guideline.locked.law.log_rates(sweep.values))
     mean = np.sqrt(slip * drop)
@@ -80,7 +80,8 @@ def _edge_of_rigid_masses(guideline: Guideline) -> Figure:
 
 
 def _free(guideline: Guideline) -> Figure:
-    """The edge with a free joint of ample stroke over the rate of the joint, both over the locked edge."""
+    """Return the edge with a free joint of ample stroke over the rate of the joint,
+    both over the locked edge."""
     sweep = _both(guideline.free, lambda values: values["stroke"] > FULL)
     joint = np.exp(guideline.free.law.log_rates(sweep.values)[0])
     x, y = joint / sweep.locked, sweep.edge / sweep.locked
@@ -100,7 +101,7 @@ def _free(guideline: Guideline) -> Figure:
 
 
 def _stroke(guideline: Guideline) -> Figure:
-    """The share of a joint's effect that is left with its stroke."""
+    """Return the share of a joint's effect that is left with its stroke."""
     sweep = _both(guideline.free, lambda values: values["stroke"] > 0)
     joint, stroke = np.exp(guideline.free.law.log_rates(sweep.values))
     effect = (sweep.edge**-2 - sweep.locked**-2) * joint**2
@@ -153,7 +154,7 @@ def _scatter(title: str, law: Sequence[Array], computed: Sequence[Array]) -> Pan
 
 
 def _thesis_rig(guideline: Guideline) -> Figure:
-    """The thesis rig with one thing changed at a time."""
+    """Return the thesis rig with one thing changed at a time."""
     laws = Laws(guideline.locked.law, guideline.free.law)
     panels = tuple(_studied(title, x, guideline.worked.studies[name], laws) for name, (title, x) in PANELS.items())
     flat = plain_rig("joint")
@@ -202,7 +203,8 @@ def _by_end(x: Array, y: Array, sweep: Sweep) -> Cloud:
 
 
 def _both(fit: Fit, which: object) -> Sweep:
-    """The samples of fit and test together that have an edge and for which `which` is true of their groups."""
+    """Return the samples of fit and test together that have an edge and for which `which` is
+    true of their groups."""
     return fit.sweep.usable.take(which(fit.sweep.usable.values))  # type: ignore[operator]
 
 

@@ -62,13 +62,13 @@ CONSTANTS: Mapping[str, Any] = {
 
 
 def guideline_files(guideline: Guideline) -> dict[str, Content]:
-    """The page, the table of edges, and the charts."""
+    """Return the page, the table of edges, and the charts."""
     charts = pictures(guideline_figures(guideline), ("png",))
     return {PAGE: guideline_page(guideline), TABLE: edges_table(guideline), **charts}
 
 
 def guideline_page(guideline: Guideline) -> str:
-    """The page in Markdown; its charts and the table stand beside it."""
+    """Return the page in Markdown; its charts and the table stand beside it."""
     template = environment("friso_thesis.shown").overlay(autoescape=False).get_template("guideline.md.j2")
     return template.render(
         guideline=guideline,
@@ -170,18 +170,19 @@ def _span(x: np.ndarray) -> tuple[float, float]:
 
 
 def _span_text(ends: tuple[float, float]) -> str:
-    """The ends of a range, or the number that it is."""
+    """Return the ends of a range, or the number that it is."""
     low, high = (number(end) for end in ends)
     return low if low == high else f"{low} to {high}"
 
 
 def _rows(name: str, cases: tuple[ThesisCase, ...]) -> list[tuple[float, float, float]]:
-    """What a study varies, the edge by the law, and that computed."""
+    """Return what a study varies, the edge by the law, and that computed."""
     return [(STUDIED[name](case.changes), case.law, case.computed) for case in cases]
 
 
 def edges_table(guideline: Guideline) -> str:
-    """All samples with their groups and edges, as CSV; four digits, which is more than edges are known to."""
+    """Return all samples with their groups and edges, as CSV; four digits,
+    which is more than edges are known to."""
     sweeps = {
         ("locked", "fit"): guideline.locked.fit,
         ("locked", "held out"): guideline.locked.test,

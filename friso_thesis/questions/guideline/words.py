@@ -51,7 +51,7 @@ def _rates(law: FittedLaw) -> list[str]:
 
 
 def _power(group: str, exponent: float) -> str:
-    """A group over its reference to a power."""
+    """Return a group over its reference to a power."""
     written, reference = GROUPS[group].written, REFERENCE[group]
     base = f"({written})" if reference == 1 else f"({written}/{reference:g})"
     if group == "gap":
@@ -60,19 +60,19 @@ def _power(group: str, exponent: float) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number to so many digits; a dash where there is none."""
+    """Return a number to so many digits; a dash where there is none."""
     if value is None or not math.isfinite(value):
         return "–"
     return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
 def log_error(off: float) -> str:
-    """An error of a logarithm as a share: 0.1 is 11 %."""
+    """Return an error of a logarithm as a share: 0.1 is 11 %."""
     return f"{percent(math.expm1(off))}"
 
 
 def accuracy(guideline: Guideline) -> list[str]:
-    """How well each law predicts the edge of hunting of stages that it was not fitted to."""
+    """Return how well each law predicts the edge of hunting of stages that it was not fitted to."""
     fits = (("locked", guideline.locked.on_test), ("free", guideline.free.on_test))
     return [
         f"The law for the {case} joint predicts the edge of hunting of {errors.count} stages that it was not fitted to "
@@ -82,7 +82,7 @@ def accuracy(guideline: Guideline) -> list[str]:
 
 
 def parasitic_edges(cases: Sequence[ThesisCase]) -> str:
-    """How far the parasitic mode moves the edge of hunting."""
+    """Return how far the parasitic mode moves the edge of hunting."""
     edges = [case.computed for case in cases if math.isfinite(case.computed)]
     if not edges:
         return "No edge is known with any of these modes."
@@ -91,8 +91,8 @@ def parasitic_edges(cases: Sequence[ThesisCase]) -> str:
 
 
 def parasitic_sentences(modes: Sequence[ParasiticLimits]) -> list[str]:
-    """Where the ranges of crossovers end, joint locked and free, by the damping ratio of the mode; and whether one
-    multiple of the crossover is a rule for all modes."""
+    """Return where the ranges of crossovers end, joint locked and free,
+    by the damping ratio of the mode; and whether one multiple of the crossover is a rule for all modes."""
     ratios = [mode.frequency / end[1] for mode in modes for end in (mode.locked, mode.free) if end]
     conclusion = "Actuator and sensor are on the same part here."
     if ratios and max(ratios) > RULE * min(ratios):
@@ -108,7 +108,7 @@ def parasitic_sentences(modes: Sequence[ParasiticLimits]) -> list[str]:
 
 
 def _ranges(state: str, damping: float, modes: Sequence[ParasiticLimits]) -> str:
-    """The edges of one state of the joint and one damping ratio."""
+    """Return the edges of one state of the joint and one damping ratio."""
     ends = {mode.frequency: getattr(mode, state) for mode in modes if mode.damping_ratio == damping}
     usable = {frequency: end for frequency, end in ends.items() if end}
     without = [f"{frequency:g}" for frequency, end in ends.items() if not end]
@@ -130,5 +130,5 @@ def _spread(values: Sequence[float]) -> str:
 
 
 def sentences(guideline: Guideline) -> list[str]:
-    """How accurate the laws are."""
+    """Return how accurate the laws are."""
     return accuracy(guideline)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def conclusion(reproduction: Reproduction) -> str:
-    """How many claims of the thesis hold."""
+    """Return how many claims of the thesis hold."""
     counts = Counter(verdict.judgement for verdict in reproduction.verdicts)
     parts = [
         f"{counts[judgement]} {singular if counts[judgement] == 1 else plural}"
@@ -44,8 +44,8 @@ _VERBS: tuple[tuple[ClaimJudgement, str, str], ...] = (
 
 
 def reproduce_document(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> dict[str, Any]:
-    """All claims with their judgements, ready for JSON; how they were judged stands before them. With those under each
-    friction law, where they were asked."""
+    """Return all claims with their judgements, ready for JSON;
+    how they were judged stands before them. With those under each friction law, where they were asked."""
     tolerances = sorted(reproduction.tolerances)
     verdicts, counts = reproduction.changed
     document = {
@@ -107,7 +107,7 @@ def _part(part: Part) -> dict[str, Any]:
 
 
 def _space(space: ClaimInSpace) -> dict[str, Any]:
-    """A claim over the joint draws."""
+    """Return a claim over the joint draws."""
     return {
         "draws": space.draws,
         "undecided": space.undecided,

@@ -45,7 +45,8 @@ _SHOWN_FROM = 6.0  # [s] the return move is over by then, at the paths of Fig. 5
 
 
 def reproduction_figures(reproduction: Reproduction) -> dict[str, Figure]:
-    """The figures by their number in the thesis, in its order, those whose studies were run."""
+    """Return the figures by their number in the thesis, in its order,
+    those whose studies were run."""
     figures = {**_in_time(reproduction), **loop_figures(reproduction)}
     if reproduction.experiments is not None:
         figures |= rig_figures(reproduction.experiments, reproduction.experimented)
@@ -54,7 +55,7 @@ def reproduction_figures(reproduction: Reproduction) -> dict[str, Figure]:
 
 
 def _maps(reproduction: Reproduction, number: str) -> Figure:
-    """The maps of one figure side by side, each with its evaluation point."""
+    """Return the maps of one figure side by side, each with its evaluation point."""
     panels, statements, zeros = [], [], []
     for study in STUDIES.values():
         if study.panel[:-1] != number or study.name not in reproduction.maps:
@@ -83,7 +84,8 @@ def _maps(reproduction: Reproduction, number: str) -> Figure:
 
 
 def _with_edges(panel: Panel, reproduction: Reproduction, study: ThesisStudy) -> Panel:
-    """The map with the curves on which the hunting cycle stops attracting, and on which asymmetric ones appear."""
+    """Return the map with the curves on which the hunting cycle stops attracting,
+    and on which asymmetric ones appear."""
     figures = reproduction.cycles.get(study.name)
     if figures is None:
         return panel
@@ -97,14 +99,14 @@ def _line(edge: Edge) -> Series:
 
 
 def _runs_shown(reproduction: Reproduction, study: ThesisStudy, letter: str) -> Mapping[str, xr.Dataset]:
-    """The maps of a study by title: one, or Fig. 14B at the two tolerances."""
+    """Return the maps of a study by title: one, or Fig. 14B at the two tolerances."""
     if study.panel == "14B":
         return {f"{letter}: {study.title}, rtol {rtol:g}": runs for rtol, runs in reproduction.tolerances.items()}
     return {f"{letter}: {study.title}": reproduction.maps[study.name]}
 
 
 def _in_time(reproduction: Reproduction) -> dict[str, Figure]:
-    """The figures of single runs, of those that were made."""
+    """Return the figures of single runs, of those that were made."""
     made = reproduction.responses.keys()
     figures = {"5": _response(reproduction)} if "locked" in made else {}
     return figures | ({"13": _shares(reproduction)} if {WIDE, NARROW} <= made else {})

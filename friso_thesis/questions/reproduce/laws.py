@@ -14,7 +14,8 @@ TITLE = "Conclusions of the thesis under each friction law"
 
 
 def laws_sentences(laws: ConclusionsByLaw) -> list[str]:
-    """How many conclusions survive, which do not, and which laws cannot say since they keep too little."""
+    """Return how many conclusions survive, which do not,
+    and which laws cannot say since they keep too little."""
     count, of_one = len(laws.conclusions), [conclusion.claim.id for conclusion in laws.dependent]
     others = ", ".join(laws.laws[1:])
     alike = f"{count - len(of_one)} of {count} conclusions have the same judgement"

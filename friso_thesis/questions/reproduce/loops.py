@@ -35,7 +35,7 @@ _SHOWN = {
 
 
 def loop_figures(reproduction: Reproduction) -> dict[str, Figure]:
-    """The figures by their number in the thesis; none where no linear analysis was made."""
+    """Return the figures by their number in the thesis; none where no linear analysis was made."""
     if reproduction.linear is None or reproduction.bode is None:
         return {}
     by_name = {figure.name: figure for figure in bode_figures(reproduction.bode)}

@@ -41,7 +41,8 @@ class FigureSection:
 
 
 def reproduce_files(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> dict[str, Content]:
-    """The page, a summary of one sheet, the claims, and every figure as PNG and SVG in a folder of its own."""
+    """Return the page, a summary of one sheet, the claims,
+    and every figure as PNG and SVG in a folder of its own."""
     text = json.dumps(reproduce_document(reproduction, laws), indent=2, ensure_ascii=False, allow_nan=False)
     figures = pictures(reproduction_figures(reproduction).values(), ("png", "svg"))
     return {
@@ -53,7 +54,8 @@ def reproduce_files(reproduction: Reproduction, laws: ConclusionsByLaw | None = 
 
 
 def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> str:
-    """The whole page: all claims at a glance, then item by item in the order of the thesis. It opens offline."""
+    """Return the whole page: all claims at a glance,
+    then item by item in the order of the thesis. It opens offline."""
     verdicts = words.in_order(reproduction.verdicts)
     numbered = reproduction_figures(reproduction)
     parts = sections(numbered, verdicts)
@@ -98,9 +100,9 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
 
 
 def sections(figures: Mapping[str, Figure], verdicts: Iterable[ClaimVerdict]) -> tuple[FigureSection, ...]:
-    """The items in the order of the verdicts, each figure where its first claim stands, those of no claim at the end;
-    claims that are not covered stand in the table alone. A panel's claims, such as those of "11A", stand with the
-    figure."""
+    """Return the items in the order of the verdicts, each figure where its first claim stands,
+    those of no claim at the end; claims that are not covered stand in the table alone. A panel's claims, such as those
+    of "11A", stand with the figure."""
     groups: dict[str, list[ClaimVerdict]] = {}
     for verdict in verdicts:
         if verdict.finding:
@@ -118,20 +120,22 @@ def sections(figures: Mapping[str, Figure], verdicts: Iterable[ClaimVerdict]) ->
 
 
 def _titled(place: str, group: Iterable[ClaimVerdict]) -> str:
-    """An item without a figure of its own, by where the thesis makes its claims, and what they are about."""
+    """Return an item without a figure of its own, by where the thesis makes its claims,
+    and what they are about."""
     if place.isdigit():
         return f"Figure {place}"
     return place if place.startswith("Sec. ") else ", ".join(dict.fromkeys(item.claim.where for item in group))
 
 
 def _printed(figure: Figure) -> Markup:
-    """The figure for paper as a data address; maps as pixels, since thousands of cells make megabytes of lines."""
+    """Return the figure for paper as a data address; maps as pixels,
+    since thousands of cells make megabytes of lines."""
     if not any(panel.maps for panel in figure.panels):
         return print_image(figure)
     return print_image(figure, "png", noted=False)
 
 
 def _counts(verdicts: Iterable[ClaimVerdict]) -> dict[str, int]:
-    """How many claims got each judgement, those that occur."""
+    """Return how many claims got each judgement, those that occur."""
     parts = [verdict.judgement for verdict in verdicts]
     return {judgement: parts.count(judgement) for judgement in COLOURS if judgement in parts}

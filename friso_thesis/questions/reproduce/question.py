@@ -33,7 +33,8 @@ class ReproduceAnswer(Answer):
         return reproduce_document(self.result, self.laws)
 
     def sentences(self) -> Sequence[str]:
-        """How many of the claims hold, which draw fits best, and how many survive other friction laws."""
+        """Return how many of the claims hold, which draw fits best,
+        and how many survive other friction laws."""
         from friso_thesis.questions.reproduce.laws import laws_sentences
         from friso_thesis.questions.reproduce.words import fit_sentence
 
@@ -45,7 +46,7 @@ class ReproduceAnswer(Answer):
         ]
 
     def tables(self) -> Sequence[AnswerTable]:
-        """The conclusions under each law."""
+        """Return the conclusions under each law."""
         from friso_thesis.questions.reproduce.laws import TITLE, laws_rows
 
         return [AnswerTable(TITLE, self.laws.laws, laws_rows(self.laws))] if self.laws else []
@@ -65,17 +66,17 @@ class ReproduceAnswer(Answer):
         return [*claims, *cycles]
 
     def figures(self) -> Sequence[Figure]:
-        """The figures of the thesis."""
+        """Return the figures of the thesis."""
         from friso_thesis.questions.reproduce.figures import reproduction_figures
 
         return [*reproduction_figures(self.result).values()]
 
     def document(self) -> dict[str, Any]:
-        """The claims with their judgements."""
+        """Return the claims with their judgements."""
         return self._document
 
     def files(self) -> Files:
-        """The page, the claims, the figures."""
+        """Return the page, the claims, the figures."""
         from friso_thesis.questions.reproduce.page import reproduce_files
 
         return reproduce_files(self.result, self.laws)

@@ -114,7 +114,8 @@ QUESTIONS: tuple[ThesisQuestion, ...] = (
 
 
 def question_rows() -> list[Sequence[str]]:
-    """The open questions, with the commands that answer them and the answers on the thesis's rig."""
+    """Return the open questions, with the commands that answer them and the answers on the
+    thesis's rig."""
     return [(question.asked, question.command, question.shows, question.answer()) for question in QUESTIONS]
 
 
@@ -123,8 +124,8 @@ _PARASITIC, _LARGEST = 360.0, 2.5
 
 
 def method_rows(reproduction: Reproduction) -> list[Sequence[str]]:
-    """The steps of Sec. 3.4: what the thesis does, what friso finds at its values, and what `friso design` makes of its
-    specification (on file)."""
+    """Return the steps of Sec. 3.4: what the thesis does, what friso finds at its values,
+    and what `friso design` makes of its specification (on file)."""
     single = reproduction.linear.locked.single if reproduction.linear else None
     reached = (
         f"by Sec. 3.4.2 up to {single:.3g} Hz, where a mode reaches 0 dB too" if single else "not computed in this run"

@@ -48,7 +48,7 @@ _ZOOM = 2e-3  # [m] about the end of the move, Fig. 24B
 
 
 def rig_figures(experiments: Experiments, made: frozenset[str]) -> dict[str, Figure]:
-    """The figures by their number in the thesis, those whose experiments were `made`."""
+    """Return the figures by their number in the thesis, those whose experiments were `made`."""
     drawn: dict[str, Figure] = {}
     for need, draw in _DRAWN.items():
         if need in made:

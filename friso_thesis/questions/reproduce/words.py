@@ -25,24 +25,25 @@ AGREEMENT = {"holds": "agrees", "holds in part": "in part", "differs": "contradi
 
 
 def in_order(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:
-    """The verdicts in the order in which the thesis makes the claims."""
+    """Return the verdicts in the order in which the thesis makes the claims."""
     return sorted(verdicts, key=lambda verdict: verdict.claim.place)
 
 
 def short(text: str) -> str:
-    """The first statements of a number, as many as stand within `SHORT` characters, but one at least."""
+    """Return the first statements of a number, as many as stand within `SHORT` characters,
+    but one at least."""
     first = text.split(". Assumed", 1)[0]
     ends = [match.start() for match in re.finditer(r"; |\. (?=[A-Z])|$", first)]
     return first[: max((end for end in ends if end <= SHORT), default=ends[0])]
 
 
 def numbers(verdict: ClaimVerdict) -> str:
-    """The numbers of all parts in one line; empty for a claim that is not covered."""
+    """Return the numbers of all parts in one line; empty for a claim that is not covered."""
     return "; ".join(part.number for part in verdict.finding.judged) if verdict.finding else ""
 
 
 def met(verdict: ClaimVerdict) -> str:
-    """How many criteria are met."""
+    """Return how many criteria are met."""
     if verdict.finding is None:
         return ""
     pattern = verdict.finding.pattern
@@ -67,15 +68,15 @@ def in_draws(verdict: ClaimVerdict, part: int) -> str:
 
 
 def ways(verdict: ClaimVerdict) -> list[tuple[str, str]]:
-    """The word of agreement by each way of judging, where there are several."""
+    """Return the word of agreement by each way of judging, where there are several."""
     if len(verdict.ways) < 2:
         return []
     return [(way, AGREEMENT[finding.judgement]) for way, finding in verdict.ways.items()]
 
 
 def reasons(verdict: ClaimVerdict) -> list[str]:
-    """Why it does not hold, the first sentence of each reason, of several criteria with those to which it belongs; the
-    rest is among the details."""
+    """Return why it does not hold, the first sentence of each reason,
+    of several criteria with those to which it belongs; the rest is among the details."""
     if not verdict.reason:
         return []
     parts = verdict.finding.judged if verdict.finding else ()
@@ -93,8 +94,9 @@ def _first_sentence(text: str) -> str:
 
 
 def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
-    """What stands below an item, by its name: numbers and reasons that are shortened above, draws that decide nothing,
-    and what another grid or tolerance changes."""
+    """Return what stands below an item, by its name:
+    numbers and reasons that are shortened above, draws that decide nothing, and what another grid or tolerance changes.
+    """
     parts = verdict.finding.judged if verdict.finding else ()
     rows = [
         (f"Criterion {place}", part.number) for place, part in enumerate(parts, 1) if short(part.number) != part.number
@@ -107,7 +109,7 @@ def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
 
 
 def self_tests(verdicts: Iterable[ClaimVerdict]) -> list[tuple[str, Part]]:
-    """The parts by which friso only tests itself, with the claim they stand at."""
+    """Return the parts by which friso only tests itself, with the claim they stand at."""
     return [
         (verdict.claim.id, part)
         for verdict in verdicts
@@ -118,7 +120,8 @@ def self_tests(verdicts: Iterable[ClaimVerdict]) -> list[tuple[str, Part]]:
 
 
 def open_rows() -> list[Sequence[str]]:
-    """The values that the thesis leaves open: range, how it is drawn, friso's own, and the reason."""
+    """Return the values that the thesis leaves open: range, how it is drawn, friso's own,
+    and the reason."""
     drawn = {"even": "evenly", "log": "evenly in the logarithm", "either": "one of the two"}
     return [
         (
@@ -133,7 +136,8 @@ def open_rows() -> list[Sequence[str]]:
 
 
 def fit_sentence(plausible: Plausible) -> str:
-    """Which draw, or friso's own choice, fits the printed numbers best, and which numbers these are."""
+    """Return which draw, or friso's own choice, fits the printed numbers best,
+    and which numbers these are."""
     fit = plausible.fit
     if fit is None:
         return ""
@@ -154,7 +158,7 @@ def fit_sentence(plausible: Plausible) -> str:
 
 
 def fit_rows(plausible: Plausible) -> list[Sequence[str]]:
-    """The printed numbers, beside those of the best draw."""
+    """Return the printed numbers, beside those of the best draw."""
     if plausible.fit is None:
         return []
     return [

@@ -19,7 +19,7 @@ PARTS = (GREEN, ORANGE, GREY)
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """How still it stands, what moves it, and what damping does."""
+    """Return how still it stands, what moves it, and what damping does."""
     result: InPosition = outcome.result
     locked, free = (result.runs[case, "all"].true[0] for case in CASES)
     floor = "the floor of the stage file" if result.own_floor else "a quiet laboratory's floor (assumed)"
@@ -118,7 +118,7 @@ def _over_damping(result: InPosition) -> Figure:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """All results."""
+    """Return all results."""
     result: InPosition = outcome.result
     return {
         "crossover_hz": result.crossover,

@@ -31,7 +31,8 @@ ASYMMETRY = "Difference of friction between the two sides"
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """The even rail's cycle, what rails that vary make of it, and what else makes it as slow."""
+    """Return the even rail's cycle, what rails that vary make of it,
+    and what else makes it as slow."""
     result: CycleComparison = outcome.result
     even = result.even
     if not even.swings[0]:
@@ -61,7 +62,7 @@ def _field(result: CycleComparison) -> str:
 
 
 def _asymmetry(result: CycleComparison) -> str:
-    """What ends hunting on rails that vary."""
+    """Return what ends hunting on rails that vary."""
     rows = [(low, high, *row) for low, high, row in zip(BINS[:-1], BINS[1:], result.by_asymmetry, strict=True)]
     low, high, even, slow = rows[0]
     parts = [
@@ -90,7 +91,7 @@ def _rolling(result: CycleComparison) -> str:
 
 
 def _irregular(result: CycleComparison) -> str:
-    """How the cycles of varied rails are irregular."""
+    """Return how the cycles of varied rails are irregular."""
     swings = result.field.swings & np.isfinite(result.field.rising)
     if not swings.any():
         return "No cycle on a varied rail lasts long enough to show how regular it is."
@@ -109,7 +110,7 @@ def _irregular(result: CycleComparison) -> str:
 
 
 def _levels(result: CycleComparison) -> str:
-    """Whether other friction levels make the cycle as slow."""
+    """Tell whether other friction levels make the cycle as slow."""
     slow, swing = result.slower(result.levels), result.larger(result.levels)
     matches = np.argwhere(result.as_measured(result.levels))
     if not len(matches):
@@ -250,7 +251,7 @@ def _motor(share: float) -> str:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """All results; arrays of runs have the shapes of `CycleComparison`."""
+    """Return all results; arrays of runs have the shapes of `CycleComparison`."""
     result: CycleComparison = outcome.result
     classes = [
         {"from": low, "to": high, **share_document(share), "period_over_even": slow}

@@ -40,7 +40,8 @@ def _limit(counts: StrokeCrossover, row: int) -> str:
 
 
 def _needed(counts: StrokeCrossover) -> list[str]:
-    """The crossover limits by stroke, and from which stroke on none are counted at the stage's own crossover."""
+    """Return the crossover limits by stroke, and from which stroke on none are counted at the
+    stage's own crossover."""
     named = [f"{with_unit(float(stroke), 'm')} {_limit(counts, row)}" for row, stroke in enumerate(counts.strokes)]
     lines = [f"Counted peaks by stroke: {'; '.join(named)}."]
     rows = np.flatnonzero(counts.share[:, counts.nearest] > 0)
@@ -54,7 +55,7 @@ def _needed(counts: StrokeCrossover) -> list[str]:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """The map."""
+    """Return the map."""
     counts: StrokeCrossover = outcome.result
     finite = np.isfinite(counts.limits) & (counts.limits > 0)
     border = Series(counts.strokes[finite], counts.limits[finite], "no counted peaks above", INK, width=2.0)
@@ -72,7 +73,8 @@ def rails_panel(counts: StrokeCrossover) -> Panel:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """All results; arrays have the shape (strokes, crossovers, rails), shares (strokes, crossovers)."""
+    """Return all results; arrays have the shape (strokes, crossovers, rails), shares (strokes,
+    crossovers)."""
     counts: StrokeCrossover = outcome.result
     shares = [
         [share_document(counts.runs.share((row, column))) for column in range(len(counts.crossovers))]

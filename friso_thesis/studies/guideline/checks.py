@@ -45,7 +45,7 @@ class SimulationCheck:
 
 
 def simulate_samples(sweep: Sweep, most: int) -> SimulationCheck:
-    """The first `most` samples that have an edge, which are random ones, simulated."""
+    """Return the first `most` samples that have an edge, which are random ones, simulated."""
     usable = sweep.usable
     samples = usable.take(np.arange(min(most, len(usable.edge))))
     runs = [_still_swing(samples, share, *begin) for begin in (_STUCK, _MOVED) for share in (BELOW, ABOVE)]
@@ -58,7 +58,8 @@ _Begins = Callable[[Ensemble, np.ndarray, int], Begin]
 
 
 def _still_swing(sweep: Sweep, share: float, begin: _Begins, tried: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which runs of each sample still swing at the end, and which were completed, shape (samples, tried)."""
+    """Return which runs of each sample still swing at the end, and which were completed,
+    shape (samples, tried)."""
     count = len(sweep.edge)
     which = np.repeat(np.arange(count), tried)
     values = {name: value[which] for name, value in sweep.values.items()} | {"crossover": share * sweep.edge[which]}

@@ -49,7 +49,8 @@ class GuidelineClaim:
 
 
 def judged_claims(worked: Worked) -> tuple[GuidelineClaim, ...]:
-    """The claims of the thesis that the edge decides, judged by computed edges, not by the laws."""
+    """Return the claims of the thesis that the edge decides, judged by computed edges,
+    not by the laws."""
     return _gap(worked), _share_below_limit(worked), _mass(worked), _stiffness(worked), _stroke(worked), _edges(worked)
 
 
@@ -148,7 +149,7 @@ def _edges(worked: Worked) -> GuidelineClaim:
 
 
 def _verdict(holds: bool, *edges: float) -> bool | None:
-    """Whether something holds of edges; None if one of them is not known."""
+    """Tell whether something holds of edges; None if one of them is not known."""
     return None if np.isnan(edges).any() else bool(holds)
 
 
@@ -163,7 +164,7 @@ def _computed(cases: Sequence[ThesisCase]) -> np.ndarray:
 
 
 def _edge(case: ThesisCase) -> str:
-    """A computed edge in words, or why there is none."""
+    """Return a computed edge in words, or why there is none."""
     if np.isfinite(case.computed):
         return _hertz(case.computed)
     return case.kind if case.kind in (BELOW, ABOVE) else f"unknown ({KINDS[NOT_TOLD]})"
@@ -189,15 +190,15 @@ class LeastGap:
         return f"{self.low:.2g} N" if np.isfinite(self.high) else f"more than {self.low:.2g} N, the largest tried,"
 
     def within(self, least: float, most: float) -> bool | None:
-        """Whether it lies in a range; None if that is not known."""
+        """Tell whether it lies in a range; None if that is not known."""
         if self.high < least or self.low > most:
             return False
         return True if least <= self.low and self.high <= most else None
 
 
 def least_gap(cases: Sequence[ThesisCase], static: float) -> LeastGap:
-    """The friction gap F_s - F_c from which on the rig of a static friction [N] hunts at `CLAIMED_AT`, straight
-    between the points of its edge in logarithms."""
+    """Return the friction gap F_s - F_c from which on the rig of a static friction [N] hunts at
+    `CLAIMED_AT`, straight between the points of its edge in logarithms."""
     at_force = [case for case in cases if case.changes["friction.static"] == static]
     x, y = np.array([STUDIED["gap"](case.changes) for case in at_force]), _computed(at_force)
     above = np.flatnonzero(y >= CLAIMED_AT)

@@ -76,7 +76,8 @@ class Fit:
 
     @property
     def kinds(self) -> Mapping[str, int]:
-        """How many samples of fit and test have an edge of which kind, or none for which reason."""
+        """Return how many samples of fit and test have an edge of which kind,
+        or none for which reason."""
         return Counter(self.sweep.edges.kind.astype(str))
 
     @property
@@ -137,7 +138,8 @@ def by_rates(locked: Fit) -> list[ByRates]:
 
 
 def safe_over_friction(locked: Fit) -> float:
-    """The largest of the safe factors of those bins of slip over drop that the rig visits over its friction range."""
+    """Return the largest of the safe factors of those bins of slip over drop that the rig visits
+    over its friction range."""
     flats = [plain_rig() | forces for forces in friction_range()]
     groups = [values_of(flat) for flat in flats]
     visited = _ratio(locked.law, {name: np.array([group[name] for group in groups], float) for name in groups[0]})
@@ -209,7 +211,8 @@ def _sizes(samples: int) -> dict[str, int]:
 
 
 def _steps(sizes: Mapping[str, int]) -> int:
-    """The steps of all sweeps; a sample with a free joint is computed with the joint locked, too."""
+    """Return the steps of all sweeps; a sample with a free joint is computed with the joint
+    locked, too."""
     both = sum(STEPS.values())
     return sum(size * (both if name.startswith("free") else STEPS[LOCKED]) for name, size in sizes.items())
 

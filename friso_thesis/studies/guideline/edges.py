@@ -70,12 +70,12 @@ class Edges:
 
     @property
     def located(self) -> np.ndarray:
-        """Which stages have an edge in the range, shape (count,)."""
+        """Return which stages have an edge in the range, shape (count,)."""
         return np.isfinite(self.crossover)
 
 
 def concatenate_edges(parts: list[Edges]) -> Edges:
-    """The edges of all stages."""
+    """Return the edges of all stages."""
     return Edges(*(np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(Edges)))
 
 
@@ -95,7 +95,8 @@ class _AtCrossovers:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _at_crossovers(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> _AtCrossovers:
-    """Where an orbit may be but could not be closed, a long simulation tells whether anything hunts on."""
+    """Return where an orbit may be but could not be closed,
+    a long simulation tells whether anything hunts on."""
     part = stages(which, crossover)
     cycles = find_cycles(part)
     attracts, failed, unsure = cycles.attracting, np.zeros(part.count, bool), np.flatnonzero(cycles.uncertain)
@@ -106,9 +107,9 @@ def _at_crossovers(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> 
 
 
 def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
-    """The edges of stages whose crossovers are tried on a grid, shape (count, points), ascending; then the step behind
-    the last one at which a cycle attracts is halved, `rounds` times, and gone on upward where the cycle is replaced by
-    another one beside which something still hunts.
+    """Return the edges of stages whose crossovers are tried on a grid, shape (count, points),
+    ascending; then the step behind the last one at which a cycle attracts is halved, `rounds` times, and gone on upward
+    where the cycle is replaced by another one beside which something still hunts.
 
     A flip is interpolated between the multipliers on both sides of it, if it comes to lie in what is left of the step;
     else the middle of that is taken (of the logarithm).
@@ -181,7 +182,8 @@ class _Search:
 
     @property
     def jumps(self) -> np.ndarray:
-        """Where a repelling cycle is known just above, but not that which attracts just below."""
+        """Return where a repelling cycle is known just above,
+        but not that which attracts just below."""
         meets = (self.inside < -MEETS[0]) & (-MEETS[1] < self.outside) & (self.outside < 0)
         return np.isfinite(self.outside) & ~meets
 
@@ -201,7 +203,7 @@ class _Search:
         self.failed[jumping] = True
 
     def columns(self) -> dict[str, np.ndarray]:
-        """The edges by the steps, under the names of `Edges`."""
+        """Return the edges by the steps, under the names of `Edges`."""
         excess = np.abs(self.inside) - 1, np.abs(self.flipped) - 1
         crossed = self.low - excess[0] * (self.flip - self.low) / (excess[1] - excess[0])
         within = (self.low <= crossed) & (crossed <= self.high)

@@ -77,7 +77,7 @@ class Group:
     part: str = "stage"
 
     def of(self, flat: Mapping[str, Any]) -> Any:
-        """The value of a stage given by flat keys to SI numbers or arrays."""
+        """Return the value of a stage given by flat keys to SI numbers or arrays."""
         value = self.factor
         for name, power in self.powers.items():
             parameter = PARAMETERS[name]
@@ -184,7 +184,8 @@ class Count:
 
 
 def group_parameters(flat: Mapping[str, Any]) -> tuple[str, ...]:
-    """The parameters on which the equations of a stage depend, by name; masses that move as one are one."""
+    """Return the parameters on which the equations of a stage depend, by name;
+    masses that move as one are one."""
     form = structure(flat)
     present = {str(symbol) for symbol in assemble(form).parameters}
     names = [name for name, parameter in PARAMETERS.items() if present.issuperset(parameter.keys)]
@@ -207,14 +208,15 @@ def _powers(unit: str) -> tuple[float, float, float]:
 
 
 def group_count(flat: Mapping[str, Any]) -> Count:
-    """How many groups govern stages of the structure of this one."""
+    """Return how many groups govern stages of the structure of this one."""
     names = group_parameters(flat)
     matrix = np.stack([dimensions(name, flat) for name in names])
     return Count(len(names), int(np.linalg.matrix_rank(matrix)))
 
 
 def values_of(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """The groups of a stage given by flat keys to SI numbers or arrays, those of the parts that it has.
+    """Return the groups of a stage given by flat keys to SI numbers or arrays,
+    those of the parts that it has.
 
     Raises InputError for a stage without LuGre friction or without van Dijk's rules.
     """

@@ -54,7 +54,7 @@ class Rate:
     candidates: tuple[str, ...]
 
     def fixed(self, values: SampleValues) -> np.ndarray:
-        """The logarithm of the part that is not fitted, shape (count,)."""
+        """Return the logarithm of the part that is not fitted, shape (count,)."""
         return sum((power * np.log(values[group]) for group, power in self.base.items()), start=np.zeros(()))
 
 
@@ -89,7 +89,7 @@ class FittedLaw:
     path: tuple[float, ...] = ()
 
     def of(self, rate: int) -> dict[str, float]:
-        """The exponents of a rate by group."""
+        """Return the exponents of a rate by group."""
         return {group: value for (number, group), value in self.exponents.items() if number == rate}
 
     def log_rates(self, values: SampleValues) -> np.ndarray:
@@ -98,7 +98,8 @@ class FittedLaw:
         return _log_rates(self.law, tuple(self.exponents), values, parameters)
 
     def edge(self, values: SampleValues, locked: np.ndarray | None = None) -> np.ndarray:
-        """The edge of stages with these groups, in units of sqrt(sigma_0/m); `locked` is that with the joint locked."""
+        """Return the edge of stages with these groups, in units of sqrt(sigma_0/m);
+        `locked` is that with the joint locked."""
         rates = self.log_rates(values)
         return np.exp(self.law.combine(rates, np.log(locked) if locked is not None else np.zeros(rates.shape[1:]))[0])
 
@@ -149,7 +150,7 @@ def beside_locked(rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np
 
 
 def fit_law(law: EdgeLaw, values: SampleValues, edges: np.ndarray, locked: np.ndarray | None = None) -> FittedLaw:
-    """The law fitted to edges, shape (count,), its exponents chosen by cross-validation."""
+    """Return the law fitted to edges, shape (count,), its exponents chosen by cross-validation."""
     target = np.log(edges)
     offset = np.zeros(len(edges)) if locked is None else np.log(locked)
     folds = np.random.default_rng(0).permutation(len(edges)) % FOLDS
@@ -181,7 +182,7 @@ def _validated(
     offset: np.ndarray,
     folds: np.ndarray,
 ) -> float:
-    """The loss on each part of the samples of the law fitted to the others."""
+    """Return the loss on each part of the samples of the law fitted to the others."""
     off = np.empty(len(target))
     for fold in range(FOLDS):
         out, rest = folds == fold, folds != fold

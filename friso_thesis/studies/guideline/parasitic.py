@@ -35,7 +35,8 @@ class ParasiticLimits:
 
 
 def parasitic_limits(stage: Stage) -> list[ParasiticLimits]:
-    """The stage with each of these modes instead of its own, sampled as the thesis's drive."""
+    """Return the stage with each of these modes instead of its own,
+    sampled as the thesis's drive."""
     modes = []
     for damping in DAMPING_RATIOS:
         for frequency in FREQUENCIES:
@@ -47,11 +48,11 @@ def parasitic_limits(stage: Stage) -> list[ParasiticLimits]:
 
 
 def margin_with(stage: Stage, changes: Mapping[str, Any]) -> float:
-    """The least modulus margin of the settled states of a stage with these changes (flat keys to SI numbers), sampled
-    as the thesis's drive; 0 if one of them is not stable."""
+    """Return the least modulus margin of the settled states of a stage with these changes (flat
+    keys to SI numbers), sampled as the thesis's drive; 0 if one of them is not stable."""
     return crossover.settled_margin(stage.replace(DRIVE).flat() | dict(changes))
 
 
 def holding(ranges: Sequence[Range], crossover: float) -> Range | None:
-    """The range [Hz] that contains a crossover [Hz]; None if none does."""
+    """Return the range [Hz] that contains a crossover [Hz]; None if none does."""
     return next((window for window in ranges if window[0] <= crossover <= window[1]), None)

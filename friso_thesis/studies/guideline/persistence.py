@@ -52,7 +52,8 @@ def from_rest(stages: Ensemble, distances: np.ndarray) -> Begin:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def still_swings(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tuple[np.ndarray, np.ndarray]:
-    """Which stages still swing at the end, and which runs were completed, both of shape (count,)."""
+    """Return which stages still swing at the end, and which runs were completed,
+    both of shape (count,)."""
     period = 2 * (wait(stages, SLOW * stages.length) + 2 * np.pi / stages.number("rate"))
     end = begin.over + periods * period
     options = RunOptions(
@@ -75,8 +76,8 @@ def still_swings(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tu
 def swings_from_any_distance(
     stages: Ensemble, periods: float = PERIODS, distances: np.ndarray = DISTANCES
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which stages swing for ever from any of the distances, and of which that is known, both of shape (count,): a
-    stage of which a run failed, while no other swings on, may swing or not."""
+    """Return which stages swing for ever from any of the distances, and of which that is known,
+    both of shape (count,): a stage of which a run failed, while no other swings on, may swing or not."""
     several = stages.take(np.repeat(np.arange(stages.count), len(distances)))
     runs = still_swings(several, from_rest(several, np.tile(distances, stages.count)), periods)
     swings, completed = (runs_of_stages.reshape(stages.count, -1) for runs_of_stages in runs)

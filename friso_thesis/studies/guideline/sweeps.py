@@ -68,7 +68,7 @@ class Sweep:
     edges: Edges
 
     def take(self, which: np.ndarray) -> Sweep:
-        """The samples with these numbers, or those for which it is true."""
+        """Return the samples with these numbers, or those for which it is true."""
         values = {name: value[which] for name, value in self.values.items()}
         return Sweep(values, self.locked[which], Edges(*(getattr(self.edges, e.name)[which] for e in fields(Edges))))
 
@@ -78,12 +78,12 @@ class Sweep:
 
     @property
     def usable(self) -> Sweep:
-        """Those with an edge in the range."""
+        """Return those with an edge in the range."""
         return self.take(self.edges.located)
 
 
 def concatenate_sweeps(*sweeps: Sweep) -> Sweep:
-    """The samples of all sweeps of one kind."""
+    """Return the samples of all sweeps of one kind."""
     values = {name: np.concatenate([sweep.values[name] for sweep in sweeps]) for name in sweeps[0].values}
     return Sweep(
         values, np.concatenate([sweep.locked for sweep in sweeps]), concatenate_edges([sweep.edges for sweep in sweeps])
@@ -96,7 +96,7 @@ class Keep(KeptWork):
     sources = ("../friso_thesis/studies/guideline",)
 
     def part(self, name: str, make: Callable[[], Edges]) -> Edges:
-        """The part with this name: as it was kept, or made now and kept."""
+        """Return the part with this name: as it was kept, or made now and kept."""
         columns = self.arrays((name,), lambda: _columns(make()), [field.name for field in fields(Edges)])
         return Edges(**columns)
 
@@ -113,7 +113,8 @@ def sobol_samples(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
 
 
 def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
-    """The edges of samples of rigid masses, which locked joints are apart from the contact of their fixtures."""
+    """Return the edges of samples of rigid masses,
+    which locked joints are apart from the contact of their fixtures."""
     values = sobol_samples(LOCKED_BOX, count, seed)
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
     edges = _in_parts(f"locked {seed} {count}", values, grid, keep, tally, LOCKED)
@@ -121,8 +122,9 @@ def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
 
 
 def free_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> tuple[Sweep, Sweep]:
-    """The edges of samples with a free joint, of those that have one with the joint locked; and those of all samples
-    with their joints locked, to which the frequency of the joint is drawn relative."""
+    """Return the edges of samples with a free joint,
+    of those that have one with the joint locked; and those of all samples with their joints locked, to which the
+    frequency of the joint is drawn relative."""
     drawn_values = sobol_samples({**LOCKED_BOX, **JOINT_BOX}, count, seed)
     rigid = {name: drawn_values[name] for name in LOCKED_BOX}
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
@@ -150,7 +152,7 @@ def _in_parts(
 
 
 def _stages(values: Mapping[str, np.ndarray]) -> Callable[[np.ndarray, np.ndarray], Ensemble]:
-    """The stages of samples at crossovers in units of sqrt(sigma_0/m)."""
+    """Return the stages of samples at crossovers in units of sqrt(sigma_0/m)."""
 
     def stages(which: np.ndarray, crossover: np.ndarray) -> Ensemble:
         subset = {name: value[which] for name, value in values.items()}

@@ -36,8 +36,8 @@ class ThesisCase:
 
     @property
     def ranked(self) -> float:
-        """The computed edge [Hz] to be compared: 0 if it lies below the crossovers tried, infinite if above, NaN if it
-        is not known."""
+        """Return the computed edge [Hz] to be compared: 0 if it lies below the crossovers tried,
+        infinite if above, NaN if it is not known."""
         return {BELOW: 0.0, ABOVE: np.inf}.get(self.kind, self.computed)
 
 
@@ -49,17 +49,18 @@ class Laws:
     free: FittedLaw
 
     def locked_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
-        """The edge [Hz] with the joint locked of stages given by flat keys to SI numbers or arrays."""
+        """Return the edge [Hz] with the joint locked of stages given by flat keys to SI numbers or
+        arrays."""
         values, rate = _shaped(flat)
         return self.locked.edge(values) * rate
 
     def free_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
-        """The edge [Hz] with the joint free, likewise."""
+        """Return the edge [Hz] with the joint free, likewise."""
         values, rate = _shaped(flat)
         return self.free.edge(values, self.locked.edge(values)) * rate
 
     def rates(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """All rates of the laws [Hz], by name."""
+        """Return all rates of the laws [Hz], by name."""
         values, rate = _shaped(flat)
         return {
             quantity.name: np.exp(log) * rate
@@ -69,7 +70,8 @@ class Laws:
 
 
 def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """The groups as arrays of one shape, and the frequency [Hz] of the mass on its bristles."""
+    """Return the groups as arrays of one shape,
+    and the frequency [Hz] of the mass on its bristles."""
     values = values_of(flat)
     rate = np.sqrt(flat["friction.bristle_stiffness"] / (flat["masses.cart"] + flat["masses.stage"])) / (2 * np.pi)
     arrays = np.broadcast_arrays(*(np.atleast_1d(value) for value in values.values()))
@@ -77,13 +79,14 @@ def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]
 
 
 def plain_rig(part: str = "") -> dict[str, Any]:
-    """The flat keys of the rig without its parasitic mode; without its joint as well unless part is "joint"."""
+    """Return the flat keys of the rig without its parasitic mode;
+    without its joint as well unless part is "joint"."""
     dropped = "parasitic." if part == "joint" else ("parasitic.", "joint.")
     return {key: value for key, value in thesis_rig().flat().items() if not key.startswith(dropped)}
 
 
 def cases(laws: Laws, changes: Sequence[RigChanges], free: bool) -> list[ThesisCase]:
-    """The rig with each of these changes, rigid or with its joint free."""
+    """Return the rig with each of these changes, rigid or with its joint free."""
     mode = any("parasitic.frequency" in change for change in changes)
     base = thesis_rig().flat() if mode else plain_rig("joint" if free else "")
     keys = {key for change in changes for key in change}
@@ -102,6 +105,7 @@ def cases(laws: Laws, changes: Sequence[RigChanges], free: bool) -> list[ThesisC
 
 
 def direct(stage: Stage) -> float:
-    """The edge [Hz] as `friso check` finds it, from a crossover at which the stage hunts; NaN without one."""
+    """Return the edge [Hz] as `friso check` finds it,
+    from a crossover at which the stage hunts; NaN without one."""
     edge = find_margin(stage, attracting=True)
     return edge.crossover if edge and edge.crossover else np.nan

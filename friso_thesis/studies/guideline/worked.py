@@ -72,7 +72,7 @@ class WorkedDesign:
 
     @property
     def worst(self) -> float:
-        """The highest edge that is known [Hz], or the least crossover tried if all lie below."""
+        """Return the highest edge that is known [Hz], or the least crossover tried if all lie below."""
         return float(np.nanmax([FREE_GRID[0], *(case.ranked for case in self.cases)]))
 
     @property
@@ -82,7 +82,7 @@ class WorkedDesign:
 
     @property
     def does(self) -> bool:
-        """Whether no cycle attracts at the limit over the friction range."""
+        """Tell whether no cycle attracts at the limit over the friction range."""
         return self.worst <= self.limit and not self.unknown
 
 
@@ -118,17 +118,19 @@ class Worked:
 
     @property
     def worst(self) -> ThesisCase:
-        """The case of the friction range with the highest computed edge, or one of which it is not known."""
+        """Return the case of the friction range with the highest computed edge,
+        or one of which it is not known."""
         return max(self.friction, key=lambda case: case.ranked if case.ranked == case.ranked else np.inf)
 
 
 def friction_range(gaps: Sequence[float] = GAPS) -> list[dict[str, float]]:
-    """The friction forces [N] that the rig may have."""
+    """Return the friction forces [N] that the rig may have."""
     return [{"friction.static": force, "friction.coulomb": force * (1 - gap)} for force, gap in product(STATIC, gaps)]
 
 
 def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
-    """The worked steps with these laws; crossovers are kept above them by the safety factors."""
+    """Return the worked steps with these laws;
+    crossovers are kept above them by the safety factors."""
     friction = cases(laws, friction_range(), free=False)
     highest_law = safe_locked * max(case.law for case in friction)
     needs = tuple(IsolatorNeed(limit, highest_law) for limit in LIMITS)
@@ -145,7 +147,7 @@ def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
 
 
 def machines(laws: Laws) -> tuple[WorkedMachine, ...]:
-    """The rig as one rigid mass, locked and free."""
+    """Return the rig as one rigid mass, locked and free."""
     flat = plain_rig("joint")
     locked, free = (float(edge(flat)[0]) for edge in (laws.locked_edge, laws.free_edge))
     stage = thesis_rig()
@@ -163,16 +165,18 @@ def machines(laws: Laws) -> tuple[WorkedMachine, ...]:
 
 
 def highest(laws: Laws) -> float:
-    """The highest edge [Hz] of the rig by the law, over all friction forces with a gap in the range, its masses and
-    bristles as they are: the edge goes with sqrt(sigma_0/m)."""
+    """Return the highest edge [Hz] of the rig by the law,
+    over all friction forces with a gap in the range, its masses and bristles as they are: the edge goes with
+    sqrt(sigma_0/m)."""
     static, gap = np.meshgrid(np.geomspace(0.05, 500.0, 400), np.linspace(*LOCKED_BOX["gap"], 50))
     flat = plain_rig() | {"friction.static": static.ravel(), "friction.coulomb": (static * (1 - gap)).ravel()}
     return float(laws.locked_edge(flat).max())
 
 
 def designed(laws: Laws, limit: float, safe: float) -> tuple[WorkedDesign, ...]:
-    """The isolator by the law, its edge by a safety factor below the limit; then, as long as computed edges are above
-    the limit, again with the aim lowered by as much, and where one is unknown at least by `BLIND`."""
+    """Return the isolator by the law, its edge by a safety factor below the limit; then,
+    as long as computed edges are above the limit, again with the aim lowered by as much, and where one is unknown at
+    least by `BLIND`."""
     designs = [_design(laws, limit, limit / safe)]
     while not designs[-1].does and len(designs) < CORRECTED:
         share = min(limit / designs[-1].worst, BLIND if designs[-1].unknown else 1.0)

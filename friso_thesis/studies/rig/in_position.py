@@ -96,7 +96,7 @@ class InPosition:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """All standstills. Raises InputError without a joint or a crossover."""
+    """Return all standstills. Raises InputError without a joint or a crossover."""
     result, recordings = in_position(stage, seed, progress)
     logs = tuple(
         rig_log(recorded, 0, f"in_position_{case}", None, machine, seed)
@@ -109,8 +109,8 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 def in_position(
     stage: Stage, seed: int, progress: Progress, noises: tuple[float, ...] = ()
 ) -> tuple[InPosition, dict[str, tuple[RecordedRuns, Stage]]]:
-    """All standstills, with all disturbances also at other `noises` of the force, over that assumed; and by case the
-    run with all disturbances and its stage."""
+    """Return all standstills, with all disturbances also at other `noises` of the force,
+    over that assumed; and by case the run with all disturbances and its stage."""
     fast = with_joint(stage, locked=False).replace({crossover_key(stage): f"{FASTER * crossover(stage):.6g} Hz"})
     shaken = fast if stage.floor is not None else fast.replace({f"floor.{key}": value for key, value in FLOOR.items()})
     quiet = fast.replace({"floor": None}) if stage.floor is not None else fast
@@ -168,13 +168,14 @@ def amplifier_noise(stage: Stage) -> float:
 
 
 def with_noise(task: MoveTask, force: float, seed: int, step: float) -> MoveTask:
-    """The task with a force of an RMS [N], unknown to the drive, that is another at every sample of it, `step` [s]."""
+    """Return the task with a force of an RMS [N], unknown to the drive,
+    that is another at every sample of it, `step` [s]."""
     noise = np.random.default_rng(seed).standard_normal(int(np.ceil(task.duration / step)) + 1)
     return replace(task, injected=force * noise, injected_each=step, unknown=True)
 
 
 def _silenced(stage: Stage, source: str) -> dict[str, Any]:
-    """The encoder's noise and its resolution are there with its own source, and with all."""
+    """Return the encoder's noise and its resolution are there with its own source, and with all."""
     if source in ("encoder", "all") or stage.drive is None:
         return {}
     return {key: 0.0 for key in ("drive.encoder_noise", "drive.encoder_resolution") if key in stage.flat()}

@@ -108,7 +108,7 @@ class CycleComparison:
         return np.where(runs.swings, runs.swing, np.nan) / self.even.swing[0]
 
     def as_measured(self, runs: RailRuns) -> np.ndarray:
-        """Which runs have nearly twice the period of the even rail at a similar swing."""
+        """Return which runs have nearly twice the period of the even rail at a similar swing."""
         swing = self.larger(runs)
         return (self.slower(runs) >= AS_SLOW) & (swing <= SIMILAR) & (swing >= 1 / SIMILAR)
 
@@ -126,7 +126,8 @@ class CycleComparison:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """All cycles. Raises InputError without a joint, a crossover or a motion that moves the stage."""
+    """Return all cycles. Raises InputError without a joint,
+    a crossover or a motion that moves the stage."""
     locked = with_joint(stage, locked=True)
     crossover(stage)
     result = compare_cycles(locked, seed, DEVIATIONS, LENGTHS, HARMONICS, len(rails(on_rail(locked))), progress)
@@ -148,7 +149,7 @@ def compare_cycles(
     machines: int,
     progress: Progress,
 ) -> CycleComparison:
-    """The cycles of a stage with its joint locked, on so many rails of each kind."""
+    """Return the cycles of a stage with its joint locked, on so many rails of each kind."""
     even = on_rail(stage)
     plain = started(even, seed, {}, 1, progress, "an even rail")
     swing = float(plain.swing[0]) if plain.swings[0] else 0.01 * distance(stage)
@@ -173,7 +174,7 @@ def compare_cycles(
 
 
 def on_rail(stage: Stage) -> Stage:
-    """The stage on a rail with the same friction everywhere, whose keys can be changed."""
+    """Return the stage on a rail with the same friction everywhere, whose keys can be changed."""
     seed = 1.0 if stage.rail is None else stage.flat()["rail.seed"]
     level = 0.0 if stage.rail is None else stage.flat()["rail.offset"]
     bare = stage.replace({"rail": None}) if stage.rail is not None else stage
@@ -187,7 +188,8 @@ def _longer(task: MoveTask) -> MoveTask:
 def started(
     stage: Stage, seed: int, changes: Mapping[str, Any], count: int, progress: Progress, label: str
 ) -> RailRuns:
-    """What became of machines, shape (count,), at the first start after which each swings on; else after the move."""
+    """Return what became of machines, shape (count,),
+    at the first start after which each swings on; else after the move."""
     tasks = [move(stage) if share == 0 else released(stage, share * distance(stage)) for share in STARTS]
     runs = [run_moves(stage, _longer(task), [seed] * count, changes, progress, label) for task in tasks]
     all_runs = concatenate_runs(runs).shaped(len(tasks), count)
@@ -260,7 +262,7 @@ def single_changes(stage: Stage, seed: int, progress: Progress) -> dict[str, Rai
 
 
 def _with_slowest(result: CycleComparison, even: Stage, seed: int, seeds: np.ndarray) -> CycleComparison:
-    """The slowest of the cycles of a similar swing on the rails with a field, in time."""
+    """Return the slowest of the cycles of a similar swing on the rails with a field, in time."""
     similar = abs(np.log(result.larger(result.field))) <= np.log(SIMILAR)
     slower = np.where(similar, np.nan_to_num(result.slower(result.field)), 0.0)
     if not slower.max(initial=0.0) > 1:

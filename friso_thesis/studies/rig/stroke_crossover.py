@@ -45,7 +45,8 @@ class StrokeCrossover:
 
     @property
     def share(self) -> np.ndarray:
-        """The share of rails on which peaks are counted, shape (strokes, crossovers); NaN where all runs failed."""
+        """Return the share of rails on which peaks are counted, shape (strokes, crossovers);
+        NaN where all runs failed."""
         done = ~self.runs.failed
         count = done.sum(axis=2)
         counted = (self.runs.counted & done).sum(axis=2)
@@ -69,7 +70,8 @@ class StrokeCrossover:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """The move at all strokes and crossovers on all rails, the joint free. Raises InputError without a joint."""
+    """Return the move at all strokes and crossovers on all rails, the joint free.
+    Raises InputError without a joint."""
     free = with_joint(stage, locked=False)
     result = stroke_crossover(free, seed, STROKES, CROSSOVERS, rails(stage), progress)
     corners = {"joint.stroke": result.strokes[[0, -1]], crossover_key(stage): np.full(2, crossover(stage))}
@@ -85,7 +87,8 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 def stroke_crossover(
     stage: Stage, seed: int, strokes: np.ndarray, factors: np.ndarray, seeds: np.ndarray, progress: Progress
 ) -> StrokeCrossover:
-    """The grid of `strokes` and crossovers (`factors`) over those of the stage, [m] and [Hz], on rails."""
+    """Return the grid of `strokes` and crossovers (`factors`) over those of the stage,
+    [m] and [Hz], on rails."""
     sizes, frequencies = stage.flat()["joint.stroke"] * strokes, crossover(stage) * factors
     cases = {
         "joint.stroke": np.repeat(sizes, len(frequencies)),

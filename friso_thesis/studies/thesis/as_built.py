@@ -114,20 +114,21 @@ class CyclesOnRails:
 
 
 def _prescribed(stage: Stage) -> Stage:
-    """The rig with its drive, moved as Sec. 4.3.2 prescribes, by 100 mm at 100 m/s^2, whatever the path of the
-    simulations is; `move` takes the acceleration of this path, and rounds its 90 mm to them."""
+    """Return the rig with its drive, moved as Sec. 4.3.2 prescribes, by 100 mm at 100 m/s^2,
+    whatever the path of the simulations is; `move` takes the acceleration of this path, and rounds its 90 mm to them.
+    """
     time = 0.03 / np.sqrt(1 + stage.flat().get(CRUISE, 0.0))
     own = {"motion.acceleration": "100 m/s^2", "motion.acceleration_time": f"{float(time)!r} s"}
     return rig_with_drive(stage.replace(own))
 
 
 def rig_with_drive(stage: Stage) -> Stage:
-    """The rig with its drive."""
+    """Return the rig with its drive."""
     return stage.replace(dict(AS_BUILT))
 
 
 def moves(stage: Stage) -> MovesOnRails:
-    """The moves of Fig. 24 and 25, on several rails."""
+    """Return the moves of Fig. 24 and 25, on several rails."""
     machine = _prescribed(stage)
     locked, free = (with_joint(machine, held) for held in (True, False))
     seeds, frequencies = 1.0 + np.arange(float(RAILS)), crossover(machine) * CROSSOVERS
@@ -216,7 +217,7 @@ class RigLoops:
 
 
 def rig_loops(stage: Stage) -> RigLoops:
-    """The loops of a rig with its drive as built."""
+    """Return the loops of a rig with its drive as built."""
     built = rig_with_drive(stage)
     fixed, free, place = locked_stage(built), freed(built), travel(built)[0]
     log = rig_log(excite(free, place, SEED), 0, "free", "frequency", free, SEED)

@@ -37,13 +37,13 @@ class Claim:
 
     @property
     def place(self) -> tuple[int, ...]:
-        """Where the thesis makes it, by section, to sort by."""
+        """Return where the thesis makes it, by section, to sort by."""
         return tuple(int(number) for number in self.section.split("."))
 
 
 @cache
 def claims() -> tuple[Claim, ...]:
-    """All claims of the thesis, in its order."""
+    """Return all claims of the thesis, in its order."""
     text = files("friso_thesis.studies.thesis").joinpath("claims.toml").read_text(encoding="utf-8")
     return tuple(Claim(**{**row, "quotes": tuple(row["quotes"])}) for row in tomllib.loads(text)["claim"])
 
@@ -84,12 +84,12 @@ class Finding:
 
     @property
     def judged(self) -> tuple[Part, ...]:
-        """The parts that say something of the thesis."""
+        """Return the parts that say something of the thesis."""
         return tuple(part for part in self.parts if not part.self_test)
 
     @property
     def pattern(self) -> tuple[bool, ...]:
-        """Which of these hold."""
+        """Return which of these hold."""
         return tuple(part.holds for part in self.judged)
 
     @property
@@ -100,7 +100,7 @@ class Finding:
 
 
 def number_text(value: float, form: str = ".3g", unit: str = "") -> str:
-    """A number with its unit, or that there is none (NaN)."""
+    """Return a number with its unit, or that there is none (NaN)."""
     return f"{value:{form}} {unit}".rstrip() if math.isfinite(value) else "none"
 
 
@@ -126,13 +126,13 @@ class Evidence:
 
     @property
     def analysis(self) -> Linear:
-        """The linear analysis, for a judge that needs a part of it."""
+        """Return the linear analysis, for a judge that needs a part of it."""
         assert self.linear is not None
         return self.linear
 
     @property
     def experiments(self) -> Experiments:
-        """The experiments, for a judge that needs one of them."""
+        """Return the experiments, for a judge that needs one of them."""
         assert self.identified is not None
         return self.identified
 
@@ -170,7 +170,8 @@ def judges(claim: str, figure: str, needs: tuple[str, ...] = (), undrawn: str = 
 
 
 def registered() -> Mapping[str, Registered]:
-    """The judges by claim, those that stand in `friso_thesis.studies.thesis.judges` and any registered later."""
+    """Return the judges by claim, those that stand in `friso_thesis.studies.thesis.judges` and
+    any registered later."""
     import friso_thesis.studies.thesis.judges  # noqa: F401 (registers them)
 
     return dict(_JUDGES)

@@ -73,12 +73,13 @@ class Surveyed:
 
     @property
     def attracted(self) -> xr.Dataset:
-        """The runs by what attracts their stages."""
+        """Return the runs by what attracts their stages."""
         return by_attraction(by_peak_count(self.runs), self.attracts, self.decided)
 
 
 def map_cycles(study: ThesisStudy, runs: xr.Dataset, surveyed: Surveyed, kept: Kept = NOT_KEPT) -> CyclesOnMap:
-    """The hunting cycles over a map of the thesis, from the study, its runs and what was surveyed of them."""
+    """Return the hunting cycles over a map of the thesis, from the study,
+    its runs and what was surveyed of them."""
     ends = [(name, float(runs[name].values[0]), float(runs[name].values[-1])) for name in runs.dims]
     about = ("edges", runs.attrs["stage"], runs.attrs["links"], ends)
     arrays = kept.flags(about, lambda: _as_arrays(_edges(study, runs)))
@@ -99,7 +100,7 @@ def _from_arrays(arrays: Mapping[str, np.ndarray]) -> tuple[Edge, ...]:
 
 
 def survey(runs: xr.Dataset, kept: Kept = NOT_KEPT) -> Surveyed:
-    """What attracts the stages of a map."""
+    """Return what attracts the stages of a map."""
     coarse = runs.isel({name: slice(None, None, every(size)) for name, size in runs.sizes.items()})
     axes = [(name, coarse[name].values.tolist()) for name in coarse.dims]
     flags = kept.flags(("survey", coarse.attrs["stage"], coarse.attrs["links"], axes), lambda: _survey(coarse))
@@ -137,7 +138,8 @@ def _comparison(surveyed: Surveyed) -> PeaksAgainstCycles:
 
 
 def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
-    """The curves over a map; none where the axes belong to the motion, which plays no part."""
+    """Return the curves over a map; none where the axes belong to the motion,
+    which plays no part."""
     if study.of_motion:
         return ()
     source = study_of(runs)

@@ -38,7 +38,8 @@ def maps_of(
     verify: float = 0.0,
     changes: Mapping[str, object] = NOTHING,
 ) -> dict[str, xr.Dataset]:
-    """The maps of some studies by name, `points` values per axis, `changes` being made to the rig before."""
+    """Return the maps of some studies by name, `points` values per axis,
+    `changes` being made to the rig before."""
     return {study.name: map_of(study, points, rtol, verify, changes) for study in studies}
 
 
@@ -50,7 +51,7 @@ def map_of(
     changes: Mapping[str, object] = NOTHING,
     kept: Kept = NOT_KEPT,
 ) -> xr.Dataset:
-    """The map of one study, as it was kept or computed now."""
+    """Return the map of one study, as it was kept or computed now."""
     stage, axes, links = study.stage(changes), study.axes(points), dict(study.links)
     request = Request(stage, axes, None, links).study(None, rtol)
     return kept.runs(request, verify, lambda: sweep(stage, axes, links=links, rtol=rtol, verify=verify))
@@ -71,8 +72,8 @@ def evidence(
     changes: Mapping[str, object] = NOTHING,
     kept: Kept = NOT_KEPT,
 ) -> Evidence:
-    """All that is needed, by the names of maps, responses, and parts of the analysis, of the rig with `changes`;
-    experiments are run when they are asked for."""
+    """Return all that is needed, by the names of maps, responses, and parts of the analysis,
+    of the rig with `changes`; experiments are run when they are asked for."""
     wanted, rig = set(needs), thesis_rig().replace(dict(changes))
     return Evidence(
         {name: map_of(study, points, rtol, verify, changes, kept) for name, study in STUDIES.items() if name in wanted},

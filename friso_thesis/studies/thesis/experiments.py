@@ -210,7 +210,7 @@ def _experiment(name: str, stage_file: str) -> Any:
 
 
 def locked_line(stage: Stage) -> LockedLine:
-    """The response of the locked rig to sines of one force at places of other friction."""
+    """Return the response of the locked rig to sines of one force at places of other friction."""
     places = [
         {"friction.static": f"{f} N", "friction.coulomb": f"{COULOMB * f} N"} for f in np.linspace(*RANGE, PLACES)
     ]
@@ -264,7 +264,7 @@ def _ramp(stage: Stage, speed: float, duration: float) -> Log:
 
 
 def _with_motion(stage: Stage, **motion: Any) -> Stage:
-    """The stage with a motion of another kind, of which other keys are left out."""
+    """Return the stage with a motion of another kind, of which other keys are left out."""
     rows = "\n".join(f'{key} = "{value}"' for key, value in motion.items())
     text = stage.to_toml()
     begin = text.index("[motion]")
@@ -273,8 +273,8 @@ def _with_motion(stage: Stage, **motion: Any) -> Stage:
 
 
 def _lively_rail(moves: MovesOnRails) -> int:
-    """The first rail on which peaks are counted at the lowest crossover, joint locked; the first where there is
-    none."""
+    """Return the first rail on which peaks are counted at the lowest crossover, joint locked;
+    the first where there is none."""
     return int(np.argmax(moves.locked.counted[0]))
 
 

@@ -50,7 +50,7 @@ class Kept(KeptWork):
     sources = SOURCES
 
     def runs(self, study: Study, verify: float, make: Callable[[], xr.Dataset]) -> xr.Dataset:
-        """The runs of a study, as they were kept or made now."""
+        """Return the runs of a study, as they were kept or made now."""
         axes = [(axis.name, axis.values.tolist()) for axis in study.axes]
         file = self._file("npz", study.stage.to_toml(), axes, dict(study.links), study.rtol, study.metrics, verify)
         columns = None if file is None else kept_arrays(file)
@@ -67,11 +67,12 @@ class Kept(KeptWork):
         return runs
 
     def flags(self, about: tuple[Any, ...], make: Callable[[], Mapping[str, np.ndarray]]) -> Mapping[str, np.ndarray]:
-        """Arrays by name `about` something, as they were kept or made now."""
+        """Return arrays by name `about` something, as they were kept or made now."""
         return self.arrays(("flags", *about), make)
 
     def result(self, about: tuple[Any, ...], kind: type[T], make: Callable[[], T]) -> T:
-        """A result of a kind (see `taken_apart`) `about` something, as it was kept or made now."""
+        """Return a result of a kind (see `taken_apart`) `about` something,
+        as it was kept or made now."""
         file = self._file("npz", "result", *about)
         columns = None if file is None else kept_arrays(file)
         if columns is not None:

@@ -36,11 +36,12 @@ class ConclusionByLaw:
     findings: Mapping[str, Finding]
 
     def judgement(self, law: str) -> ClaimJudgement:
-        """How it is judged under a law."""
+        """Return how it is judged under a law."""
         return self.findings[law].judgement
 
     def turned(self, law: str) -> tuple[str, ...]:
-        """The numbers of the parts that hold under a law where they do not under the thesis's own, or the reverse."""
+        """Return the numbers of the parts that hold under a law where they do not under the thesis's
+        own, or the reverse."""
         first = next(iter(self.findings.values()))
         pairs = zip(first.parts, self.findings[law].parts, strict=True)
         return tuple(other.number for own, other in pairs if own.holds != other.holds)
@@ -57,13 +58,13 @@ class ConclusionsByLaw:
 
     @property
     def dependent(self) -> tuple[ConclusionByLaw, ...]:
-        """The conclusions that do not survive every law."""
+        """Return the conclusions that do not survive every law."""
         return tuple(c for c in self.conclusions if any(c.turned(law) for law in self.laws[1:]))
 
 
 def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) -> ConclusionsByLaw:
-    """The conclusions of the thesis under each law, on the studies and the grid of a reproduction: of the claims that
-    it judged."""
+    """Return the conclusions of the thesis under each law,
+    on the studies and the grid of a reproduction: of the claims that it judged."""
     studies, rig = [STUDIES[name] for name in reproduction.judged], thesis_rig()
     own = rig.flat()["friction.model"]
     judged = {item.claim.id for item in reproduction.verdicts if item.finding}
@@ -102,8 +103,8 @@ def _evidence(maps: Mapping[str, xr.Dataset], responses: Mapping[str, Response],
 
 
 def _apart(rig: Stage, conversion: LawConversion) -> LawConversion:
-    """The rig under a law: as converted, or, where that is the rig's own law, with what is left open as far from it as
-    measurements allow."""
+    """Return the rig under a law: as converted, or, where that is the rig's own law,
+    with what is left open as far from it as measurements allow."""
     same = all(change.off <= change.allowed / 10 for change in conversion.compared)
     if not same:
         return conversion

@@ -71,7 +71,7 @@ def trend(x: np.ndarray, y: np.ndarray) -> float:
 
 
 def trend_text(correlation: float) -> str:
-    """A rank correlation in words: where `trend` has none, that it is undefined."""
+    """Return a rank correlation in words: where `trend` has none, that it is undefined."""
     return f"{correlation:.2f}" if np.isfinite(correlation) else "undefined (too few cells, or all equal)"
 
 

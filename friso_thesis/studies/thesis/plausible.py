@@ -126,7 +126,8 @@ def plausible(
     kept: Kept = NOT_KEPT,
     tally: Tally | None = None,
 ) -> Plausible:
-    """The claims over so many joint draws; friso's own choice is computed as one more, for the best fit."""
+    """Return the claims over so many joint draws; friso's own choice is computed as one more,
+    for the best fit."""
     cheap = {name: entry for name, entry in entries.items() if entry.needs and not entry.needs & PARTS.keys()}
     costly = {name: entry for name, entry in entries.items() if entry.needs & PARTS.keys()}
     drawn = tuple(draw(number) for number in range(draws))
@@ -167,14 +168,16 @@ def work_of(entries: Mapping[str, Registered], draws: int) -> int:
 
 
 def ways_of(entry: Registered, base: Evidence) -> dict[str, Finding]:
-    """The findings of a judge in the two ways that need the runs alone; in one, where no runs are looked at."""
+    """Return the findings of a judge in the two ways that need the runs alone; in one,
+    where no runs are looked at."""
     if entry.needs & (STUDIES.keys() | RESPONSES.keys()):
         return {way: entry.judge(by_way(base, read)) for way, read in READ.items()}
     return {COUNT: entry.judge(base)}
 
 
 def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
-    """The findings in a draw, by claim and way; of what cannot be computed there, why not."""
+    """Return the findings in a draw, by claim and way; of what cannot be computed there,
+    why not."""
     needs = {need for entry in entries.values() for need in entry.needs}
     try:
         base = evidence(needs, POINTS, DRAW_RTOL, changes=one.changes)
@@ -190,7 +193,7 @@ def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
 
 
 def _failure(error: Exception) -> Finding:
-    """What stands for a claim that is undecided in a draw."""
+    """Return what stands for a claim that is undecided in a draw."""
     return Finding((Part("can be computed", False, one_line(f"{type(error).__name__}: {error}")),))
 
 
@@ -229,7 +232,7 @@ def _in_space(
 
 
 def _share(flags: np.ndarray, count: int) -> Share:
-    """The share of `count` draws, those beyond the flags being undecided."""
+    """Return the share of `count` draws, those beyond the flags being undecided."""
     missing = count - len(flags)
     return share(
         np.append(flags, np.zeros(missing, bool)), np.append(np.ones(len(flags), bool), np.zeros(missing, bool))
@@ -237,7 +240,8 @@ def _share(flags: np.ndarray, count: int) -> Share:
 
 
 def _separations(entry: Registered, drawn: Sequence[Draw], holds: np.ndarray) -> Iterator[Separation]:
-    """The values that separate the draws more than by chance (Mann and Whitney, with Bonferroni's correction)."""
+    """Yield the values that separate the draws more than by chance (Mann and Whitney,
+    with Bonferroni's correction)."""
     from scipy.stats import mannwhitneyu  # 0.7 s to import
 
     if holds.all() or not holds.any():
@@ -257,8 +261,8 @@ def _fit(
     by_claim_tried: Mapping[str, Sequence[tuple[Draw, Mapping[str, Finding]]]],
     own: Mapping[str, Mapping[str, Finding]],
 ) -> BestFit | None:
-    """The draw, or friso's `own` choice, that fits the printed numbers best, by the thesis's own count; one of which
-    not all of them are known is none."""
+    """Return the draw, or friso's `own` choice, that fits the printed numbers best,
+    by the thesis's own count; one of which not all of them are known is none."""
     first = baseline()
     at_baseline = [item for name in by_claim_tried if name in own for item in numbers_of(name, own[name][COUNT])]
     by_draw: dict[int, list[PrintedNumber]] = {first.number: at_baseline}
@@ -278,7 +282,7 @@ def _fit(
 
 
 def numbers_of(claim: str, finding: Finding) -> list[PrintedNumber]:
-    """The printed numbers of a claim with what was found of them."""
+    """Return the printed numbers of a claim with what was found of them."""
     return [
         PrintedNumber(claim, part.criterion, part.printed, part.read)
         for part in finding.parts

@@ -49,7 +49,7 @@ _READ: ContextVar[WordReading] = ContextVar("reading", default=OWN)
 
 
 def reading() -> WordReading:
-    """The reading by which claims are judged now."""
+    """Return the reading by which claims are judged now."""
     return _READ.get()
 
 
@@ -65,7 +65,8 @@ def read_as(other: WordReading) -> Iterator[None]:
 
 @contextmanager
 def words_read() -> Iterator[set[str]]:
-    """The words that are read within: what is judged there is the same by any other reading of all others."""
+    """Return the words that are read within: what is judged there is the same by any other
+    reading of all others."""
     noted = _NotedReading(reading())
     with read_as(cast("WordReading", noted)):
         yield noted.words
@@ -126,7 +127,7 @@ OTHERWISE: Mapping[str, WordReading] = MappingProxyType(_otherwise())
 
 
 def others_of(words: Set[str]) -> dict[str, WordReading]:
-    """Those that read one of these words otherwise."""
+    """Return those that read one of these words otherwise."""
     return {
         name: other
         for name, other in OTHERWISE.items()
@@ -135,7 +136,8 @@ def others_of(words: Set[str]) -> dict[str, WordReading]:
 
 
 def about(value: float, expected: float, factor: float | None = None) -> bool:
-    """Whether a positive number is within a factor (by default that of “about”) of what is expected; NaN is not."""
+    """Tell whether a positive number is within a factor (by default that of “about”) of what is
+    expected; NaN is not."""
     within = reading().about if factor is None else factor
     return expected / within <= value <= expected * within
 

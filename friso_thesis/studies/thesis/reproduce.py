@@ -200,8 +200,8 @@ def _verdict(
 
 
 def _ways(entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed]) -> dict[str, Finding]:
-    """The findings of a judge in all the ways in which its evidence can be read; a claim on paths alone is left out of
-    what attracts, which does not depend on the path."""
+    """Return the findings of a judge in all the ways in which its evidence can be read;
+    a claim on paths alone is left out of what attracts, which does not depend on the path."""
     findings, maps = ways_of(entry, base), entry.needs & STUDIES.keys()
     if maps <= surveyed.keys() and not all(STUDIES[name].of_motion for name in maps):
         attracted = {name: surveyed[name].attracted for name in maps}
@@ -213,8 +213,8 @@ def _ways(entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed]) -
 def _read_otherwise(
     entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed], words: Set[str]
 ) -> dict[str, Finding]:
-    """The findings by other readings of the `words` of the thesis by which the claim is judged, by what is read
-    otherwise."""
+    """Return the findings by other readings of the `words` of the thesis by which the claim is
+    judged, by what is read otherwise."""
     findings = {}
     for name, other in others_of(words).items():
         with read_as(other):
@@ -225,8 +225,8 @@ def _read_otherwise(
 def _others(
     entries: Mapping[str, Registered], base: Evidence, loose: Mapping[str, xr.Dataset]
 ) -> dict[str, dict[str, Finding]]:
-    """The findings on maps of every second value of each axis, and on those at the thesis's tolerance, by the two ways
-    that need the runs alone."""
+    """Return the findings on maps of every second value of each axis,
+    and on those at the thesis's tolerance, by the two ways that need the runs alone."""
     grids = {
         "every second value of each axis": {name: _second(runs) for name, runs in base.maps.items()},
         f"the thesis's relative tolerance, {RTOL:g},": dict(loose),
@@ -249,13 +249,14 @@ def _second(runs: xr.Dataset) -> xr.Dataset:
 def _needs(
     entries: Mapping[str, Registered], chosen: Mapping[str, ThesisStudy], asked: frozenset[str] | None
 ) -> set[str]:
-    """What is computed: what the claims need, and all studies and responses where none is asked for by name."""
+    """Return what is computed: what the claims need,
+    and all studies and responses where none is asked for by name."""
     needs = {need for entry in entries.values() for need in entry.needs}
     return needs if asked is not None else needs | chosen.keys() | RESPONSES.keys() | NEEDS.keys()
 
 
 def _tolerances(studies: Mapping[str, ThesisStudy], points: int, kept: Kept, tally: Tally) -> dict[float, xr.Dataset]:
-    """The map of Fig. 14B at the thesis's tolerance and a tight one."""
+    """Return the map of Fig. 14B at the thesis's tolerance and a tight one."""
     maps = {}
     for study in studies.values():
         for tolerance in (RTOL, TIGHT) if study.panel == "14B" else ():
@@ -275,7 +276,7 @@ def _studies(names: Iterable[str] | None) -> dict[str, ThesisStudy]:
 
 
 def _claims(only: Iterable[str] | None) -> frozenset[str] | None:
-    """The claims asked for, whatever their case; all where none is."""
+    """Return the claims asked for, whatever their case; all where none is."""
     if only is None:
         return None
     ids = {claim.id.upper(): claim.id for claim in claims()}

@@ -37,7 +37,7 @@ class OpenValue:
     baseline: float
 
     def at(self, share: float) -> float:
-        """The value at a share of the way through its range."""
+        """Return the value at a share of the way through its range."""
         if self.scale == "either":
             return self.low if share < 0.5 else self.high
         if self.scale == "log":
@@ -45,16 +45,16 @@ class OpenValue:
         return self.low + share * (self.high - self.low)
 
     def touches(self, study: ThesisStudy) -> bool:
-        """Whether the study's map can be another with another value."""
+        """Tell whether the study's map can be another with another value."""
         return self.decides(study.sets, bool(study.changes.get("joint.locked")))
 
     def decides(self, fixed: Set[str], locked: bool) -> bool:
-        """Whether it matters where the keys `fixed` are decided on otherwise; a locked joint has no damping of its
-        own."""
+        """Tell whether it matters where the keys `fixed` are decided on otherwise;
+        a locked joint has no damping of its own."""
         return not self.keys <= (fixed | _OPEN_JOINT_KEYS if locked else fixed)
 
     def touches_part(self, need: PartNeeded) -> bool:
-        """Whether that part of the linear analysis, or that experiment, can be another."""
+        """Tell whether that part of the linear analysis, or that experiment, can be another."""
         return self.decides({key for key in self.keys if key.startswith(need.outside)}, need.locked)
 
 
@@ -112,7 +112,7 @@ OPEN: tuple[OpenValue, ...] = (
 
 
 def draw_name(number: int) -> str:
-    """What a draw is called; people count from 1, seeds from 0."""
+    """Return what a draw is called; people count from 1, seeds from 0."""
     return f"draw {number + 1}"
 
 
@@ -129,7 +129,7 @@ class Draw:
 
     @property
     def changes(self) -> dict[str, Any]:
-        """What it changes in the stage file of the rig."""
+        """Return what it changes in the stage file of the rig."""
         v = self.values
         ratio, mass = v["cruise over acceleration time"], v["mass"]
         time = np.sqrt(v["distance"] / (v["acceleration"] * (1 + ratio)))
@@ -152,7 +152,8 @@ class Draw:
 
 
 def draw(number: int) -> Draw:
-    """The joint draw of this number, from 0 on: values independent of each other, and of other draws."""
+    """Return the joint draw of this number, from 0 on: values independent of each other,
+    and of other draws."""
     shares = np.random.default_rng([SEED, number]).random(len(OPEN))
     return Draw(number, {value.name: value.at(float(share)) for value, share in zip(OPEN, shares, strict=True)})
 
@@ -164,8 +165,8 @@ def baseline() -> Draw:
 
 def enters(value: OpenValue, needs: frozenset[str], responses: Mapping[str, Mapping[str, object]],
            parts: Mapping[str, PartNeeded]) -> bool:  # fmt: skip
-    """Whether a value can change anything of what a judge `needs`: maps, `responses` by what they change in the rig, or
-    `parts` of the analysis."""
+    """Tell whether a value can change anything of what a judge `needs`: maps,
+    `responses` by what they change in the rig, or `parts` of the analysis."""
     for name in needs:
         if name in STUDIES:
             touched = value.touches(STUDIES[name])

@@ -26,7 +26,7 @@ class AxisSpan:
     log: bool = False
 
     def text(self, points: int) -> str:
-        """The range as `friso.sweep` reads it, `points` values with both ends."""
+        """Return the range as `friso.sweep` reads it, `points` values with both ends."""
         ends = "..".join(f"{end!r} {self.unit}".rstrip() for end in (self.low, self.high))
         return f"{ends}:{points}:{'log' if self.log else 'linear'}"
 
@@ -51,26 +51,27 @@ class ThesisStudy:
 
     @property
     def sets(self) -> frozenset[str]:
-        """The keys that the study itself decides on."""
+        """Return the keys that the study itself decides on."""
         return frozenset(span.key for span in self.spans) | frozenset(self.links) | frozenset(self.changes)
 
     @property
     def of_motion(self) -> bool:
-        """Whether its axes are those of the motion alone, on which what attracts does not depend."""
+        """Tell whether its axes are those of the motion alone,
+        on which what attracts does not depend."""
         return all(span.key.startswith("motion.") for span in self.spans)
 
     def axes(self, points: int) -> dict[str, str]:
-        """The axes as `friso.sweep` takes them, `points` values each."""
+        """Return the axes as `friso.sweep` takes them, `points` values each."""
         return {span.key: span.text(points) for span in self.spans}
 
     def stage(self, changes: Mapping[str, Any] = NOTHING) -> Stage:
-        """The stage of the study; `changes` are made to the rig before those of the study."""
+        """Return the stage of the study; `changes` are made to the rig before those of the study."""
         return thesis_rig().replace(dict(changes)).replace(dict(self.changes))
 
 
 @cache
 def thesis_rig() -> Stage:
-    """The rig of Table 2 and Sec. 3.5 with our choice of what the thesis leaves open."""
+    """Return the rig of Table 2 and Sec. 3.5 with our choice of what the thesis leaves open."""
     return loads(files("friso_thesis.studies.thesis").joinpath("thesis_rig.toml").read_text(encoding="utf-8"))
 
 
@@ -87,7 +88,8 @@ def rig_gains(mass: float) -> tuple[float, float, float]:
 
 
 def masses(whole: float) -> dict[str, object]:
-    """The masses that make a whole [kg], in the proportions weighed, and the controller tuned for it."""
+    """Return the masses that make a whole [kg], in the proportions weighed,
+    and the controller tuned for it."""
     shares = {"masses.cart": 1.2, "masses.stage": 0.5, "parasitic.mass": 0.25, TUNED_MASS: 1.7}
     return {key: f"{whole * share / 1.7!r} kg" for key, share in shares.items()}
 

@@ -17,8 +17,8 @@ _SCALARS = str, int, float, bool, NoneType
 
 
 def taken_apart(result: Any) -> dict[str, np.ndarray]:
-    """The arrays of a result, by their number, and the rest as a text in JSON. A result is a dataclass, a tuple, a
-    mapping, an array, a slice, a number, a text or None, or made of these."""
+    """Return the arrays of a result, by their number, and the rest as a text in JSON.
+    A result is a dataclass, a tuple, a mapping, an array, a slice, a number, a text or None, or made of these."""
     arrays: dict[str, np.ndarray] = {}
     tree = _tree(result, arrays)
     return {**arrays, _TREE: np.array(json.dumps(tree))}
@@ -40,8 +40,8 @@ def _tree(value: Any, arrays: dict[str, np.ndarray]) -> Any:
 
 
 def put_together(kind: type[T], arrays: Mapping[str, np.ndarray]) -> T:
-    """The result of a kind whose annotations tell what its parts are. Raises ValueError, TypeError, KeyError or
-    RecursionError for arrays that are not of it."""
+    """Return the result of a kind whose annotations tell what its parts are. Raises ValueError,
+    TypeError, KeyError or RecursionError for arrays that are not of it."""
     return cast("T", _value(kind, json.loads(str(arrays[_TREE])), arrays))
 
 

@@ -44,12 +44,13 @@ class ClaimVerdict:
 
     @property
     def by_runs(self) -> Finding | None:
-        """The finding in the ways that the draws and the other methods know too, without what attracts."""
+        """Return the finding in the ways that the draws and the other methods know too,
+        without what attracts."""
         return _by_runs(self.ways) or self.finding
 
     @property
     def by_cycle_only(self) -> bool:
-        """Whether it does not hold, but for what attracts would."""
+        """Tell whether it does not hold, but for what attracts would."""
         runs = self.by_runs
         return self.judgement != "holds" and runs is not None and runs.judgement == "holds"
 
@@ -70,7 +71,8 @@ class ClaimVerdict:
 
     @property
     def chosen(self) -> bool:
-        """Whether it holds at friso's choice of the unstated values, and in some draw of them does not."""
+        """Tell whether it holds at friso's choice of the unstated values,
+        and in some draw of them does not."""
         return self.judgement == "holds" and self.space is not None and self.space.misses > 0
 
     @property
@@ -101,7 +103,7 @@ class ClaimVerdict:
         return sentence
 
     def _word_of(self, finding: Finding) -> str:
-        """The judgement by another reading."""
+        """Return the judgement by another reading."""
         return finding.judgement if finding.judgement != self.judgement else f"still {finding.judgement}"
 
 
@@ -114,12 +116,12 @@ _KINDS = {
 
 
 def draws_text(share: Share, count: int, draws: int) -> str:
-    """The share of the joint draws in words."""
+    """Return the share of the joint draws in words."""
     return f"{count} of {draws} joint draws of the unstated values ({percent(share.low)} to {percent(share.high)})"
 
 
 def _listed(space: ClaimInSpace) -> str:
-    """The values on which a claim hangs, the most decisive first."""
+    """Return the values on which a claim hangs, the most decisive first."""
     either = {value.name: value for value in OPEN}
     words = []
     for item in space.hangs_on:
@@ -130,7 +132,7 @@ def _listed(space: ClaimInSpace) -> str:
 
 
 def not_covered(claim: Claim, reason: str) -> ClaimVerdict:
-    """A claim with no judge, or without what its judge needs."""
+    """Return a claim with no judge, or without what its judge needs."""
     return ClaimVerdict(claim, "not yet covered", "", None, reason)
 
 
@@ -144,9 +146,9 @@ def verdict(
     undrawn: str = "",
     readings: Mapping[str, Finding] = NO_WAYS,
 ) -> ClaimVerdict:
-    """The verdict from the findings of all `ways` and the one that they allow `together`; `others` are findings by
-    another method, by its name, in the ways that need the runs alone, and `readings` by another reading of the words,
-    in all ways; both are mentioned where other parts hold than here."""
+    """Return the verdict from the findings of all `ways` and the one that they allow `together`;
+    `others` are findings by another method, by its name, in the ways that need the runs alone, and `readings` by
+    another reading of the words, in all ways; both are mentioned where other parts hold than here."""
     runs = _by_runs(ways) or together
     turned = {
         name: f"with {name} {_change(runs, finding)}"
@@ -164,13 +166,13 @@ def verdict(
 
 
 def _by_runs(ways: Mapping[str, Finding]) -> Finding | None:
-    """The weakest finding of the ways that need the runs alone; None without any."""
+    """Return the weakest finding of the ways that need the runs alone; None without any."""
     runs = {way: finding for way, finding in ways.items() if way != CYCLE}
     return weakest(runs) if runs else None
 
 
 def _change(first: Finding, second: Finding) -> str:
-    """How a finding is judged otherwise, with the numbers of the parts that turned."""
+    """Return how a finding is judged otherwise, with the numbers of the parts that turned."""
     pairs = zip(first.judged, second.judged, strict=True)
     numbers = "; ".join(after.number for before, after in pairs if before.holds != after.holds)
     return f"the claim is judged by the runs: {second.judgement} ({numbers})"

@@ -22,9 +22,9 @@ whatever the move."""
 
 
 def by_peak_count(runs: xr.Dataset) -> xr.Dataset:
-    """The runs with what judges read, by the thesis's count: whether at least one peak is counted, how many, the
-    swing at the end over the height from which peaks count, and whether the stage hunts for good (`lasts`): here,
-    whether the run swings at its end."""
+    """Return the runs with what judges read, by the thesis's count:
+    whether at least one peak is counted, how many, the swing at the end over the height from which peaks count, and
+    whether the stage hunts for good (`lasts`): here, whether the run swings at its end."""
     return runs.assign(
         keeps_moving=(runs["peaks"] > 0).assign_attrs(criterion=PEAK_CRITERION),
         count=runs["peaks"],
@@ -59,7 +59,7 @@ def by_attraction(runs: xr.Dataset, attracts: np.ndarray, decided: np.ndarray) -
 
 
 def by_way(evidence: Evidence, read: Callable[[xr.Dataset], xr.Dataset]) -> Evidence:
-    """The evidence with its maps and responses read in one way."""
+    """Return the evidence with its maps and responses read in one way."""
     responses = {name: Response(read(item.cell), item.trace) for name, item in evidence.responses.items()}
     return replace(evidence, maps={name: read(runs) for name, runs in evidence.maps.items()}, responses=responses)
 
@@ -71,8 +71,9 @@ READ: Mapping[str, Callable[[xr.Dataset], xr.Dataset]] = MappingProxyType(
 
 
 def weakest(findings: Mapping[str, Finding]) -> Finding:
-    """The finding that all ways allow, the thesis's first: a part holds where it does in each of them; where the ways
-    differ, the numbers of all stand beside, of those in which it fails first."""
+    """Return the finding that all ways allow, the thesis's first:
+    a part holds where it does in each of them; where the ways differ, the numbers of all stand beside, of those in
+    which it fails first."""
     first = next(iter(findings.values()))
     parts = []
     for number in range(len(first.parts)):

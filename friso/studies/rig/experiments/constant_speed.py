@@ -67,7 +67,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 
 def pass_speeds(stage: Stage) -> tuple[float, ...]:
-    """The speeds [m/s], the slow one first."""
+    """Return the speeds [m/s], the slow one first."""
     return tuple(longest_travel(stage) * pace(stage) / periods for periods in DURATIONS)
 
 
@@ -82,7 +82,7 @@ def _passes(name: str, stage: Stage, seed: int) -> Passes:
 
 
 def _passes_log(name: str, stage: Stage, seed: int) -> RigLog:
-    """The log of passes there and back at both speeds."""
+    """Return the log of passes there and back at both speeds."""
     period, parts = 1 / pace(stage), [(0.0, STANDS / pace(stage))]
     for speed, periods in zip(pass_speeds(stage), DURATIONS, strict=True):
         for velocity in (speed, -speed):

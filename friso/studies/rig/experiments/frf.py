@@ -83,24 +83,26 @@ class Frf:
 
     @property
     def highest_stable(self) -> float:
-        """The last setting [Hz] before the first that is not stable; NaN if the first is not."""
+        """Return the last setting [Hz] before the first that is not stable; NaN if the first is not."""
         return highest_stable(self.settings, self.stable)
 
 
 def highest_stable(settings: np.ndarray, stable: np.ndarray) -> float:
-    """The last of rising settings before the first that is not stable, both of shape (n,); NaN if the first is not."""
+    """Return the last of rising settings before the first that is not stable,
+    both of shape (n,); NaN if the first is not."""
     first = len(stable) if stable.all() else int(np.argmin(stable))
     return float(settings[first - 1]) if first else np.nan
 
 
 def crossing_near_target(loop: MeasuredLoop) -> float:
-    """The crossing of 0 dB [Hz] nearest to where the loop was tuned; NaN without any."""
+    """Return the crossing of 0 dB [Hz] nearest to where the loop was tuned; NaN without any."""
     crossed = [crossing.value for crossing in loop.crossings]
     return min(crossed, key=lambda f: abs(np.log(f / loop.tuned)), default=np.nan)
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """All plants and loops, and the stable settings. Raises InputError for a stage without a joint."""
+    """Return all plants and loops, and the stable settings.
+    Raises InputError for a stage without a joint."""
     fixed, free = locked_stage(jointed(stage)), freed(stage)
     places = np.linspace(*travel(stage), PLACES)
     progress(0, 4, f"plant, joint locked, at {PLACES} places")
@@ -126,7 +128,7 @@ NOTES = (
 
 
 def plant_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
-    """The log of one excitation of the closed loop at a place [m]."""
+    """Return the log of one excitation of the closed loop at a place [m]."""
     return rig_log(excite(stage, place, seed), 0, name, "frequency", stage, seed)
 
 
@@ -147,7 +149,8 @@ def open_loops(
 
 
 def measured_loop(log: RigLog, tuned: float) -> MeasuredLoop:
-    """The open loop of a log of one excitation, tuned to a crossover [Hz]; of one that was not stable, no lines."""
+    """Return the open loop of a log of one excitation, tuned to a crossover [Hz];
+    of one that was not stable, no lines."""
     if log.failure:
         none = np.zeros(0)
         return MeasuredLoop(tuned, FrequencyResponse(none, none + 0j, none, none, none, none, "multisine"), ())
@@ -156,7 +159,7 @@ def measured_loop(log: RigLog, tuned: float) -> MeasuredLoop:
 
 
 def locked_plant(logs: list[RigLog]) -> Plant:
-    """The averaged response, and its lowest mass line."""
+    """Return the averaged response, and its lowest mass line."""
     averaged = estimate_plant(logs)
     lines = mass_lines(averaged)
     nothing = Estimate.unknown("mass", "kg", "mass line", "the response shows no mass line")
@@ -165,7 +168,7 @@ def locked_plant(logs: list[RigLog]) -> Plant:
 
 
 def free_plant(logs: list[RigLog]) -> Plant:
-    """The averaged response; its first mode is where it is the largest against a mass."""
+    """Return the averaged response; its first mode is where it is the largest against a mass."""
     averaged, flat = estimate_plant(logs), logs[0].stage.flat()
     above = flat.get("parasitic.frequency", float(averaged.frequency[-1]))
     level = np.abs(averaged.accelerations().response)
@@ -176,7 +179,8 @@ def free_plant(logs: list[RigLog]) -> Plant:
 
 
 def mass_between(response: FrequencyResponse, low: float, high: float) -> Estimate:
-    """The median [kg] of force over acceleration between two frequencies [Hz], with the range of the middle half."""
+    """Return the median [kg] of force over acceleration between two frequencies [Hz],
+    with the range of the middle half."""
     inside = (response.frequency >= low) & (response.frequency <= high)
     method = f"force over acceleration, {low:.3g} to {high:.3g} Hz"
     if not inside.any():

@@ -91,24 +91,26 @@ class HuntingResult:
     startable: Startable | None
 
     def shares(self, case: str) -> list[Share]:
-        """The share of rails on which peaks are counted, by crossover."""
+        """Return the share of rails on which peaks are counted, by crossover."""
         return [self.cases[case].share(row) for row in range(len(self.crossovers))]
 
     def limit(self, case: str, rail: int | None = None) -> float:
-        """The highest crossover [Hz] at which peaks are counted on one rail (None: any); NaN for none."""
+        """Return the highest crossover [Hz] at which peaks are counted on one rail (None: any);
+        NaN for none."""
         counted = self.cases[case].counted if rail is None else self.cases[case].counted[:, [rail]]
         rows = np.flatnonzero(counted.any(axis=1))
         return float(self.crossovers[rows[-1]]) if len(rows) else np.nan
 
     @property
     def can_start(self) -> np.ndarray:
-        """Whether peaks are counted after the move or a release with the joint locked, shape (crossovers, rails)."""
+        """Tell whether peaks are counted after the move or a release with the joint locked,
+        shape (crossovers, rails)."""
         return self.started.counted.any(axis=0) | self.cases["locked"].counted
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """The move at all crossovers on all rails, and releases with the joint locked. Raises InputError without a joint or
-    a motion that moves the stage."""
+    """Return the move at all crossovers on all rails, and releases with the joint locked.
+    Raises InputError without a joint or a motion that moves the stage."""
     stages = {case: with_joint(stage, locked) for case, locked in CASES.items()}
     frequencies, seeds = pace(stage) * CROSSOVERS, rails(stage)
     moves, started = _moves_and_releases(stages, move(stage), seed, frequencies, seeds, progress)
@@ -133,7 +135,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 
 def machine_file(stage: Stage, rail: float) -> Stage:
-    """The stage file of a machine on a rail of another seed."""
+    """Return the stage file of a machine on a rail of another seed."""
     return stage if stage.rail is None else stage.replace({"rail.seed": rail})
 
 
@@ -145,8 +147,8 @@ def _moves_and_releases(
     seeds: np.ndarray,
     progress: Progress,
 ) -> tuple[dict[str, RailRuns], RailRuns]:
-    """The move `there` of each case at crossovers [Hz] on all rails, shape (crossovers, rails), and releases with the
-    joint locked, shape (displacements, crossovers, rails)."""
+    """Return the move `there` of each case at crossovers [Hz] on all rails, shape (crossovers,
+    rails), and releases with the joint locked, shape (displacements, crossovers, rails)."""
     stage, shape = stages["locked"], (len(frequencies), len(seeds))
     changes = on_rails(stage, at_crossovers(stage, frequencies), seeds)
     numbers = numbers_of(seed, *shape)

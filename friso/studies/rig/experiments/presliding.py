@@ -51,8 +51,8 @@ class Bristles:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """A small multisine at each place, and loops at the middle one. Raises InputError for a stage whose friction has no
-    bristles."""
+    """Return a small multisine at each place, and loops at the middle one.
+    Raises InputError for a stage whose friction has no bristles."""
     flat = stage.flat()
     measured = friction_law(flat["friction.model"]).shown(flat) if "friction.model" in flat else None
     if measured is None or not measured.stiffness > 0:
@@ -80,13 +80,14 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 
 def presliding_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
-    """The log of one small excitation at a place [m]."""
+    """Return the log of one small excitation at a place [m]."""
     kind = replace(GENTLE, samples=max(GENTLE.samples, 1 / (LONGEST * pace(stage))))
     return rig_log(excite(stage, place, seed, kind=kind), 0, name, "presliding", stage, seed)
 
 
 def loop_log(stage: Stage, name: str, place: float, seed: int, share: float) -> RigLog:
-    """The log of a loop at a place [m]: a sine of force, up to a `share` of static friction."""
+    """Return the log of a loop at a place [m]: a sine of force,
+    up to a `share` of static friction."""
     step = as_built_keys(stage)["drive.sample_time"]
     samples = round(PERIOD / pace(stage) / step)
     turn = share * friction(stage) * np.sin(2 * np.pi * np.arange(samples) / samples)

@@ -70,7 +70,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 
 def _note(flat: Mapping[str, Any]) -> str:
-    """How the stage was set up."""
+    """Return how the stage was set up."""
     stroke = f"{flat['joint.stroke'] * 1e3:g} mm"
     return f"the limiters are set to {stroke}, which is recorded beside the logs for friso identify"
 

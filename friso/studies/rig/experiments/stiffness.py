@@ -56,7 +56,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 
 def steps(stage: Stage, seed: int) -> RigLog:
-    """The log of the steps."""
+    """Return the log of the steps."""
     free, period = freed(stage), 1 / pace(stage)
     step = STEP * stage.flat()["joint.stroke"]
     stands = np.clip(SETTLED * pulling_time(free), STANDS * period, LONGEST * period)
@@ -76,7 +76,7 @@ def pulling_time(stage: Stage) -> float:
 
 
 def _notes(stage: Stage) -> tuple[str, ...]:
-    """What to know of the result."""
+    """Return what to know of the result."""
     notes = ["the cart is fixed and the limiters are far away, as an engineer would set them up; the joint is free"]
     if stage.flat().get("cable.stiffness", 0.0) > 0:
         notes.append("the cables move with the stage: their stiffness is included in the result")

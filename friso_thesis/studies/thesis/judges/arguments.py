@@ -37,7 +37,7 @@ _START = 0.02
 
 @judges("S341", figure="Sec. 3.4.1, force at full stroke", needs=("isolator-stiffness",))
 def force_at_full_stroke(evidence: Evidence) -> Finding:
-    """The rule at the thesis's own values, and over the map of stiffness and stroke."""
+    """Return the rule at the thesis's own values, and over the map of stiffness and stroke."""
     words = reading()
     flat = evidence.rig.flat()
     force, static = flat["joint.stiffness"] * flat["joint.stroke"], flat["friction.static"]
@@ -84,7 +84,8 @@ def _margins(stage_file: str) -> tuple[float, float]:
 
 @judges("S342", figure="Sec. 3.4.2, mass the controller is tuned for", needs=(FREE,))
 def the_mass_to_tune_for(evidence: Evidence) -> Finding:
-    """The margins of all settled states, tuned for the largest and for the smallest mass that moves."""
+    """Return the margins of all settled states,
+    tuned for the largest and for the smallest mass that moves."""
     whole, small = _margins(evidence.rig.to_toml())
     return Finding(
         (
@@ -105,7 +106,7 @@ def the_mass_to_tune_for(evidence: Evidence) -> Finding:
 
 @judges("S352", figure="Sec. 3.5, acceleration")
 def close_to_ten_g(evidence: Evidence) -> Finding:
-    """The peak force over the masses weighed and identified."""
+    """Return the peak force over the masses weighed and identified."""
     reached = [_PEAK_FORCE / mass / _GRAVITY for mass in _MASSES]
     rows = tuple((f"{mass:g} kg", f"{_PRESCRIBED * mass:g} N", f"{_PEAK_FORCE:g} N") for mass in _MASSES)
     return Finding(
@@ -125,7 +126,8 @@ def close_to_ten_g(evidence: Evidence) -> Finding:
 
 @judges("S41", figure="Sec. 4.1, why mass helps", needs=(LIGHT, HEAVY))
 def why_mass_helps(evidence: Evidence) -> Finding:
-    """The first slip across the reference after the return move, with both masses at the same crossover."""
+    """Return the first slip across the reference after the return move,
+    with both masses at the same crossover."""
     light, heavy = (_overshooting_slip(evidence.responses[name]) for name in (LIGHT, HEAVY))
     names = LIGHT, HEAVY
     why = "" if np.isfinite([*light, *heavy]).all() else "One of the two has no overshoot: there is nothing to compare."
@@ -173,7 +175,7 @@ def _overshooting_slip(response: Response) -> tuple[float, float]:
 
 @judges("F25O", figure="25", needs=("system",))
 def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
-    """The swing at the end over the crossover, at every mass of the map."""
+    """Return the swing at the end over the crossover, at every mass of the map."""
     words = reading()
     runs = evidence.maps["system"]
     crossover, mass, moving, _ = verdict_table(runs, CROSSOVER, "mass")

@@ -25,7 +25,7 @@ _GAP = 1.0
 
 @judges("F12A", figure="12A", needs=("friction",))
 def gap_makes_hunting(evidence: Evidence) -> Finding:
-    """The smallest gap at which runs keep moving, and how the count goes with the gap."""
+    """Return the smallest gap at which runs keep moving, and how the count goes with the gap."""
     words = reading()
     axes = ("friction.static", "friction.coulomb")
     static, coulomb, moving, _ = verdict_table(evidence.maps["friction"], *axes)
@@ -65,7 +65,8 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
 
 
 def smallest_gap(evidence: Evidence) -> float:
-    """The smallest gap F_s - F_c [N] from which on runs keep moving, over all Coulomb friction forces; NaN of none."""
+    """Return the smallest gap F_s - F_c [N] from which on runs keep moving,
+    over all Coulomb friction forces; NaN of none."""
     axes = ("friction.static", "friction.coulomb")
     runs = evidence.maps["friction"]
     static, coulomb, moving, _ = verdict_table(runs, *axes)
@@ -75,7 +76,7 @@ def smallest_gap(evidence: Evidence) -> float:
 
 @judges("F12B", figure="12B", needs=("control",))
 def control_is_no_cure(evidence: Evidence) -> Finding:
-    """How the count goes with alpha and beta, and whether either brings all runs to rest."""
+    """Return how the count goes with alpha and beta, and whether either brings all runs to rest."""
     words = reading()
     axes = (ALPHA, BETA)
     alpha, beta, moving, valid = verdict_table(evidence.maps["control"], *axes)

@@ -20,7 +20,7 @@ _AXES = (CROSSOVER, "joint.stroke")
 
 @judges("F16A", figure="16A", needs=("isolator-crossover",))
 def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
-    """The crossover below which the isolated rig keeps moving, at each stroke."""
+    """Return the crossover below which the isolated rig keeps moving, at each stroke."""
     words = reading()
     runs = evidence.maps["isolator-crossover"]
     crossover, stroke, moving, valid = verdict_table(runs, *_AXES)
@@ -50,7 +50,7 @@ def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
 
 @judges("F16B", figure="16B", needs=("isolator-crossover", "isolator-crossover-soft"))
 def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
-    """The limits of both stiffnesses, stroke by stroke."""
+    """Return the limits of both stiffnesses, stroke by stroke."""
     words = reading()
     names = ("isolator-crossover", "isolator-crossover-soft")
     stiff, soft = (_limits(evidence.maps[name]) for name in names)

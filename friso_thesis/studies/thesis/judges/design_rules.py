@@ -45,7 +45,7 @@ def rules_of_design(evidence: Evidence) -> Finding:
 
 
 def _soft(evidence: Evidence) -> Part:
-    """Whether a joint that is softer than one that does, does too."""
+    """Tell whether a joint that is softer than one that does, does too."""
     runs, axes = evidence.maps["isolator-stiffness"], ("joint.stiffness", "joint.stroke")
     stiffness, stroke, moving, _ = verdict_table(runs, *axes)
     enough = stroke >= _STROKE
@@ -62,8 +62,8 @@ def _soft(evidence: Evidence) -> Part:
 
 @lru_cache(maxsize=256)
 def _needed_ratio(stage_file: str) -> float:
-    """The least parasitic frequency over the crossover from which the rig has a modulus margin of 0.5 in all settled
-    states; NaN if it never has."""
+    """Return the least parasitic frequency over the crossover from which the rig has a modulus
+    margin of 0.5 in all settled states; NaN if it never has."""
     flat = {**loads(stage_file).flat(), "joint.locked": False}
     crossover = flat[CROSSOVER]
     enough = np.nan
@@ -76,7 +76,8 @@ def _needed_ratio(stage_file: str) -> float:
 
 @lru_cache(maxsize=256)
 def _margins_at_the_top(stage_file: str) -> dict[str, float]:
-    """The least modulus margin of the settled states at the highest crossover, joint locked and free; 0: unstable."""
+    """Return the least modulus margin of the settled states at the highest crossover,
+    joint locked and free; 0: unstable."""
     flat = {**loads(stage_file).flat(), CROSSOVER: _HIGHEST}
     return {name: settled_margin({**flat, "joint.locked": name == "locked"}) for name in ("locked", "free")}
 
@@ -105,14 +106,15 @@ def _far(rig: Stage) -> Part:
 
 
 def _strokes_needed(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
-    """The stiffnesses of the map [N/m], and the stroke [m] beyond which nothing keeps moving at 8 Hz with each."""
+    """Return the stiffnesses of the map [N/m],
+    and the stroke [m] beyond which nothing keeps moving at 8 Hz with each."""
     runs, axes = evidence.maps["isolator-stiffness"], ("joint.stroke", "joint.stiffness")
     stroke, stiffness, moving, _ = verdict_table(runs, *axes)
     return stiffness, ends(stroke, moving, sizes(runs, *axes))
 
 
 def _stroke(evidence: Evidence) -> Part:
-    """The stroke needed with the joint as built."""
+    """Return the stroke needed with the joint as built."""
     stiffness, by_stiffness = _strokes_needed(evidence)
     nearest = int(np.abs(stiffness - 2.4e3).argmin())
     needed = float(by_stiffness[nearest])
@@ -125,7 +127,7 @@ def _stroke(evidence: Evidence) -> Part:
 
 
 def _softer_needs_less_stroke(evidence: Evidence) -> Part:
-    """How the stroke needed goes with the stiffness."""
+    """Return how the stroke needed goes with the stiffness."""
     words = reading()
     stiffness, needed = _strokes_needed(evidence)
     rises = trend(stiffness, needed)
@@ -188,7 +190,8 @@ def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
 
 
 def locked_limit(evidence: Evidence, mass: float) -> float:
-    """The crossover [Hz] above which the locked rig of a mass [kg] comes to rest, between those of the map."""
+    """Return the crossover [Hz] above which the locked rig of a mass [kg] comes to rest,
+    between those of the map."""
     runs = evidence.maps["system"]
     crossover, masses, moving, _ = verdict_table(runs, CROSSOVER, "mass")
     return float(np.interp(mass, masses, ends(crossover, moving, sizes(runs, CROSSOVER, "mass"))))
@@ -196,7 +199,8 @@ def locked_limit(evidence: Evidence, mass: float) -> float:
 
 @judges("F25P", figure="25", needs=("system",))
 def experiment_needs_more_crossover(evidence: Evidence) -> Finding:
-    """The limit of the parameter study at the mass with which it was made, beside that of the experiment."""
+    """Return the limit of the parameter study at the mass with which it was made,
+    beside that of the experiment."""
     weighed, moving = (locked_limit(evidence, mass) for mass in (_WEIGHED, _MOVING_MASS))
     return Finding(
         (

@@ -33,12 +33,12 @@ _UNIFORM = "uniform friction along the rail, no noise"
 
 @judges("F19", figure="19", needs=(STEPPED,), undrawn="the joint's stiffness, which is entered")
 def stiffness_from_position_steps(evidence: Evidence) -> Finding:
-    """The steps of the rig with its cart fixed."""
+    """Return the steps of the rig with its cart fixed."""
     return judged_steps(evidence.experiments.joint_steps)
 
 
 def judged_steps(steps: JointSteps) -> Finding:
-    """The finding from the simulated steps."""
+    """Return the finding from the simulated steps."""
     words = reading()
     read, apparent = steps.result.stiffness, (2 * np.pi * FIRST) ** 2 * MEASURED[1]
     larger = steps.stiffness * float(np.mean(CONSTANTS))
@@ -76,7 +76,7 @@ def static_friction_from_stick_slip(evidence: Evidence) -> Finding:
 
 
 def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
-    """The finding from simulated slow motion."""
+    """Return the finding from simulated slow motion."""
     slips = sum(len(run.result.forces) for run in runs)
     forces, rates = (np.concatenate([getattr(run.result, name) for run in runs]) for name in ("forces", "rates"))
     read = static_friction("friction.static", forces, rates)
@@ -113,7 +113,8 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
 
 
 def _spikes(run: SlowMotion) -> bool:
-    """Whether the velocity of the cart spikes after every peak, to more than half of the usual."""
+    """Tell whether the velocity of the cart spikes after every peak,
+    to more than half of the usual."""
     slips, time = run.result, run.log.time
     after = [(time >= at) & (time <= at + _SPIKE) for at in slips.times]
     return all(np.abs(slips.cart_velocity[window]).max() > np.median(slips.speeds) / 2 for window in after)
@@ -126,7 +127,8 @@ def force_at_constant_speed(evidence: Evidence) -> Finding:
 
 
 def force_swings(runs: ConstantSpeed) -> list[float]:
-    """The standard deviation of the force over its mean at each speed, from a tenth of the way on."""
+    """Return the standard deviation of the force over its mean at each speed,
+    from a tenth of the way on."""
     forces = [runs.log["force"][part] for part in runs.log.segments]
     return [float(np.std(late) / abs(np.mean(late))) for late in (force[len(force) // 10 :] for force in forces)]
 
@@ -137,7 +139,7 @@ def _swing_text(share: float) -> str:
 
 
 def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
-    """The finding from the simulated runs."""
+    """Return the finding from the simulated runs."""
     words = reading()
     named = {"free": free.result, "locked": locked.result}
     swings = {"free": force_swings(free), "locked": force_swings(locked)}

@@ -30,14 +30,14 @@ FIRST, _PARASITIC = 11.0, 300.0
 
 @judges("F17", figure="17", needs=(LINE, BUILT))
 def mass_line_of_the_locked_rig(evidence: Evidence) -> Finding:
-    """The mass line with friction at several places."""
+    """Return the mass line with friction at several places."""
     flat = evidence.rig.flat()
     line = judged_line(evidence.experiments.locked_line, flat["masses.cart"] + flat["masses.stage"])
     return Finding((*line.parts, *on_the_rig(evidence, lambda built: weaker_motor(built, 0, MEASURED[0], WEIGHED[0]))))
 
 
 def judged_line(line: LockedLine, moved: float) -> Finding:
-    """The finding from the simulated responses of a rig that moves so much mass [kg]."""
+    """Return the finding from the simulated responses of a rig that moves so much mass [kg]."""
     words = reading()
     rates, magnitude, scatter = np.array(FREQUENCIES), line.magnitude, line.scatter
     mean = np.nanmean(magnitude, axis=0)

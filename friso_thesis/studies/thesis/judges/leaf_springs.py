@@ -32,7 +32,7 @@ _SPACINGS, _HEIGHTS = (0.03, 0.06, 0.09), (0.0, 0.03, 0.06)
 
 @cache
 def _evaluated() -> tuple[Evaluation, ...]:
-    """The thesis's leaves over what it leaves open."""
+    """Return the thesis's leaves over what it leaves open."""
     return tuple(beams(_mechanism(*variant), _STROKE) for variant in product(_YOUNG, _SPACINGS, _HEIGHTS))
 
 
@@ -89,7 +89,7 @@ def the_leaf_springs(evidence: Evidence) -> Finding:
 
 
 def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
-    """The first mode other than the drive mode, over the parameters left open."""
+    """Return the first mode other than the drive mode, over the parameters left open."""
     words = reading()
     modes = [min(evaluation.modes[1:], key=lambda mode: mode.frequency) for evaluation in evaluations]
     visible = np.array(
@@ -123,5 +123,5 @@ def _range(values: np.ndarray) -> str:
 
 
 def _millimetres(lengths: Sequence[float]) -> str:
-    """The range of lengths [m]."""
+    """Return the range of lengths [m]."""
     return f"{1e3 * min(lengths):g} to {1e3 * max(lengths):g} mm"

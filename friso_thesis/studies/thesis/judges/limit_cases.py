@@ -37,7 +37,7 @@ def _table(plants: Mapping[str, LimitCase]) -> FindingTable:
 
 
 def _joint_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part]:
-    """The eigenfrequency of the free joint, and its pair where the cart slides."""
+    """Return the eigenfrequency of the free joint, and its pair where the cart slides."""
     words = reading()
     low = {name: [f for f in plants[name].antiresonances if f < plants[name].first] for name in _FREE}
     pair = f"antiresonance {low['sliding'][-1]:.3g} Hz, resonance" if low["sliding"] else "no antiresonance below"
@@ -57,7 +57,7 @@ def _joint_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part]:
 
 
 def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
-    """The parasitic mode, and the pair above it where the limiter is touched."""
+    """Return the parasitic mode, and the pair above it where the limiter is touched."""
     words = reading()
     names = (*_FREE, *_TOUCHED)
     pairs = {name: plants[name].pair_above for name in _TOUCHED}

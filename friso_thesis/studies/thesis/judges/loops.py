@@ -53,7 +53,7 @@ def stable_at_every_speed(evidence: Evidence) -> Finding:
 
 
 def _beyond(locked: CrossoverLoops) -> str:
-    """What crosses 0 dB besides, at the highest setting."""
+    """Return what crosses 0 dB besides, at the highest setting."""
     further = _further(locked.margins[_MEASURED]["sliding"], _MEASURED)
     return f"a mode reaches it too (locked, tuned to {_MEASURED:g} Hz: {_frequencies(further)})"
 
@@ -85,7 +85,7 @@ def _speeds(ranges: tuple[Range, ...]) -> str:
 
 @judges("F22", figure="22", needs=(LOCKED_LOOP, BUILT), undrawn=RAIL)
 def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
-    """The crossings of the locked rig, sliding, at the thesis's settings."""
+    """Return the crossings of the locked rig, sliding, at the thesis's settings."""
     words = reading()
     settings = {f: cases["sliding"] for f, cases in evidence.analysis.locked.margins.items()}
     tuned = {f: crossing_nearest(loop, f) for f, loop in settings.items()}
@@ -121,7 +121,7 @@ def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
 
 
 def _why_elsewhere(contact: Contact) -> str:
-    """What it would take to cross 0 dB where the thesis measured it."""
+    """Return what it would take to cross 0 dB where the thesis measured it."""
     soft, undamped = (_further(loop_margins, _MEASURED) for loop_margins in (contact.margins, contact.undamped))
     return (
         "No mode of the locked model lies there. The contact of cart and stage would with k_l of "
@@ -132,7 +132,7 @@ def _why_elsewhere(contact: Contact) -> str:
 
 
 def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) -> Part:
-    """Whether a further crossing takes the loop close to instability."""
+    """Tell whether a further crossing takes the loop close to instability."""
     close = any(about(margins.closest, f) for f in further)
     where = (
         f"distance {margins.modulus_margin:.2g} from -1, at {margins.closest:.3g} Hz" if margins.stable else "unstable"
@@ -151,7 +151,8 @@ def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) ->
 
 @judges("F23", figure="23", needs=(FREE, LOCKED_LOOP, BUILT), undrawn=RAIL)
 def free_loop_crosses_above(evidence: Evidence) -> Finding:
-    """The crossing of the free joint tuned for the whole mass, and its highest stable setting."""
+    """Return the crossing of the free joint tuned for the whole mass,
+    and its highest stable setting."""
     words = reading()
     analysis = evidence.analysis
     cases = analysis.free.margins[min(analysis.free.margins)]
@@ -184,7 +185,7 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
 
 
 def crossing_nearest(margins: Margins, frequency: float) -> float:
-    """The crossing of 0 dB closest to a frequency [Hz]; NaN without any."""
+    """Return the crossing of 0 dB closest to a frequency [Hz]; NaN without any."""
     return min(margins.crossovers, key=lambda f: abs(np.log(f / frequency)), default=np.nan)
 
 
@@ -207,7 +208,7 @@ def _hertz(crossover: float | None) -> str:
 
 
 def _sampled(analysis: Linear) -> FindingTable:
-    """What sampling and delays leave of the highest stable crossover."""
+    """Return what sampling and delays leave of the highest stable crossover."""
     rows = tuple(
         (_micro(delay), _hertz(free), _hertz(analysis.locked.sampled[delay]))
         for delay, free in analysis.free.sampled.items()
@@ -216,7 +217,7 @@ def _sampled(analysis: Linear) -> FindingTable:
 
 
 def _edges(analysis: Linear, setting: float) -> str:
-    """The delays at which a setting is at the edge of stability."""
+    """Return the delays at which a setting is at the edge of stability."""
     edges = {"free": analysis.free.delay_at[setting], "locked": analysis.locked.delay_at[setting]}
     parts = [
         f"{name} {f'with a delay of {_micro(at)}' if np.isfinite(at) else 'beyond it'}" for name, at in edges.items()

@@ -78,7 +78,7 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
 
 @judges("F11B", figure="11B", needs=("system",))
 def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
-    """The highest crossover that keeps moving, over all masses and for each."""
+    """Return the highest crossover that keeps moving, over all masses and for each."""
     words = reading()
     runs = evidence.maps["system"]
     crossover, mass, moving, _ = verdict_table(runs, CROSSOVER, "mass")
@@ -109,7 +109,8 @@ def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
 
 
 def _at_the_limit(moving: np.ndarray, peaks: np.ndarray) -> str:
-    """How many cells keep moving at the highest crossover at which any does, and with how many peaks."""
+    """Return how many cells keep moving at the highest crossover at which any does,
+    and with how many peaks."""
     rows = np.flatnonzero(moving.any(axis=1))
     if not rows.size:
         return ""

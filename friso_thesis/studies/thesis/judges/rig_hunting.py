@@ -41,12 +41,12 @@ def _rails(counted: tuple[int, int]) -> str:
 
 @judges("F24", figure="24", needs=(MOVES,), undrawn=RAIL)
 def locked_hunts_and_free_settles(evidence: Evidence) -> Finding:
-    """The move at 8 Hz."""
+    """Return the move at 8 Hz."""
     return judged_move(evidence.experiments.moves)
 
 
 def judged_move(moves: MovesOnRails) -> Finding:
-    """The finding from the moves on several rails."""
+    """Return the finding from the moves on several rails."""
     words = reading()
     locked, free = _runs_with_peaks(moves.locked, 0), _runs_with_peaks(moves.free)
     return Finding(
@@ -64,12 +64,12 @@ def judged_move(moves: MovesOnRails) -> Finding:
 
 @judges("F25", figure="25", needs=(MOVES,), undrawn=RAIL)
 def locked_needs_crossover(evidence: Evidence) -> Finding:
-    """The move at the crossovers of Fig. 25, and releases at the middle one."""
+    """Return the move at the crossovers of Fig. 25, and releases at the middle one."""
     return judged_crossovers(evidence.experiments.moves)
 
 
 def judged_crossovers(moves: MovesOnRails) -> Finding:
-    """The finding from moves and releases with the joint locked."""
+    """Return the finding from moves and releases with the joint locked."""
     low, middle, high = (_runs_with_peaks(moves.locked, row) for row in range(3))
     settle = ~moves.locked.counted[1] & ~moves.locked.failed[1]
     lasts = moves.released.counted & moves.released.swings
@@ -101,12 +101,12 @@ def judged_crossovers(moves: MovesOnRails) -> Finding:
 
 @judges("F26", figure="26", needs=(GRID,), undrawn=RAIL)
 def more_stroke_needs_less_crossover(evidence: Evidence) -> Finding:
-    """The share of rails over stroke and crossover."""
+    """Return the share of rails over stroke and crossover."""
     return judged_grid(evidence.experiments.grid)
 
 
 def judged_grid(grid: StrokeCrossover) -> Finding:
-    """The finding from the grid."""
+    """Return the finding from the grid."""
     limits, share = grid.limits, grid.share
     named = ", ".join(
         f"{limit:.3g} Hz at {stroke * 1e3:.3g} mm" for limit, stroke in zip(limits, grid.strokes, strict=True)
@@ -129,12 +129,13 @@ def judged_grid(grid: StrokeCrossover) -> Finding:
 
 @judges("F27", figure="27", needs=(ON_RAILS,), undrawn=RAIL)
 def simulated_cycles_are_faster(evidence: Evidence) -> Finding:
-    """The cycle of an even rail against those of rails that vary."""
+    """Return the cycle of an even rail against those of rails that vary."""
     return judged_cycles(evidence.experiments.cycles)
 
 
 def judged_cycles(cycles: CyclesOnRails) -> Finding:
-    """The finding from the cycles on an even rail, which is the simulation of the thesis, and on rails that vary."""
+    """Return the finding from the cycles on an even rail,
+    which is the simulation of the thesis, and on rails that vary."""
     words = reading()
     even, rails = cycles.even, cycles.rails
     swings = rails.swings
@@ -188,7 +189,7 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
 
 
 def _weak_motor(cycles: CyclesOnRails) -> str:
-    """What a weaker motor and more Coulomb friction do to the cycle on an even rail."""
+    """Return what a weaker motor and more Coulomb friction do to the cycle on an even rail."""
     cause = (
         f"On an even rail, with a motor that gives {MOTORS[1]:.2g} of its force, which would explain the mass line, "
         f"and {COULOMB_LEVEL:g} times the Coulomb friction,"
@@ -206,12 +207,12 @@ _COMPARED = ("period", "swing")
 
 @judges("F28", figure="28", needs=(STANDSTILL,))
 def free_joint_stands_less_still(evidence: Evidence) -> Finding:
-    """The standstill with the joint locked and free, and with more damping."""
+    """Return the standstill with the joint locked and free, and with more damping."""
     return judged_standstill(evidence.experiments.standstill)
 
 
 def judged_standstill(standstill: InPosition) -> Finding:
-    """The finding from the standstills."""
+    """Return the finding from the standstills."""
     words = reading()
     peaks = [float(standstill.runs[case, "all"].true[0, 1]) for case in ("locked", "free")]
     ratio = standstill.ratio("all")
@@ -265,7 +266,7 @@ def _over_noise(standstill: InPosition) -> str:
 
 
 def _noises(standstill: InPosition) -> FindingTable | None:
-    """The deviations over the noise of the force, where it was varied."""
+    """Return the deviations over the noise of the force, where it was varied."""
     rows = tuple(
         (f"{factor:g}", f"{locked * 1e6:.2g} um", f"{free * 1e6:.2g} um", f"{free / locked:.2g}")
         for factor, (locked, free) in standstill.louder.items()

@@ -31,12 +31,12 @@ RAIL = "how friction varies along the rail, which rails these are, the drive's d
 
 
 def on_the_rig(evidence: Evidence, parts: Callable[[RigLoops], tuple[Part, ...]]) -> tuple[Part, ...]:
-    """The parts that the rig as built adds; none where it was not run."""
+    """Return the parts that the rig as built adds; none where it was not run."""
     return parts(evidence.identified.rig_loops) if evidence.identified is not None else ()
 
 
 def measured_locked(loops: RigLoops) -> tuple[Part, ...]:
-    """Where the open loops of the locked rig cross 0 dB."""
+    """Return where the open loops of the locked rig cross 0 dB."""
     return _crossings(loops), _further(loops)
 
 
@@ -53,7 +53,7 @@ def _crossings(loops: RigLoops) -> Part:
 
 
 def _further(loops: RigLoops) -> Part:
-    """Whether the loop with the highest setting crosses again."""
+    """Tell whether the loop with the highest setting crosses again."""
     words = reading()
     last = loops.locked[-1]
     above = [crossing.value for crossing in last.crossings if crossing.value > words.about * last.tuned]
@@ -79,7 +79,7 @@ def _peak(loop: MeasuredLoop, low: float) -> tuple[float, float]:
 
 
 def measured_free(loops: RigLoops) -> tuple[Part, Part]:
-    """Where the open loop of the free joint crosses 0 dB, and the highest stable tuning."""
+    """Return where the open loop of the free joint crosses 0 dB, and the highest stable tuning."""
     crossed = max((crossing.value for crossing in loops.free.crossings), default=np.nan)
     highest = highest_stable(loops.settings, loops.stable)
     return (
@@ -102,7 +102,7 @@ def measured_free(loops: RigLoops) -> tuple[Part, Part]:
 
 
 def weaker_motor(loops: RigLoops, joint: int, seen: float, weighed: float) -> tuple[Part]:
-    """Whether a weaker motor shows the mass seen [kg]; `joint` is 0 locked, 1 free."""
+    """Tell whether a weaker motor shows the mass seen [kg]; `joint` is 0 locked, 1 free."""
     plain, weak, strong = loops.apparent[joint]
     part = Part(
         f"with a motor that gives {RATIOS[1]:g} of the force that the drive assumes, it is nearer {seen:g} than the "

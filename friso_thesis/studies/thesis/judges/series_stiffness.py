@@ -35,7 +35,7 @@ def printed_formulas(evidence: Evidence) -> Finding:
 
 @cache
 def judged_formulas(stiffness: sp.Expr, slope_printed: sp.Expr) -> tuple[Part, Part, Part]:
-    """The given formulas, in K_F and K_J, against two springs that carry one force."""
+    """Return the given formulas, in K_F and K_J, against two springs that carry one force."""
     force, middle, end = sp.symbols("F u x")
     balance = sp.solve([K_F * middle - force, K_J * (end - middle) - force], [middle, end], dict=True)[0]
     derived = sp.simplify(force / balance[end])
@@ -65,12 +65,13 @@ def judged_formulas(stiffness: sp.Expr, slope_printed: sp.Expr) -> tuple[Part, P
 
 
 def _written(expression: sp.Basic) -> str:
-    """An expression as people write it."""
+    """Return an expression as people write it."""
     return str(expression).replace("**", "^").replace("*", " ")
 
 
 def in_the_plant(stiffness: sp.Expr, springs: Springs) -> Part:
-    """A formula for the stiffness, in K_F and K_J, against the plant derived from the declared equations."""
+    """Return a formula for the stiffness, in K_F and K_J,
+    against the plant derived from the declared equations."""
     eta = springs.joint / springs.bristles
     expected = float(stiffness.subs({K_F: springs.bristles, K_J: springs.joint}))
     return Part(

@@ -49,11 +49,11 @@ class Sticking:
 
     @property
     def both(self) -> bool:
-        """Whether there is a break-away in both directions."""
+        """Tell whether there is a break-away in both directions."""
         return {1, -1} <= set(self.direction)
 
     def words(self, values: np.ndarray, written: Callable[[float], str]) -> str:
-        """The mean, and the means in the two directions, as numbers are `written`."""
+        """Return the mean, and the means in the two directions, as numbers are `written`."""
         if not self.both:
             return "no cycle"
         forward, back = (written(float(values[self.direction == direction].mean())) for direction in (1, -1))
@@ -90,7 +90,8 @@ def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
 
 
 def sticking(response: Response) -> Sticking:
-    """The sticks of a response that end in a break-away after the time from which peaks count.
+    """Return the sticks of a response that end in a break-away after the time from which peaks
+    count.
 
     A stick begins where the cart falls below the Stribeck velocity and ends where it exceeds it; the share of the
     integral action is taken where the friction force is largest within the stick, before it drops.

@@ -73,7 +73,8 @@ def _kept(values: Mapping[str, float], name: str) -> Counted:
 
 @cache
 def own_runs(rtol: float) -> Mapping[str, Counted]:
-    """What friso finds at a relative tolerance; a swing of 0 where the stage does not swing at the end."""
+    """Return what friso finds at a relative tolerance;
+    a swing of 0 where the stage does not swing at the end."""
     return {name: _counted(_run(changes, rtol)) for name, changes in CASES.items()}
 
 
@@ -88,7 +89,8 @@ def _counted(cell: xr.Dataset) -> Counted:
 
 
 def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loose: Mapping[str, Counted]) -> Finding:
-    """The finding from runs by name: of ode23s, and of friso at the tight tolerance and at the thesis's."""
+    """Return the finding from runs by name: of ode23s,
+    and of friso at the tight tolerance and at the thesis's."""
     words = reading()
     swinging = [name for name, (_, swing, _) in tight.items() if swing > 0]
     counts = [name for name in tight if theirs[name][0] != tight[name][0]]
@@ -125,7 +127,7 @@ def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loo
 
 
 def _title(name: str) -> str:
-    """A run's name in words."""
+    """Return a run's name in words."""
     return name.replace("_", " ").replace(" hz", " Hz").replace(" um damping", " um, damping")
 
 

@@ -23,7 +23,7 @@ _SMALL_DAMPING = 1.0
 
 @judges("F14A", figure="14A", needs=("isolator-stiffness", "locked"))
 def stiffness_has_a_limit(evidence: Evidence) -> Finding:
-    """The stiffness above which the isolated rig keeps moving, at each stroke."""
+    """Return the stiffness above which the isolated rig keeps moving, at each stroke."""
     words = reading()
     runs = evidence.maps["isolator-stiffness"]
     stiffness, stroke, moving, _ = verdict_table(runs, "joint.stiffness", "joint.stroke")
@@ -67,7 +67,7 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
 
 
 def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
-    """The cells of stroke 0, compared with the locked rig."""
+    """Return the cells of stroke 0, compared with the locked rig."""
     none = runs.sel({"joint.stroke": 0.0})
     peaks, same = int(locked.cell["count"]), none["keeps_moving"].values == locked.cell["keeps_moving"].item()
     counted = none["count"].values
@@ -83,7 +83,8 @@ def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
 
 @judges("F14B", figure="14B", needs=("isolator-damping", "locked"))
 def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
-    """The stroke from which runs come to rest where the limiter is damped much, and the amplitude."""
+    """Return the stroke from which runs come to rest where the limiter is damped much,
+    and the amplitude."""
     words = reading()
     runs, axes = evidence.maps["isolator-damping"], ("joint.stroke", "joint.limiter_damping")
     stroke, damping, moving, _ = verdict_table(runs, *axes)
@@ -120,8 +121,8 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
 
 
 def _stripe(stroke: np.ndarray, damping: np.ndarray, moving: np.ndarray) -> str:
-    """Where runs keep moving apart from the others, at longer strokes than some at which all come to rest; `moving` is
-    of shape (strokes, dampings)."""
+    """Return where runs keep moving apart from the others,
+    at longer strokes than some at which all come to rest; `moving` is of shape (strokes, dampings)."""
     rests = np.maximum.accumulate(~moving, axis=0)  # from the first stroke at which they come to rest
     apart = moving & rests
     if not apart.any():
@@ -136,7 +137,7 @@ def _stripe(stroke: np.ndarray, damping: np.ndarray, moving: np.ndarray) -> str:
 
 
 def _span(values: np.ndarray) -> str:
-    """The least and the greatest of the values, or the one that there is."""
+    """Return the least and the greatest of the values, or the one that there is."""
     low, high = _rounded(values.min()), _rounded(values.max())
     return low if low == high else f"{low} to {high}"
 
@@ -147,7 +148,8 @@ def _rounded(value: float) -> str:
 
 
 def _by_decade(damping: np.ndarray, needed: np.ndarray) -> FindingTable:
-    """The stroke needed [m], shape (n,), over the limiter's damping [N s/m], decade by decade."""
+    """Return the stroke needed [m], shape (n,), over the limiter's damping [N s/m],
+    decade by decade."""
     decades = np.floor(np.log10(damping * (1 + 1e-9))).clip(max=np.ceil(np.log10(damping[-1])) - 1)
     rows = []
     for decade in np.unique(decades):

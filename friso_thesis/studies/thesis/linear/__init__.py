@@ -73,7 +73,8 @@ class Linear:
 
 
 def analysed(stage: Stage) -> Linear:
-    """The linear analysis of a rig with its joint free; kept, since every reproduction asks for the same rigs."""
+    """Return the linear analysis of a rig with its joint free; kept,
+    since every reproduction asks for the same rigs."""
     return _analysed(stage.to_toml())
 
 

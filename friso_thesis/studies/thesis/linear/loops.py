@@ -65,7 +65,7 @@ class CrossoverLoops:
 
 
 def loops_of(stage: Stage, settings: tuple[float, ...]) -> CrossoverLoops:
-    """The loops of a stage, tuned to the crossovers `settings` [Hz]."""
+    """Return the loops of a stage, tuned to the crossovers `settings` [Hz]."""
     flat = stage.flat()
     tuned = {f: _tuned(flat, f) for f in settings}
     resonances = plant_poles(flat, concatenate_families([*limit_cases(flat).values()]))
@@ -108,12 +108,13 @@ def _single(flat: Mapping[str, Any]) -> float | None:
 
 
 def _highest(flat: Mapping[str, Any]) -> float | None:
-    """The crossover [Hz] up to which all limit cases are stable; None at the end of the search, 0 where none is."""
+    """Return the crossover [Hz] up to which all limit cases are stable;
+    None at the end of the search, 0 where none is."""
     ranges = stable_crossovers(flat, concatenate_families([*limit_cases(flat).values()]))
     end = range_end(ranges, flat[CROSSOVER]) or 0.0
     return None if end == searched_crossovers(flat)[1] else end
 
 
 def _edge(flat: Mapping[str, Any]) -> float:
-    """The delay [s] that some limit case does not bear."""
+    """Return the delay [s] that some limit case does not bear."""
     return float(np.min([margins(flat, member).delay_margin for member in limit_cases(flat).values()]))

@@ -40,17 +40,18 @@ class LimitCase:
 
     @property
     def parasitic(self) -> float:
-        """The resonance closest to the thesis's parasitic mode [Hz]; NaN without any."""
+        """Return the resonance closest to the thesis's parasitic mode [Hz]; NaN without any."""
         return min(self.resonances, key=lambda f: abs(np.log(f / PARASITIC)), default=np.nan)
 
     @property
     def first(self) -> float:
-        """The first resonance [Hz]; NaN without any."""
+        """Return the first resonance [Hz]; NaN without any."""
         return self.resonances[0] if self.resonances else np.nan
 
     @property
     def pair_above(self) -> tuple[float, float] | None:
-        """The first antiresonance above the parasitic mode and the resonance that follows it [Hz]; None without."""
+        """Return the first antiresonance above the parasitic mode and the resonance that follows it
+        [Hz]; None without."""
         pairs = [(z, p) for z in self.antiresonances for p in self.resonances if self.parasitic < z < p]
         return min(pairs, default=None)
 
@@ -65,7 +66,7 @@ class Springs:
 
 
 def springs_of(flat: Mapping[str, Any]) -> Springs:
-    """The springs of a stage whose cart is stuck, its limiter free."""
+    """Return the springs of a stage whose cart is stuck, its limiter free."""
     machine = plant(flat, limit_cases(flat)["stuck"]).take((FORCE,), (STAGE,))
     both = float(1 / abs(machine.at(np.zeros(1))[0, 0, 0, 0]))
     bristles = friction_law(flat["friction.model"]).shown(flat).stiffness
@@ -73,7 +74,8 @@ def springs_of(flat: Mapping[str, Any]) -> Springs:
 
 
 def limit_cases_of(flat: Mapping[str, Any]) -> dict[str, LimitCase]:
-    """All limit cases by name; those with a touched limiter by the formula of Table 1 too, with "-series" behind."""
+    """Return all limit cases by name; those with a touched limiter by the formula of Table 1
+    too, with "-series" behind."""
     cases = limit_cases(flat)
     series = limiter_in_series(flat)
     plain = {name: _limit_case(flat, member) for name, member in cases.items()}

@@ -47,7 +47,7 @@ class Speeds:
 
 
 def loop_over_speed(flat: Mapping[str, Any]) -> Speeds:
-    """The loop of a stage over the speed of its cart."""
+    """Return the loop of a stage over the speed of its cart."""
     unstable = {touched: _unstable(flat, touched) for touched in (False, True)}
     tenth = 2 * np.pi * flat[CROSSOVER] * np.array([0.1, 10.0])
     size = np.abs(np.array([loops(flat, member(speed), tenth)[0] for speed in PRESCRIBED]))
@@ -67,13 +67,13 @@ def _unstable(flat: Mapping[str, Any], touched: bool) -> tuple[Range, ...]:
 
 
 def _sliding(speed: np.ndarray, touched: bool = False) -> Members:
-    """States that slide at these speeds [m/s]."""
+    """Return states that slide at these speeds [m/s]."""
     n = len(speed)
     return Members(speed, np.zeros(n), np.full(n, touched), np.full(n, True))
 
 
 def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
-    """Whether in the middle of some of the ranges no faster controller is stable."""
+    """Tell whether in the middle of some of the ranges no faster controller is stable."""
     settings = FrequencySettings.current()
     crossover = np.geomspace(flat[CROSSOVER], settings.highest_crossover, CROSSOVERS)
     many = faster(flat, crossover / flat[CROSSOVER])

@@ -40,7 +40,7 @@ class Contact:
 
 
 def identified_loop(stage: Stage) -> Margins:
-    """The loop of the sliding cart, its joint free, with the masses that were identified."""
+    """Return the loop of the sliding cart, its joint free, with the masses that were identified."""
     return _sliding(stage.replace(dict(IDENTIFIED)))
 
 
