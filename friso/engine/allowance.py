@@ -1,5 +1,7 @@
-"""How much may be computed to answer one question: counted in work rather than in time, so that the answer is the same
-on every machine."""
+"""Limit how much may be computed to answer one question, counted in work.
+
+Work is counted rather than time, so that the answer is equal on every machine.
+"""
 
 from __future__ import annotations
 

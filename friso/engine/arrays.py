@@ -1,4 +1,4 @@
-"""What goes into a kernel and what comes out: arrays with one row per run."""
+"""Define the arrays that go into a kernel and come out of it, with one row per run."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ import numpy as np
 
 
 class Tables(NamedTuple):
-    """What a drive with a clock looks up, evenly spaced: over position (runs or 1, tables, points), its first place
-    and points per metre (runs or 1, 2), over time (runs or 1, tables, points), and its points per second (1,)."""
+    """Tables that a drive with a clock looks up, evenly spaced.
+
+    Tables over position have the shape (runs or 1, tables, points), with their first place and points per metre (runs
+    or 1, 2). Tables over time have the shape (runs or 1, tables, points), with their points per second (1,).
+    """
 
     places: np.ndarray
     grid: np.ndarray
@@ -22,12 +25,17 @@ NO_TABLES = Tables(np.zeros((1, 0, 2)), np.zeros((1, 2)), np.zeros((1, 0, 2)), n
 
 
 class Batch(NamedTuple):
-    """Runs of one model: constants (n, constants), start states, absolute tolerances (n, states), modes (n, kinks),
-    first and longest steps [s] (n,), pieces of the reference (n, pieces + 1, 1 + inputs), of which the last one only
-    ends the run (in the first dimension also 1: shared by all runs), the number of the piece that begins the window
-    in which extremes are taken (n,), the period and the lateness of the drive's clock [s] (n, 2), the least swing [m]
-    between two turning points that are kept (n,), and what is looked up. Start states go on with the numbers that are
-    held."""
+    """Inputs of the runs of one model; the first dimension may also be 1, shared by all runs.
+
+    - Constants (n, constants), start states, and absolute tolerances (n, states). Start states are followed by the
+      numbers that are held.
+    - Modes (n, kinks); first and longest steps [s] (n,).
+    - Pieces of the reference (n, pieces + 1, 1 + inputs); the last only ends the run.
+    - The number of the piece with which the window for extremes begins (n,).
+    - The period and the lateness of the drive's clock [s] (n, 2).
+    - The smallest swing [m] between two turning points that are kept (n,).
+    - The tables that a drive looks up.
+    """
 
     constants: np.ndarray
     starts: np.ndarray
@@ -43,9 +51,12 @@ class Batch(NamedTuple):
 
 
 class BatchOptions(NamedTuple):
-    """What all runs share: relative tolerance, step budget, the two bands of settling [m], the time [s] from which
-    turning points are kept, the sampling interval [s], and a flag, shape (1,), that is set to have no further run
-    begun."""
+    """Options shared by all runs.
+
+    They are the relative tolerance, the step budget, and the two bands of settling [m]. Then come the time [s] from
+    which turning points are kept, and the sampling interval [s]. A flag, shape (1,), when set, keeps further runs from
+    starting.
+    """
 
     rtol: float
     budget: float
@@ -57,8 +68,11 @@ class BatchOptions(NamedTuple):
 
 
 class Results(NamedTuple):
-    """What the runs leave: statistics (n, len(STATISTICS)), status (n,), turning points (n, capacity) with their
-    count (n,), sampled states and numbers held (n, samples, states + held), and the same at the end."""
+    """Outputs of the runs.
+
+    Statistics (n, len(STATISTICS)), status (n,), turning points (n, capacity) with their count (n,). Then sampled
+    states with the numbers held (n, samples, states + held), and both at the end of the run.
+    """
 
     statistics: np.ndarray
     statuses: np.ndarray
@@ -94,7 +108,7 @@ where a drive has a clock: its samples tell them."""
 
 
 class Status(IntEnum):
-    """How a run ended."""
+    """Outcomes of a run for the solver."""
 
     NOT_RUN = 0
     DONE = 1
@@ -105,6 +119,7 @@ class Status(IntEnum):
 
     @property
     def text(self) -> str:
+        """Return the status in words."""
         return _TEXTS[self]
 
 

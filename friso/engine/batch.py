@@ -37,11 +37,16 @@ MORE = 2
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How to run: relative tolerance, bands of settling [m], start of the window for extremes as a share of the run,
-    time [s] from which turning points are kept (at most half of the run), the least swing [m] between two of them, a
-    number or one for each run (the smaller ones of a zigzag are passed over), how many there is room for at first,
-    sampling interval [s] (None: no samples), step budget, threads,
-    and a flag, shape (1,): once it is set from another thread, no further run begins."""
+    """Options of runs.
+
+    - Relative tolerance, step budget, and number of threads.
+    - Bands of settling [m]; start of the window for extremes, as a share of the run.
+    - Time [s] from which turning points are kept, at most half of the run.
+    - Smallest swing [m] between two of them, one number or one per run: smaller legs of a zigzag are skipped.
+    - Room for turning points at first.
+    - Sampling interval [s] (None: no samples).
+    - A flag, shape (1,): once another thread sets it, no further run begins.
+    """
 
     rtol: float = 1e-6
     bands: tuple[float, float] = (1e-6, 1e-5)

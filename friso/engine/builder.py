@@ -1,8 +1,8 @@
-"""The program that fills the cache: ``python -m friso.engine.builder FOLDER``.
+"""Run the program that fills the cache: ``python -m friso.engine.builder FOLDER``.
 
-It is asked pairs, the name of a module and a task (`friso.platform.helper_process`), has the module's
-`build(folder, task)` keep what the task asks for in the cache's FOLDER, and answers the name of the entry, or the
-OSError that kept it from that.
+It receives pairs, the name of a module and a task (`friso.platform.helper_process`). The module's `build(folder, task)`
+compiles for the task into the cache's FOLDER. The program answers the name of the entry, or the OSError that prevented
+it.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ def main(folder: Path) -> None:
     gc.set_threshold(*GARBAGE)
 
     def built(asked: tuple[str, bytes]) -> str | OSError:
+        """Build one request; return the name of its entry, or the error that prevented it."""
         builder, task = asked
         try:
             return import_module(builder).build(folder, task)

@@ -1,7 +1,8 @@
-"""Has processes of its own compile what is missing in the cache, as many at a time as there are cores.
+"""Compile code that is missing in the cache in separate processes,
+as many at a time as there are cores.
 
-They are processes of their own so that what runs is always what is kept, loaded from its file, and so that a command
-which finds everything compiled loads neither SymPy nor a compiler's front end.
+With separate processes, the code that runs is always the code on file, loaded from the cache. A command that finds
+everything compiled loads neither SymPy nor a compiler's front end.
 """
 
 from __future__ import annotations
@@ -54,8 +55,10 @@ def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
 
 
 class _Work:
-    """What a process is building: each request once for all of its threads that wait for it, as many at a time as there
-    are cores."""
+    """Builds in progress in this process, as many at a time as there are cores.
+
+    Each request is built once for all threads that wait for it.
+    """
 
     def __init__(self) -> None:
         self._cores, self._turn = Semaphore(usable_cores()), Lock()
@@ -108,6 +111,7 @@ class _Work:
         return left
 
     def _do(self, job: _Job) -> None:
+        """Build one job in a process, and hand its result to all threads that wait for it."""
         error: BaseException | None = None
         try:
             job.meet()
@@ -222,8 +226,10 @@ class _Job:
 
 @dataclass(frozen=True)
 class _Surroundings:
-    """What a builder is started with and what it has loaded: by which process (one that was forked has none of its
-    own), for which cache, where modules are, which plug-ins."""
+    """Conditions under which a builder was started; another builder is needed if they change.
+
+    They are the process (a forked one has no builder of its own), the cache, the places of modules, and the plug-ins.
+    """
 
     process: int
     folder: Path

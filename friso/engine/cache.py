@@ -144,7 +144,8 @@ def environment() -> str:
 
 @dataclass(frozen=True)
 class Compiled:
-    """What is kept of one module: its name in the cache, its source, the same for the interpreter, and machine code."""
+    """Cache entry of one module: its name, its source, its byte code for the interpreter,
+    and its machine code."""
 
     name: str
     source: str
@@ -158,9 +159,11 @@ class Compiled:
 
 @dataclass(frozen=True)
 class CodeRequest:
-    """What is to be compiled: its `name` in full, a `title` for people, the module whose `build(folder, task)` keeps it
-    in the cache (`keep`) and returns the name of its entry, the task that it is given, and the digests of the plug-ins
-    that it loads."""
+    """Request to compile code.
+
+    It has the full `name`, a `title` for people, and the task. `build(folder, task)` of its module stores the code in
+    the cache (`keep`) and returns the name of the entry. The digests of the plug-ins that it loads belong to it.
+    """
 
     name: str
     title: str

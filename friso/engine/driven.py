@@ -21,9 +21,12 @@ CHUNK, FEWEST, MOST = 4e6, 16, 256
 
 @dataclass(frozen=True)
 class Inputs:
-    """What the runs follow, every `sample_time` [s]: reference [m] and force on the stage besides the controller's [N],
-    both of shape (n,). Between samples the velocity of the reference, at each its central difference, is a straight
-    line; the force is one too unless it is `held`, as a sampled drive does."""
+    """Inputs that runs follow, every `sample_time` [s]:
+    the reference [m] and the force on the stage [N], shape (n,).
+
+    The force acts besides the controller's. The velocity at each sample is the central difference of the reference, and
+    linear between samples. The force is linear too, or constant if `held`, as in a sampled drive.
+    """
 
     reference: np.ndarray
     force: np.ndarray
@@ -32,7 +35,7 @@ class Inputs:
 
     @property
     def velocity(self) -> np.ndarray:
-        """Of the reference at the samples [m/s], shape (n,)."""
+        """Return the velocity of the reference at the samples [m/s], shape (n,)."""
         return np.gradient(self.reference, self.sample_time)
 
     @property

@@ -201,7 +201,8 @@ def enter_segment(B, layout, lane, j, segment, batch):
 
 
 def walk(B, layout, lane, w):
-    """Where a lane is on the way that tables are looked up over, in their points: a state's, or the time's."""
+    """Return the place of a lane along the axis of its tables, in points: by a state,
+    or by time."""
     timed = w == layout.place_states.size
     axis = (layout.axis + (AXIS_ROWS if timed else 0)) * layout.lanes + lane
     if timed:
@@ -351,7 +352,7 @@ def next_segment(B, layout, lane, j, batch):
 
 
 def stands(B, layout, lane):
-    """Whether the reference stands still in the segment that the lane is in."""
+    """Tell whether the reference stands still in the present segment of the lane."""
     velocity = (layout.reference + 1) * layout.lanes + lane
     return B[velocity] == 0.0 and B[velocity + layout.lanes] == 0.0
 
@@ -365,7 +366,7 @@ def look_inside(B, layout, lane, fraction, batch, settings, results):
 
 
 def outcome(B, layout, lane, batch, settings):
-    """How the lane's run has ended; not run where it goes on."""
+    """Return how the lane's run has ended, or that it goes on."""
     if B[ROW.segment * layout.lanes + lane] >= batch.segments.shape[1] - 1:
         return DONE
     if B[ROW.attempted * layout.lanes + lane] >= settings.budget:

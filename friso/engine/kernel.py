@@ -46,8 +46,11 @@ _CALLS = re.compile(r"\b(?:exp|gaussian|power|sqrt|tanh|sine|log|clipped)\(")
 
 @dataclass(frozen=True)
 class Kernel:
-    """A generated module with its names (states, numbers held between samples, parameters and outputs), its layout with
-    the addresses of its machine code, and the loops that run it; and its source."""
+    """A generated module with its machine code and the loops that run it.
+
+    It has the names of states, of numbers held between samples, of parameters and outputs. It also has its layout with
+    the addresses of the machine code, and its source.
+    """
 
     module: ModuleType
     layout: ModelLayout = field(compare=False)
@@ -75,6 +78,7 @@ class Kernel:
 
     @property
     def states(self) -> tuple[str, ...]:
+        """Return the names of the states."""
         return self.module.STATE_NAMES
 
     @property
@@ -125,6 +129,7 @@ class Kernel:
 
     @property
     def parameters(self) -> tuple[str, ...]:
+        """Return the names of the parameters."""
         return self.module.PARAMETERS
 
     @property
@@ -142,11 +147,16 @@ class Kernel:
         return self.settled_at(self.values(flat, runs), steady, runs)
 
     def settled_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
-        """The same for stages given by the values of their parameters."""
+        """Return states in a steady motion that has lasted,
+        for stages given by the values of their parameters."""
         return columns(self.module.settled(steady, values), runs)
 
     def unwound_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
-        """The same with all integrals 0, the force of the controller being what follows from that."""
+        """Return states in a steady motion with all integrals 0,
+        for stages given by the values of their parameters.
+
+        The force of the controller follows from the other states.
+        """
         resting = self.settled_at(values, steady._replace(force=0.0), runs)
         if integrals := self.having(Role.INTEGRAL):
             per_newton = self.settled_at(values, steady._replace(force=1.0), runs) - resting
@@ -185,8 +195,10 @@ class Kernel:
 
 @dataclass(frozen=True)
 class KernelRequest:
-    """Which kernel: for what, with variational equations or without, by the named method, in so many lanes. The
-    deviations of variational equations may be `along` keys of the stage file too."""
+    """Request for a kernel: the structure, the solver's method and the number of lanes.
+
+    It may have variational equations, whose deviations may also be `along` keys of the stage file.
+    """
 
     structure: KernelForm
     variational: bool = False
@@ -265,6 +277,7 @@ def _request(request: KernelRequest) -> CodeRequest:
 
 
 def _load(request: KernelRequest, entry: Compiled) -> None:
+    """Load a compiled kernel from its entry in the cache."""
     with _loading:
         if request in _kernels:  # another thread was first
             return

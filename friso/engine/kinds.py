@@ -18,7 +18,7 @@ class NumberKind:
 
     @property
     def form(self) -> str:
-        """Its words, as `struct` has it."""
+        """Return the format of the number for `struct`."""
         return "d" if self.name == "float" else "q"
 
     def words(self, value: Any) -> list[Any]:
@@ -40,6 +40,7 @@ class ArrayKind:
 
     @property
     def form(self) -> str:
+        """Return the format of the array's address and shape for `struct`."""
         return "q" * (1 + self.dimensions)
 
     def words(self, value: Any) -> list[Any]:
@@ -57,6 +58,7 @@ class RecordKind:
 
     @property
     def form(self) -> str:
+        """Return the format of the record's fields for `struct`, one after another."""
         return "".join(kind.form for _, kind in self.fields)
 
     def words(self, value: Any) -> list[Any]:
@@ -81,7 +83,7 @@ def argument_kind(example: Any) -> CompiledKind:
 
 
 class Packing:
-    """How arguments of some kinds are handed over: one after another."""
+    """Layout of arguments of given kinds, one after another."""
 
     def __init__(self, kinds: Sequence[CompiledKind]) -> None:
         self._kinds, self._struct = tuple(kinds), struct.Struct("".join(kind.form for kind in kinds))

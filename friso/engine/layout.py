@@ -1,4 +1,5 @@
-"""Where the lanes keep their numbers: one flat float64 buffer, row by row, with the lanes of a row side by side."""
+"""Lay out the numbers of the lanes in one flat float64 buffer, row by row,
+the lanes of a row side by side."""
 
 from __future__ import annotations
 

@@ -97,6 +97,8 @@ def _looked_up(model: Model, writer: StepWriter) -> dict[str, tuple[int, ...]]:
 
 
 def _numpy_functions(model: Model, writer: StepWriter) -> str:
+    """Write the functions of a model for NumPy arrays: constants, scales, steady states,
+    outputs and others."""
     names: dict[sp.Symbol, str] = {p: f"p[{i}]" for i, p in enumerate(model.parameters)}
     names |= {s: f"x[{i}]" for i, s in enumerate(model.symbols)}
     names |= {r: f"r[{i}]" for i, r in enumerate(model.fixed)} | {TIME: "t"}

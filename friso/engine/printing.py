@@ -78,6 +78,8 @@ def print_scalar(expr: Any, rename: Rename) -> str:
 
 
 class _Renamed(NumPyPrinter):
+    """Printer of expressions as NumPy code, with symbols renamed to places in arrays."""
+
     def __init__(self, rename: Rename) -> None:
         super().__init__({"fully_qualified_modules": False})
         self._rename = rename

@@ -1,4 +1,4 @@
-"""What has not been used for long is deleted from the folder of compiled code."""
+"""Delete compiled code that has not been used for long."""
 
 from __future__ import annotations
 
@@ -16,8 +16,12 @@ KEPT_FOR, KEPT_IN_ALL = 60 * DAY, 200_000_000
 
 
 def prune(folder: Path) -> None:
-    """Delete what has not been used for long, then what has not been used for longest as long as there is too much, and
-    what killed processes left. What another process is writing is left alone."""
+    """Delete compiled code that has not been used for long,
+    and files that killed processes left behind.
+
+    If the folder is still too large, the code unused for longest goes next. Files that another process is writing are
+    left alone.
+    """
     try:
         with FileLock(folder / "prune.lock", blocking=False, mode=0o600):
             size, now = 0, time.time()

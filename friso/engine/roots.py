@@ -15,9 +15,11 @@ def cubic(p0, p1, p2, p3, theta):
 
 
 def bracket(p0, p1, p2, p3):
-    """Where the cubic first is below zero: the ends of an interval with its first zero, and the cubic there.
+    """Bracket the first zero of a cubic: return an interval that holds it,
+    and the cubic at its ends.
 
-    It is looked at in the thirds, at the end, and where it is least; the upper end is 2 where it is nowhere below zero.
+    The cubic is evaluated at the thirds, at the end, and at its minimum. The upper end is 2 if it is nowhere below
+    zero.
     """
     c1 = -5.5 * p0 + 9.0 * p1 - 4.5 * p2 + p3
     c2 = 9.0 * p0 - 22.5 * p1 + 18.0 * p2 - 4.5 * p3
@@ -42,10 +44,10 @@ def first_guess(p0, p1, p2, p3):
 
 
 def crossing(p0, p1, p2, p3, guess):
-    """Where the cubic first falls below zero, from `first_guess`.
+    """Find where the cubic first falls below zero, starting from `first_guess`.
 
-    Three Newton steps find it, halving the bracket where a step would leave it; what has not converged then is taken
-    at the bracket's far end.
+    Three Newton steps find it; a step that would leave the bracket halves it instead. Without convergence, the far end
+    of the bracket is returned.
     """
     c1 = -5.5 * p0 + 9.0 * p1 - 4.5 * p2 + p3
     c2 = 9.0 * p0 - 22.5 * p1 + 18.0 * p2 - 4.5 * p3

@@ -108,6 +108,7 @@ class _RecordValue:
         raise TypeError(f"not in the language of plain loops: no field {name}")
 
     def _field(self, builder: Any, place: int, kind: CompiledKind) -> Any:
+        """Load a field of the record at a place among its words."""
         if isinstance(kind, RecordKind):
             return _RecordValue(builder.gep(self.words, [ir.Constant(_INT64, place)]), kind)
         parts = []
@@ -148,6 +149,7 @@ class _Writer:
     def _write(
         self, function: Callable[..., Any], kinds: tuple[CompiledKind, ...]
     ) -> tuple[ir.Function, NumberKind | None]:
+        """Write a function for arguments of these kinds as LLVM code."""
         tree = syntax(function)
         signature = ir.FunctionType(_INT64, [part for kind in kinds for part in _types(kind)])
         code = ir.Function(self.module, signature, self.module.get_unique_name(function.__name__))
@@ -234,6 +236,7 @@ class _Frame(ast.NodeVisitor):
         self._assign(node.target, self._operate(node.op, self.visit(node.target), self.visit(node.value)))
 
     def _assign(self, target: ast.expr, value: Any) -> None:
+        """Assign a value to a name, to several names, or to an element of an array."""
         if isinstance(target, ast.Tuple):
             for part, element in zip(target.elts, value, strict=True):
                 self._assign(part, element)
@@ -264,6 +267,7 @@ class _Frame(ast.NodeVisitor):
         self._builder.store(self._number(number, variable.kind).value, variable.room)
 
     def visit_Return(self, node: ast.Return) -> None:
+        """Write a return; a function without a value returns nothing."""
         if node.value is None:
             self._builder.ret(ir.Constant(_INT64, 0))
             return
@@ -276,6 +280,7 @@ class _Frame(ast.NodeVisitor):
         self._builder.ret(value)
 
     def visit_If(self, node: ast.If) -> None:
+        """Write a branch with its two sides."""
         condition = self.visit(node.test)
         if not isinstance(condition, _Value):
             self._statements(node.body if condition else node.orelse)
@@ -323,6 +328,7 @@ class _Frame(ast.NodeVisitor):
         self._loop(node, body, increment, after)
 
     def _loop(self, node: ast.For | ast.While, body: ir.Block, repeat: ir.Block, after: ir.Block) -> None:
+        """Write the body of a loop, with its `break` and `continue`."""
         if node.orelse:
             self.generic_visit(node)
         self._builder.position_at_end(body)
@@ -360,6 +366,8 @@ class _Frame(ast.NodeVisitor):
         return self._outside[node.id] if node.id in self._outside else getattr(builtins, node.id)
 
     def visit_Attribute(self, node: ast.Attribute) -> Any:
+        """Write access to an attribute: a constant of a module, a field of a record,
+        or the shape of an array."""
         value = self.visit(node.value)
         if isinstance(value, _RecordValue):
             return value.field(self._builder, node.attr)
@@ -373,6 +381,7 @@ class _Frame(ast.NodeVisitor):
         return getattr(value, node.attr)
 
     def visit_Subscript(self, node: ast.Subscript) -> Any:
+        """Write access to an element, or to a row, of an array."""
         array = self.visit(node.value)
         if not isinstance(array, _ArrayValue):
             return array[self.visit(node.slice)]
@@ -397,6 +406,7 @@ class _Frame(ast.NodeVisitor):
         return self._builder.gep(array.data, [place], inbounds=True)
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> Any:
+        """Write a negation of a number or of a truth value."""
         operand = self.visit(node.operand)
         if not isinstance(operand, _Value):
             return -operand if isinstance(node.op, ast.USub) else not operand
@@ -412,6 +422,7 @@ class _Frame(ast.NodeVisitor):
         return self._operate(node.op, self.visit(node.left), self.visit(node.right))
 
     def _operate(self, sign: ast.operator, left: Any, right: Any) -> Any:
+        """Write an arithmetic operation on two numbers."""
         if not isinstance(left, _Value) and not isinstance(right, _Value):
             return _PYTHON[type(sign)](left, right)
         if isinstance(sign, ast.Div):
@@ -455,6 +466,7 @@ class _Frame(ast.NodeVisitor):
         return _Value(self._meet(after, ends, _BIT), TRUTH)
 
     def visit_IfExp(self, node: ast.IfExp) -> Any:
+        """Write a conditional expression, of which only one side is computed."""
         condition = self.visit(node.test)
         if not isinstance(condition, _Value):
             return self.visit(node.body if condition else node.orelse)
@@ -484,6 +496,7 @@ class _Frame(ast.NodeVisitor):
         return value
 
     def visit_Call(self, node: ast.Call) -> Any:
+        """Write a call of a built-in, a NumPy function, or a function that is compiled too."""
         function, arguments = self.visit(node.func), [self.visit(argument) for argument in node.args]
         if node.keywords:
             self.generic_visit(node)
@@ -563,7 +576,7 @@ class _Frame(ast.NodeVisitor):
 
 @dataclass(frozen=True)
 class _Variable:
-    """Where a number is kept."""
+    """Storage of a number in a frame."""
 
     room: ir.Value
     kind: NumberKind

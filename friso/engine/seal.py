@@ -1,5 +1,8 @@
-"""What friso keeps for itself is sealed: an authenticator (HMAC-SHA-256, RFC 2104) by a secret of this user tells that
-friso wrote it under just this name, even where others could once write to the folder."""
+"""Seal the files that friso keeps for itself.
+
+An authenticator (HMAC-SHA-256, RFC 2104) by a secret of this user shows that friso wrote a file under exactly this
+name. This holds even where others could once write to the folder.
+"""
 
 from __future__ import annotations
 

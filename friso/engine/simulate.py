@@ -31,15 +31,14 @@ MOST_SAMPLES = 20_000_000
 
 
 def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None) -> xr.Dataset:
-    """Time response of a stage to its motion.
+    """Simulate a stage's own motion, and return its time response.
 
-    Variables over `time` [s], each with `units` and `long_name`: reference, position, velocity, error, force and
-    its shares, cart position and velocity, joint deflection and force, friction force and bristle deflection, as far
-    as the stage has them; and the extrema of position minus reference over `turning_point`. `attrs` hold the stage
-    as TOML text, rtol, status, steps and rejected steps. `sample_time` [s] defaults to a 20 000th of the duration;
-    samples are taken from the method's dense output. Units are those of the stage's kind of axis. A run that fails has
-    NaN from there on, and the reason in `status`. Raises InputError for a sample time and a tolerance
-    that is not usable.
+    Variables over `time` [s], each with `units` and `long_name`: reference, position, velocity, error, force and its
+    shares, cart position and velocity, joint deflection and force, friction force and bristle deflection, as far as the
+    stage has them; and the extrema of position minus reference over `turning_point`. `attrs` hold the stage as TOML
+    text, rtol, status, steps and rejected steps. `sample_time` [s] defaults to a 20 000th of the duration; samples are
+    taken from the method's dense output. Units are those of the stage's kind of axis. A run that fails has NaN from
+    there on, and the reason in `status`. Raises InputError for a sample time and a tolerance that is not usable.
     """
     flat = stage.flat()
     duration = flat["motion.duration"]
@@ -82,6 +81,8 @@ def time_axis(time: np.ndarray) -> dict[str, Any]:
 def _dataset(
     stage: Stage, shape: Kernel, flat: dict[str, Any], runs: Runs, time: np.ndarray, rtol: float
 ) -> xr.Dataset:
+    """Return the signals of a run as a dataset over time, with units,
+    names and the status of the run."""
     import xarray as xr
 
     results = runs.results

@@ -257,6 +257,7 @@ class StepWriter:
         return f"B[{self._rows[block] + i}]"
 
     def _load(self) -> list[str]:
+        """Write the code that loads states, modes and constants of a lane from the buffer."""
         named = {
             "x": [f"x{i}" for i in range(self.size)],
             "tolerance": [f"tol{i}" for i in range(self.size)],
@@ -290,6 +291,7 @@ class StepWriter:
         return [*lines, "edge = stop if together else min(stop, due)"]
 
     def _stages(self) -> list[str]:
+        """Write the stages of the Rosenbrock step: linear solves, and the states in between."""
         method = self.tableau
         lines = [f"diagonal, inverse = {1 / method.gamma!r} * per_h, {method.gamma!r} * h"]
         for i in range(self.size):

@@ -1,11 +1,11 @@
-"""Writes straight-line Python, made for one lane, as vector instructions for all lanes.
+"""Write straight-line Python, made for one lane, as vector instructions for all lanes.
 
 The step of a model is a thousand lines without a branch. A general compiler would infer the type of every variable in
 them, and find out that the lanes do not depend on each other. Here each operation becomes one instruction on a vector
-with an element per lane, which takes a fraction of the time and leaves nothing to a vectoriser's judgement.
+with an element per lane. This takes a fraction of the time, and does not rely on a vectoriser.
 
-The language: assignments, arithmetic, comparisons, conditional expressions (both sides of which are computed), tuples,
-`for` over a known range, and functions written in it, which are inlined.
+The language has assignments, arithmetic, comparisons and tuples. It also has conditional expressions, both sides of
+which are computed, and `for` over a known range. Functions written in it are inlined.
 """
 
 from __future__ import annotations
@@ -34,12 +34,13 @@ CACHE_LINE = 64
 
 
 def vector_llvm(functions: Mapping[str, Callable[..., Any]], lanes: int) -> ir.Module:
-    """Functions under these names, as LLVM has it. Each does what its original `(B, *numbers)` does to a column of
-    numbers B[row], in each of so many lanes of a flat float64 buffer in which those of a row lie side by side; the
-    numbers are the same for all.
+    """Compile functions to LLVM code under these names, for so many lanes at once.
 
-    It takes the buffer's address and the numbers, and returns a whole number whose bits tell for which lanes the
-    original returned something true: bit 0 that of lane 0.
+    An original `(B, *numbers)` works on a column of numbers B[row]. The compiled function does so in every lane of a
+    flat float64 buffer, in which the lanes of a row lie side by side; the numbers are common to all lanes.
+
+    It takes the buffer's address and the numbers. It returns a whole number whose bit k is set if the original would
+    return true for lane k.
     """
     module = ir.Module()
     for name, function in functions.items():
@@ -48,6 +49,7 @@ def vector_llvm(functions: Mapping[str, Callable[..., Any]], lanes: int) -> ir.M
 
 
 def _add(module: ir.Module, name: str, function: Callable[..., Any], lanes: int) -> None:
+    """Add a function to an LLVM module, written as vector instructions for so many lanes."""
     numbers = [_FLOAT.element] * (len(syntax(function).args.args) - 1)
     signature = ir.FunctionType(_SIGNED.element, [ir.PointerType(_FLOAT.element), *numbers])
     code = ir.Function(module, signature, name)
@@ -64,7 +66,7 @@ def _add(module: ir.Module, name: str, function: Callable[..., Any], lanes: int)
 
 @dataclass(frozen=True)
 class _Kind:
-    """What the elements of a vector are, and the names of the instructions of the operators."""
+    """Type of a vector's elements, with the names of the instructions for its operators."""
 
     element: ir.Type
     instructions: Mapping[type[ast.AST], str]
@@ -268,6 +270,7 @@ class _Frame(ast.NodeVisitor):
                 self.visit(statement)
 
     def _assign(self, target: ast.expr, value: Any) -> None:
+        """Assign a value to a name, to several names, or to a row of the buffer."""
         if isinstance(target, ast.Tuple):
             for part, element in zip(target.elts, value, strict=True):
                 self._assign(part, element)
@@ -318,6 +321,7 @@ class _Frame(ast.NodeVisitor):
         return self._writer.select(*(self.visit(part) for part in (node.test, node.body, node.orelse)))
 
     def visit_Call(self, node: ast.Call) -> Any:
+        """Write a call: of a mathematical function, or of a function that is inlined."""
         function, arguments = self.visit(node.func), [self.visit(argument) for argument in node.args]
         if not any(isinstance(argument, _Vector) for argument in arguments):
             return function(*arguments)

@@ -1,4 +1,4 @@
-"""How fast a controller is, and the same controller made faster or slower as a whole."""
+"""Return the bandwidth of a controller, and make it faster or slower as a whole."""
 
 from __future__ import annotations
 

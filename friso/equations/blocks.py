@@ -1,8 +1,7 @@
-"""What controllers are made of: signals, and blocks that act on them.
+"""Define the parts of controllers: signals, and blocks that act on them.
 
-A controller is declared once, in terms of `Blocks`. There are two kinds of these, from which follow its two
-realisations: `friso.equations.continuous`, for cycles, verdicts and Bode plots, and `friso.equations.sampled`, as a
-drive carries it out.
+A controller is declared once, in terms of `Blocks`. Two kinds of blocks give its two realisations.
+`friso.equations.continuous` serves cycles, verdicts and Bode plots; `friso.equations.sampled` computes as a drive does.
 """
 
 from __future__ import annotations
@@ -26,9 +25,12 @@ from friso.stage.standstill import FrictionSettings
 
 @dataclass(frozen=True)
 class Loop:
-    """What a controller sees: error [m], position [m], its rate, that of the reference [m/s], its acceleration
-    [m/s^2], and its direction: 1 ahead, -1 back, 0 at rest; and the position [m] at the encoder of the velocity, where
-    that is another one."""
+    """Inputs of a controller.
+
+    They are the error [m], the position [m] and its rate, and the rate [m/s] and acceleration [m/s^2] of the reference.
+    The direction of the reference is 1 ahead, -1 back, 0 at rest. The position [m] at the encoder of the velocity is
+    separate where that is another encoder.
+    """
 
     error: sp.Expr
     position: sp.Expr
@@ -56,9 +58,12 @@ class Controller:
 
 @dataclass(frozen=True)
 class Signal:
-    """A signal in a controller: its value, the magnitude below which it does not matter, its value and its rate in a
-    steady motion that has lasted (in terms of `STEADY`), and, as far as there are such expressions, its rate in
-    continuous time and its value at the sample before. Signals are added, and multiplied by gains."""
+    """A signal in a controller.
+
+    It has its value, the magnitude below which it does not matter, and its value and rate in a steady motion that has
+    lasted (in terms of `STEADY`). Where such expressions exist, it also has its rate in continuous time and its value
+    at the sample before. Signals can be added, and multiplied by gains.
+    """
 
     value: sp.Expr
     scale: sp.Expr
@@ -68,6 +73,7 @@ class Signal:
     before: sp.Expr | None = None
 
     def __add__(self, other: Signal) -> Signal:
+        """Add two signals, with all their expressions."""
         return Signal(
             self.value + other.value,
             self.scale or other.scale,
@@ -78,6 +84,7 @@ class Signal:
         )
 
     def __mul__(self, gain: Any) -> Signal:
+        """Multiply a signal, with all its expressions, by a gain."""
         return Signal(
             gain * self.value,
             sp.Abs(gain) * self.scale,
@@ -99,8 +106,11 @@ class Signal:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a controller acts on: error and position [m]; the position of which the velocity is the rate, from the same
-    encoder or another; velocity [m/s], acceleration [m/s^2] and direction (1, -1, 0) of the reference."""
+    """Measured inputs of a controller.
+
+    They are error and position [m], and the position behind the velocity, from one encoder or from two. Of the
+    reference they are velocity [m/s], acceleration [m/s^2] and direction (1, -1, 0).
+    """
 
     error: Signal
     position: Signal

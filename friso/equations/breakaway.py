@@ -55,7 +55,7 @@ def _variant(flat: Mapping[str, Any]) -> Hashable:
 
 
 def _breakaway(flat: Mapping[str, Any]) -> Any:
-    """That of one law [N]; 0 without friction."""
+    """Return the break-away force of one friction law [N]; 0 without friction."""
     force = _breakaway_of(flat["friction.model"], _variant(flat))
     return 0.0 if force is None else force(flat)
 

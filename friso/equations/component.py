@@ -1,7 +1,8 @@
-"""What every part of the model is made of: states, kinks and outputs, written in SymPy symbols.
+"""Define the building blocks of the model: states, kinks and outputs,
+written in SymPy symbols.
 
-A parameter is a symbol that bears its stage-file key as its name, so that the value of a parameter is looked up
-in the flat stage and a derivative with respect to it is a sensitivity to that key.
+A parameter is a symbol named after its stage-file key. So its value is looked up in the flat stage, and a derivative
+with respect to it is a sensitivity to that key.
 """
 
 from __future__ import annotations
@@ -52,8 +53,11 @@ class State:
 
 @dataclass(frozen=True)
 class Held:
-    """A number that is held between samples, what it becomes at one, in terms of what held just before, its value in a
-    steady motion that has lasted, in terms of `STEADY`, and its role."""
+    """A number that is held between samples.
+
+    It has an expression for its next value, in terms of the values held just before, and its value in a steady motion
+    that has lasted (in terms of `STEADY`). It also has a role.
+    """
 
     symbol: sp.Symbol
     update: sp.Expr
@@ -150,11 +154,11 @@ class Kink:
         return Kink(self.name, self.surface, narrow=self.narrow, starts=cast(sp.Expr, self.surface.xreplace(sides)))
 
     def called(self, name: str) -> Self:
-        """The same with another name; `beyond` is to be replaced in what contains it."""
+        """Return the kink with another name; replace `beyond` in expressions that contain it."""
         return replace(self, name=name)
 
     def with_values(self, values: Mapping[Any, Any]) -> Kink:
-        """The same with expressions put in the place of others."""
+        """Return the kink with some expressions replaced by others."""
         surface, narrow = (cast(sp.Expr, expression.xreplace(values)) for expression in (self.surface, self.narrow))
         starts = None if self.starts is None else cast(sp.Expr, self.starts.xreplace(values))
         return Kink(self.name, surface, narrow=narrow, starts=starts)
@@ -190,7 +194,7 @@ class Switch(Kink):
         return {x: (1 - self.beyond) * self.entered.get(x, x) + self.beyond * self.left.get(x, x) for x in changed}
 
     def with_values(self, values: Mapping[Any, Any]) -> Switch:
-        """The same with expressions put in the place of others."""
+        """Return the switch with some expressions replaced by others."""
         enter, leave, begins = (
             cast(sp.Expr, expression.xreplace(values)) for expression in (self.enter, self.leave, self.begins)
         )

@@ -52,7 +52,7 @@ def friction_level(name: str, conditions: bool) -> sp.Expr:
 
 
 def level_under_conditions(flat: Mapping[str, Any], name: str) -> Any:
-    """The same [N] of a stage given as flat keys."""
+    """Return a friction level [N] of a stage given as flat keys, under its operating conditions."""
     return flat[f"friction.{name}"] * flat.get(factor_key(name), 1.0)
 
 

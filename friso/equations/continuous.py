@@ -88,8 +88,11 @@ def _per_error(value: sp.Expr) -> sp.Expr:
 
 @dataclass(frozen=True)
 class ForceLimit:
-    """The limit of the force [N], the force that keeps to it, its kinks, by how much [N] it is off the demand, and what
-    integrators do then."""
+    """A limit of the force [N].
+
+    It has the force within the limit, its kinks, its difference from the demand [N], and the behaviour of integrators
+    at the limit.
+    """
 
     limit: sp.Expr
     force: sp.Expr
@@ -99,7 +102,7 @@ class ForceLimit:
 
     @classmethod
     def of(cls, demand: Signal, anti_windup: AntiWindup) -> ForceLimit:
-        """That of a demand."""
+        """Make the force limit for a demand."""
         limit = force_limit()
         force, kinks = _clamped(demand.value, limit, "force")
         return cls(limit, force, kinks, force - demand.value, anti_windup)
@@ -243,8 +246,11 @@ class Continuous(Blocks):
         return (Switch("positive_error", error, -error, error, empty, empty),) if empty else ()
 
     def finished(self, demand: Demand, bound: ForceLimit | None) -> tuple[tuple[State, ...], tuple[Kink, ...]]:
-        """Return all states, the integrators doing as they are to where the demand is beyond its
-        bound, and resting where their output is beyond a limit of its own; and the kinks of that."""
+        """Return all states and the kinks, with the integrators' behaviour at limits.
+
+        Integrators follow the anti-windup where the demand exceeds its bound. They rest where their output exceeds a
+        limit of its own.
+        """
         steady = wound_up(demand.force.settled, [integral.symbol for integral in self._integrals])
         states = [replace(part, settled=part.settled.xreplace(steady)) for part in self.states]
         clamp = bound if bound and bound.anti_windup == "clamp" else None

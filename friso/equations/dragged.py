@@ -21,13 +21,16 @@ IMPULSE = "impulse"
 
 @dataclass(frozen=True)
 class Dragged(Imposed):
-    """Which law, and what else its equations depend on (see `Structure`)."""
+    """Friction law of a body that follows a reference,
+    and the rest on which its equations depend (see `Structure`)."""
 
 
 def dragged(form: Dragged) -> Model:
-    """Return the equations of the law on a body with the position [m],
-    velocity [m/s] and acceleration [m/s^2] of a reference, as `friso.engine.driven.run_driven` gives them at every
-    sample."""
+    """Return the equations of a friction law on a body that follows a reference.
+
+    The reference gives position [m], velocity [m/s] and acceleration [m/s^2] at every sample, as in
+    `friso.engine.driven.run_driven`.
+    """
     import sympy as sp
 
     from friso.equations.component import Output, Role, State, key, state

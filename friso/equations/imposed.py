@@ -30,7 +30,7 @@ HARMONIC = ("in_phase", "in_quadrature")
 
 @dataclass(frozen=True)
 class Imposed:
-    """Which law, and what else its equations depend on (see `Structure`)."""
+    """Friction law on a body with an imposed motion, and its variant (see `Structure`)."""
 
     friction: str
     friction_variant: Hashable

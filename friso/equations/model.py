@@ -35,18 +35,21 @@ SMALLEST_LENGTH = sp.Rational(1, 10**4)
 
 @dataclass(frozen=True)
 class Model:
-    """The equations of a stage: of the bodies `stage`, which is measured, and `cart`, which feels friction; a rigid
-    stage has one that is both.
+    """Equations of a stage with the bodies `stage`, which is measured, and `cart`,
+    which feels friction.
 
-    The right-hand side is smooth while the kinks' `beyond` symbols are held; `TIME` counts from the last corner
-    of the reference. `deviation` [m] is position minus reference, `length` [m] and `rate` [1/s] the scales of
-    the motion from which the solver takes its absolute tolerances, `breakaway` [N] the largest friction force at rest,
-    `steady` [N] the one in a steady motion, None where the law cannot say it, and `stiffness` [N/m] the proportional
-    one of the loop. `jumps` gives by how much states jump where a
-    kink is crossed, in terms of what holds just before: kinks to states to expressions.
+    A rigid stage has one body that is both. The right-hand side is smooth while the kinks' `beyond` symbols are held.
+    `TIME` counts from the last corner of the reference.
 
-    `inputs` are what a run is given anew at every corner of the reference, in this order. Between corners, or between
-    the samples of a `clock` where there is one, the numbers `held` stay as they are.
+    - `deviation` [m]: position minus reference.
+    - `length` [m] and `rate` [1/s]: scales of the motion, from which the solver takes its absolute tolerances.
+    - `breakaway` [N]: largest friction force at rest; `steady` [N]: friction in a steady motion, None where the law
+      lacks it.
+    - `stiffness` [N/m]: proportional stiffness of the loop.
+    - `jumps`: jumps of states where a kink is crossed, in terms of the values just before: kinks to states to
+      expressions.
+    - `inputs`: values given anew at every corner of the reference, in this order.
+    - `held`: numbers that stay constant between corners, or between the samples of a `clock` if there is one.
     """
 
     states: tuple[State, ...]
@@ -220,6 +223,8 @@ class Pushes:
 
 
 def _bodies(structure: Structure) -> Bodies:
+    """Return the bodies of a stage with their masses: cart, stage,
+    and a parasitic mass or a motor if there is one."""
     motor = Body.named("motor_", key(MOTOR_MASS)) if structure.transmission else None
     if structure.joint == "rigid":
         rigid = Body.named("", sum((key(f"masses.{name}") for name in structure.masses), start=sp.S.Zero))
@@ -268,9 +273,12 @@ def _steady(chain: Bodies, friction: Friction | None, motor_friction: Friction |
 
 
 def _scales(structure: Structure, breakaway: sp.Expr, mass: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Length [m] by which the break-away force deflects the control loop (about the motion itself where that is
-    shorter), and the natural frequency of mass and loop [1/s]: a hunting cycle is a few of the one in size and period.
-    Without friction the length is that of the motion, or else the deflection by the forces of [bias]."""
+    """Return the length [m] and the rate [1/s] by which a hunting cycle is sized.
+
+    The length is the deflection of the loop by the break-away force, or about the motion itself if that is shorter. The
+    rate is the natural frequency of mass and loop. A hunting cycle is a few of each in size and period. Without
+    friction the length is that of the motion, or else the deflection by the forces of [bias].
+    """
     stiffness = loop_stiffness(structure.controller)
     if breakaway == 0:
         bias = sum((sp.Abs(key(f"bias.{name}")) for name in structure.biased), start=sp.S.Zero)

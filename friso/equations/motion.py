@@ -22,6 +22,8 @@ def _there(flat: Mapping[str, Any]) -> Any:
 
 
 def _there_and_back(flat: Mapping[str, Any]) -> list[Piece]:
+    """Return the pieces of a motion there and back: time, position,
+    velocity and acceleration at each corner."""
     a, ramp, return_at = (flat[f"motion.{name}"] for name in ("acceleration", "acceleration_time", "return_at"))
     size, top, cruise = _there(flat), a * ramp, flat.get(CRUISE)
     if cruise is not None:
@@ -125,8 +127,11 @@ def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def standing(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the flat keys of a stage with a motion whose reference stands from the start where
-    that of its own motion, which comes to stand, does from its last corner on; magnitudes remain those of its own."""
+    """Return the flat keys of a stage whose reference stands from the start.
+
+    It stands where the reference of its own motion stands after the last corner. Magnitudes remain those of its own
+    motion.
+    """
     if flat["motion.kind"] != "there_and_back":
         return dict(flat)
     return {**without_motion(flat), "motion.kind": "release", "motion.displacement": size(flat)}

@@ -27,13 +27,14 @@ BLOCK = 4
 
 
 def friction_factors(flat: Mapping[str, Any], places: np.ndarray, seed: int | None = None) -> np.ndarray:
-    """Factors of static and of Coulomb friction at places [m], shape (n,), of one run: shape (2, n).
+    """Return factors of static and of Coulomb friction at places [m], shape (n,), of one run:
+    shape (2, n).
 
     (1 + offset) (1 + sum of A_n cos(2 pi n x / pitch + phase_n)) exp(s g - s^2 / 2), with s^2 = log(1 + deviation^2):
     lognormal of mean 1 and of the standard deviation given, hence positive, from one Gaussian field g for both, since
     both follow the same preload. Flat keys "rail.*" describe it, all 1 without them; `seed` replaces that of the rail.
-    What stands at a place does not depend on the other places. Raises InputError for a correlation length that
-    is no more than a speck of the places' range.
+    What stands at a place does not depend on the other places. Raises InputError for a correlation length that is no
+    more than a speck of the places' range.
     """
     rail = {key.removeprefix("rail."): value for key, value in flat.items() if key.startswith("rail.")}
     if not rail:

@@ -1,4 +1,5 @@
-"""What states are, and the motion from which runs begin, for modules that use states by role."""
+"""Name the roles of states, and the motion from which runs begin,
+for modules that use states by role."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ from typing import Any, NamedTuple
 
 
 class Role(StrEnum):
-    """What a state is."""
+    """Role of a state in the model."""
 
     POSITION = "position"
     """Of a mass [m]."""

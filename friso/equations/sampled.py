@@ -80,14 +80,15 @@ class _Integral:
 
 @dataclass(frozen=True)
 class DiscreteRate:
-    """What stands for s in discrete time: 2 (1 - 1/z)/(step (1 + weight/z)), step [s]."""
+    """Discrete-time substitute for s: 2 (1 - 1/z)/(step (1 + weight/z)), step [s]."""
 
     step: sp.Expr
     weight: sp.Integer
 
     @classmethod
     def by(cls, rule: FilterRule, period: sp.Expr, exact_at: sp.Expr) -> DiscreteRate:
-        """That of a rule with a period [s], prewarped to be exact at an angular frequency [rad/s]."""
+        """Make the substitute of a rule with a period [s],
+        prewarped to be exact at an angular frequency [rad/s]."""
         if rule == "backward_euler":
             return cls(2 * period, sp.S.Zero)
         if rule == "prewarped":
@@ -285,9 +286,12 @@ class Sampled(Blocks):
         return Rest(rests, restarts)
 
     def finished(self, demand: Demand, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
-        """Return the force before it is limited, and all that is held,
-        the integrators doing as they are to where the force would be beyond its limit, and resting where their output
-        would be beyond a limit of its own."""
+        """Return the force before it is limited, and all numbers held,
+        with the integrators' behaviour at limits.
+
+        Integrators follow the anti-windup where the force would exceed its limit. They rest where their output would
+        exceed a limit of its own.
+        """
         settings = self._standstill(demand.error.value) if self._integrals else Rest()
         rest = Rest(sp.Or(rest.rests, settings.rests), sp.Or(rest.restarts, settings.restarts))
         new: dict[Any, Any] = {}

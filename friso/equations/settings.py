@@ -41,8 +41,12 @@ stiffness."""
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting: its `name` in words, what it does (`says`, names of its keys in braces standing for their values),
-    whether it needs an integral, its `sizes`, and the ranges in which it is tuned (None: it is not)."""
+    """A setting of a controller against friction.
+
+    It has its `name` in words, and its effect in words (`says`, with names of its keys in braces for their values). It
+    says whether it needs an integral. `sizes` computes values of its keys for a machine, and `tuned_in` the ranges in
+    which it is tuned (None: it is not tuned).
+    """
 
     name: str
     says: str
@@ -51,11 +55,12 @@ class Setting:
     tuned_in: Ranges | None = None
 
     def numbers(self, flat: FlatMachine, within: float) -> dict[str, float]:
-        """Its keys in a stage file, and their values [SI]."""
+        """Return the setting's keys in a stage file, and their values [SI]."""
         return {ControllerSection.key(name): value for name, value in self.sizes(flat, within).items()}
 
     def ranges(self, flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
-        """Its keys in a stage file, and the ends [SI] between which they are tuned; none where it is not."""
+        """Return the setting's keys in a stage file,
+        and the ends [SI] between which they are tuned; none if it is not tuned."""
         if self.tuned_in is None:
             return {}
         return {ControllerSection.key(name): ends for name, ends in self.tuned_in(flat, within).items()}
@@ -103,7 +108,8 @@ def _dithers(flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]
 
 
 def _own_frequency(flat: FlatMachine) -> float:
-    """That [Hz] of the moving mass on the proportional stiffness of the loop; 0 where it has none."""
+    """Return the frequency [Hz] of the moving mass on the proportional stiffness of the loop;
+    0 without one."""
     proportional, _ = slow_gains(flat)
     return sqrt(max(proportional, 0.0) / moving_mass(flat)) / (2 * pi)
 

@@ -1,4 +1,5 @@
-"""Which equations a stage needs. Stages with equal structure share one set of equations and differ in numbers only."""
+"""Describe the equations that a stage needs;
+stages of equal structure share them and differ in numbers only."""
 
 from __future__ import annotations
 
@@ -31,10 +32,13 @@ JointForm = Literal["rigid", "locked", "free", "touching"]
 
 @dataclass(frozen=True)
 class ControllerForm:
-    """Which controller, by its kind and the name of the class of its form; what else its equations depend on; whether
-    it has integral action; what that does at the limit of the force (None: there is no limit); its filters; its
-    settings against friction; which of its loops have sample times of their own; and how a drive takes its integrals
-    (None: as the controller says) and the low-pass filters of its own."""
+    """Structure of a controller: its kind, the class of its form,
+    and the choices on which its equations depend.
+
+    These are whether it has integral action, and its anti-windup at the force limit (None: no limit). Further ones are
+    its filters, its settings against friction, and the loops with their own sample times. A drive may also choose how
+    integrals (None: as the controller says) and low-pass filters are computed.
+    """
 
     kind: str
     form: str
@@ -67,8 +71,11 @@ class ControllerForm:
 
 @dataclass(frozen=True)
 class TransmissionForm:
-    """Whether there is a backlash; the law of the friction at the motor ("none": there is no such friction), with what
-    else its equations depend on; and on which sides position and velocity are measured."""
+    """Structure of a transmission.
+
+    It has a backlash or not; a friction law at the motor ("none": no friction there) with its choices; and the sides on
+    which position and velocity are measured.
+    """
 
     backlash: bool
     friction: str
@@ -160,6 +167,7 @@ def _joint_form(flat: Mapping[str, Any]) -> JointForm:
 
 
 def _transmission_form(flat: Mapping[str, Any]) -> TransmissionForm:
+    """Return the structure of a stage's transmission from its flat keys."""
     at_motor = {"friction.model": "none", **as_friction(flat)}
     law = at_motor["friction.model"]
     return TransmissionForm(

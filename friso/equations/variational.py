@@ -1,8 +1,8 @@
-"""The variational equations: how a small deviation from a motion evolves beside it.
+"""Derive the variational equations: how a small deviation from a motion evolves.
 
-Between kinks the deviation obeys the linearised equations. Where a kink is crossed at which the right-hand side
-itself jumps, or the state does, the deviation jumps with it, since the motion beside crosses a little earlier or later:
-the saltation matrix (Leine, Nijmeijer 2004, doi:10.1007/978-3-540-44398-8, chapter 7).
+Between kinks the deviation obeys the linearised equations. At a kink the right-hand side or the state itself may jump.
+The deviation then jumps too, because the neighbouring motion crosses a little earlier or later. The jump is the
+saltation matrix (Leine, Nijmeijer 2004, doi:10.1007/978-3-540-44398-8, chapter 7).
 """
 
 from __future__ import annotations
@@ -79,7 +79,8 @@ def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Exp
 
 
 def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
-    """The same where states become R(x): the deviations become DR small + (f+ - DR f-) share, f+ taken at R(x)."""
+    """Return the jump of deviations at a kink where states become R(x):
+    DR small + (f+ - DR f-) share, f+ taken at R(x)."""
     becomes = switch.becomes
     behind = {**becomes, switch.beyond: 1 - switch.beyond}
     before = {part.symbol: part.derivative for part in model.states}

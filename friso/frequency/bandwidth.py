@@ -28,8 +28,10 @@ def loop_bandwidth(stage: Stage) -> float:
 
 
 def rigid_bandwidth(stage: Stage) -> float:
-    """The same with its joint locked and without a parasitic mode: of the mass as a whole, as crossovers by van Dijk's
-    rules are."""
+    """Return the bandwidth of a stage with its joint locked and without a parasitic mode.
+
+    The mass then moves as a whole, as van Dijk's rules for the crossover assume.
+    """
     flat = {key: value for key, value in stage.flat().items() if not key.startswith("parasitic.")}
     return _last_crossing({**flat, "joint.locked": True} if stage.joint else flat)
 
@@ -48,8 +50,11 @@ def bandwidths_at(stage: Stage, factors: Sequence[float] | np.ndarray) -> np.nda
 @np.errstate(all="ignore")
 def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.ndarray:
     """Return the bandwidths [Hz] of a stage with changes, arrays of shape (count,),
-    in continuous time: to a share of 1e-3, as loops are looked at on a grid of frequencies and their gain is taken to
-    be a power of it in between. With other gains at standstill they are the larger ones of both."""
+    in continuous time.
+
+    They are exact to a share of 1e-3: the loop is computed on a grid of frequencies, and its gain is a power of
+    frequency in between. If the gains at standstill differ, the larger bandwidth counts.
+    """
     flat, sliding = stage.flat(), _sliding(stage.flat())
     omega = with_resonances(2 * np.pi * GRID, [poles(flat, sliding, DriveTiming(0.0, 0.0)).cut])
     machines = sliding.repeated(count)

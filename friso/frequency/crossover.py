@@ -1,4 +1,5 @@
-"""How fast a controller may be: the crossovers at which a stage is stable, and has the modulus margin wanted."""
+"""Find how fast a controller may be: the crossovers at which a stage is stable with the
+wanted modulus margin."""
 
 from __future__ import annotations
 

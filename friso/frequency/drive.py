@@ -26,8 +26,12 @@ SCALED = 0.5
 
 @dataclass(frozen=True)
 class DriveTiming:
-    """Sample time [s], 0 for a controller in continuous time, delay between measurement and force [s], the samples
-    after which all its loops are due again, and the time constant of the current loop [s], 0 without one."""
+    """Timing of a drive.
+
+    It has the sample time [s], 0 for a controller in continuous time, and the delay between measurement and force [s].
+    `every` number of samples after which all loops are due again, and the time constant of the current loop [s], 0
+    without one.
+    """
 
     sample_time: float
     delay: float
@@ -122,9 +126,11 @@ def waited(machine: System, samples: int) -> System:
 
 
 def delayed(machine: System, delay: float, loop: float) -> System:
-    """Return a plant with one input behind a delay [s], as a row of rational functions (Pade),
-    whose closed loop without delay has resonances of up to `loop` [rad/s]. Raises InputError where the plant's own turn
-    too often in the delay."""
+    """Return a plant with one input behind a delay [s], as a row of rational functions (Pade).
+
+    The closed loop without delay has resonances of up to `loop` [rad/s]. Raises InputError where the plant's own
+    resonances turn too often within the delay.
+    """
     settings = FrequencySettings.current()
     turn = fastest(np.linalg.eigvals(machine.a).astype(complex)) * delay
     sections = int(

@@ -1,8 +1,9 @@
-"""A whole family of states at once: friction as an impedance between cart and ground, the masses computed once.
+"""Analyse a family of states at once: friction is an impedance between cart and ground,
+the masses are computed once.
 
-The masses without friction answer forces on stage and cart by g (2 x 2), with the cart held the stage by h. A cart that
-feels the dynamic stiffness k = s Z of friction makes the stage answer by (g_ss + k g_cc h)/(1 + k g_cc), without taking
-large numbers from each other: a few operations for each member and frequency.
+The masses without friction respond to forces on stage and cart by g (2 x 2), and by h with the cart held. With the
+dynamic stiffness k = s Z of friction on the cart, the stage responds by (g_ss + k g_cc h)/(1 + k g_cc). No large
+numbers are subtracted, and each member and frequency takes a few operations.
 """
 
 from __future__ import annotations
@@ -50,6 +51,7 @@ class Scan:
 
     @property
     def stable(self) -> np.ndarray:
+        """Return which members are stable."""
         return self.abscissa < 0
 
     @cached_property

@@ -29,9 +29,12 @@ FORWARD = str(direction(VELOCITY).beyond)
 
 @dataclass(frozen=True)
 class LinearFriction:
-    """A friction law as a linear system from the velocity of the cart to its force, and its steady states: those of its
-    internal states, and then of its modes that remember and the sides of its kinks, that slide at a velocity, and that
-    bear a bias force at rest; and the lengths [m] among the scales of its states."""
+    """A friction law as a linear system from the velocity of the cart to its force.
+
+    It also has the law's steady states, sliding at a velocity and bearing a bias force at rest. These are its internal
+    states, then its modes that remember and the sides of its kinks. The lengths [m] among the scales of its states
+    belong to it.
+    """
 
     declared: Declared
     modes: tuple[str, ...]
@@ -42,6 +45,7 @@ class LinearFriction:
 
     @property
     def states(self) -> tuple[str, ...]:
+        """Return the number of internal states of the law."""
         return tuple(map(str, self.declared.states))
 
 

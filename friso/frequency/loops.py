@@ -31,16 +31,20 @@ ROUNDING = 50 * float(np.finfo(float).eps)
 
 
 def open_loop(flat: Mapping[str, Any], members: Members) -> System:
-    """Return the loop cut at the actuator force, in continuous time:
-    from the force on the stage to the force with which the controller answers, its sign reversed, so that 1 + L = 0 at
-    the poles of the closed loop."""
+    """Return the loop cut at the actuator force, in continuous time.
+
+    It runs from the force on the stage to the force of the controller, with reversed sign, so that 1 + L = 0 at the
+    poles of the closed loop.
+    """
     return _cut(plant(flat, members), compensator(flat, len(members)))
 
 
 def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
-    """Return the closed loop in continuous time: from a force on the stage, reference,
-    disturbance on the cart, noise of the sensor and what is fed forward of the reference to all that the plant shows
-    and the actuator force."""
+    """Return the closed loop in continuous time, with all its inputs and outputs.
+
+    Inputs are a force on the stage, the reference, a disturbance on the cart, noise of the sensor, and feedforward of
+    the reference. Outputs are those of the plant, and the actuator force.
+    """
     machine, control = plant(flat, members), compensator(flat, len(members))
     ahead = reference_derivatives(control)
     n, k = len(machine.states), len(control.states)

@@ -49,6 +49,7 @@ class Margins:
 
     @property
     def stable(self) -> bool:
+        """Tell whether the closed loop is stable."""
         return self.abscissa < 0
 
     @property
@@ -116,9 +117,11 @@ def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
 
 
 def of_loop(response: LoopResponse, poles: Complex, abscissa: float, omega: np.ndarray, ends: Complex) -> Margins:
-    """Return the margins of a loop from its response,
-    the poles of the closed loop with the real part of the rightmost, frequencies [rad/s] that show it, and its values
-    where it is real at any gain: at rest, and at half the sampling frequency."""
+    """Return the margins of a loop from its response.
+
+    `poles` are those of the closed loop, `abscissa` the real part of the rightmost, and `omega` frequencies [rad/s]
+    that show the loop. `ends` are its values where it is real at any gain: at rest, and at half the sampling frequency.
+    """
     seen = response(omega)
     crossovers = _roots(lambda w: _decades(response(np.array([w])))[0], omega, _decades(seen))
     if abscissa >= 0:

@@ -54,6 +54,7 @@ class Members:
 
     @property
     def stuck(self) -> np.ndarray:
+        """Return which members are stuck."""
         return self.speed == 0
 
     @property
@@ -62,7 +63,7 @@ class Members:
         return self.stuck | (self.speed == self.speed.max())
 
     def with_limiter(self, touched: bool) -> Members:
-        """The same with the limiter touched or not."""
+        """Return the members with the limiter touched or not."""
         return replace(self, touched=np.full(len(self), touched))
 
     def repeated(self, times: int) -> Members:
@@ -110,8 +111,11 @@ def limit_cases(flat: Mapping[str, Any]) -> dict[str, Members]:
 
 
 def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS) -> Members:
-    """Every limit case's neighbours: stuck under bias forces up to nearly the break-away force, for and against the
-    motion, and sliding at all speeds, in both directions if friction differs between them."""
+    """Return states near every limit case of a stage, stuck and sliding.
+
+    Stuck members bear bias forces up to nearly break-away, for and against the motion. Sliding members cover all
+    speeds, in both directions if friction differs between them.
+    """
     settings = FrequencySettings.current()
     flat = leading_friction(flat)
     if flat["friction.model"] == "none":

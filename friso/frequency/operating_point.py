@@ -14,8 +14,11 @@ from friso.stage.transmission import STATE_PREFIX, of_motor
 
 
 def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
-    """Return values of the internal states of the law, of its modes that remember,
-    of the sides of its kinks and of its direction, by name, each of shape (members,)."""
+    """Return operating points of a friction law by name, each of shape (members,).
+
+    They are the values of its internal states, of its modes that remember, of the sides of its kinks, and of its
+    direction.
+    """
     law, forward = law_of(flat), members.forward.astype(float)
     if law is None:
         return {}
@@ -30,7 +33,8 @@ def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]
 
 
 def operating_point_of_motor(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
-    """The same as `operating_point` at the motor, which moves with the load and bears no bias."""
+    """Return operating points of the friction law at the motor,
+    which moves with the load and bears no bias."""
     unbiased = replace(members, bias=np.zeros(len(members)))
     point = operating_point(of_motor(flat), unbiased)
     beyond = "beyond_"

@@ -46,9 +46,12 @@ _CONTROLLER_INPUTS = {
 
 
 def plant(flat: Mapping[str, Any], members: Members) -> System:
-    """From the forces on stage and cart [N] to position of stage and cart, joint deflection, position at the velocity's
-    encoder [m] and velocity of the stage [m/s], of members all of which are stuck or none; `flat` may hold arrays of
-    shape (members,)."""
+    """Return the plant of members that are all stuck, or all not.
+
+    Inputs are the forces on stage and cart [N]. Outputs are the positions of stage and cart, the joint deflection, the
+    position at the velocity's encoder [m], and the velocity of the stage [m/s]. `flat` may hold arrays of shape
+    (members,).
+    """
     form = _plant(shared_structure(flat))
     velocity = np.where(members.forward, members.speed, -members.speed)
     values = {**flat, **operating_point(flat, members)}

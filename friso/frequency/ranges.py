@@ -1,4 +1,4 @@
-"""Where something holds along one axis: ranges whose ends are located."""
+"""Find the ranges along one axis in which a condition holds, with their ends located."""
 
 from __future__ import annotations
 

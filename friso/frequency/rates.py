@@ -1,11 +1,13 @@
-"""Sampled loops, at one rate or several: a controller sample by sample, and what repeats after a period lifted to it.
+"""Analyse sampled loops, at one rate or several,
+lifted to the period after which all loops are due again.
 
-The controller is that of `friso.equations.sampled`, as a drive carries it out. Over a period of N samples the loop is
-a system with N inputs and outputs that does not change (lifting: Chen, Francis 1995, Optimal Sampled-Data Control
-Systems, chapter 8; Bittanti, Colaneri 2009, Periodic Systems, chapter 6). Its poles decide on stability. Cut at
-the actuator it has N characteristic loci; a gain or a phase that is the same at all samples takes it to the edge where
-one of them passes -1 (MacFarlane, Postlethwaite 1977, doi:10.1080/00207177708922217), so that margins are those of a
-locus. With all loops at one rate the loci are the loop's response at a frequency and at its aliases.
+The controller is that of `friso.equations.sampled`, as a drive computes it. Over a period of N samples the loop is a
+time-invariant system with N inputs and outputs (lifting: Chen, Francis 1995, Optimal Sampled-Data Control Systems,
+chapter 8; Bittanti, Colaneri 2009, Periodic Systems, chapter 6). Its poles decide on stability.
+
+Cut at the actuator, it has N characteristic loci. A gain or a phase common to all samples brings it to the edge of
+stability where one locus passes -1 (MacFarlane, Postlethwaite 1977, doi:10.1080/00207177708922217). So margins are
+those of a locus. With all loops at one rate, the loci are the loop's response at a frequency and at its aliases.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ class Lifted:
     d: np.ndarray
 
     def at(self, points: np.ndarray) -> Complex:
-        """Its transfer matrices at points (k,) of z to the power N, shape (members, k, N, N)."""
+        """Return the transfer matrices at points (k,) of z to the power N, shape (members, k, N, N)."""
         shifted = points[:, None, None] * np.eye(self.a.shape[-1]) - self.a[:, None]
         states = np.linalg.solve(shifted, self.b[:, None].astype(complex)).astype(complex)
         return self.c[:, None].astype(complex) @ states + self.d[:, None]
@@ -50,8 +52,11 @@ class Lifted:
         return self.at(np.exp(1j * turn * self.d.shape[-1]))
 
     def fundamental(self, turn: np.ndarray) -> Complex:
-        """Return the part of the answer to a harmonic signal that has its frequency,
-        shape (members, k), for the angle (k,) [rad] by which it turns in a sample."""
+        """Return the part of the response to a harmonic signal that has its frequency,
+        shape (members, k).
+
+        The signal turns by an angle (k,) [rad] in each sample.
+        """
         return _fundamental(self.over(turn), turn)
 
     def locus(self, turn: np.ndarray) -> Complex:

@@ -33,7 +33,8 @@ class Tuning:
 
     @property
     def parallel(self) -> dict[str, float]:
-        """The same as gains of Eq. 6, on the error behind the low-pass: kp [N/m], ki [N/(m s)], kd [N s/m], tau [s]."""
+        """Return the tuning as gains of Eq. 6, on the error behind the low-pass: kp [N/m],
+        ki [N/(m s)], kd [N s/m], tau [s]."""
         return as_gains(self.k_p, self.tau_z, self.tau_i, self.tau_p)
 
     @property

@@ -1,7 +1,8 @@
-"""What comes first where friso is a command, in a module that needs next to nothing: a signal that comes while the rest
-is imported is noted, and nothing of that is looked for in the current folder, which may be someone else's.
+"""Prepare the command line before the rest of friso is imported;
+this module needs next to nothing.
 
-Nothing is done where friso is used as a library.
+A signal that arrives during the import is noted. No module is looked for in the current folder, which may belong to
+someone else. Nothing is done where friso is used as a library.
 """
 
 import os

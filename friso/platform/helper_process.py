@@ -57,8 +57,10 @@ class HelperProcess:
 
 
 def answer_questions(answer: Callable[[Any], Any], orphaned: bool = True) -> None:
-    """What such a process does: answer the questions on standard input until there are no more, or none comes for a
-    while. Unless it may be `orphaned`, it ends, whatever it is at, once the process that started it has."""
+    """Answer the questions on standard input until there are no more, or none comes for a while.
+
+    Unless the process may be `orphaned`, it ends at once when the process that started it has ended.
+    """
     if not orphaned:
         Thread(target=_end_with, args=[os.getppid()], daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: who started this one ends it

@@ -1,7 +1,8 @@
-"""What installed packages add to friso: modules that they name in entry points, by group.
+"""Find modules that installed packages add to friso, which they name in entry points,
+by group.
 
-Names are read from the metadata of packages, without importing any; a module is imported when it is asked for. A name
-that is taken, or a module that cannot be used, is told in one sentence and left out: the rest of friso goes on.
+Names are read from the metadata of packages, without importing any; a module is imported when it is needed. A name that
+is taken, or a module that cannot be used, is reported in one sentence and left out; the rest of friso goes on.
 """
 
 from __future__ import annotations

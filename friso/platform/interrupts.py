@@ -1,8 +1,9 @@
-"""Ctrl-C, a termination and a closed terminal end the command line in one line, whenever they come.
+"""End the command line in one line on Ctrl-C, a termination or a closed terminal,
+whenever they come.
 
-Importing friso and its libraries takes up to a second, in which an exception is lost, or ends in a traceback out of a
-library that is half there. So a signal raises KeyboardInterrupt only where no import is under way, and before the
-command begins it is noted (`friso.platform.early`). Where that does not end the command in time, the process is ended.
+Importing friso and its libraries takes up to a second. An exception in this time is lost, or ends in a traceback from a
+half-loaded library. So a signal raises KeyboardInterrupt only while no import is under way. Before the command begins,
+it is noted (`friso.platform.early`). If the command does not end in time, the process is ended.
 """
 
 from __future__ import annotations
@@ -87,8 +88,10 @@ def raising() -> Iterator[None]:
 
 
 def raise_what_waits() -> None:
-    """Wait for the KeyboardInterrupt of a signal that came during an import, before anything is done that must be
-    whole, for whose end it would have to wait."""
+    """Raise the KeyboardInterrupt of a signal that came during an import.
+
+    It is called before work that must not be cut short, because a later signal would have to wait for its end.
+    """
     while _waits and not _held:
         time.sleep(_AGAIN)
 

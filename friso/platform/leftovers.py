@@ -33,7 +33,7 @@ def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
 
 
 def temporary_folder(prefix: str) -> AbstractContextManager[Path]:
-    """The same where the system keeps temporary files."""
+    """Make a temporary folder where the system keeps temporary files."""
     return locked_folder(Path(tempfile.gettempdir()), prefix, "lock")
 
 

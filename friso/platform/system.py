@@ -1,4 +1,4 @@
-"""What differs between operating systems: Linux, macOS and Windows."""
+"""Hide the differences between operating systems: Linux, macOS and Windows."""
 
 import errno
 import math
@@ -149,15 +149,19 @@ if sys.platform == "win32":
         return f"{cause}; a path of {length} characters, which Windows takes only if long paths are enabled"
 
     def foreign_writers(status: os.stat_result) -> str:
-        """Nobody: what is below a user's profile is the user's own by its access lists, which a mode does not tell."""
+        """Return in words who else than this user and root may write to a file,
+        or replace files in a folder; "" for nobody.
+
+        In a folder with the sticky bit (/tmp), everybody may only replace their own files.
+        """
         return ""
 
     def is_users_own(status: os.stat_result) -> bool:
-        """Yes: see `foreign_writers`."""
+        """Tell whether a file belongs to this user."""
         return True
 
     def is_open_to_others(status: os.stat_result) -> bool:
-        """No: see `foreign_writers`."""
+        """Tell whether others than this user may read a file, or write to it."""
         return False
 
     def closed_to_others(folder: Path) -> os.stat_result:

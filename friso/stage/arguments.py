@@ -99,9 +99,11 @@ MOST_SEED = 2**31 - 1
 
 @dataclass(frozen=True)
 class ArgumentKind:
-    """What an annotation stands for: a test, what passes it in words, and an example of that; and on the command line
-    what `metavar` stands for its value ("": the name of the parameter) and of which `command_type` one value is, of
-    which there may be `several`."""
+    """Kind of an argument, chosen by its annotation.
+
+    It has a test, words for values that pass it, and an example. On the command line, `metavar` stands for the value
+    ("": the name of the parameter), and `command_type` is the type of one value; there may be `several`.
+    """
 
     holds: Callable[[Any], bool]
     words: str
@@ -211,9 +213,12 @@ def alternatives(annotation: str) -> list[str]:
 
 
 def check_arguments(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
-    """Return a function that raises InputError for an argument of another type than is
-    annotated, and for a path that is none, and TypeError for a keyword that it lacks; where it takes a Stage, it takes
-    its file or tables as well. Raises KeyError for an annotation that is no kind of argument."""
+    """Return a function that checks its arguments against their annotations.
+
+    It raises InputError for an argument of another type, or for a path that does not exist, and TypeError for an
+    unknown keyword. Where a Stage is expected, its file or tables are accepted as well. Raises KeyError for an
+    annotation that is no kind of argument.
+    """
     parameters = signature(function)
     kinds = {
         name: {part: KINDS[part] for part in alternatives(str(parameter.annotation))}
@@ -225,6 +230,7 @@ def check_arguments(function: Callable[Arguments, Returned]) -> Callable[Argumen
 
     @wraps(function)
     def call(*arguments: Arguments.args, **options: Arguments.kwargs) -> Returned:
+        """Check the arguments, then call the function."""
         if unknown := options.keys() - parameters.parameters.keys() if takes_no_others else ():
             nearest = near_words(min(unknown), parameters.parameters)
             raise TypeError(f"{function.__name__}() has no keyword {min(unknown)!r}{nearest}")

@@ -1,4 +1,5 @@
-"""What a stage file may say, but hardly means: implausible values, and an encoder that nothing reads."""
+"""Warn of stage files that are valid but hardly meant: implausible values,
+and an encoder that nothing reads."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ PRESLIDING = (1e-10, 1e-2)
 
 @dataclass(frozen=True)
 class _Usual:
-    """What positioning stages have [SI], and the units in which it is told."""
+    """Range of values [SI] that is usual for positioning stages,
+    with the unit in which it is shown."""
 
     low: float
     high: float

@@ -1,10 +1,10 @@
-"""Where registered sections come from that are not friso's own, so that another process can register them too.
+"""Register sections from other packages and files, and find them again in another process.
 
-Friso's own are named here. Installed packages name theirs in entry points, which are read when a name in a stage file
-is not friso's own.
+Friso's own sections are named here. Installed packages name theirs in entry points, which are read if a name in a stage
+file is not friso's own.
 
-A kernel is built in a process of its own, which gets the plug-ins with its task: a friction law or a controller from
-another package, from one file, or from the script that runs.
+A kernel is built in a separate process, which gets the plug-ins with its task. A plug-in is a friction law or a
+controller from another package, from one file, or from the script that runs.
 """
 
 from __future__ import annotations

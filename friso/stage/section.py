@@ -1,4 +1,5 @@
-"""What all tables of a stage file share: strict keys, readable errors, rules, variants by a tag."""
+"""Base of all tables of a stage file: strict keys, readable errors, rules,
+and variants by a tag."""
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping
@@ -36,7 +37,7 @@ class Rule:
     example: str
 
     def at(self, place: str) -> "Rule":
-        """The same between the keys of a table that stands at a place of the stage file."""
+        """Return the rule between the keys of a table at a place of the stage file."""
         keys = tuple(f"{place}.{key}" for key in self.keys)
         return Rule(keys, lambda flat: self.holds(keys_below(flat, place)), self.expected, self.example)
 

@@ -373,7 +373,7 @@ def numeric_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
 
 
 def declared_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
-    """The same in the units in which keys are declared, those of a linear axis."""
+    """Return the keys of a flat stage in their declared units, those of a linear axis."""
     keys: dict[str, Quantity | Number] = {}
     for name, cls in _tables(flat).items():
         keys |= _numeric_keys_of(flat, name, cls)

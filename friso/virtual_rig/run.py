@@ -89,8 +89,11 @@ def run(
 
 
 def _check(flat: Mapping[str, Any], interval: float) -> None:
-    """Raises InputError for an interval that is no whole number of samples, for a delay of too many, and for a rail
-    along which nothing of the friction law varies."""
+    """Check the sampling interval, the delay and the rail of a run.
+
+    Raises InputError for an interval that is no whole number of samples, for a delay of too many, and for a rail along
+    which nothing of the friction law varies.
+    """
     settings = RigSettings.current()
     if (
         "rail.seed" in flat
@@ -119,6 +122,7 @@ def _recorded(
     numbers: np.ndarray,
     timing: tuple[float, int, int | None],
 ) -> RecordedRuns:
+    """Run moves on the virtual rig, and return the signals that the drive records."""
     settings = RigSettings.current()
     interval, count, threads = timing
     flat = {**flat, "drive.seed": seeds.astype(float)}

@@ -1,4 +1,5 @@
-"""What the drive finds around it: friction and motor constant over position, floor and injection over time."""
+"""Build the surroundings of the drive: friction and motor constant over position,
+floor and injection over time."""
 
 from __future__ import annotations
 

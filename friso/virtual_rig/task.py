@@ -1,4 +1,5 @@
-"""What a drive is asked to do: a reference in pieces of parabola, and a force injected beside the controller's."""
+"""Define the task of a drive: a reference in pieces of parabola,
+and a force injected beside the controller's."""
 
 from __future__ import annotations
 

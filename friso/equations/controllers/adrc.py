@@ -46,6 +46,8 @@ class _Parts(NamedTuple):
 
 
 def _parts(blocks: Any) -> _Parts:
+    """Return the parts of the observer-based controller as blocks:
+    the integral and the filter beside it."""
     from sympy import pi
 
     bandwidth, ratio, mass = map(blocks.key, ("bandwidth", "observer_ratio", "tuned_mass"))
@@ -101,12 +103,12 @@ class DisturbanceRejection(ControllerSection):
 
     @classmethod
     def with_defaults(cls, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """It believes in what moves."""
+        """Return the default of the mass that the controller assumes: the moving mass."""
         return {TUNED_MASS: moving_mass(flat)}
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Its keys, and the bandwidth of the observer."""
+        """Return the controller's keys, and the bandwidth of the observer."""
         observer = flat[BANDWIDTH] * flat[OBSERVER_RATIO]
         return (*super().gains(flat), Gain("bandwidth of the observer, w_o/(2 pi)", "fo", observer, "Hz"))
 
@@ -139,8 +141,10 @@ class DisturbanceRejection(ControllerSection):
 
 
 def crossing_ratio(observer_ratio: float) -> float:
-    """How many times its bandwidth the loop of a free mass crosses 0 dB, its mass known: that depends on the ratio
-    of observer to feedback alone.
+    """Return the 0 dB crossover of the loop over the controller's bandwidth,
+    for a free mass that is known.
+
+    It depends only on the ratio of observer to feedback.
 
     Examples
     --------

@@ -36,7 +36,7 @@ SLOWER = 4.0
 
 
 class CascadeTerms(NamedTuple):
-    """Which terms there are; each absent term is absent from the equations."""
+    """Terms that are present; an absent term is absent from the equations."""
 
     position_integral: bool
     velocity_integral: bool
@@ -153,7 +153,7 @@ class Cascade(ControllerSection):
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Its keys, and the integral of the velocity loop as a gain."""
+        """Return the controller's keys, and the integral of the velocity loop as a gain."""
         listed = super().gains(flat)
         if VELOCITY_TIME not in flat:
             return listed

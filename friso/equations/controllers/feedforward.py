@@ -31,7 +31,10 @@ def fed_forward(flat: Mapping[str, Any]) -> str:
 
 def feedforward_of_moves(flat: Mapping[str, Any], *names: str) -> dict[str, float]:
     """Return keys and values [SI] of the feedforward that the moving mass and its viscous
-    friction need, of those `names` of it that a controller has not got."""
+    friction need.
+
+    Only those `names` are included that the controller lacks.
+    """
     needed = {"acceleration_feedforward": moving_mass(flat), "viscous_feedforward": flat.get("friction.viscous", 0.0)}
     return {
         ControllerSection.key(name): float(value)

@@ -28,7 +28,7 @@ SLOWER = 4.0
 
 
 class Terms(NamedTuple):
-    """Which terms there are; each absent term is absent from the equations."""
+    """Terms that are present; an absent term is absent from the equations."""
 
     integral: bool
     filtered: bool
@@ -119,7 +119,8 @@ class PidGains(Pid):
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Its keys; its times; and, where it is one, the gains of a P over a PI controller."""
+        """Return the controller's keys and times and, if it is one,
+        the gains of a P over a PI controller."""
         kp, ki, kd = flat[KP], flat[KI], flat[KD]
         listed = [*super().gains(flat)]
         if ki and kp:

@@ -56,7 +56,7 @@ class VanDijk(Pid):
 
     @classmethod
     def with_defaults(cls, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """It is tuned for what moves."""
+        """Return the default of the mass that the controller is tuned for: the moving mass."""
         return {TUNED_MASS: moving_mass(flat)}
 
     @classmethod

@@ -134,9 +134,11 @@ def _is_direction(kink: Kink) -> bool:
 
 
 class StribeckCurve(NamedTuple):
-    """What the equations of a Stribeck curve depend on: the exponent where it is a small whole number (then it is
-    written out as products), else None; whether friction, and viscous friction, differ between the directions; and
-    whether there are conditions that multiply the levels."""
+    """Choices on which the equations of a Stribeck curve depend.
+
+    The exponent is given if it is a small whole number, and then written out as products; else it is None. The others
+    say whether friction, and viscous friction, differ between directions, and whether conditions multiply the levels.
+    """
 
     exponent: int | None
     asymmetric: bool
@@ -195,7 +197,7 @@ def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp
 
 
 def stribeck_level_from_speed(velocity: sp.Expr, curve: StribeckCurve) -> sp.Expr:
-    """The same g(v) [N] where no sign is held: not differentiable at rest."""
+    """Return g(v) [N] without a held sign, so that it is not differentiable at rest."""
     from sympy import Integer, sqrt
 
     from friso.equations.component import key

@@ -52,7 +52,7 @@ class MeasuredFriction:
 
     @property
     def slope(self) -> np.ndarray:
-        """Of the virgin curve [N/m], shape (n,)."""
+        """Return the slope of the virgin curve [N/m], shape (n,)."""
         slopes = np.gradient(self.force, self.displacement)
         slopes[0] = self.stiffness
         return np.minimum.accumulate(np.clip(slopes, 0.0, self.stiffness))
@@ -83,13 +83,16 @@ def levels_of(flat: Mapping[str, Any]) -> Levels:
 
 
 def levels_under_conditions(flat: Mapping[str, Any]) -> Levels:
-    """The same under the conditions of [conditions]."""
+    """Return the friction levels under the operating conditions of [conditions]."""
     return replace(levels_of(flat), **{name: float(level_under_conditions(flat, name)) for name in LEVELS})
 
 
 def on_bristles(flat: Mapping[str, Any], displacement: np.ndarray, force: np.ndarray) -> MeasuredFriction:
-    """Return what is measured of a law with a Stribeck curve whose bristles,
-    as stiff and damped as those of LuGre, give the virgin curve `force` [N] over `displacement` [m]."""
+    """Return measured quantities of a law with a Stribeck curve and bristles.
+
+    The bristles are as stiff and damped as those of LuGre, and give the virgin curve `force` [N] over `displacement`
+    [m].
+    """
     stiffness, damping = (float(flat[f"friction.bristle_{name}"]) for name in ("stiffness", "damping"))
     return MeasuredFriction(levels_of(flat), stiffness, damping, displacement, force)
 

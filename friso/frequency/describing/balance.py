@@ -1,9 +1,11 @@
-"""Single-harmonic balance: the textbook's test for a limit cycle, which for hunting is no test.
+"""Solve the single-harmonic balance: the textbook's test for a limit cycle,
+which is no test for hunting.
 
-A loop whose friction is replaced by its describing function N(A, omega) has a periodic motion where 1/R(i omega) =
-N(A, omega), R being the receptance of the loop for a friction force (`loop`): -1/R + N = 0 is one complex equation in A
-and omega (Gelb, Vander Velde 1968). Every cell of a grid in amplitude and frequency is asked whether the left side
-turns round zero along its edges, so that "no cycle" is the outcome of a computation and not a solver that failed.
+The friction is replaced by its describing function N(A, omega). The loop then has a periodic motion where 1/R(i omega)
+= N(A, omega), with R the receptance of the loop for a friction force (`loop`). So -1/R + N = 0 is one complex equation
+in A and omega (Gelb, Vander Velde 1968). In every cell of a grid in amplitude and frequency, it is checked whether the
+left side turns around zero along the edges. "No cycle" is then the result of a computation, and not of a solver that
+failed.
 
 Hunting is a jump out of a long rest. Its motion is so far from a sine that this balance finds no cycle where there is
 one: see docs/describing.md.
@@ -39,13 +41,13 @@ at, and how often the grid is halved for it at most."""
 class Balance:
     """Outcome of a single-harmonic balance.
 
-    `amplitudes` [m] and `frequencies` [Hz] of the solutions, with the `residuals` left there, all of shape
-    (solutions,), none of them if there is no cycle. `least` is the smallest residual of the grid, at the amplitude
+    `amplitudes` [m] and `frequencies` [Hz] are the solutions, with the `residuals` left there, all of shape
+    (solutions,). There are none if there is no cycle. `least` is the smallest residual of the grid, at the amplitude
     `least_amplitude` [m] of the cart and `least_frequency` [Hz]. A residual is abs(N - 1/R) over abs(N) + abs(1/R): 0
     where the balance holds, and at most 1.
 
-    That there is no other cycle within the grid is known except for `unknown` cells, at a corner of which friction was
-    not found, and `unsolved` ones, round which the balance turns but in which no solution was found.
+    The grid holds no other cycle, except possibly in two kinds of cell. At a corner of `unknown` cells, friction was
+    not found. Around `unsolved` cells the balance turns, but no solution was found in them.
     """
 
     amplitudes: np.ndarray

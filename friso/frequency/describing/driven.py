@@ -1,8 +1,9 @@
-"""A plant with friction, driven by a sinusoidal force: by which force it moves by how much, and all inverse answers.
+"""Solve for the motion of a plant with friction under a sinusoidal force:
+all amplitudes that a force may give.
 
 The masses, joint and parasitic mode are linear; friction acts on the cart through its describing function N(A, omega).
-A force of amplitude Phi on the stage moves the cart by x_c = H_cs Phi - H_cc N x_c, so that its amplitude A is a root
-of A abs(1 + H_cc N(A)) / abs(H_cs) = Phi, where H are the compliances of the masses without friction.
+A force of amplitude Phi on the stage moves the cart by x_c = H_cs Phi - H_cc N x_c. So its amplitude A is a root of A
+abs(1 + H_cc N(A)) / abs(H_cs) = Phi, where H are the compliances of the masses without friction.
 """
 
 from __future__ import annotations
@@ -40,8 +41,12 @@ class DrivenPlant:
         return cls(flat, frequencies, compliances, rtol)
 
     def answer(self, amplitudes: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Forces [N] that move the cart by amplitudes [m] at the frequencies with these numbers, the positions of
-        stage and cart over them [m/N], complex, and the dynamic stiffness of friction [N/m], each of shape (count,)."""
+        """Return the forces [N] that move the cart by amplitudes [m] at the frequencies with these
+        numbers.
+
+        Also returns the positions of stage and cart over the forces [m/N], complex, and the dynamic stiffness of
+        friction [N/m], each of shape (count,).
+        """
         stiffness = dynamic_stiffness(self.flat, amplitudes, self.frequencies[which], self.rtol)
         compliances = self.compliances[which]
         with np.errstate(all="ignore"):  # what cannot be computed is NaN or infinite, and no root
@@ -95,8 +100,12 @@ class DrivenPlant:
         return amplitudes
 
     def grid(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Amplitudes [m] with their forces [N], both of shape (frequencies, points), and whether roots for a force are
-        looked for in the cell behind each of them, shape (forces, frequencies, points - 1)."""
+        """Return amplitudes [m] with their forces [N] on a grid, both of shape (frequencies,
+        points).
+
+        The third result, shape (forces, frequencies, points - 1), marks the cells in which a root for a force is looked
+        for.
+        """
         settings = FrequencySettings.current()
         low, high = self.ends(forces)
         first = np.floor(settings.amplitudes_per_decade * np.log10(low)).astype(int)

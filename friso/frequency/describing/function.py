@@ -1,12 +1,13 @@
-"""The describing function of a friction law: what a sinusoidal motion feels of it, harmonic by harmonic.
+"""Compute the describing function of a friction law:
+the response of friction to a sinusoidal motion, by harmonics.
 
-Gelb, Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, McGraw-Hill 1968, for the method;
-the law is the stage's own (LuGre: Canudas de Wit et al. 1995, doi:10.1109/9.376053). LuGre has a memory, so that its
+The method is that of Gelb, Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, McGraw-Hill
+1968. The law is the stage's own (LuGre: Canudas de Wit et al. 1995, doi:10.1109/9.376053). LuGre has a memory, so its
 describing function depends on amplitude and frequency.
 
-Convention: position x(t) = Re(A exp(i omega t)) with real A > 0, and friction force F(t) = Re(sum of F_k exp(i k omega
-t)), positive against positive velocity. The dynamic stiffness N = F_1/A then has a spring as positive real part and a
-damper as positive imaginary part, and takes pi A^2 Im(N) out of the motion in every period.
+Convention: position x(t) = Re(A exp(i omega t)) with real A > 0. Friction force F(t) = Re(sum of F_k exp(i k omega t)),
+positive against positive velocity. The dynamic stiffness N = F_1/A then has a spring as positive real part and a damper
+as positive imaginary part. It takes pi A^2 Im(N) out of the motion in every period.
 """
 
 from __future__ import annotations
@@ -134,8 +135,11 @@ def checked_positive(name: str, values: Sequence[float] | np.ndarray, example: s
 
 
 def _harmonics(friction: Imposition, inner: np.ndarray, count: int, samples: int) -> tuple[np.ndarray, np.ndarray]:
-    """Harmonics 0 to `count` of the force [N], shape (runs, count + 1), from the law's own periodic states, and the
-    error of the first one if it is sampled, shape (runs,)."""
+    """Return harmonics 0 to `count` of the force [N], shape (runs, count + 1),
+    from periodic states of the law.
+
+    The second result, shape (runs,), is the error of the first harmonic if it is sampled.
+    """
     share, _ = share_of_period(friction)
     force = np.full((friction.count, count + 1), 0.0 if share < 1 else np.nan, complex)
     aliasing = np.full(friction.count, np.nan)

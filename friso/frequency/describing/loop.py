@@ -21,8 +21,11 @@ TOUCHES = "the joint deflects beyond its stroke: the limiter, which this answer 
 
 
 def receptance(flat: Mapping[str, Any], frequencies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of cart and stage per friction force on the cart [m/N], complex, shape (frequencies,), of a loop whose
-    reference rests, whose limiter is not touched and whose force is not limited, at frequencies [Hz]."""
+    """Return positions of cart and stage per friction force on the cart [m/N], complex,
+    shape (frequencies,).
+
+    The frequencies are in [Hz]. The reference rests, the limiter is not touched and the force is not limited.
+    """
     loop = _loop(shared_structure(flat)).at(flat, 1)
     (answer,) = loop.take((FORCE,), (CART, STAGE)).at(2j * np.pi * frequencies)
     return -answer[:, 0, 0], -answer[:, 1, 0]

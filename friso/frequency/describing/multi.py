@@ -58,8 +58,11 @@ class HarmonicSeries:
 
 @dataclass(frozen=True)
 class Basis:
-    """Cosines and sines of the `orders` at the middles of the intervals of the half period of a motion that is its own
-    mirror image, whose orders are odd, or of the whole period of another."""
+    """Cosines and sines of the `orders`, at the middles of the intervals of a motion.
+
+    A motion that is its own mirror image has odd orders over half a period; any other motion has all orders over a
+    whole one.
+    """
 
     orders: np.ndarray
     sign: float

@@ -1,8 +1,9 @@
-"""The frequency response of a plant with friction, as a drive's analyser measures it: it depends on the force.
+"""Compute the frequency response of a plant with friction as a drive's analyser measures it,
+for a given force.
 
 The analyser divides the first harmonic of the position by the force (Gelb, Vander Velde 1968, quasi-linear response).
-Where one force has several answers, those at which the force falls with the amplitude do not last, and which of the
-others shows depends on where the analyser comes from.
+One force may have several answers. Those at which the force falls with the amplitude are unstable. Which of the others
+shows depends on where the analyser comes from.
 """
 
 from __future__ import annotations

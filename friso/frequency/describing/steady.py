@@ -45,6 +45,7 @@ class Imposition:
 
     @property
     def kernel(self) -> Kernel:
+        """Return the compiled friction law under an imposed motion."""
         first = {key: value[0] if np.ndim(value) else value for key, value in self.flat.items()}
         return kernel(imposed_form(first))
 
@@ -114,8 +115,11 @@ def periodic_gap(rtol: float) -> float:
 
 @dataclass(frozen=True)
 class PeriodicStates:
-    """Periodic steady states: the law's own states at the farthest point of the motion (count, inner), the `gap` that
-    is left after a period as a share of their scales, and whether every run was completed, both of shape (count,)."""
+    """Periodic steady states of a friction law.
+
+    They are the law's own states at the farthest point of the motion (count, inner), and the `gap` left after a period
+    as a share of their scales, shape (count,). The last array says which runs were completed, shape (count,).
+    """
 
     inner: np.ndarray
     gap: np.ndarray
@@ -149,9 +153,11 @@ def share_of_period(friction: Imposition) -> tuple[float, float]:
 
 
 def _secant(friction: Imposition, inner: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the step to the fixed point of the map's secant,
-    by how much the states miss themselves, and which runs were completed, from the states and the widths of the secants
-    (count, inner)."""
+    """Take a secant step to the fixed point of the map over a period.
+
+    Starts from the states and the widths of the secants (count, inner). Returns the step, the error of the states after
+    a period, and which runs were completed.
+    """
     share, sign = share_of_period(friction)
     count, size = inner.shape
     rows = np.repeat(np.arange(count), size + 1)

@@ -1,9 +1,10 @@
-"""The friction force on any periodic motion, and its derivative by the motion: what multi-harmonic balance needs.
+"""Compute the friction force on any periodic motion, and its derivative by the motion,
+for multi-harmonic balance.
 
-The law's own state obeys an ordinary differential equation of its own, under a velocity that is given at the middles of
-M equal intervals; the implicit midpoint rule makes it a chain that ends where it began (or at the mirror image of it,
-over half a period of a symmetric motion), and the force at the middles follows. The rule is of second order, and a
-quick state settles on its steady value there however long the intervals are.
+The law's own state obeys a differential equation under a velocity given at the middles of M equal intervals. The
+implicit midpoint rule makes it a chain that ends where it began. Over half a period of a symmetric motion it ends at
+the mirror image. The force at the middles follows. The rule is of second order, and a fast state settles on its steady
+value however long the intervals are.
 """
 
 from __future__ import annotations
@@ -27,8 +28,11 @@ from friso.stage.tables import friction_law
 
 @dataclass(frozen=True)
 class OneStateLaw:
-    """A friction law with at most one state of its own, z: functions of the parameters by name, of velocity and z, that
-    give the rate of z with its derivatives by z and velocity, and the force with its derivatives by the same."""
+    """A friction law with at most one state of its own, z, as functions of parameters,
+    velocity and z.
+
+    They give the rate of z and the force, each with its derivatives by z and velocity.
+    """
 
     values: Mapping[str, Any]
     function: Callable[..., list[Any]]
@@ -116,8 +120,11 @@ def _middles(z: np.ndarray) -> np.ndarray:
 
 
 def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> FrictionAnswer:
-    """Return the friction on a motion with these velocities [m/s] at the middles (M,) of
-    intervals [s], after which it comes back (sign 1) or comes to its mirror image (-1)."""
+    """Return the friction on a motion with velocities [m/s] at the middles (M,) of intervals
+    [s].
+
+    After the intervals the motion comes back (sign 1) or comes to its mirror image (-1).
+    """
     settings = FrequencySettings.current()
     z = np.zeros(len(velocity) + 1)
     chain, pushed = None, np.zeros(0)
