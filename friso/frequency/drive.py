@@ -28,8 +28,8 @@ SCALED = 0.5
 class DriveTiming:
     """Timing of a drive.
 
-    It has the sample time [s], 0 for a controller in continuous time, and the delay between measurement and force [s].
-    `every` number of samples after which all loops are due again, and the time constant of the current loop [s], 0
+    `sample_time` [s] is 0 for a controller in continuous time; `delay` [s] lies between measurement and force. `period`
+    is the number of samples after which all loops are due again. `lag` [s] is the time constant of the current loop, 0
     without one.
     """
 

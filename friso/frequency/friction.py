@@ -45,7 +45,7 @@ class LinearFriction:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Return the number of internal states of the law."""
+        """Return the names of the internal states of the law."""
         return tuple(map(str, self.declared.states))
 
 

@@ -138,6 +138,7 @@ def _number(value: Any) -> float | None:
 
 
 def _range(name: str, text: str, reader: _Reader, log: bool) -> SweptRange:
+    """Read a range of an axis, such as "1 Hz..40 Hz:41", into its values."""
     match = _RANGE.fullmatch(text)
     if match is None:
         raise InputError("", quoted(text), "FIRST..LAST:POINTS, optionally followed by :log", RANGE_EXAMPLE)
@@ -153,6 +154,7 @@ def _range(name: str, text: str, reader: _Reader, log: bool) -> SweptRange:
 
 
 def _count(text: str, digits: str | None) -> int | None:
+    """Read the number of values of a range."""
     settings = StudySettings.current()
     if digits is None:
         return None
@@ -164,6 +166,7 @@ def _count(text: str, digits: str | None) -> int | None:
 
 
 def _axis_of_values(name: str, values: AxisValues, reader: _Reader) -> SweptAxis:
+    """Make an axis from values that were given one by one."""
     if isinstance(values, tuple) and len(values) == 2 and isinstance(values[1], str) and np.ndim(values[0]):
         si = np.asarray(values[0], dtype=float) * reader.factor(values[1])
     elif isinstance(values, str):

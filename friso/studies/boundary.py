@@ -71,6 +71,7 @@ def _refuse_impossible(space: Space, example: str) -> None:
 
 
 def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) -> KeyRange:
+    """Read a range of a key or of a free name for the boundary of hunting."""
     read, example = read_axis(stage, name, text, name in free, log), range_example(stage.flat())
     if isinstance(read, SweptAxis) or read.count is not None:
         raise InputError(

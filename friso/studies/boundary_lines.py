@@ -101,6 +101,7 @@ def _path_coordinate(path: np.ndarray, vector: np.ndarray) -> float:
 
 
 def _line(result: Diagram | Plane, traced: Branch | Curve, rows: list[_Row]) -> Line:
+    """Add the line of a branch or a curve to the dataset's rows."""
     at = np.array([row.at for row in rows])
     values = _values(result.space, at)
     return Line(
@@ -216,9 +217,12 @@ def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
 
 
 class PlaneEdge(NamedTuple):
-    """Where hunting ends along one key, number `along`, for each of the values of the other one that were tried [SI],
-    `across` (n,), ascending: whether it is possible `below`, and between which values [SI] it ends, `low` and `high`
-    (n,), both the same where a curve passes there."""
+    """Edge of hunting along one key, for the tried values of the other key [SI].
+
+    `along` is the number of the first key, and `across` (n,) are the values of the other one, ascending. `below` says
+    whether hunting is possible below the edge. The edge lies between `low` and `high` [SI] (n,), which are equal where
+    a curve passes.
+    """
 
     along: int
     below: bool
@@ -228,9 +232,11 @@ class PlaneEdge(NamedTuple):
 
 
 def plane_edge(result: Plane) -> PlaneEdge | None:
-    """Return where hunting ends, if along one of the keys, the first if it may be,
-    it does so once and on the same side whatever the value of the other; None elsewhere, and where the verdict at a
-    node is not known."""
+    """Return the edge of hunting along one of the keys of a plane, the first if possible.
+
+    Hunting must end once, and on one side, for every value of the other key. Returns None otherwise, and if the verdict
+    at a node is not known.
+    """
     nodes = node_verdicts(result)
     if any(verdict not in (ATTRACTS, REPELS) for _, _, verdict in nodes):
         return None

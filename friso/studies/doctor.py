@@ -1,4 +1,5 @@
-"""Whether friso works on this machine, and what it runs on: for a bug report, without names of users or folders."""
+"""Check that friso works on this machine, and describe the machine for a bug report,
+without names of users or folders."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ from friso.version import VERSION
 
 @dataclass(frozen=True)
 class DoctorCheck:
-    """What was looked at, the result in words, and whether it works; a `remedy` where it does not."""
+    """One check of the installation: its subject, the result in words, whether it works,
+    and a `remedy` if it does not."""
 
     subject: str
     text: str

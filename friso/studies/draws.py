@@ -1,4 +1,4 @@
-"""Whether a stage hunts whose numbers are uncertain: the verdicts on many stages drawn from it."""
+"""Judge a stage whose numbers are uncertain, by the verdicts on many stages drawn from it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Where the blocks of a study are computed: in the threads of this process, or wherever an executor sends them."""
+"""Compute the blocks of a study in the threads of this process,
+or where an executor sends them."""
 
 from __future__ import annotations
 

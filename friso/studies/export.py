@@ -39,6 +39,7 @@ def _bytes(texts: np.ndarray) -> np.ndarray:
 
 
 def _write_csv(runs: xr.Dataset, path: Path) -> None:
+    """Write runs as a table of comma-separated values."""
     settings = StudySettings.current()
     import pandas as pd
 

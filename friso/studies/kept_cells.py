@@ -1,4 +1,5 @@
-"""What a refined study was told of its cells, kept until it is done: asked the same again, it needs no runs."""
+"""Keep the results of cells until a refined study is done,
+so that repeated questions need no runs."""
 
 from __future__ import annotations
 

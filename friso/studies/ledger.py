@@ -1,7 +1,7 @@
-"""What was written of each block: the digests of its chunks, kept under the name of the block in a file of its own.
+"""Record the digests of the chunks of each block, in a file per block named after it.
 
-The digests say of which study, which block and which variable a chunk is: exchanged chunks are noticed, which checksums
-within them are not. The file is written last: a block that has one is done.
+The digests include the study, the block and the variable of a chunk. So exchanged chunks are noticed, unlike with the
+checksums inside them. The file is written last: a block that has one is done.
 """
 
 from __future__ import annotations

@@ -48,8 +48,8 @@ _EXAMPLE = "friso map STAGE.toml ... --out study.zarr"
 
 @dataclass(frozen=True)
 class Metadata:
-    """What the metadata of a store say: what stands in each file of Zarr's beside the arrays; friso's digest of the
-    study as it was made, the SHA-256 of each file of the axes, and its notes."""
+    """Metadata of a store: the contents of Zarr's files beside the arrays,
+    friso's digest of the study as it was made, the SHA-256 of each file of the axes, and its notes."""
 
     document: Mapping[str, Any]
     study: str
@@ -63,7 +63,7 @@ class Metadata:
 
     @property
     def all_files(self) -> dict[str, Any]:
-        """The same with the file that holds them all, and its copy."""
+        """Return the metadata with the file that holds them all, and its copy."""
         return {**self.files, _FILE: self.document, _COPY: self.document}
 
     @property

@@ -35,8 +35,11 @@ class RunEvidence:
 
 @dataclass(frozen=True)
 class StageEvidence:
-    """What attracts the stages of cells: their flat keys, the attractors, how their motions went, and `verdicts`, which
-    simulates more and returns a word for each."""
+    """Evidence on the stages of cells.
+
+    It has their flat keys, their attractors and their motions. `verdicts` simulates more and returns a word for each
+    stage.
+    """
 
     flat: Mapping[str, Any]
     attracted: StageAttractors
@@ -46,10 +49,11 @@ class StageEvidence:
 
 @dataclass(frozen=True)
 class Word:
-    """A word that a cell can have: its colour (a name of the palette of maps, or "#rrggbb"), what it means, its label
-    in legends if that is longer, and the paler colour of cells that were inferred to have it.
+    """A word that a cell can have.
 
-    Words that are verbs stand in the third person ("swings"), for sentences that count cells.
+    It has a colour (a name of the palette of maps, or "#rrggbb"), a meaning, and a label in legends if that is longer.
+    A paler colour marks cells whose word was inferred. Words that are verbs stand in the third person ("swings"), for
+    sentences that count cells.
     """
 
     text: str
@@ -61,8 +65,12 @@ class Word:
 
 @dataclass(frozen=True)
 class MapFinding:
-    """What the sentences on a map state: in which share of it, and where, cells have one of the `words` (of counts:
-    more than 0). With `if_any` it is left out where no cell has."""
+    """A finding that sentences on a map state: the share of cells with one of the `words`,
+    and where they lie.
+
+    For counts, it is the share of cells with more than 0. With `if_any` the finding is left out if no cell has the
+    word.
+    """
 
     clause: str
     words: tuple[str, ...] = ()

@@ -43,8 +43,10 @@ def processes(workers: int) -> Iterator[Crew]:
 
 @contextmanager
 def _modules_of_this_folder_ignored() -> Iterator[None]:
-    """Processes of Python that are started within import nothing from the current folder, which may be someone else's,
-    with a file in it that has the name of a module."""
+    """Start Python processes within the block that import nothing from the current folder.
+
+    The folder may belong to someone else, and hold a file with the name of a module.
+    """
     before = os.environ.get(_SAFE_PATH)
     os.environ[_SAFE_PATH] = "1"
     try:

@@ -88,7 +88,7 @@ def _lattice(shape: tuple[int, ...]) -> np.ndarray:
 
 
 class _Grid:
-    """What is known of the cells of a study."""
+    """Results of the cells of a study so far, for a grid that is refined."""
 
     def __init__(self, study: Study) -> None:
         settings = StudySettings.current()

@@ -1,4 +1,5 @@
-"""What a user wants varied, read into a study; how large it would be, and a trial of it."""
+"""Read the variations that a user wants into a study, estimate its size,
+and run a trial of it."""
 
 from __future__ import annotations
 

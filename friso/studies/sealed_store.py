@@ -40,7 +40,8 @@ class SealedStore(WrapperStore[LocalStore]):
         return type(self)(store, self.metadata)
 
     def with_read_only(self, read_only: bool = False) -> SealedStore:
-        """The same store, for reading alone or not: Zarr before 3.1.6 has it for no store of this kind."""
+        """Return the store, for reading alone or not;
+        Zarr before 3.1.6 lacks this for a store of this kind."""
         return self._with_store(self._store.with_read_only(read_only))
 
     async def get(self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None) -> Buffer | None:

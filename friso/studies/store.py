@@ -284,8 +284,11 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
 
 @dataclass(frozen=True)
 class StoreState:
-    """How many blocks a study has, how many of them are done, the numbers of those that are damaged, the files of
-    metadata that are, which the next run writes anew, and chunks that may not be read."""
+    """State of a study's store.
+
+    It has the number of blocks, the number of those done, and the numbers of damaged blocks. It also lists damaged
+    files of metadata, which the next run writes anew, and chunks that may not be read.
+    """
 
     blocks: int
     done: int

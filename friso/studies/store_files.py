@@ -64,8 +64,10 @@ def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[
 
 
 def keep_arrays(file: Path, arrays: Mapping[str, Any], about: str = "") -> None:
-    """Keep arrays in an archive after a digest of it, of the name of its file and of what they are `about`, which tells
-    of one that is damaged or exchanged. Raises OSError."""
+    """Store arrays in an archive, after a digest that detects damage and exchange.
+
+    The digest covers the arrays, the name of the file, and the text `about`. Raises OSError.
+    """
     archive = io.BytesIO()
     np.savez_compressed(archive, **arrays)
     content = archive.getvalue()
@@ -100,9 +102,11 @@ def is_of_store(name: str) -> bool:
 
 
 def refuse_foreign(path: Path, files: Collection[str]) -> None:
-    """Raises StoreError for a store with such `files` of metadata and anything in it that Zarr must not read, nor friso
-    write to: a link, which may lead elsewhere, a device, a pipe, a huge file, a folder in place of a file or a file in
-    place of a folder."""
+    """Refuse a store with entries that Zarr must not read, nor friso write to.
+
+    The store has such `files` of metadata. Entries refused are links, which may lead elsewhere, devices, pipes, huge
+    files, and files in place of folders or the reverse. Raises StoreError.
+    """
     folders = {BLOCKS, ANSWERS, *(name.partition("/")[0] for name in files if "/" in name)}
     for entry in _entries(path):
         status = entry.stat(follow_symlinks=False)

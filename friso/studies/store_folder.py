@@ -1,8 +1,8 @@
-"""The folder of a store: made aside and moved into place, exchanged for another, locked by one process at a time; what
-killed processes left of that is set right by the next.
+"""Manage the folder of a store: make it aside and move it into place, exchange it,
+and lock it for one process.
 
-Beside a store `a.zarr`, `.a.zarr.<32 digits>` is one that is being made, in a folder with its lock, and the same with
-`.old` at its end one that is being replaced.
+The next process repairs the state that a killed process left. Beside a store `a.zarr`, `.a.zarr.<32 digits>` is a store
+being made, in a folder with its lock. With `.old` at its end it is a store being replaced.
 """
 
 from __future__ import annotations

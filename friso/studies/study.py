@@ -54,10 +54,12 @@ class Study:
 
     @property
     def shape(self) -> tuple[int, ...]:
+        """Return the numbers of values along the axes."""
         return tuple(len(dimension) for dimension in self.dimensions)
 
     @property
     def cells(self) -> int:
+        """Return the number of cells."""
         return math.prod(self.shape)
 
     @property

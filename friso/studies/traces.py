@@ -23,9 +23,12 @@ DRAWING = "drawing runs"
 
 @dataclass(frozen=True)
 class Traces:
-    """How far positions are from their references [m]: `deviations`, shape (cells, 2 BINS), the two extremes of each
-    of the BINS pieces of `duration` [s] as they follow each other, NaN where a run has ended; and `late`, shape
-    (cells,), the time [s] from which on a run shows what it does at its end: half of what follows its last corner."""
+    """Deviations of positions from their references [m], reduced for drawing.
+
+    `deviations`, shape (cells, 2 BINS), are the two extremes of each of BINS pieces of `duration` [s], in order, NaN
+    after the end of a run. `late`, shape (cells,), is the time [s] after which a run shows its final behaviour: half of
+    the time after its last corner.
+    """
 
     deviations: np.ndarray
     late: np.ndarray

@@ -1,4 +1,5 @@
-"""How far a map can be trusted: a sample of its cells run again at a tighter tolerance."""
+"""Estimate how far a map can be trusted: run a sample of its cells again at a tighter
+tolerance."""
 
 from __future__ import annotations
 
@@ -76,11 +77,11 @@ def check_verified(attributes: Mapping[str, Any], cells: int) -> None:
 
 
 def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], int]:
-    """Return the loosest tolerance at which `WANTED` of the outcomes survive,
-    the surviving share at each one tried, and on how many cells that was found (none, and the tightest, where no cell
-    has a stage).
+    """Return the loosest tolerance at which `WANTED` of the outcomes survive.
 
-    If no tolerance is good enough it is the one at which most survive.
+    Also returns the surviving share at each tolerance tried, and the number of cells used. If no cell has a stage,
+    there are none, and the tightest tolerance is returned. If no tolerance is good enough, it is the one at which most
+    survive.
     """
     settings = StudySettings.current()
     picked = random_cells(study, TRIED, lambda cells: allowed_cells(study.stage, study.links, study.columns(cells)))

@@ -46,5 +46,6 @@ def rejecting(stage: Stage, crossings: Sequence[float]) -> Stage:
 
 
 def rejection(flat: Mapping[str, Any]) -> Rejection | None:
-    """Its numbers in a stage given as flat keys; None with another controller."""
+    """Return the numbers of a disturbance-rejecting controller from flat keys;
+    None with another controller."""
     return Rejection(flat[BANDWIDTH], flat[OBSERVER_RATIO]) if flat[KIND] == ADRC else None

@@ -89,6 +89,7 @@ class Machines:
 
     @property
     def count(self) -> int:
+        """Return the number of machines."""
         return len(self.seeds)
 
     def flat(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:

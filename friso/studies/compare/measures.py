@@ -1,4 +1,5 @@
-"""What becomes of a machine: swinging, settling, standstill, force; and the margin of its linear loop."""
+"""Measure machines: swinging, settling, standstill, force,
+and the margin of the linear loop."""
 
 from __future__ import annotations
 
@@ -28,11 +29,14 @@ CLOSER, WITHIN = 2, 9
 
 @dataclass(frozen=True)
 class MachineMeasures:
-    """Measures of runs, arrays of shape (count,): what each did at its end (`outcome`, words of
-    `friso.hunting.criteria.run_outcome`, the band being the tolerance), its distinct peaks `counted`, the time of
-    `settling` [s] (see `friso.hunting.criteria.settling`; infinite: it swings, creeps, or is not in position at the far
-    end of its motion when it returns), root mean squares of the deviation `in_position`, in the last quarter of the run
-    [m], and of the commanded `force`, over all of it [N]."""
+    """Measures of runs, arrays of shape (count,).
+
+    - `outcome`: words of `friso.hunting.criteria.run_outcome`, with the tolerance as band; `counted`: distinct peaks.
+    - `settling` [s]: see `friso.hunting.criteria.settling`. It is infinite if the machine swings, creeps, or is not in
+      position at the far end of its motion when it returns.
+    - `in_position` [m]: root mean square of the deviation in the last quarter of the run.
+    - `force` [N]: root mean square of the commanded force over the whole run.
+    """
 
     outcome: np.ndarray
     counted: np.ndarray

@@ -73,8 +73,11 @@ class Situation:
 
 
 class Variant(NamedTuple):
-    """A stage as an option has it, the keys that differ from machine to machine (numbers, or arrays of one for each
-    machine), and the factor by which its controller is faster."""
+    """A stage of one option.
+
+    It has the keys that differ from machine to machine (numbers, or arrays with one for each machine), and the factor
+    by which its controller is faster.
+    """
 
     stage: Stage
     changes: Mapping[str, Any] = MappingProxyType({})
@@ -127,6 +130,7 @@ class Option:
 
     @property
     def letter(self) -> str:
+        """Return the letter of the option."""
         return self.kind.letter
 
     @property

@@ -55,6 +55,7 @@ class OptionResult:
 
     @property
     def letter(self) -> str:
+        """Return the letter of the option."""
         return self.option.letter
 
     @property
@@ -119,9 +120,12 @@ class OptionResult:
 
 @dataclass(frozen=True)
 class Paired:
-    """An option against option a on the same machines: by how much swinging at the end is more probable, the shares of
-    machines in position `sooner`, `later` and `alike` (never with both, too), and the medians of what root mean squares
-    in position and of the force are multiplied by."""
+    """An option against option a on the same machines.
+
+    It has the increase in the probability of swinging at the end. Shares of machines are in position `sooner`, `later`
+    and `alike` (also if never with both). The medians are the factors on the root mean squares in position and of the
+    force.
+    """
 
     swinging: EstimatedValue
     sooner: Share
@@ -222,8 +226,11 @@ def _places(stage: Stage) -> list[Stand]:
 
 @dataclass(frozen=True)
 class _Work:
-    """What all options share: the machines, their task, the places where its reference stands, the tolerance [m], who
-    to which progress is reported, and how many options there are."""
+    """Inputs that all options share.
+
+    They are the machines, their task, the places where its reference stands, the tolerance [m], the receiver of
+    progress, and the number of options.
+    """
 
     machines: Machines
     task: MoveTask

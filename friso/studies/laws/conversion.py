@@ -37,9 +37,11 @@ at rest, viscous damping; and the conditions under which they were taken."""
 
 @dataclass(frozen=True)
 class MeasuredChange:
-    """One thing that a measurement shows, `before` and `after` the conversion [unit], and by how much it is off, as a
-    share of static friction for curves and of the number itself for numbers; it is kept where that is below
-    `allowed`."""
+    """One measured quantity, `before` and `after` the conversion [unit], and its error.
+
+    The error is a share of static friction for curves, and of the number itself for numbers. The quantity is kept if
+    the error is below `allowed`.
+    """
 
     kind: MeasuredKind
     unit: str
@@ -50,14 +52,18 @@ class MeasuredChange:
 
     @property
     def kept(self) -> bool:
+        """Tell whether the conversion keeps the measured quantity."""
         return self.off <= self.allowed
 
 
 @dataclass(frozen=True)
 class LawConversion:
-    """A stage with another friction law: what it was made from, what was compared, the keys that the measurements leave
-    open, with their ranges [SI], the condition of passivity that the law does not meet ("" where it is passive), and
-    the `points` that were measured of the virgin curve, where it is not that of the law of the source."""
+    """A stage converted to another friction law.
+
+    It has the source, the quantities compared, and the keys that the measurements leave open, with their ranges [SI].
+    It names the condition of passivity that the law violates ("" if it is passive). `points` are the measured points of
+    the virgin curve, unless the curve is that of the source's law.
+    """
 
     stage: Stage
     source: Stage
@@ -101,11 +107,13 @@ def measure_friction(flat: Mapping[str, Any]) -> MeasuredFriction:
 def convert(
     stage: Stage, law: str, elements: int = ELEMENTS, virgin: str | os.PathLike[str] | None = None
 ) -> LawConversion:
-    """Return the stage with the named law in the place of its own,
-    which shows the same in measurements as nearly as the law can; `elements` side by side, of a law that has several.
-    Before sliding, what was measured is that of the stage's law, or the points in the file `virgin`. Raises InputError
-    for a law that cannot be made from measurements, for a stage whose own does not stick, and for a file that holds no
-    virgin curve of it."""
+    """Replace the friction law of a stage by the named `law`,
+    with measured behaviour as nearly equal as possible.
+
+    `elements` lie side by side, in a law that has several. Before sliding, the stage's own law counts as measured, or
+    the points in the file `virgin`. Raises InputError for a law that cannot be made from measurements, for a stage
+    whose own law does not stick, and for a file that holds no virgin curve of it.
+    """
     if law not in convertible():
         near = nearest_name(law, convertible()) or "gms"
         raise InputError("--friction", f'"{law}"', f"one of {', '.join(convertible())}", f"--friction {near}")

@@ -61,7 +61,10 @@ class Trial:
 
 @dataclass(frozen=True)
 class LawVerdict:
-    """What becomes of a stage under a law: the conversion, and a trial for each choice of what it leaves open."""
+    """The verdict on a stage under one friction law.
+
+    It has the conversion to the law, and a trial for each choice of the values that the conversion leaves open.
+    """
 
     conversion: LawConversion
     trials: tuple[Trial, ...]
@@ -154,10 +157,12 @@ class VerdictsByLaw:
         return [verdict.law for verdict in self.verdicts if not verdict.certain(case)]
 
     def deciding(self, case: str) -> list[str]:
-        """Return the experiments that would decide,
-        where the verdict depends on the law or is not certain under all: those that tell what is open in a law under
-        which the answer depends on that, else those that tell the laws that disagree, or are not certain, from the
-        others."""
+        """Return the experiments that would decide between the answers under different friction
+        laws.
+
+        If the answer depends on values left open in a law, they are the experiments that show these values. Otherwise
+        they separate laws that disagree, or are not certain, from the others.
+        """
         if self.hunts(case) is not None or not self.answers(case):
             return []
         depends = self.depends_on_law(case)

@@ -26,9 +26,11 @@ ELSEWHERE = (-0.2, -0.1, -0.05, 0.05, 0.1, 0.2)
 
 @dataclass(frozen=True)
 class VirginPoints:
-    """Points of a virgin curve: `displacement` [m] and `force` [N], both of shape (n,), the standard deviation by which
-    the force scatters [N], and the range of the first slope [N/m] that they allow, up to infinity where they lie too
-    far from rest to say."""
+    """Points of a virgin curve.
+
+    `displacement` [m] and `force` [N] have the shape (n,). The standard deviation is that of the scatter of the force
+    [N]. The range of the first slope [N/m] allowed by the points reaches up to infinity if they lie too far from rest.
+    """
 
     displacement: np.ndarray
     force: np.ndarray
@@ -36,8 +38,10 @@ class VirginPoints:
     stiffness: tuple[float, float]
 
     def means(self, force: np.ndarray) -> np.ndarray:
-        """Of so many neighbouring points that their scatter hardly counts, where there are many: of forces [N] at the
-        displacements, shape (n,)."""
+        """Average forces [N] at the displacements, shape (n,), over neighbouring points.
+
+        There are so many neighbours that their scatter hardly counts, if there are many points.
+        """
         return np.convolve(force, np.full(self.together, 1 / self.together), "valid")
 
     @property
@@ -54,8 +58,12 @@ class VirginPoints:
 
 
 def read_virgin_curve(path: str | os.PathLike[str], kind: AxisKind) -> tuple[np.ndarray, np.ndarray]:
-    """Displacement [m] from rest and force [N], both of shape (n,), of a file of any log format with one channel of
-    each, by their units on such an axis. Raises InputError, LogError for a file that holds none."""
+    """Read displacement [m] from rest and force [N], both of shape (n,),
+    from a file of any log format.
+
+    The file has one channel of each, recognised by their units on such an axis. Raises InputError, LogError for a file
+    that holds none.
+    """
     settings = StudySettings.current()
     channels = read_table(Path(path)).channels
     displacement, force = (
@@ -99,9 +107,12 @@ def _refused(path: str | os.PathLike[str], actual: str, expected: str) -> InputE
 def with_virgin_curve(
     measured: MeasuredFriction, displacement: np.ndarray, force: np.ndarray
 ) -> tuple[MeasuredFriction, VirginPoints]:
-    """The same with the points [m, N], both of shape (n,), as its virgin curve, and what these tell. The curve is the
-    nearest that springs which slip one after the other can have: concave, from 0 to static friction, by least squares;
-    straight between few points, smooth through many. Raises InputError for points that contradict static friction."""
+    """Return measured friction with the points [m, N], both of shape (n,), as its virgin curve.
+
+    The curve is the nearest one that springs can have which slip one after the other: concave, from 0 to static
+    friction, by least squares. It is straight between few points and smooth through many. Raises InputError for points
+    that contradict static friction.
+    """
     settings = StudySettings.current()
     static = measured.levels.static
     end = float(force[-max(len(force) // settings.late_points, 1) :].mean())

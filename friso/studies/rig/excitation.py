@@ -30,8 +30,11 @@ PHASES = int.from_bytes(b"sines")
 
 @dataclass(frozen=True)
 class Excitation:
-    """RMS of the injected force over static friction, highest line over the crossover, about how many lines there are,
-    evenly in the logarithm, and samples of the log per period of the crossover: our choice."""
+    """Choices for the excitation of a frequency response.
+
+    They are the RMS of the injected force over static friction, and the highest line over the crossover. Then come the
+    approximate number of lines, evenly spaced in the logarithm, and samples of the log per period of the crossover.
+    """
 
     strength: float
     top: float

@@ -52,8 +52,11 @@ stage's own (2 ms)."""
 
 @dataclass(frozen=True)
 class PlaceOnRail:
-    """Passes on one stretch: the log, what it shows, and dynamic friction with drag [N] at speeds [m/s] as it truly is
-    on average over the way on which it was read, both of shape (n,)."""
+    """Passes on one stretch of the rail.
+
+    It has the log, its evaluation, and the true mean dynamic friction with drag [N] at speeds [m/s], over the way on
+    which it was read. Both have the shape (n,).
+    """
 
     log: RigLog
     velocity: FrictionVelocity

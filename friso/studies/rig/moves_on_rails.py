@@ -120,14 +120,17 @@ def numbers_of(seed: int, cases: int, machines: int) -> list[int]:
 
 @dataclass(frozen=True)
 class RailRuns:
-    """What became of runs, each of shape (runs,).
+    """Results of runs on rails, each of shape (runs,).
 
-    The number of distinct `peaks` (see `friso.hunting.criteria.peak_count`); what it did at its end (`outcome`, words
-    of `friso.hunting.criteria.run_outcome`, the band being `BAND`); over the last quarter `swing` [m] from peak to
-    peak and `period` [s] (NaN: none). Of the swings after half of the run: mean heights of both sides, `above` and
-    `below` the reference [m], shares of the period that the deviation rises (`rising`), and the scatter from swing to
-    swing (standard deviation) of the period over its mean (`period_scatter`) and of the heights over the swing
-    (`height_scatter`), NaN of less than three swings. Runs that failed have NaN, and no peaks.
+    - `peaks`: distinct peaks (see `friso.hunting.criteria.peak_count`).
+    - `outcome`: words of `friso.hunting.criteria.run_outcome`, with `BAND` as band.
+    - `swing` [m], peak to peak, and `period` [s] of the last quarter (NaN: none).
+    - `above`, `below` [m]: mean heights of swings on both sides of the reference, after half of the run.
+    - `rising`: share of the period in which the deviation rises.
+    - `period_scatter`: standard deviation of the period over its mean; `height_scatter`: of the heights over the swing
+      (NaN with fewer than three swings).
+
+    Runs that failed have NaN, and no peaks.
     """
 
     peaks: np.ndarray

@@ -1,4 +1,4 @@
-"""What an experiment of the rig gives: logs, the truth behind each, and their analysis."""
+"""Outcome of an experiment of the rig: logs, the truth behind each, and their analysis."""
 
 from __future__ import annotations
 

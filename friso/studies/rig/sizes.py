@@ -1,7 +1,7 @@
-"""How large, how long and where: the sizes of the experiments, all taken from the stage.
+"""Set the sizes, durations and places of the experiments, all taken from the stage.
 
 Times are in periods of the controller's crossover, ways in those of the stage's own motion, deflections in strokes,
-forces in those of friction: on the thesis's rig (8 Hz, 90 mm, 1 mm, 3 N) they come out as the thesis has them.
+forces in those of friction. On the thesis's rig (8 Hz, 90 mm, 1 mm, 3 N) they are as in the thesis.
 """
 
 from __future__ import annotations

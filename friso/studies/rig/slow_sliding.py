@@ -41,8 +41,10 @@ s, 0.125 s and 0.1 ms on the thesis's rig)."""
 
 @dataclass(frozen=True)
 class Slow:
-    """The log of a place, what it shows, mass and bristles being known as they are, and Coulomb and static friction [N]
-    as they truly are on average over its way, shape (2,)."""
+    """The log of slow sliding at a place, and its evaluation with true mass and bristles.
+
+    The true mean Coulomb and static friction [N] over its way have the shape (2,).
+    """
 
     log: RigLog
     result: SlowSliding

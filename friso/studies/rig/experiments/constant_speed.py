@@ -27,8 +27,11 @@ DURATIONS = (480.0, 120.0)
 
 @dataclass(frozen=True)
 class Passes:
-    """What a log shows with the joint as `name` says: along the place, and against the velocity; and the dynamic
-    friction at the two speeds as it truly is on average over the way [N], shape (2,)."""
+    """Results of passes at constant speed, with the joint as `name` says.
+
+    They are friction along the place and against the velocity. The true mean dynamic friction at the two speeds over
+    the way [N] has the shape (2,).
+    """
 
     name: str
     log: RigLog
@@ -39,8 +42,11 @@ class Passes:
 
 @dataclass(frozen=True)
 class ConstantSpeedResult:
-    """The two speeds [m/s] of the thesis, the passes at them with the joint free and locked, those at many, and slow
-    sliding (nothing where friction has no bristles)."""
+    """Results of the experiment at constant speed.
+
+    They are the two speeds [m/s] of the thesis, the passes at these with the joint free and locked, and the passes at
+    many speeds. Slow sliding is added, except where friction has no bristles.
+    """
 
     speeds: tuple[float, ...]
     cases: tuple[Passes, ...]

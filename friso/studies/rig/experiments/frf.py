@@ -64,6 +64,7 @@ class MeasuredLoop:
 
     @property
     def measured(self) -> bool:
+        """Return the measured response of the loop."""
         return len(self.response.frequency) > 0
 
 

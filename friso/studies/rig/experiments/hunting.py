@@ -58,8 +58,11 @@ class Trace:
 
 @dataclass(frozen=True)
 class Startable:
-    """The same machine `after_move`, where no peaks are counted, and `after_release`, where it swings for as long as it
-    is watched: its crossover [Hz], the number of its rail, and the displacement [m] of the release."""
+    """One machine `after_move`, where no peaks are counted, and `after_release`,
+    where it swings as long as it is observed.
+
+    It has its crossover [Hz], the number of its rail, and the displacement [m] of the release.
+    """
 
     after_move: Trace
     after_release: Trace

@@ -41,8 +41,8 @@ crossover (0.5 s and 1 ms on the thesis's rig)."""
 
 @dataclass(frozen=True)
 class Bristles:
-    """What the log of each place shows, the bristles' true stiffness [N/m] and damping [N s/m], and the logs of the
-    loops."""
+    """Results of the presliding experiment: for each place the fit to its log,
+    the bristles' true stiffness [N/m] and damping [N s/m], and the logs of the loops."""
 
     by_place: tuple[Presliding, ...]
     stiffness: float

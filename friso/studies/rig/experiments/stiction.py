@@ -38,8 +38,11 @@ SPEEDS = (1, 2, -1, -2)
 
 @dataclass(frozen=True)
 class Stiction:
-    """What each log shows, read with the joint's true stiffness; per rail the least and greatest true static friction
-    [N] where the cart went, shape (rails, 2); and the slow velocity [m/s]."""
+    """Results of the stiction experiment.
+
+    Each log is read with the joint's true stiffness. For each rail there are the least and greatest true static
+    friction [N] along the cart's way, shape (rails, 2), and the slow velocity [m/s].
+    """
 
     by_rail: tuple[StickSlip, ...]
     true: np.ndarray

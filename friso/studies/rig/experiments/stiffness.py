@@ -30,8 +30,12 @@ states neither."""
 
 @dataclass(frozen=True)
 class Stiffness:
-    """What the log shows, the joint's true stiffness [N/m], and the motor's true constant over the believed one: the
-    drive's newtons are so many times smaller than true ones."""
+    """Results of the stiffness experiment: the fit to the log,
+    and the joint's true stiffness [N/m].
+
+    The motor's true constant over the assumed one is the factor by which the drive's newtons are smaller than true
+    ones.
+    """
 
     steps: StepStiffness
     true: float
