@@ -101,7 +101,7 @@ def _path_coordinate(path: np.ndarray, vector: np.ndarray) -> float:
 
 
 def _line(result: Diagram | Plane, traced: Branch | Curve, rows: list[_Row]) -> Line:
-    """Add the line of a branch or a curve to the dataset's rows."""
+    """Make the line of a branch or a curve from its rows, with values, errors and cycles."""
     at = np.array([row.at for row in rows])
     values = _values(result.space, at)
     return Line(

@@ -12,7 +12,7 @@ from friso.platform.interrupts import hold_interrupts
 
 
 class UnfinishedWork(Protocol):
-    """What is kept of long work until all of it is done, in a folder."""
+    """Results of long work, kept in a folder until all of it is done."""
 
     @property
     def folder(self) -> Path | None: ...

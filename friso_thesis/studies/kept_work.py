@@ -1,4 +1,5 @@
-"""What is done of long work, kept in a folder until all of it is: an interrupted run goes on from there."""
+"""Keep finished pieces of long work in a folder until all is done,
+so that an interrupted run goes on from there."""
 
 from __future__ import annotations
 
@@ -20,8 +21,10 @@ from friso.studies.study import equations_version
 
 @dataclass(frozen=True)
 class KeptWork:
-    """Where pieces of work are kept, a folder; None keeps nothing. What other code made, or is damaged, is made
-    again."""
+    """Folder in which pieces of work are kept; None keeps nothing.
+
+    Pieces that were made by other code, or are damaged, are made again.
+    """
 
     folder: Path | None = None
 

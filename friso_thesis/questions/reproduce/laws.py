@@ -1,4 +1,5 @@
-"""What becomes of the thesis's conclusions under other friction laws: a sentence, a table, the JSON document."""
+"""Show the thesis's conclusions under other friction laws: a sentence, a table,
+the JSON document."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""What the thesis leaves to others, with the command that answers it; and its design method, step by step."""
+"""List the questions that the thesis leaves open, with the command that answers each,
+and its design method by steps."""
 
 from __future__ import annotations
 
@@ -17,8 +18,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ThesisQuestion:
-    """What the thesis leaves open, where (`asked`), the `command` that answers it, what that shows, and its answer on
-    the thesis's rig from findings on file (`answer`)."""
+    """A question that the thesis leaves open.
+
+    It has the place where it is `asked`, the `command` that answers it, the meaning of the result, and its `answer` on
+    the thesis's rig from findings on file.
+    """
 
     asked: str
     command: str

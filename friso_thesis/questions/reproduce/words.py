@@ -1,4 +1,5 @@
-"""What `friso reproduce` says of a claim: what was found, and what agrees, in short and in full."""
+"""Write the words of `friso reproduce` on a claim: the finding, and how far it agrees,
+in short and in full."""
 
 from __future__ import annotations
 

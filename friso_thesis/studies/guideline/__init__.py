@@ -1,5 +1,9 @@
-"""The design guideline: the dimensionless groups that govern hunting, sweeps of its edge over them, and laws fitted to
-these, with their error on samples that were not used for the fit."""
+"""Derive the design guideline: dimensionless groups that govern hunting,
+and laws of its edge.
+
+The edge is swept over the groups. Laws are fitted to it, and their errors are taken from samples that were not used for
+the fit.
+"""
 
 from friso_thesis.studies.guideline.compute import SAMPLES, Fit, Guideline, guideline
 

@@ -32,8 +32,12 @@ APART = 20.0
 
 @dataclass(frozen=True)
 class SimulationCheck:
-    """How many of the `samples` still swing at the end, from some of the distances and after some of the moves, at
-    0.9 and at 1.15 times their edge; `runs` in all, and how many of them `failed`."""
+    """Check of the law by simulation.
+
+    It counts how many of the `samples` still swing at the end, from some of the distances and after some of the moves.
+    They are simulated at 0.9 and at 1.15 times their edge. There are `runs` in all, of which `failed` were not
+    completed.
+    """
 
     samples: int
     stuck_below: int

@@ -1,4 +1,4 @@
-"""What the thesis claims about the edge of hunting, and what the sweeps and the rig show."""
+"""Judge the thesis's claims about the edge of hunting, by the sweeps and the rig."""
 
 from __future__ import annotations
 
@@ -38,8 +38,11 @@ SAME = 0.02
 
 @dataclass(frozen=True)
 class GuidelineClaim:
-    """What the thesis says, where, what was found, and whether the claim holds by the rule given (unknown
-    where an edge is: what was found says why)."""
+    """A claim of the thesis about the edge of hunting.
+
+    It has the claim's words and place, the finding, and whether the claim holds by the rule given. This is unknown if
+    the edge is; the finding then gives the reason.
+    """
 
     where: str
     text: str
@@ -197,8 +200,11 @@ class LeastGap:
 
 
 def least_gap(cases: Sequence[ThesisCase], static: float) -> LeastGap:
-    """Return the friction gap F_s - F_c from which on the rig of a static friction [N] hunts at
-    `CLAIMED_AT`, straight between the points of its edge in logarithms."""
+    """Return the smallest friction gap F_s - F_c with which the rig, at a static friction [N],
+    hunts at `CLAIMED_AT`.
+
+    It is interpolated linearly between the points of its edge, in logarithms.
+    """
     at_force = [case for case in cases if case.changes["friction.static"] == static]
     x, y = np.array([STUDIED["gap"](case.changes) for case in at_force]), _computed(at_force)
     above = np.flatnonzero(y >= CLAIMED_AT)

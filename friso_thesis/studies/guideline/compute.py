@@ -57,9 +57,12 @@ RATIOS = (0.0, 0.05, 0.3, 3.0, 20.0, np.inf)
 
 @dataclass(frozen=True)
 class Fit:
-    """A law and what it rests on: the samples it was fitted to, those it was tested on, and its errors on both. With a
-    free joint the locked edge is that computed in `on_fit`, that of the locked law in `on_test`, where
-    `on_computed_edge` has the errors with the computed one. `checked` holds simulations of samples of the test."""
+    """A law, the samples behind it, and its errors.
+
+    The law has samples that it was fitted to and samples that it was tested on, with errors on both. With a free joint,
+    the locked edge is the computed one in `on_fit`, and that of the locked law in `on_test`. `on_computed_edge` has the
+    errors of the test with the computed one. `checked` holds simulations of samples of the test.
+    """
 
     law: FittedLaw
     fit: Sweep

@@ -81,8 +81,11 @@ def concatenate_edges(parts: list[Edges]) -> Edges:
 
 @dataclass(frozen=True)
 class _AtCrossovers:
-    """What is known at crossovers: whether something attracts, the multiplier (NaN: no cycle), whether there may be a
-    cycle that could not be closed, and whether simulation, which had to decide then, failed."""
+    """Results at crossovers.
+
+    They are whether something attracts, and the multiplier (NaN: no cycle). Further, a cycle may exist that could not
+    be closed, and a simulation that then had to decide may have failed.
+    """
 
     attracts: np.ndarray
     multiplier: np.ndarray
@@ -107,12 +110,11 @@ def _at_crossovers(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> 
 
 
 def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
-    """Return the edges of stages whose crossovers are tried on a grid, shape (count, points),
-    ascending; then the step behind the last one at which a cycle attracts is halved, `rounds` times, and gone on upward
-    where the cycle is replaced by another one beside which something still hunts.
+    """Find the edges of stages on a grid of crossovers, shape (count, points), ascending.
 
-    A flip is interpolated between the multipliers on both sides of it, if it comes to lie in what is left of the step;
-    else the middle of that is taken (of the logarithm).
+    The step behind the last crossover at which a cycle attracts is halved `rounds` times. The search goes on upward if
+    another cycle takes over that still hunts. A flip is interpolated between the multipliers on both sides, if it lies
+    within the remaining step. Otherwise the logarithmic middle of the step is taken.
     """
     count, points = grid.shape
     at_crossovers = _at_crossovers(stages, np.repeat(np.arange(count), points), grid.ravel()).reshaped(count, points)

@@ -156,7 +156,7 @@ GroupValues = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class GroupScale:
-    """What the groups leave open: the unit of mass [kg], of stiffness [N/m] and of force [N]."""
+    """Units that the groups leave open: of mass [kg], of stiffness [N/m] and of force [N]."""
 
     mass: float = 1.0
     stiffness: float = 1.0

@@ -1,15 +1,16 @@
-"""Laws of the edge of hunting: a few frequencies, each a product of powers, combined; the powers by cross-validation.
+"""Fit laws of the edge of hunting: a few frequencies, each a product of powers, combined.
 
-A law is fitted to the logarithm of the edge with a loss that outliers do not dominate (soft L1). Beginning with none,
-the exponent that lowers the cross-validated loss most is added, until the next one gains too little.
+A law is fitted to the logarithm of the edge with a loss that outliers do not dominate (soft L1). The powers are chosen
+by cross-validation. Beginning with none, the exponent that lowers the cross-validated loss most is added, until the
+next one gains too little.
 
-Rigid (or locked). Two times add up. At the Stribeck velocity the bristles need F_s/(sigma_0 v_s) to slip; and where
+Rigid (or locked): two times add up. At the Stribeck velocity the bristles need F_s/(sigma_0 v_s) to slip. Where
 friction falls with speed, it drives a mass away with the time constant m v_s/(F_s - F_c). A loop that is faster than
 both together catches the mass before it has broken away for good.
 
-Free joint. The stage on its joint may move without the cart, so that the loop corrects it while the bearing sticks.
-The slower the joint, sqrt(k_j/m), the lower the edge; but once the deflection has used up the stroke the joint is as
-good as locked, and the edge no lower than that of a joint whose stroke just suffices, sqrt(F_s/(m S_j)).
+Free joint: the stage on its joint may move without the cart, so that the loop corrects it while the bearing sticks. The
+slower the joint, sqrt(k_j/m), the lower the edge. But once the deflection has used up the stroke, the joint is as good
+as locked. The edge is then no lower than that of a joint whose stroke just suffices, sqrt(F_s/(m S_j)).
 """
 
 from __future__ import annotations
@@ -46,8 +47,11 @@ SampleValues = Mapping[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Rate:
-    """A frequency in units of sqrt(sigma_0/m): a factor times groups to the fixed powers of `base`, times others, over
-    their references, to exponents that are fitted, those of `candidates` that turn out to matter."""
+    """A frequency in units of sqrt(sigma_0/m).
+
+    It is a factor times groups to the fixed powers of `base`, times further groups over their references. The exponents
+    of these are fitted, for those `candidates` that turn out to matter.
+    """
 
     name: str
     base: Mapping[str, float]
@@ -106,8 +110,11 @@ class FittedLaw:
 
 @dataclass(frozen=True)
 class Errors:
-    """How far a law is off: of `count` samples the root of the mean square, the median and the 95 % quantile of the
-    error of the logarithm, and the `worst`; `least` and `most`, between which the edge over that of the law lies."""
+    """Errors of a law.
+
+    For `count` samples, it has the root mean square, the median, the 95 % quantile and the `worst` of the error of the
+    logarithm. The edge over that of the law lies between `least` and `most`.
+    """
 
     count: int
     rms: float

@@ -1,4 +1,5 @@
-"""How far above the crossover the parasitic mode of a joint has to be, by linear analysis."""
+"""Find how far above the crossover the parasitic mode of a joint has to be,
+by linear analysis."""
 
 from __future__ import annotations
 
@@ -24,9 +25,11 @@ DRIVE = {"drive.sample_time": "50 us", "drive.delay": "50 us"}
 
 @dataclass(frozen=True)
 class ParasiticLimits:
-    """A parasitic mode at a frequency [Hz] with a damping ratio, and the range of crossovers [Hz], joint locked and
-    free, that holds the stage's own and in which the modulus margin is 0.5 in all settled states; None where the stage
-    lacks it at its own crossover."""
+    """Limits of the crossover set by a parasitic mode at a frequency [Hz] with a damping ratio.
+
+    For the joint locked and free, it has the range of crossovers [Hz] around the stage's own with a modulus margin of
+    0.5 in all settled states. None if the stage lacks this margin at its own crossover.
+    """
 
     frequency: float
     damping_ratio: float

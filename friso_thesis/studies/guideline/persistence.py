@@ -1,5 +1,7 @@
-"""Whether stages still swing after a long simulation, however they began: the evidence that something attracts where
-no orbit could be closed."""
+"""Simulate stages for long from many starts to see whether they still swing.
+
+This is the evidence of an attractor where no orbit could be closed.
+"""
 
 from __future__ import annotations
 

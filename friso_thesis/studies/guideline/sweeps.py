@@ -91,7 +91,7 @@ def concatenate_sweeps(*sweeps: Sweep) -> Sweep:
 
 
 class Keep(KeptWork):
-    """Where the parts of sweeps are kept until they are all done."""
+    """Folder in which the parts of sweeps are kept until all are done."""
 
     sources = ("../friso_thesis/studies/guideline",)
 

@@ -88,8 +88,11 @@ class WorkedDesign:
 
 @dataclass(frozen=True)
 class IsolatorNeed:
-    """Whether a machine with a crossover limit [Hz] needs an isolator: if that is below `edge` [Hz], the highest locked
-    edge by the law over the friction range, with its safety factor."""
+    """Tell whether a machine with a crossover limit [Hz] needs an isolator.
+
+    It does if the limit is below `edge` [Hz], the highest locked edge by the law over the friction range, with its
+    safety factor.
+    """
 
     limit: float
     edge: float
@@ -101,11 +104,16 @@ class IsolatorNeed:
 
 @dataclass(frozen=True)
 class Worked:
-    """The rig: its `rates` [Hz] by name; `machines` by law and computation; its edge over the `friction` range, rigid,
-    the `bound` [Hz] that the law has over all friction forces at the rig's bristles and masses and the gaps swept, and
-    the `safe` factor on the locked law; what it `needs`, by crossover limit, and where that
-    is an isolator its `designs`, by the law and then corrected until computation agrees; and the `studies` of claims of
-    the thesis, by name."""
+    """The rig as a worked example of the guideline.
+
+    - `rates` [Hz], by name; `machines`, by law and by computation.
+    - Its edge over the `friction` range, rigid.
+    - `bound` [Hz]: highest edge by the law over all friction forces, at the rig's bristles and masses and the gaps
+      swept.
+    - `safe`: factor on the locked law.
+    - `needs`: by crossover limit; `designs`: isolators, by the law and then corrected until the computation agrees.
+    - `studies`: of claims of the thesis, by name.
+    """
 
     rates: Mapping[str, float]
     machines: tuple[WorkedMachine, ...]
@@ -166,8 +174,10 @@ def machines(laws: Laws) -> tuple[WorkedMachine, ...]:
 
 def highest(laws: Laws) -> float:
     """Return the highest edge [Hz] of the rig by the law,
-    over all friction forces with a gap in the range, its masses and bristles as they are: the edge goes with
-    sqrt(sigma_0/m)."""
+    over all friction forces with a gap in the range.
+
+    Masses and bristles are unchanged: the edge is proportional to sqrt(sigma_0/m).
+    """
     static, gap = np.meshgrid(np.geomspace(0.05, 500.0, 400), np.linspace(*LOCKED_BOX["gap"], 50))
     flat = plain_rig() | {"friction.static": static.ravel(), "friction.coulomb": (static * (1 - gap)).ravel()}
     return float(laws.locked_edge(flat).max())
@@ -185,8 +195,11 @@ def designed(laws: Laws, limit: float, safe: float) -> tuple[WorkedDesign, ...]:
 
 
 def _design(laws: Laws, limit: float, aim: float) -> WorkedDesign:
-    """Nine tenths of the stiffest joint whose edge by the law stays below the aim over the friction range, with the
-    least stroke with which it still does."""
+    """Design a joint with nine tenths of the largest stiffness whose edge by the law stays below
+    the aim.
+
+    The edge must stay below it over the friction range. The stroke is the smallest with which it still does.
+    """
     forces = friction_range(DESIGN_GAPS)
     base: dict[str, Any] = plain_rig("joint")
     base |= {key: np.array([pair[key] for pair in forces]) for key in forces[0]}

@@ -75,14 +75,15 @@ BINS = (0.0, 0.01, 0.02, 0.03, 0.05, 0.1, np.inf)
 class CycleComparison:
     """Cycles with the joint locked, at the stage's crossover.
 
-    `even`: on an even rail, one run. `field`: of the rails with a random field, shape (deviations, lengths, rails),
-    with their `asymmetry`: what the logarithm of the static friction differs by between the two sides of the target,
-    half the even rail's swing to either side. `rolling` and `rolling_asymmetry`: of rails with a first harmonic, shape
-    (harmonics, rails). `levels`: on an even rail with other static and Coulomb friction, shape (motors, static,
-    coulomb), for the motor that the drive believes and for the weaker one of `MOTORS`.
-    `others`: on an even rail, by what else was changed. Where one start does not lead to a cycle, another was taken.
-    `traces`: the even rail, and the varied one whose cycle is the slowest of a similar swing (None: there is none)
-    with its deviation, length [m] and seed.
+    - `even`: on an even rail, one run.
+    - `field`: on rails with a random field, shape (deviations, lengths, rails). `asymmetry` is the difference in the
+      logarithm of static friction between the two sides of the target, half the even rail's swing away.
+    - `rolling`, `rolling_asymmetry`: on rails with a first harmonic, shape (harmonics, rails).
+    - `levels`: on an even rail with other static and Coulomb friction, shape (motors, static, coulomb), for the motor
+      that the drive assumes and for the weaker one of `MOTORS`.
+    - `others`: on an even rail, by the other change made. If one start does not lead to a cycle, another was taken.
+    - `traces`: the even rail, and the varied one with the slowest cycle of a similar swing (None: there is none), with
+      its deviation, length [m] and seed.
     """
 
     even: RailRuns

@@ -34,8 +34,10 @@ STROKES = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.6, 1.0])
 
 @dataclass(frozen=True)
 class StrokeCrossover:
-    """What became of the moves, arrays of shape (strokes, crossovers, rails), at `strokes` [m] and `crossovers` [Hz] on
-    `rails` (seeds); `frequency` [Hz] is the stage's own crossover."""
+    """Results of moves, arrays of shape (strokes, crossovers, rails).
+
+    They are at `strokes` [m] and `crossovers` [Hz] on `rails` (seeds); `frequency` [Hz] is the stage's own crossover.
+    """
 
     strokes: np.ndarray
     crossovers: np.ndarray

@@ -103,9 +103,11 @@ class MovesOnRails:
 
 @dataclass(frozen=True)
 class CyclesOnRails:
-    """Fig. 27: the cycle on an even rail, one run, and those on rails that vary, shape (rails,), with the asymmetry of
-    their friction about the target; `weak` is the even rail again, one run, with a motor so weak that the mass line
-    shows the mass measured (`MOTORS`) and `COULOMB_LEVEL` times the Coulomb friction."""
+    """Cycles of Fig. 27 on an even rail, one run, and on rails that vary, shape (rails,).
+
+    The asymmetry is that of friction about the target. `weak` is the even rail again, one run. Its motor is so weak
+    that the mass line shows the mass measured (`MOTORS`), and it has `COULOMB_LEVEL` times the Coulomb friction.
+    """
 
     even: RailRuns
     rails: RailRuns
@@ -175,9 +177,11 @@ def standstill(stage: Stage) -> InPosition:
 
 @dataclass(frozen=True)
 class RailTraces:
-    """What the drive logs of single moves on one rail that varies, and on an even one: time [s], shape (n,), and
-    the position less the end of the move [m], by joint and crossover [Hz] and by rail, each of shape (n,); the
-    `distance` of the move [m]."""
+    """Logs of single moves on one rail that varies, and on an even one.
+
+    They have the time [s], shape (n,), and the position less the end of the move [m], by joint and crossover [Hz] and
+    by rail, each of shape (n,). `distance` [m] is that of the move.
+    """
 
     time: np.ndarray
     moves: Mapping[tuple[str, float], np.ndarray]

@@ -77,7 +77,7 @@ class FindingTable:
 
 @dataclass(frozen=True)
 class Finding:
-    """How a claim was judged, with a table of what was found where it has one."""
+    """Result of judging a claim, with a table of numbers if there is one."""
 
     parts: tuple[Part, ...]
     table: FindingTable | None = None
@@ -115,8 +115,11 @@ class Response:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a judge may look at: maps by study name, responses by name, the linear analysis of the rig, and the
-    identification of it by experiments, each None where that was not made; and the rig itself."""
+    """Evidence that a judge may use.
+
+    It has maps by study name, responses by name, the linear analysis of the rig, and its identification by experiments,
+    each None if not made. It also has the rig itself.
+    """
 
     maps: Mapping[str, xr.Dataset]
     responses: Mapping[str, Response]

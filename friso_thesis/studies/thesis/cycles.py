@@ -1,5 +1,8 @@
-"""What attracts the stages of the thesis's maps: the curves on which cycles stop attracting, and the agreement of the
-peak count with what attracts."""
+"""Find the attractors of the stages in the thesis's maps,
+and compare them with the peak count.
+
+The curves on which cycles stop attracting are drawn as well.
+"""
 
 from __future__ import annotations
 
@@ -42,9 +45,12 @@ class Edge:
 
 @dataclass(frozen=True)
 class PeaksAgainstCycles:
-    """What the peak count and the survey say of the cells compared: peaks counted where something attracts (`both`)
-    or `neither`, peaks counted although nothing attracts (`counted_only`), something that attracts although no peaks
-    are counted (`attracted_only`: another move would start it), and cells of which it is not certain."""
+    """Agreement of the peak count with the survey, in numbers of cells.
+
+    Peaks are counted and something attracts (`both`), or `neither`. Peaks are counted although nothing attracts
+    (`counted_only`). Something attracts although no peaks are counted (`attracted_only`: another move would start it).
+    The other cells are uncertain.
+    """
 
     cells: int
     both: int
@@ -109,7 +115,7 @@ def survey(runs: xr.Dataset, kept: Kept = NOT_KEPT) -> Surveyed:
 
 
 def every(values: int) -> int:
-    """Of so many values of an axis each of this many is surveyed."""
+    """Return the step between surveyed values of an axis with so many values."""
     return max(1, round((values - 1) / (SURVEYED - 1)))
 
 

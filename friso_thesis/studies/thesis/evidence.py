@@ -1,4 +1,5 @@
-"""What judges look at, computed: maps of the studies, and runs in time, of the rig with or without changes."""
+"""Compute the evidence for judges: maps of the studies, and runs in time,
+of the rig with or without changes."""
 
 from __future__ import annotations
 

@@ -73,8 +73,11 @@ SPEEDS, WAY = (2.5e-3, 10e-3), 0.15
 
 @dataclass(frozen=True)
 class LockedLine:
-    """Fig. 17: magnitude over the mass line, and phase over that of it [rad], shape (places, frequencies), and the
-    scatter of the phase over the places [rad], shape (frequencies,), at FREQUENCIES."""
+    """Fig. 17: magnitude and phase over the mass line.
+
+    The magnitude and the phase [rad] over those of the mass line have the shape (places, frequencies). The scatter of
+    the phase over the places [rad], shape (frequencies,), is at FREQUENCIES.
+    """
 
     magnitude: np.ndarray
     phase: np.ndarray

@@ -1,4 +1,5 @@
-"""What is done of a long reproduction, kept in a folder until all is: an interrupted run goes on from there."""
+"""Keep finished parts of a long reproduction in a folder until all is done,
+so that an interrupted run goes on from there."""
 
 from __future__ import annotations
 
@@ -45,7 +46,7 @@ Findings = dict[str, Finding]
 
 
 class Kept(KeptWork):
-    """Where maps, experiments and findings of the thesis are kept."""
+    """Folders in which maps, experiments and findings of the thesis are kept."""
 
     sources = SOURCES
 

@@ -1,4 +1,5 @@
-"""What judges read off a map: where runs keep moving, limits, trends, blocks where they come to rest."""
+"""Read maps for judges: where runs keep moving, limits, trends,
+and blocks in which they come to rest."""
 
 from __future__ import annotations
 
@@ -33,12 +34,14 @@ def sizes(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray | None:
 
 
 def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
-    """For each column of `moving`, shape (n, columns), the value beyond which no run keeps moving.
+    """Return, for each column of `moving`, shape (n, columns),
+    the value beyond which no run keeps moving.
 
-    `values` ascend, shape (n,). The limit lies between the last that keeps moving and the next, where the `size` of
-    their swings, interpolated in its logarithm, is 1; halfway where no sizes are known, both are on one side, or
-    nothing is left of the swing beyond, which tells no more than that it ended in between.
-    Where it is outside the range, the end of the range stands for it."""
+    `values` ascend, shape (n,). The limit lies between the last value that keeps moving and the next. It is where the
+    `size` of the swings, interpolated in its logarithm, is 1. It is halfway between both if sizes are unknown, lie on
+    one side, or nothing is left of the swing beyond. If the limit is outside the range, the end of the range stands for
+    it.
+    """
     last = np.where(moving.any(axis=0), len(values) - 1 - np.argmax(moving[::-1], axis=0), -1)
     after = np.minimum(last + 1, len(values) - 1)
     share = np.full(last.shape, 0.5)
@@ -92,5 +95,5 @@ def overlap(part: np.ndarray, total: np.ndarray) -> float:
 
 
 def overlap_text(moving: np.ndarray, cells: np.ndarray) -> str:
-    """The same share in words."""
+    """Return the overlap in words."""
     return f"{percent(overlap(moving, cells))}" if cells.any() else "none"

@@ -44,8 +44,11 @@ PARTS = {**NEEDS, **EXPERIMENTS}
 
 @dataclass(frozen=True)
 class Separation:
-    """How well a value separates the draws in which a claim holds from the others: the rank-biserial correlation
-    (Kerby 2014, doi 10.2466/11.IT.3.1), 1 where it holds at all the larger values, and its probability by chance."""
+    """How well a value separates the draws in which a claim holds from the others.
+
+    The measure is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1), 1 if the claim holds at all the
+    larger values, with its probability by chance.
+    """
 
     value: str
     correlation: float
@@ -111,8 +114,11 @@ class BestFit:
 
 @dataclass(frozen=True)
 class Plausible:
-    """All claims over the space, by their name, the best fit (None without draws), and the findings at friso's `own`
-    choice by the runs, on maps of `POINTS` values per axis."""
+    """All claims over the space of draws, by their name.
+
+    It has the best fit (None without draws), and the findings at friso's `own` choice by the runs, on maps of `POINTS`
+    values per axis.
+    """
 
     draws: tuple[Draw, ...]
     claims: Mapping[str, ClaimInSpace]

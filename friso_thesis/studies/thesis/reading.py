@@ -1,5 +1,5 @@
-"""How the words of the thesis are read in numbers: “about”, “far”, “few”, “the same”, “trend”, “large”; and how they
-might be read as well."""
+"""Turn the words of the thesis into numbers: “about”, “far”, “few”, “the same”, “trend”,
+“large”, and other readings."""
 
 from __future__ import annotations
 
@@ -16,15 +16,21 @@ from friso_thesis.studies.rig.measured_cycles import AS_SLOW, SIMILAR
 
 @dataclass(frozen=True)
 class WordReading:
-    """The numbers behind the words: the factor within which a number is `about` another, and that within which it is
-    `of the order` of another and beyond which it is far below it; the share of a map's cells up to which they are
-    `few`, and up to which there are `none`; the rank correlation (Spearman) from which there is a `trend`; the share
-    within which numbers are the `same`, and within which they are `close`, as far as one reads them off a figure; and
-    the damping [N s/m] from which that of the limiter is `large`: the upper two of the six decades studied; the share
-    that is at least `half` or “most” of them; the share of the range of strokes from which they are `long`; and of
-    cycles on the rig, the factor from which one is nearly `twice` as long as another, that within which swings are
-    `similar`, that from which their two sides are `unequal`, and the scatter of the period over its mean from which one
-    is less regular, `uneven`."""
+    """Numbers behind the thesis's words.
+
+    - The factor within which a number is `about` another. The factor within which it is `of the order` of another, and
+      beyond which it is far below it.
+    - The share of a map's cells up to which they are `few`, and up to which there are `none`.
+    - The rank correlation (Spearman) from which there is a `trend`.
+    - The share within which numbers are the `same`, and within which they are `close`, as far as one reads them off a
+      figure.
+    - The damping [N s/m] from which that of the limiter is `large`: the upper two of the six decades studied.
+    - The share that is at least `half` or “most” of them, and the share of the range of strokes from which they are
+      `long`.
+    - For cycles on the rig: the factor from which one is nearly `twice` as long as another, that within which swings
+      are `similar`, and that from which their two sides are `unequal`.
+    - The scatter of the period over its mean from which a cycle is less regular, `uneven`.
+    """
 
     about: float = 1.5
     order: float = 10**0.5

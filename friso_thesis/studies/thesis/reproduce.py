@@ -57,16 +57,17 @@ or an experiment; what attracts the stages of a map, with the joint locked and f
 
 @dataclass(frozen=True)
 class Reproduction:
-    """All results.
+    """All results of reproducing the thesis.
 
-    Maps by study name and responses by name, judged by the thesis's count, and the maps on which the claims were judged
-    (`judged`), which are finer where few values per axis were asked for; the linear analysis of the rig, and in
-    `bode` its curves over the frequency, and the experiments, each None where no claim of this run needs it, with the
-    names of those that were made (`experimented`); the map of
-    Fig. 14B by relative tolerance and the shares of its cells in which peaks are counted at one of them only, and whose
-    peak count differs between them (NaN if not computed); a verdict per claim; the claims over the joint draws of what
-    the thesis leaves open; the hunting cycles behind each map by study name; values per axis of the maps (`points`),
-    and of those judged (`judged_points`).
+    - Maps by study name and responses by name, judged by the thesis's count. `judged` are the maps on which the claims
+      were judged, which are finer if few values per axis were asked for.
+    - The linear analysis of the rig, its curves over frequency in `bode`, and the experiments, each None if no claim of
+      this run needs it. `experimented` names the experiments made.
+    - The map of Fig. 14B by relative tolerance. The shares of its cells with peaks at one tolerance only, and with a
+      different peak count (NaN if not computed).
+    - A verdict per claim, and the claims over the joint draws of the values that the thesis leaves open.
+    - The hunting cycles behind each map, by study name.
+    - Values per axis of the maps (`points`), and of those judged (`judged_points`).
     """
 
     maps: Mapping[str, xr.Dataset]
@@ -225,8 +226,10 @@ def _read_otherwise(
 def _others(
     entries: Mapping[str, Registered], base: Evidence, loose: Mapping[str, xr.Dataset]
 ) -> dict[str, dict[str, Finding]]:
-    """Return the findings on maps of every second value of each axis,
-    and on those at the thesis's tolerance, by the two ways that need the runs alone."""
+    """Return the findings on coarser maps, and on maps at the thesis's tolerance.
+
+    Coarser maps have every second value of each axis. Both are judged in the two ways that need the runs alone.
+    """
     grids = {
         "every second value of each axis": {name: _second(runs) for name, runs in base.maps.items()},
         f"the thesis's relative tolerance, {RTOL:g},": dict(loose),

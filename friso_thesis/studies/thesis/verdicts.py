@@ -22,13 +22,14 @@ NO_WAYS: Mapping[str, Finding] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class ClaimVerdict:
-    """What stands beside a claim; `finding` is None for one that is not covered.
+    """The verdict on a claim; `finding` is None if the claim is not covered.
 
-    `ways` are the findings by the way in which hunting is judged, of which the finding is the weakest; `space` the
-    claim over joint draws of the values that the thesis leaves open, None where none enters or no draw was made;
-    `undrawn` what else is assumed that decides on it, and is in no draw;
-    `turned` is what another grid, or the thesis's tolerance, does to the judgement, by the name of that method;
-    `reread` the findings by other readings of the thesis's words that turn a criterion, by what is read otherwise.
+    - `ways`: findings by the way in which hunting is judged; the finding is the weakest of them.
+    - `space`: the claim over joint draws of the values that the thesis leaves open (None: none enters, or no draw was
+      made).
+    - `undrawn`: other assumptions that decide on it, and are in no draw.
+    - `turned`: change of the judgement by another grid, or by the thesis's tolerance, by the name of that method.
+    - `reread`: findings by other readings of the thesis's words that turn a criterion, by the change.
     """
 
     claim: Claim
@@ -56,9 +57,12 @@ class ClaimVerdict:
 
     @property
     def contradiction(self) -> str:
-        """Of a claim that does not hold: "arbitrary" where it does in some draw, "robust" where it does in none and its
-        share is at most `ROBUST` by its interval, else "open": too few draws tell, or it fails by an attracting cycle
-        alone, which is not looked for in draws, or it hangs on values that are not drawn; empty of one that holds."""
+        """Return the kind of contradiction of a claim that does not hold; empty if it holds.
+
+        It is "arbitrary" if the claim holds in some draw. It is "robust" if it holds in none and its share is at most
+        `ROBUST` by its interval. Otherwise it is "open": there are too few draws, or it fails by an attracting cycle
+        alone, which draws do not look for, or it depends on values that are not drawn.
+        """
         if self.finding is None or self.judgement == "holds":
             return ""
         if self.space is None or self.by_cycle_only:
@@ -146,9 +150,11 @@ def verdict(
     undrawn: str = "",
     readings: Mapping[str, Finding] = NO_WAYS,
 ) -> ClaimVerdict:
-    """Return the verdict from the findings of all `ways` and the one that they allow `together`;
-    `others` are findings by another method, by its name, in the ways that need the runs alone, and `readings` by
-    another reading of the words, in all ways; both are mentioned where other parts hold than here."""
+    """Return the verdict from the findings of all `ways` and the one that they allow `together`.
+
+    `others` are findings by another method, by its name, in the ways that need the runs alone. `readings` are findings
+    by another reading of the words, in all ways. Both are mentioned if other parts of the claim hold there.
+    """
     runs = _by_runs(ways) or together
     turned = {
         name: f"with {name} {_change(runs, finding)}"

@@ -22,9 +22,11 @@ whatever the move."""
 
 
 def by_peak_count(runs: xr.Dataset) -> xr.Dataset:
-    """Return the runs with what judges read, by the thesis's count:
-    whether at least one peak is counted, how many, the swing at the end over the height from which peaks count, and
-    whether the stage hunts for good (`lasts`): here, whether the run swings at its end."""
+    """Return the runs with the numbers that judges read, by the thesis's count.
+
+    They are whether at least one peak is counted, the count, the final swing over the height from which peaks count,
+    and whether the stage hunts for good (`lasts`): here, whether the run swings at its end.
+    """
     return runs.assign(
         keeps_moving=(runs["peaks"] > 0).assign_attrs(criterion=PEAK_CRITERION),
         count=runs["peaks"],
@@ -34,8 +36,10 @@ def by_peak_count(runs: xr.Dataset) -> xr.Dataset:
 
 
 def by_swing_at_end(runs: xr.Dataset) -> xr.Dataset:
-    """The same by the end of the run: whether it swings there; the peaks of others do not count, but for invalid and
-    failed cells."""
+    """Return the runs with the numbers that judges read, by whether each run swings at its end.
+
+    Peaks of other runs do not count, except in invalid and failed cells.
+    """
     swings = (runs["outcome"] == SWINGS).assign_attrs(criterion=OUTCOME_CRITERION)
     ended = runs["outcome"].isin([SWINGS, CREEPS, RESTS])
     return runs.assign(
@@ -47,9 +51,12 @@ def by_swing_at_end(runs: xr.Dataset) -> xr.Dataset:
 
 
 def by_attraction(runs: xr.Dataset, attracts: np.ndarray, decided: np.ndarray) -> xr.Dataset:
-    """The same by what attracts the stage of each cell, flags of the runs' shape; cells where that is not certain are
-    left out; what attracts also `lasts`. How often a cycle goes round in a run is known only where the move ended
-    in it."""
+    """Return the runs with the numbers that judges read,
+    by whether something attracts the stage of each cell.
+
+    The flags have the runs' shape; uncertain cells are left out. A stage with an attractor also `lasts`. How often a
+    cycle repeats in a run is known only if the move ended in it.
+    """
     moving = runs["keeps_moving"].copy(data=attracts & decided).assign_attrs(criterion="a cycle attracts the stage")
     outcome = runs["outcome"].where(runs["keeps_moving"].copy(data=decided) | (runs["outcome"] == "invalid"), FAILED)
     count = runs["peaks"].where(moving & (runs["peaks"] > 0)).where(moving, 0.0)

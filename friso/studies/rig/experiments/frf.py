@@ -64,7 +64,7 @@ class MeasuredLoop:
 
     @property
     def measured(self) -> bool:
-        """Return the measured response of the loop."""
+        """Tell whether any response was measured."""
         return len(self.response.frequency) > 0
 
 

@@ -155,9 +155,13 @@ def _compared(names: tuple[str, str], values: tuple[float, float], unit: str) ->
 
 
 def _overshooting_slip(response: Response) -> tuple[float, float]:
-    """Largest acceleration [m/s^2] of the cart after break-away and largest deviation [m] beyond the reference, of the
-    first slip after the reference has come to its end that begins on one side of it and ends on the other; NaN without
-    one. The cart also slows down where its first swing turns: a slip back from there crosses nothing."""
+    """Return the largest acceleration [m/s^2] of the cart and the overshoot [m] beyond the
+    reference in the first such slip.
+
+    It is the first slip after the end of the reference's motion that begins on one side of the reference and ends on
+    the other; NaN without one. The cart also slows down where its first swing turns, and a slip back from there crosses
+    nothing.
+    """
     trace = response.trace
     time, velocity = trace["time"].values, trace["cart_velocity"].values
     deviation = (trace["position"] - trace["reference"]).values
@@ -198,8 +202,11 @@ def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
 
 @judges("S5", figure="Sec. 5, peaks and cycles", needs=tuple(STUDIES))
 def counted_peaks_mean_cycles(evidence: Evidence) -> Finding:
-    """Of the cells of every map in which peaks are counted, those whose run still swings at its end; by what attracts,
-    of those that are decided those which a cycle attracts."""
+    """Judge whether counted peaks mean a cycle:
+    the share of cells with peaks whose run still swings at its end.
+
+    By attraction, it is the share of decided cells that a cycle attracts, for every map.
+    """
     words = reading()
     rows, counted, lasting = [], 0, 0
     for name, runs in evidence.maps.items():

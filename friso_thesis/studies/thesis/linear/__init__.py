@@ -1,4 +1,5 @@
-"""What linear analysis says of the thesis's rig: the evidence on its limit cases, its loops and its cart speeds."""
+"""Analyse the thesis's rig as a linear system: its limit cases,
+its loops and its cart speeds."""
 
 from __future__ import annotations
 

@@ -47,12 +47,15 @@ LOWEST, STEPS = 1.0, 61
 class CrossoverLoops:
     """The loops of a rig with its joint free or locked, tuned to each crossover [Hz].
 
-    `margins` by crossover and limit case; over `omega` [rad/s], the loop of the sliding cart, its limiter free if it
-    can be, in `curves` by crossover, complex. `single` is the highest crossover [Hz] up to which the loop of the
-    sliding stage as one mass (locked or with a touched limiter) crosses 0 dB only once. `unsampled` is that up to which
-    it is stable in all limit cases, in continuous time without delay, and `sampled` that at the rig's sample time, by
-    delay [s]: None beyond 10 kHz, half the sampling frequency, and 0 where there is none. `delay_at` is the delay [s],
-    at that sample time, that takes a crossover to the edge of stability; NaN for one that is not stable anyway.
+    - `margins`: by crossover and limit case.
+    - `curves`: over `omega` [rad/s], the loop of the sliding cart by crossover, complex, its limiter free if it can be.
+    - `single`: highest crossover [Hz] up to which the loop of the sliding stage as one mass (locked or with a touched
+      limiter) crosses 0 dB only once.
+    - `unsampled`: highest crossover up to which it is stable in all limit cases, in continuous time without delay.
+    - `sampled`: the same limit at the rig's sample time, by delay [s]. None beyond 10 kHz, half the sampling frequency,
+      and 0 if there is none.
+    - `delay_at`: delay [s], at that sample time, that takes a crossover to the edge of stability; NaN if it is unstable
+      anyway.
     """
 
     margins: Mapping[float, Mapping[str, Margins]]

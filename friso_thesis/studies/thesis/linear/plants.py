@@ -1,4 +1,4 @@
-"""What the plant shows in each limit case, as one reads it off Fig. 7."""
+"""Describe the plant in each limit case, as one reads it off Fig. 7."""
 
 from __future__ import annotations
 

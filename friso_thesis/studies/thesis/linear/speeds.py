@@ -29,13 +29,14 @@ CROSSOVERS = 25
 
 @dataclass(frozen=True)
 class Speeds:
-    """The loop with the cart at prescribed speeds [m/s].
+    """Stability of the loop with the cart at prescribed speeds [m/s].
 
-    `unstable` are the ranges of speed in which it is not, the limiter free and `unstable_touched`; `undeflected` the
-    same with bristles that the motion has not deflected yet (z = 0), which is where a linearisation about an initial
-    speed begins; `incurable` says whether in its middle no faster controller up to 10 kHz is stable; `slow` and
-    `fast` are the ratios of the greatest to the least magnitude of the loop over the prescribed speeds, at a tenth and
-    at ten times the crossover.
+    - `unstable`: ranges of speed in which it is unstable with the limiter free; `unstable_touched`: with it touched.
+    - `undeflected`: these ranges with bristles that the motion has not deflected yet (z = 0), where a linearisation
+      about an initial speed begins.
+    - `incurable`: whether, in the middle of the range, no faster controller up to 10 kHz is stable.
+    - `slow`, `fast`: ratio of the greatest to the least magnitude of the loop over the prescribed speeds, at a tenth
+      and at ten times the crossover.
     """
 
     unstable: tuple[Range, ...]
@@ -82,8 +83,11 @@ def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
 
 
 def abscissa_with_bristles(flat: Mapping[str, Any], speed: np.ndarray, share: float) -> np.ndarray:
-    """Real part [1/s] of the rightmost pole of the loop, its friction linearised at speeds (n,) [m/s] and at a share of
-    the deflection of the bristles that belongs to these speeds in steady state."""
+    """Return the real part [1/s] of the rightmost pole of the loop,
+    with friction linearised at speeds (n,) [m/s].
+
+    The bristles have a share of the deflection that belongs to these speeds in steady state.
+    """
     law = law_of(flat)
     assert law is not None  # the rig has friction
     sliding = _sliding(speed)

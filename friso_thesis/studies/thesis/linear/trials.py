@@ -1,4 +1,5 @@
-"""What would make the model do what was measured: the rig with other masses, and with a softer contact."""
+"""Try changes that would make the model match the measurements: other masses,
+and a softer contact."""
 
 from __future__ import annotations
 
