@@ -1,4 +1,5 @@
-"""Settings of the boundary of hunting: how cycles, and the curves on which they change, are followed."""
+"""Settings of the boundary of hunting: how cycles and the curves of their changes are
+followed."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ class ContinuationSettings(Settings):
     """Branches and curves of cycles, followed in one key or two."""
 
     first_branch_step: float = setting(0.002, "")
-    """A first step that is longer may lead to another branch."""
+    """A longer first step may lead to another branch."""
 
     longest_branch_step: float = setting(0.1, "")
     """Longer steps draw corners; shorter ones take more orbits."""
@@ -21,19 +22,19 @@ class ContinuationSettings(Settings):
     """A branch that needs shorter steps is lost: its cycle cannot be closed any more."""
 
     most_branch_steps: int = setting(300, "")
-    """Branches that wind for longer do not end; each step is an orbit."""
+    """A branch with more steps winds without end; each step is an orbit."""
 
     vanished_amplitude: float = setting(1e-3, "deflections at break-away")
     """Smaller cycles cannot be told from rest."""
 
     steepest_multiplier: float = setting(30.0, "")
-    """Nothing comes near a cycle that repels more, and its orbits are hard to close."""
+    """No motion comes near a more unstable cycle, and its orbits are hard to close."""
 
     multiplier_change_per_step: float = setting(0.25, "")
-    """Larger changes may step over two special points at once."""
+    """A larger change may step over two special points at once."""
 
     steep_multiplier: float = setting(3.0, "")
-    """Beyond it changes of the multiplier do not matter, and steps need not be short."""
+    """Beyond this multiplier its changes do not matter, so steps need not be short."""
 
     branch_turn_per_step: float = setting(0.3, "rad")
     """A sharper turn is a jump to another branch."""
@@ -42,10 +43,10 @@ class ContinuationSettings(Settings):
     """A cubic through fewer values follows their scatter."""
 
     least_cubic_values: int = setting(6, "")
-    """With fewer values that are known, the cubic tells no scatter."""
+    """With fewer values the scatter about the cubic cannot be estimated."""
 
     first_curve_step: float = setting(0.01, "ranges")
-    """A first step that is longer may lead to another curve."""
+    """A longer first step may lead to another curve."""
 
     longest_curve_step: float = setting(0.05, "ranges")
     """Longer steps draw corners; shorter ones take more orbits."""
@@ -57,16 +58,16 @@ class ContinuationSettings(Settings):
     """The second point of a curve gives its direction; farther off it may lie on another curve."""
 
     most_curve_steps: int = setting(400, "")
-    """Curves that wind for longer do not end; each step is several orbits."""
+    """A curve with more steps winds without end; each step is several orbits."""
 
     curve_turn_per_step: float = setting(0.4, "rad")
     """A sharper turn is a jump to another curve."""
 
     aside_of_prediction: float = setting(0.7, "steps")
-    """A point farther aside of its prediction is of another curve."""
+    """A point farther to the side of its prediction belongs to another curve."""
 
     grazing_sine: float = setting(0.2, "")
-    """A line at a smaller angle to the curve tells nothing of how the multiplier changes across."""
+    """Along a line at a smaller angle to the curve, the change of the multiplier across it is lost."""
 
     fold_search_depth: float = setting(0.5, "")
     """How far a fold may lie from its prediction in logarithms of distance and time."""
@@ -75,22 +76,22 @@ class ContinuationSettings(Settings):
     """Branches that are narrower than a step are missed; more stages take longer."""
 
     other_branches: int = setting(6, "")
-    """Where periods double again and again there is no end of branches."""
+    """Where periods double again and again, branches would never end."""
 
     same_point_hundredths: float = setting(0.1, "hundredths of the key")
-    """Where a limiter chatters, overlapping branches meet a point within this."""
+    """Where a limiter chatters, points of overlapping branches within this distance are one."""
 
     special_point_step: float = setting(1e-7, "")
-    """Ends the search for a special point: far below the digits told."""
+    """The search for a special point ends at this step, far below the digits shown."""
 
     special_point_tries: int = setting(30, "")
     """A search that needs more steps does not converge."""
 
     slope_step: float = setting(1e-3, "")
-    """Smaller, the slope is rounding; larger, it is that of the next bend."""
+    """With a smaller step the slope is rounding; with a larger one it belongs to the next bend."""
 
     met_multiplier_error: float = setting(1e-5, "")
-    """A first guess whose multiplier is so near the one predicted need not be tried again."""
+    """A first guess with a multiplier this close to the wanted one needs no further step."""
 
     chattering_fold_reach: float = setting(0.03, "")
     """Where a limiter chatters, the multiplier may be 1 as far as this from the fold."""
@@ -102,36 +103,37 @@ class ContinuationSettings(Settings):
     """Curves between stages that do not differ are missed; more stages take longer by the square."""
 
     most_points_between: int = setting(60, "")
-    """A branch that winds for longer between two stages hardly leads to a curve."""
+    """A branch that winds for longer between two stages rarely leads to a curve."""
 
     explained_distance: float = setting(0.2, "steps of the grid")
-    """A curve so near explains why two neighbours differ; others are looked for."""
+    """A curve this close explains why two neighbours differ; otherwise another curve is looked for."""
 
 
 @dataclass(frozen=True)
 class MeetingSettings(Settings):
-    """Where curves of the edge of hunting meet. The range of either key is one unit."""
+    """Settings of the search for meetings of curves of the edge of hunting.
+    The range of either key is one unit."""
 
     crossing_refinements: int = setting(8, "")
-    """A crossing that is not refined in so many steps is where straight lines between points cross."""
+    """A crossing that needs more steps stays where the straight lines between points cross."""
 
     crossing_precision: float = setting(1e-6, "ranges")
-    """The last step of a refinement: far below the digits shown; a smaller one costs another step."""
+    """Last step of a refinement, far below the digits shown; a smaller one costs another step."""
 
     crossing_reach: float = setting(0.05, "ranges")
-    """Farther than the longest step of a curve a refinement would find another crossing."""
+    """Farther than the longest step of a curve, a refinement would find another crossing."""
 
     chord_along: float = setting(0.7, "")
-    """A step to another point of a curve tells its direction if it is mostly along it, else where it lies."""
+    """A step to another point of a curve shows its direction only if it is mostly along the curve."""
 
     end_distance: float = setting(0.02, "ranges")
-    """A curve that is lost stops up to two first steps short of what it ends on; farther is another."""
+    """A curve that is lost stops up to two first steps short of the curve it ends on."""
 
     together_distance: float = setting(0.005, "ranges")
-    """Straight lines between points stray so far from a curve; curves farther apart are two."""
+    """Straight lines between points stray this far from a curve; curves farther apart are two."""
 
     together_length: float = setting(0.05, "ranges")
     """Ten times the distance within which curves are one: curves that cross at more than six degrees part sooner."""
 
     same_cycle_log: float = setting(0.05, "")
-    """Logarithms of amplitude and period between points are off by less; other cycles differ by more."""
+    """Interpolated log amplitude and log period of one cycle are off by less; other cycles differ by more."""

@@ -9,7 +9,8 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class ReturnMapSettings(Settings):
-    """Where a stage lands after each distance, and what that tells of all further landings."""
+    """Settings of return maps: landings of a stage by distance,
+    and the prediction of further landings."""
 
     hardly_attracting_share: float = setting(0.95, "")
     """With more of a deviation left per repetition, 51 of 149 sketched attractors did not attract."""
@@ -24,7 +25,7 @@ class ReturnMapSettings(Settings):
     """Fewer repetitions do not show that an attractor of the map is one of the stage."""
 
     simple_closing_share: float = setting(0.05, "")
-    """Landings of the simplest cycles that differ by less are closed from there."""
+    """Landings of the simplest cycles that differ by less are near enough to close an orbit."""
 
     closing_share: float = setting(0.01, "")
     """Cycles of several landings need better guesses."""
@@ -33,19 +34,19 @@ class ReturnMapSettings(Settings):
     """An orbit whose mean distance differs by more is another than that of the map."""
 
     map_scatter_share: float = setting(0.05, "")
-    """Landings that scatter by more than their neighbours foretell are no map: the stage remembers more."""
+    """Landings that scatter by more about the prediction of their neighbours are no map: the stage remembers more."""
 
     confirmed_landings: int = setting(12, "landings")
-    """Runs that land as foretold so often confirm a map."""
+    """A map is confirmed by runs that land this often where it predicts."""
 
     first_landings: int = setting(3, "landings")
     """After these a stage has forgotten how its motion began."""
 
     more_landings: int = setting(3, "landings")
-    """More at once are wasted on runs that the map is sure of."""
+    """More at once would be wasted on runs that the map already decides."""
 
     fate_rounds: int = setting(8, "")
-    """A run that the map is not sure of by then is unknown."""
+    """A run that the map does not decide by then stays unknown."""
 
     unsure_landing_share: float = setting(0.02, "")
     """A landing that is off by more shows that the stage still remembers its start."""
@@ -57,7 +58,7 @@ class ReturnMapSettings(Settings):
     """A map that is steeper between two points breaks off there."""
 
     map_iterations: int = setting(200, "landings")
-    """Most starts have come to what attracts them by then."""
+    """Most starts have reached an attractor by then."""
 
     iteration_doublings: int = setting(4, "")
     """Maps that still leave a cycle slowly are followed for sixteen times as long."""
@@ -66,13 +67,13 @@ class ReturnMapSettings(Settings):
     """A number with many divisors: cycles of 1, 2, 5 and 10 landings are seen."""
 
     exact_repetition_share: float = setting(1e-9, "")
-    """So close a repetition is not a slow approach."""
+    """A repetition this close is no slow approach."""
 
     arrived_share: float = setting(1e-6, "")
     """Landings that change by less have come to a cycle."""
 
     same_landing_share: float = setting(2e-3, "")
-    """Landings after a cycle that differ by more are others."""
+    """Landings a cycle apart that differ by more are different ones."""
 
     same_attractor_share: float = setting(0.02, "")
     """Landings of one attractor from two starts differ by less."""
@@ -81,7 +82,7 @@ class ReturnMapSettings(Settings):
     """From farther off a stage passes its reference without sticking."""
 
     scatter_range_log: float = setting(0.05, "")
-    """Points beside each other within it tell the scatter; over more the map itself changes."""
+    """Scatter is measured between points within this distance; over more, the map itself changes."""
 
     ringing_share: float = setting(0.05, "of the distance")
     """A stage that has landed rings by less."""
@@ -96,13 +97,13 @@ class ReturnMapSettings(Settings):
     """A swing takes a thousand; a limiter that chatters would take millions."""
 
     flight_time: float = setting(30.0, "1/natural frequencies")
-    """A way across that takes longer goes on in the next round."""
+    """A crossing that takes longer goes on in the next round."""
 
     extra_rounds: int = setting(10, "")
     """A stage that stops short, creeps, or is driven at its force limit needs several rounds for a swing."""
 
     run_landings: int = setting(3, "landings")
-    """What follows the first landing does not depend any more on how the run began."""
+    """After the first landing, the next ones no longer depend on how the run began."""
 
     coarse_gap_log: float = setting(0.15, "")
     """Wider gaps between points hide folds of the map."""
@@ -114,10 +115,10 @@ class ReturnMapSettings(Settings):
     """The map is near its diagonal where swings grow or shrink by less than a tenth."""
 
     outermost_loss_log: float = setting(0.3, "")
-    """Outermost points that lose more lead inward, so that nothing more is looked for."""
+    """Outermost points that lose more lead inward, so no attractor lies beyond them."""
 
     break_width_log: float = setting(0.02, "")
-    """Breaks between two starts are narrowed down so far; narrower ranges hold nothing that was met."""
+    """Breaks between two starts are narrowed down to this width; no attractor was met in narrower ranges."""
 
     runs_added: int = setting(12, "")
     """More runs at once for one stage keep all others waiting."""
