@@ -41,7 +41,7 @@ class Allowance:
 
     @property
     def left(self) -> float:
-        """Return what may still be used."""
+        """Return the work that may still be used."""
         own = self.work - self.used
         return own if self.around is None else min(own, self.around.left)
 

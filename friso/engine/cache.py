@@ -131,14 +131,15 @@ def code_digest(*parts: str) -> str:
 
 @cache
 def machine() -> str:
-    """Return what decides on the last bits of a run besides friso's code:
-    processor and compiler."""
+    """Name the processor and the compiler, which decide on the last bits of a run besides
+    friso's code."""
     return f"{processor().name}, llvmlite {llvmlite.__version__}, numpy {np.__version__}"
 
 
 @cache
 def environment() -> str:
-    """Return what machine code depends on besides its source: the compilers and the processor."""
+    """Describe the compilers and the processor,
+    on which machine code depends besides its source."""
     return repr((sys.version, np.__version__, llvmlite.__version__, processor()))
 
 
@@ -232,8 +233,8 @@ def entry_lock(file: Path) -> FileLock:
 
 
 def _without_words(source: str) -> str:
-    """Return what a module does: its bytecode, which has neither comments nor docstrings,
-    without line numbers."""
+    """Return the bytecode of a module, without comments, docstrings and line numbers,
+    so that words do not count."""
     return repr(_plain(compile(source, "", "exec", dont_inherit=True, optimize=2)))
 
 
@@ -250,7 +251,7 @@ def _plain(part: object) -> object:
 
 @cache
 def _compiled_with() -> str:
-    """Return what compiled code takes from friso."""
+    """Return a digest of the modules of friso that compiled code includes."""
     files = (Path(__file__).parent / f"{name}.py" for name in _INCLUDED)
     return _digest(*(_without_words(file.read_text(encoding="utf-8")) for file in files))
 

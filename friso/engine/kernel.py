@@ -268,8 +268,10 @@ DRIVER = CodeRequest("driver", "the loops that run any kernel", "friso.engine.bu
 
 
 def _request(request: KernelRequest) -> CodeRequest:
-    """Return what is wanted is pickled apart from the plug-ins, which the builder loads first:
-    it may hold their classes."""
+    """Make the request to compile a kernel.
+
+    The kernel is pickled apart from the plug-ins, which the builder loads first, because it may hold their classes.
+    """
     foreign = plug_ins(request.sections)
     digests = " ".join(plug_in.digest for plug_in in foreign)
     task = pickle.dumps((foreign, pickle.dumps(request)))
@@ -296,8 +298,8 @@ def _loops() -> Loops:
 
 
 def columns(rows: Iterable[Any], runs: int) -> np.ndarray:
-    """Return what a generated function says of runs, numbers or arrays of shape (runs,),
-    as an array (runs, rows)."""
+    """Stack the rows of a generated function, numbers or arrays of shape (runs,),
+    into an array (runs, rows)."""
     rows = list(rows)
     full = np.empty((runs, len(rows)))
     for i, row in enumerate(rows):

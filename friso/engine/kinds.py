@@ -44,7 +44,8 @@ class ArrayKind:
         return "q" * (1 + self.dimensions)
 
     def words(self, value: Any) -> list[Any]:
-        """Return where it is, and its shape."""
+        """Return the address of an array, and its shape.
+        Raises TypeError for arguments of other kinds."""
         if not (value.dtype == _DTYPES[self.dtype] and value.ndim == self.dimensions and value.flags.c_contiguous):
             raise TypeError(f"an array of {value.dtype}, strides {value.strides}, where {self} is expected")
         return [value.__array_interface__["data"][0], *value.shape]
@@ -62,7 +63,7 @@ class RecordKind:
         return "".join(kind.form for _, kind in self.fields)
 
     def words(self, value: Any) -> list[Any]:
-        """Return those of one field after another."""
+        """Return the words of the record's fields, one field after another."""
         return [word for (_, kind), part in zip(self.fields, value, strict=True) for word in kind.words(part)]
 
 

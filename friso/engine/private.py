@@ -41,7 +41,7 @@ def make_private(folder: Path) -> None:
 
 
 def read_private(path: Path) -> bytes:
-    """Return what is in a file. Raises PermissionError where another user can have written it,
+    """Read a private file. Raises PermissionError where another user can have written it,
     OSError where it cannot be read."""
     flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     with open(open_file(path, flags), "rb") as file:

@@ -33,7 +33,8 @@ class Processor:
         return 4 if "+avx" in features or self.name == "x86-64-v3" else 2
 
     def target_machine(self) -> llvm.TargetMachine:
-        """Return what writes code for it. Raises RuntimeError for a triple that LLVM does not know."""
+        """Return LLVM's code generator for the processor.
+        Raises RuntimeError for a triple that LLVM does not know."""
         target = llvm.Target.from_triple(self.triple)
         return target.create_target_machine(self.name, self.features, opt=3, reloc="pic", codemodel="small")
 

@@ -30,7 +30,7 @@ _ELEMENTS = {"int64": _INT64, "float64": _DOUBLE, "bool": ir.IntType(8)}
 
 
 def _types(kind: CompiledKind) -> Sequence[ir.Type]:
-    """Return what a value of a kind consists of: a number, an array's address and shape,
+    """Return LLVM's types of a value: a number, an array's address and shape,
     or a named tuple's address."""
     if isinstance(kind, NumberKind):
         return [_NUMBERS[kind]]

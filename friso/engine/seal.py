@@ -26,8 +26,8 @@ def write_sealed(path: Path, content: bytes) -> None:
 
 
 def read_sealed(path: Path) -> bytes | None:
-    """Return what `write_sealed` wrote under this name; None where it is missing,
-    or anything of it is not so."""
+    """Read the content that `write_sealed` wrote under this name; None if it is missing,
+    damaged or exchanged."""
     try:
         sealed = read_private(path)
     except OSError:

@@ -47,9 +47,12 @@ def cores_to_use() -> int:
 
 
 def results_of(jobs: Sequence[Future[_T]]) -> list[_T]:
-    """Return what jobs return, in their order; what ends one of them early is raised.
-    Between waits it is looked whether anybody waits for all of it still, and Ctrl-C is heard, which on Windows
-    interrupts no wait."""
+    """Wait for jobs and return their results, in their order;
+    an error of one of them is raised at once.
+
+    Between waits it is checked that someone still waits for all results, and Ctrl-C is noticed, which interrupts no
+    wait on Windows.
+    """
     while any(not job.done() for job in jobs):
         for job in wait(jobs, _PATIENCE, FIRST_EXCEPTION).done:
             job.result()
@@ -58,9 +61,10 @@ def results_of(jobs: Sequence[Future[_T]]) -> list[_T]:
 
 
 def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
-    """Return what the tasks return, in their order,
-    as many of them at a time as there are cores. What ends one of them early ends the others, too, at their next batch
-    of runs, and is raised."""
+    """Run tasks side by side, one per core at a time, and return their results in order.
+
+    An error of one task stops the others at their next batch of runs, and is raised.
+    """
     at_once = min(len(tasks), usable_cores())
     if at_once < 2:
         return [task() for task in tasks]
@@ -83,7 +87,7 @@ def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
 
 
 def both(first: Callable[[], _T], second: Callable[[], _Other]) -> tuple[_T, _Other]:
-    """Return what two tasks return, one beside the other as `side_by_side`."""
+    """Run two tasks side by side, as `side_by_side` does, and return both results."""
     tasks: list[Callable[[], Any]] = [first, second]
     one, other = side_by_side(tasks)
     return one, other

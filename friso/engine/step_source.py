@@ -486,7 +486,7 @@ class StepWriter:
         ]
 
     def _seen(self) -> list[str]:
-        """Return what the drive measures at the instant of its sample,
+        """Write the code for the drive's measurement at the instant of its sample,
         which may lie inside the step."""
         clock = self.model.clock
         if not clock:
@@ -510,7 +510,7 @@ class StepWriter:
         return lines + [f"{self._row(name)} = {name}" for name in SCALARS if name not in unwritten]
 
     def _store_step(self) -> list[str]:
-        """Return what the states inside the step follow from."""
+        """Write the code that stores the step, from which states inside it are interpolated."""
         lines = [f"{self._row('old', i)} = x{i}" for i in range(self.size)]
         lines += [f"{self._row('end', i)} = end{i}" for i in range(self.size)]
         for m in range(len(self.tableau.dense)):

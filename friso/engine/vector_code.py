@@ -143,7 +143,7 @@ class _Writer:
         return None
 
     def vector(self, value: Any, kind: _Kind) -> _Vector:
-        """Return what is given, the same in all lanes if it is a number."""
+        """Return a value as a vector; a number is copied to all lanes."""
         if isinstance(value, _Vector):
             if value.kind is not kind:
                 raise TypeError(f"{value.kind} where {kind} is expected")

@@ -158,8 +158,8 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
 
 
 def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...]]:
-    """Return what the encoder reads [m], what the controller commands [N],
-    and what it keeps for the next sample."""
+    """Return the encoder's reading [m], the controller's command [N],
+    and the numbers kept for the next sample."""
     from dataclasses import replace
 
     import sympy as sp

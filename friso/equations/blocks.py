@@ -156,7 +156,7 @@ class Blocks(ABC):
         yield
 
     def handed_on(self, signal: Signal, name: str) -> Signal:
-        """Return what a loop hands to a faster one: held there until it is due again."""
+        """Pass a signal to a faster loop: it is held there until it is due again."""
         return signal
 
     def key(self, name: str) -> sp.Symbol:
@@ -272,7 +272,7 @@ class Demand:
 
 
 def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
-    """Return what a controller demands for what it measures."""
+    """Return the demand of a controller for its measured inputs."""
     error, settings = seen.error, form.settings
     if form.section.feeds_back == "position":
         position = blocks.fed_back(seen.position)

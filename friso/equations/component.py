@@ -189,7 +189,7 @@ class Switch(Kink):
 
     @property
     def becomes(self) -> dict[sp.Symbol, sp.Expr]:
-        """Return what states become where the mode changes, `beyond` being what it was before."""
+        """Return the new values of states where the mode changes; `beyond` is its old value."""
         changed = dict.fromkeys((*self.entered, *self.left))
         return {x: (1 - self.beyond) * self.entered.get(x, x) + self.beyond * self.left.get(x, x) for x in changed}
 

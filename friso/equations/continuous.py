@@ -58,9 +58,12 @@ FAR = 1e9
 
 
 def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
-    """Return what a controller does with an error that hardly changes,
-    beyond all windows and deadbands: proportional gain [N/m] and integral gain [N/(m s)]; of a stage given as flat
-    keys, its reference at rest."""
+    """Return the gains of a controller for an error that hardly changes,
+    beyond all windows and deadbands.
+
+    They are the proportional gain [N/m] and the integral gain [N/(m s)], of a stage given as flat keys, with its
+    reference at rest.
+    """
     form = controller_form(flat)
     loop = Loop(STEADY.error, STEADY.position, sp.S.Zero, sp.S.Zero)
     blocks = Continuous(sp.S.One, form)
@@ -134,7 +137,7 @@ class Continuous(Blocks):
 
     @property
     def integrands(self) -> dict[sp.Symbol, sp.Expr]:
-        """Return what the integrators integrate in a steady motion."""
+        """Return the inputs of the integrators in a steady motion."""
         return {integral.symbol: integral.settled for integral in self._integrals}
 
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str, rule: FilterRule | None = None) -> Signal:
@@ -283,7 +286,7 @@ class Continuous(Blocks):
         return tuple(states), (*far, *winding, *pauses, *self._begun_anew(error))
 
     def _limits(self, integral: _Integral, demand: Demand) -> list[tuple[sp.Expr, sp.Expr, str]]:
-        """Return what of an integral is limited, to what, and the name of that limit."""
+        """Return the limited outputs of an integral, with their limits and the names of these."""
         limits = [] if integral.limit is None else [(integral.output, integral.limit, str(integral.symbol))]
         if self.settings.limit:
             force = sp.diff(demand.total.value, integral.symbol) * integral.symbol

@@ -89,13 +89,13 @@ class Model:
 
     @property
     def discrete(self) -> tuple[sp.Symbol, ...]:
-        """Return what a run has besides its states: numbers held, and the modes that remember."""
+        """Return the symbols of a run besides its states: numbers held, and the modes that remember."""
         return (*(held.symbol for held in self.held), *(switch.beyond for switch in self.switches))
 
     @property
     def fixed(self) -> tuple[sp.Symbol, ...]:
-        """Return what the right-hand side finds as it is during a step: inputs, discrete states,
-        and what is looked up."""
+        """Return the symbols that are constant during a step: inputs, discrete states,
+        and tabled values."""
         return (*self.inputs, *self.discrete, *(self.clock.tabled if self.clock else ()))
 
     @property
@@ -207,7 +207,7 @@ class Bodies:
         return mass + (self.motor.mass if self.motor else 0)
 
     def measured(self, structure: Structure) -> tuple[Body, Body]:
-        """Return those whose position and whose velocity the controller acts on."""
+        """Return the bodies whose position and whose velocity the controller acts on."""
         form = structure.transmission
         sides = (form.position, form.velocity) if form else ("load", "load")
         on_position, on_velocity = (self.motor if side == "motor" and self.motor else self.stage for side in sides)

@@ -82,7 +82,7 @@ def _white(first: int, count: int, seed: int, length: float) -> np.ndarray:
 
 
 def _rolling(rail: Mapping[str, Any], places: np.ndarray, seed: int) -> np.ndarray | float:
-    """Return what the rolling elements make of friction at places [m]."""
+    """Return the factor of the rolling elements on friction at places [m]."""
     if "rolling_pitch" not in rail:
         return 1.0
     phases = np.random.Generator(np.random.Philox(key=[seed, PHASES])).uniform(0, 2 * np.pi, len(HARMONICS))

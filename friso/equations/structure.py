@@ -58,7 +58,7 @@ class ControllerForm:
 
     @property
     def title(self) -> str:
-        """Return what it is, in a few words."""
+        """Describe the controller in a few words."""
         settings = [name for name, present in self.settings._asdict().items() if present]
         words = [
             *(["no integral"] if not self.integral else []),
@@ -110,7 +110,7 @@ class Structure:
 
     @property
     def title(self) -> str:
-        """Return what it is, in a few words."""
+        """Describe the structure in a few words."""
         axis = f"rigid {' and '.join(self.masses)}" if self.joint == "rigid" else f"{self.joint} joint"
         words = {
             axis: True,

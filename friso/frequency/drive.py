@@ -71,8 +71,8 @@ class DriveTiming:
         return samples, max(0.0, self.delay - samples * self.sample_time)
 
     def transfer(self, omega: np.ndarray) -> np.ndarray:
-        """Return what hold, delay and current loop do to angular frequencies [rad/s],
-        all but their aliases."""
+        """Return the transfer of hold, delay and current loop at angular frequencies [rad/s],
+        without aliases."""
         half = omega * self.sample_time / 2
         return np.sinc(half / np.pi) * np.exp(-1j * (half + omega * self.delay)) / (1 + 1j * omega * self.lag)
 
@@ -87,7 +87,7 @@ class DriveTiming:
 
 
 def resonances(poles: Complex) -> Complex:
-    """Return those of the poles [rad/s] that are lightly damped."""
+    """Return the poles [rad/s] that are lightly damped."""
     settings = FrequencySettings.current()
     return poles[np.abs(poles.real) < settings.light_damping * np.abs(poles.imag)]
 

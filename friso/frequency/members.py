@@ -43,12 +43,12 @@ class Members:
         return len(self.speed)
 
     def __getitem__(self, which: Any) -> Members:
-        """Return those at the numbers given, or in a boolean array."""
+        """Select the members at these numbers, or in a boolean array."""
         return Members(*(np.atleast_1d(getattr(self, field.name)[which]) for field in fields(self)))
 
     @property
     def kinds(self) -> list[Members]:
-        """Return those that are stuck and those that are not, as far as there are any:
+        """Return the stuck members and the others, as far as there are any:
         they have different states."""
         return [self[mask] for mask in (self.stuck, ~self.stuck) if mask.any()]
 

@@ -65,8 +65,8 @@ class Lifted:
 
 
 def _fundamental(matrices: Complex, turn: np.ndarray) -> Complex:
-    """Return what lifted matrices (members, k, N,
-    N) leave of a harmonic signal at its own frequency."""
+    """Return the response of lifted matrices (members, k, N, N) to a harmonic signal,
+    at its own frequency."""
     turns = np.exp(1j * turn[:, None] * np.arange(matrices.shape[-1]))  # (k, N)
     answers = (matrices @ turns[..., None])[..., 0]
     return np.asarray((answers * turns.conj()).mean(axis=-1), dtype=complex)
@@ -163,7 +163,7 @@ def unseen(control: System, measured: str) -> System:
 
 
 def _lifted(steps: list[np.ndarray], pushes: list[np.ndarray], answers: list[np.ndarray]) -> Lifted:
-    """Return what repeats after a period, from its samples: x' = step x + push u, y = answer x."""
+    """Lift a system over a period, from its samples: x' = step x + push u, y = answer x."""
     count, (members, n) = len(steps), steps[0].shape[:2]
     along = np.broadcast_to(np.eye(n), (members, n, n))
     inputs = np.zeros((members, n, count))  # from the inputs so far to the state

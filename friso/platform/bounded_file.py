@@ -20,10 +20,9 @@ class LargeFileError(OSError):
 
 
 def content_of(path: Path, most: int, follow: bool = True) -> bytes:
-    """Return what is in a file of `most` bytes or fewer;
-    a symbolic link is followed if `follow`.
+    """Read a file of `most` bytes or fewer; a symbolic link is followed if `follow`.
 
-    Raises LargeFileError, or another OSError where it cannot be read or is a device, a pipe or a socket.
+    Raises LargeFileError, or another OSError where the file cannot be read, or is a device, a pipe or a socket.
     """
     flags = _READING if follow else _READING | getattr(os, "O_NOFOLLOW", 0)
     with open(open_file(path, flags), "rb") as file:

@@ -10,7 +10,7 @@ import sys
 
 
 def _module() -> str:
-    """Return what Python was started with by -m, in whatever way that was written;
+    """Return the module that Python was started with by -m, however it was written;
     empty without."""
     if sys.argv[:1] != ["-m"]:  # as it is until the module itself runs
         return ""

@@ -12,7 +12,7 @@ with the log (`friso.identification.logs.libraries`)."""
 
 
 def install(extra: str) -> str:
-    """Return what installs an extra."""
+    """Return the command that installs an extra."""
     return f'pip install "friso[{extra}]"'
 
 

@@ -31,7 +31,8 @@ class HelperProcess:
         Thread(target=self._process.wait, daemon=True).start()  # one that has ended does not stay as a zombie
 
     def ask(self, question: object) -> Any:
-        """Return what it answers. Raises EOFError where it has ended instead."""
+        """Ask the process a question, and return its answer.
+        Raises EOFError where it has ended instead."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         with suppress(OSError):  # nobody reads it any more: the process ended, and says why

@@ -267,8 +267,11 @@ else:
 
 
 def once_free(use: Callable[[], _T]) -> _T:
-    """Return what `use` returns: where another program holds the file open,
-    it is tried again for as long as `PATIENCE`. Raises what `use` raises."""
+    """Call `use` and return its result; retry for up to `PATIENCE` while another program holds
+    the file open.
+
+    Raises the error of `use`.
+    """
     end = time.monotonic() + PATIENCE
     while True:
         try:

@@ -248,7 +248,7 @@ def check_arguments(function: Callable[Arguments, Returned]) -> Callable[Argumen
 
 
 def near_words(word: str, words: Iterable[str]) -> str:
-    """Return what to say of a word that is none of some words: which is nearest, or all of them."""
+    """Suggest the nearest of some words for an unknown one, or list them all."""
     from difflib import get_close_matches
 
     near = get_close_matches(word, words := [*words], 1)

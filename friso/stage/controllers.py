@@ -110,7 +110,7 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> Hashable:
-        """Return what else than the form the equations depend on, such as terms that are absent."""
+        """Return the further choices on which the equations depend, such as terms that are absent."""
         return None
 
     @classmethod
@@ -121,7 +121,7 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def takes_velocity(cls, flat: Mapping[str, Any]) -> bool:
-        """Tell whether it acts on a measured velocity,
+        """Tell whether the controller acts on a measured velocity,
         which may come from another encoder than the position."""
         return cls.feeds_back == "velocity"
 
@@ -157,7 +157,7 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def _called(cls, name: str) -> tuple[str, str]:
-        """Return what a key is called in a table of gains, and its symbol."""
+        """Return the name of a key in a table of gains, and its symbol."""
         return {**SYMBOLS, **cls.symbols}.get(name, (name.replace("_", " "), name))
 
     @classmethod
@@ -207,7 +207,7 @@ class Controllers(Variants):
 
     @property
     def words(self) -> dict[str, str]:
-        """Return what keys are called on the axes of maps."""
+        """Return the names of keys on the axes of maps."""
         forms_of_all = (form for forms in self.forms.values() for form in forms)
         return {form.key(name): word for form in forms_of_all for name, word in form.words.items()}
 

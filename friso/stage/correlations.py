@@ -53,7 +53,7 @@ class Correlations:
             raise StageError("matrix", problem, "a correlation matrix, one row and one column per key", _EXAMPLE)
 
     def among(self, keys: Iterable[str]) -> Correlations:
-        """Return those of some of the keys."""
+        """Select the correlations among some of the keys."""
         places = [k for k, key in enumerate(self.keys) if key in [*keys]]
         return Correlations(tuple(self.keys[k] for k in places), self.matrix[np.ix_(places, places)])
 

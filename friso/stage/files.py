@@ -58,7 +58,7 @@ def load_tables(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _hinted(path: str | os.PathLike[str], read: Callable[[str], Read]) -> Read:
-    """Return what a stage file is read as; an error says what a file of another kind is for.
+    """Read a stage file; an error says which command reads a file of another kind.
     Raises StageError."""
     try:
         return read(text_of(Path(path), _EXPECTED))
@@ -162,9 +162,11 @@ def _value(text: str) -> Any:
 
 
 def text_of(path: Path, expected: str, example: str = _EXAMPLE, latin: bool = False) -> str:
-    """Return what stands in a text file, which is to be what is `expected`;
-    where it may be Latin-1 (`latin`), as older programs write it, that is read too. Raises InputError, also for a
-    device, for a pipe and for more than MOST_BYTES."""
+    """Read a text file that should be `expected`; it may be Latin-1 if `latin`,
+    as older programs write it.
+
+    Raises InputError, also for a device, for a pipe and for more than MOST_BYTES.
+    """
     try:
         content = content_of(path, MOST_BYTES)
         return _utf_8_or_latin(content) if latin and not _NO_TEXT.search(content) else content.decode("utf-8-sig")
@@ -238,7 +240,7 @@ _WIDTH = 100
 
 
 def _syntax_error(text: str, message: str) -> str:
-    """Return what is wrong with a TOML text, and the line with a caret below the place."""
+    """Explain a syntax error of a TOML text, with its line and a caret below the place."""
     place = _PLACE.search(message)
     if place is None:
         return message

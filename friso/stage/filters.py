@@ -45,7 +45,8 @@ class FilterSection(UncertainSection):
 
     @classmethod
     def variant(cls, row: Mapping[str, Any]) -> Hashable:
-        """Return what else its equations depend on, such as its order; `row` are its keys."""
+        """Return the further choices on which the equations depend, such as an order;
+        `row` are the filter's keys."""
         return None
 
     @classmethod

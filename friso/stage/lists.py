@@ -25,7 +25,7 @@ class Values(tuple[Any, ...]):
 
     @property
     def text(self) -> list[Any]:
-        """Return what the user wrote."""
+        """Return the values as the user wrote them."""
         return [getattr(value, "text", value) for value in self]
 
 
@@ -34,7 +34,7 @@ class Rows(tuple[Any, ...]):
 
     @property
     def text(self) -> list[Any]:
-        """Return what the user wrote."""
+        """Return the rows as the user wrote them."""
         return [row.as_written() for row in self]
 
 
@@ -48,13 +48,13 @@ class Several:
     most: int | None = None
 
     def on(self, kind: AxisKind) -> Self:
-        """Return what the key takes on an axis of that kind."""
+        """Return the values that the key accepts on an axis of that kind."""
         examples = tuple(replace(self.of, example=text).on(kind).example for text in self.examples)
         return replace(self, of=self.of.on(kind), examples=examples)
 
     @property
     def expected(self) -> str:
-        """Return what the key takes, in words."""
+        """Return the values that the key accepts, in words."""
         count = f"{_WORDS[self.least]} or more" if self.most is None else f"{self.least} to {self.most}"
         return f"an array of {count}, each {self.of.expected}"
 

@@ -358,8 +358,8 @@ def axis_written(tables: Mapping[str, Any]) -> AxisKind:
 
 
 def _of_table(tables: Mapping[str, Any], name: str, key: str) -> Any:
-    """Return what stands at a key of a table, which may be a section or not be one at all;
-    None for nothing."""
+    """Return the value of a key of a table, which may be a section or anything else;
+    None if there is none."""
     table = tables.get(name)
     return table.get(key) if isinstance(table, dict) else getattr(table, key, None)
 
@@ -381,7 +381,7 @@ def declared_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
 
 
 def _numeric_keys_of(flat: Mapping[str, Any], name: str, cls: type[Section]) -> dict[str, Quantity | Number]:
-    """Return those of a table, and of the tables in it."""
+    """Return the numeric keys of a table, and of the tables in it."""
     keys: dict[str, Quantity | Number] = {f"{name}.{key}": field for key, field in numeric_fields(cls).items()}
     for key, several in list_fields(cls).items():
         keys |= dict.fromkeys(element_keys(flat, f"{name}.{key}"), several.of)
@@ -398,7 +398,7 @@ def _rows(flat: Mapping[str, Any], name: str, cls: type[Section]) -> Iterator[tu
 
 
 def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
-    """Return what is wrong with a flat SI mapping, arrays allowed:
+    """Return the violated bounds and rules of a flat SI mapping, arrays allowed:
     where (a boolean or an array), and why."""
     bounds = [
         (np.logical_not(field.bound.holds(flat[key])), f"{key} must be {field.bound.text}")
@@ -461,7 +461,7 @@ def _table_lines(name: str, table: Mapping[str, Any]) -> list[str]:
 
 
 def _at(stage: Stage, key: str) -> Any:
-    """Return what stands at a dotted key; None for nothing."""
+    """Return the value at a dotted key; None if there is none."""
     value: Any = stage
     for name in key.split("."):
         value = value[int(name) - 1] if isinstance(value, tuple) else getattr(value, name)

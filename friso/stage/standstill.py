@@ -86,7 +86,7 @@ NO_SETTINGS = FrictionSettings()
 
 
 def settings_of(flat: Mapping[str, Any]) -> FrictionSettings:
-    """Return those of a stage given as flat keys."""
+    """Return the settings against friction of a stage given as flat keys."""
     names = ("integral_limit", "integral_leak", "integral_deadband", "integral_deadband_exit")
     limit, leak, deadband, hysteresis = (f"controller.{name}" in flat for name in names)
     gains, push, dither = (f"controller.{first}" in flat for first, _ in PAIRS)

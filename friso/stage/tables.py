@@ -31,7 +31,7 @@ class MotorConstant(Quantity):
 
     @property
     def expected(self) -> str:
-        """Return what the key takes, in words."""
+        """Return the values that the key accepts, in words."""
         at_load = "at the load: of a motor of 0.5 N*m/A, 2 pi / lead times as much"
         return f"{super().expected}, {at_load if self.unit == 'N/A' else 'behind any gear'}"
 
@@ -78,7 +78,8 @@ class FrictionSection(UncertainSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Hashable:
-        """Return what else than the law's name its equations depend on, such as a whole exponent."""
+        """Return the further choices on which the equations depend besides the law's name,
+        such as a whole exponent."""
         return None
 
     @staticmethod

@@ -106,8 +106,8 @@ def _once(
     threads: int | None,
     cancel: np.ndarray | None,
 ) -> StageAttractors:
-    """Return what attracts stages of one structure,
-    looked for once for all that differ in their motion alone."""
+    """Find the attractors of stages of one structure,
+    once for all that differ in their motion alone."""
     varied = [np.zeros(count)]
     varied += [value for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")]
     _, first, again = np.unique(np.stack(varied), axis=1, return_index=True, return_inverse=True)

@@ -44,7 +44,7 @@ class KeptCells:
         remove_folder(self.folder)
 
     def _kept(self, file: Path, cells: np.ndarray) -> Columns | None:
-        """Return what was kept about just these cells, None if nothing."""
+        """Return the results kept for exactly these cells, None if there are none."""
         forms = {name: np.dtype(form_of(name)) for name in self.metrics}
         most = cells.nbytes + cells.size * sum(form.itemsize for form in forms.values()) + 1024 * (2 + len(forms))
         columns = kept_arrays(file, self.digest, most)

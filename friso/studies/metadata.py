@@ -58,7 +58,7 @@ class Metadata:
 
     @property
     def files(self) -> dict[str, Any]:
-        """Return what stands in the files of Zarr's, by their paths in the store."""
+        """Return the contents of Zarr's files, by their paths in the store."""
         return self.document["metadata"]
 
     @property
@@ -119,7 +119,7 @@ def _write(path: Path, metadata: Metadata) -> None:
 
 
 def _text(content: Any) -> bytes:
-    """Return what stands in a file of metadata."""
+    """Return the text of a file of metadata."""
     return json.dumps(content, indent=1, sort_keys=True).encode()
 
 
@@ -143,7 +143,7 @@ class _DamagedError(StoreError):
 
 
 def _metadata_in(path: Path, file: str) -> Metadata:
-    """Return what the metadata in this file of the store at `path` say. Raises StoreError."""
+    """Read the metadata in this file of the store at `path`. Raises StoreError."""
     try:
         document = json.loads(stored(path / file))
         entry, metadata = document.get(_OWN), document["metadata"]

@@ -150,7 +150,7 @@ class Store:
 
     @property
     def ledger(self) -> Ledger:
-        """Return what was written of each block."""
+        """Return the record of the blocks written."""
         return Ledger(self.path, checked_metadata(self.path).study, self.study.metrics)
 
     def missing(self) -> Iterator[CellBlock]:
@@ -224,7 +224,7 @@ class Store:
 
     @property
     def answers(self) -> KeptCells:
-        """Return what a refined study keeps until it is done."""
+        """Return the results that a refined study keeps until it is done."""
         return KeptCells(self.path / ANSWERS, self.study, checked_metadata(self.path).study)
 
     def annotate(self, attributes: Mapping[str, Any]) -> None:
@@ -233,7 +233,7 @@ class Store:
 
     @property
     def notes(self) -> Mapping[str, Any]:
-        """Return what friso noted of the store for itself."""
+        """Return friso's own notes on the store."""
         return checked_metadata(self.path).notes
 
     def note(self, **notes: Any) -> None:

@@ -29,7 +29,7 @@ MOST_EXPANDED = 1 << 30
 
 
 def stored(file: Path) -> bytes:
-    """Return what is in a file of a store. Raises OSError, also for a link, a device,
+    """Read a file of a store. Raises OSError, also for a link, a device,
     a pipe and more than MOST_BYTES."""
     return content_of(file, MOST_BYTES, follow=False)
 

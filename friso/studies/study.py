@@ -147,7 +147,8 @@ class Study:
         return coordinates
 
     def attributes(self) -> dict[str, Any]:
-        """Return what is stored with the numbers, so that any cell can be run again on its own."""
+        """Return the attributes stored with the results,
+        so that any cell can be run again on its own."""
         return {
             "name": self.stage.name,
             "stage": self.stage.to_toml(),

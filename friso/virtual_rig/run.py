@@ -155,7 +155,7 @@ def _recorded(
 def _signals(
     shape: Kernel, samples: np.ndarray, flat: Mapping[str, Any], task: MoveTask, seeds: np.ndarray, interval: float
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return what the drive logs, and what is true."""
+    """Return the signals that the drive logs, and the true ones."""
     time = np.arange(samples.shape[1]) * interval
     position, reading, commanded = (
         samples[:, :, i] for i in (shape.position, shape.full_state.index(READING), shape.full_state.index(COMMANDED))

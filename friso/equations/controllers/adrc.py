@@ -125,7 +125,7 @@ class DisturbanceRejection(ControllerSection):
 
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: None) -> sp.Expr:
-        """Return what the filter comes to beside the integral [N/m]."""
+        """Return the static stiffness of the filter beside the integral [N/m]."""
         parts = _parts(blocks)
         return parts.proportional / parts.d0
 

@@ -69,7 +69,8 @@ class VanDijk(Pid):
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Return those of Eq. 7 that follow from its keys, and the keys that every controller has."""
+        """Return the gains of Eq. 7 that follow from the controller's keys,
+        and the keys that every controller has."""
         values = numbers(flat)
         times = {"tau_z": "lead", "tau_i": "integral", "tau_p": "low-pass, before all terms"}
         return (

@@ -107,8 +107,7 @@ class Friction:
 
 
 def solve_linear(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> list[sp.Expr]:
-    """Return what the unknowns are where all equations, which are linear in them, are zero.
-    Raises ValueError if they are not linear."""
+    """Solve linear equations for the unknowns. Raises ValueError if they are not linear."""
     import sympy as sp
 
     matrix, right = sp.linear_eq_to_matrix(list(equations), list(unknowns))

@@ -122,7 +122,7 @@ def balanced(
 
 
 def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> str:
-    """Return what became of a series that was to be found near a motion of this amplitude [m]."""
+    """Return the status of a series that should lie near a motion of this amplitude [m]."""
     settings = FrequencySettings.current()
     if series.amplitude < settings.resting_share * length:
         return REST
@@ -158,7 +158,7 @@ class _Problem:
         return receptance(self.flat, self.basis.orders * speed / (2 * np.pi))[0]
 
     def residual(self, state: np.ndarray) -> np.ndarray:
-        """Return what is left of the equations, the last one that of the phase."""
+        """Return the residuals of the equations; the last is that of the phase."""
         cart, speed = self.split(state)
         force = self.basis.harmonics(self.answer(state).force[:, None])[:, 0]
         left = (cart - self.receptances(speed) * force) / self.length

@@ -86,7 +86,7 @@ class Imposition:
         return np.broadcast_to(force, states.shape[1:])
 
     def take(self, numbers: np.ndarray) -> Imposition:
-        """Return those with these numbers, any of them as often as wanted."""
+        """Select the motions with these numbers, any of them as often as wanted."""
         flat = {key: value[numbers] if np.ndim(value) else value for key, value in self.flat.items()}
         return Imposition(flat, len(numbers), self.rtol)
 

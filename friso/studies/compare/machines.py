@@ -98,7 +98,7 @@ class Machines:
         return stage.flat(self.changes(stage, changes))
 
     def changes(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return what an option changes, and what the machines do, of the keys of its stage."""
+        """Return the keys changed by an option, and those that differ between the machines."""
         return {**as_tuned(stage.flat()), **self.keys, **changes}
 
 
@@ -180,7 +180,7 @@ def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
 
 
 def _with_default_correlations(correlations: Correlations, spreads: Mapping[str, float]) -> Correlations:
-    """Return those given, and those of the keys with default spreads."""
+    """Return the given correlations, and those of the keys with default spreads."""
     arrays = [tuple(key for key in spreads if key.startswith(f"{array}.")) for array in ELEMENTS]
     levels = TOGETHER if all(key in spreads for key in TOGETHER) else ()
     groups = [(levels, TOGETHER_BY), *((array, 1.0) for array in arrays)]

@@ -135,7 +135,7 @@ class Option:
 
     @property
     def label(self) -> str:
-        """Return what a table calls it: "c isolator"."""
+        """Return the name of the option in a table: "c isolator"."""
         return f"{self.kind.letter} {self.kind.title}"
 
 

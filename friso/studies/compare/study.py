@@ -272,8 +272,8 @@ def _loops(machines: Machines, option: Option) -> LoopRobustness:
 
 
 def _missing(stage: Stage) -> list[str]:
-    """Return what acts on machines in a real room and not on these,
-    and what the linear loops leave out."""
+    """List the effects on machines in a real room that are missing here,
+    and those that the linear loops leave out."""
     notes = []
     if stage.floor is None:
         notes.append(

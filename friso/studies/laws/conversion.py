@@ -81,7 +81,7 @@ class LawConversion:
 
     @property
     def lost(self) -> tuple[MeasuredChange, ...]:
-        """Return what could not be kept."""
+        """Return the measured quantities that the conversion does not keep."""
         return tuple(item for item in self.compared if not item.kept)
 
 
@@ -92,8 +92,10 @@ def convertible() -> list[str]:
 
 
 def measure_friction(flat: Mapping[str, Any]) -> MeasuredFriction:
-    """Return what measurements would show of the friction of a stage given as flat keys,
-    moving forward. Raises InputError for a law that does not declare it."""
+    """Compute the measurable friction of a stage given as flat keys, moving forward.
+
+    Raises InputError for a law that does not declare it.
+    """
     name = flat["friction.model"]
     law = friction_law(name)
     if law.shown is FrictionSection.shown:

@@ -174,7 +174,7 @@ def once(stage: Stage, task: MoveTask, seeds: Sequence[int], changes: Mapping[st
 
 
 def concatenate_runs(parts: list[RailRuns]) -> RailRuns:
-    """Return what became of several lots of runs, one after the other."""
+    """Join the results of several lots of runs, one after the other."""
     return RailRuns(
         **{entry.name: np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(RailRuns)}
     )
@@ -198,7 +198,7 @@ def run_moves(
 
 
 def rail_runs(recorded: RecordedRuns) -> RailRuns:
-    """Return what became of the runs of a chunk, by the position as the drive logs it."""
+    """Evaluate the runs of a chunk, by the position as the drive logs it."""
     time, failed = recorded.time, recorded.statuses != Status.DONE
     deviation = recorded.logged["position"] - recorded.logged["reference"]
     deviation[failed] = 0.0

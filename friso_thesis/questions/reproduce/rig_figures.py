@@ -57,6 +57,7 @@ def rig_figures(experiments: Experiments, made: frozenset[str]) -> dict[str, Fig
 
 
 def _mass_lines(experiments: Experiments) -> dict[str, Figure]:
+    """Draw the measured plant with its joint locked, place by place, over the line of its mass."""
     hertz = np.array(FREQUENCIES)
     omega = 2 * np.pi * hertz
     line = experiments.locked_line
@@ -102,6 +103,7 @@ def _plant(hertz: np.ndarray, above: tuple[Series, ...], below: tuple[Series, ..
 
 
 def _free_plant(experiments: Experiments) -> dict[str, Figure]:
+    """Draw the measured plant with its joint free, with the line of the mass fitted to it."""
     plant = experiments.rig_loops.plant
     response = plant.averaged
     hertz = response.frequency
@@ -126,6 +128,7 @@ def _free_plant(experiments: Experiments) -> dict[str, Figure]:
 
 
 def _steps(experiments: Experiments) -> dict[str, Figure]:
+    """Draw position, reference and force over time in the experiment with steps of the joint."""
     log, read = experiments.joint_steps.log, experiments.joint_steps.result
     place = (
         Series(log.time, log["position"], "position", BLUE),
@@ -141,6 +144,7 @@ def _steps(experiments: Experiments) -> dict[str, Figure]:
 
 
 def _slow(experiments: Experiments) -> dict[str, Figure]:
+    """Draw a slow motion over time: position, velocity and force."""
     run = experiments.slow_motion[len(experiments.slow_motion) // 2]
     log = run.log
     cart = log["cart_position"]
@@ -168,6 +172,7 @@ def _slow(experiments: Experiments) -> dict[str, Figure]:
 
 
 def _speeds(experiments: Experiments) -> dict[str, Figure]:
+    """Draw the force over position at constant speeds, with the joint free and locked."""
     panels = []
     for title, runs in zip(("joint free", "joint locked"), experiments.constant_speed, strict=True):
         log = runs.log
@@ -181,6 +186,7 @@ def _speeds(experiments: Experiments) -> dict[str, Figure]:
 
 
 def _moves(experiments: Experiments) -> dict[str, Figure]:
+    """Draw the position over time in single moves, with the joint locked and free."""
     traces = experiments.traces
     crossovers = sorted({crossover for _, crossover in traces.moves})
     first = crossovers[0]
@@ -225,6 +231,7 @@ def _grid(experiments: Experiments) -> dict[str, Figure]:
 
 
 def _cycles(experiments: Experiments) -> dict[str, Figure]:
+    """Draw hunting cycles with the joint locked, on an even rail and on one that varies."""
     traces = experiments.traces
     late = traces.time >= traces.time[-1] / 2
     lines = tuple(
@@ -237,6 +244,7 @@ def _cycles(experiments: Experiments) -> dict[str, Figure]:
 
 
 def _standstill(experiments: Experiments) -> dict[str, Figure]:
+    """Draw the position at a standstill over time, with the joint free and locked."""
     result = experiments.standstill
     lines = tuple(
         Series(*result.traces[case], f"joint {case}", colour, width=0.8)

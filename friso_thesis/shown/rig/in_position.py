@@ -41,6 +41,7 @@ def _source(result: InPosition, source: str) -> str:
 
 
 def _damping(result: InPosition) -> str:
+    """Say how much of the difference more damping in the joint recovers."""
     recovered = result.recovered
     best = int(np.argmax(recovered))
     factor = result.damping / result.own_damping
@@ -83,6 +84,7 @@ def _over_time(result: InPosition) -> Figure:
 
 
 def _spectra(result: InPosition) -> Figure:
+    """Draw the spectra of the position at a standstill, one panel for each case of the joint."""
     panels = []
     above = slice(1, None)
     for case, colour in COLOURS.items():
@@ -103,6 +105,8 @@ def _spectra(result: InPosition) -> Figure:
 
 
 def _over_damping(result: InPosition) -> Figure:
+    """Draw the position error over the damping of the joint,
+    with the values of the locked and the free joint."""
     free = Series(result.damping, result.damped.true[:, 0], "joint free", BLUE)
     limits = (
         Limit((float(result.runs["locked", "all"].true[0, 0]),), "joint locked", VERMILLION),

@@ -51,6 +51,7 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def _field(result: CycleComparison) -> str:
+    """Say how many rails with a random field give cycles as slow as those measured."""
     as_slow, done = result.as_measured(result.field), int((~result.field.failed).sum())
     swings = int(result.field.swings.sum())
     slowest = np.nanmax(result.slower(result.field)) if swings else np.nan
@@ -151,6 +152,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def _cycles(result: CycleComparison) -> Figure:
+    """Draw the cycle on an even rail, and the slowest one on a rail that varies."""
     even, varied = result.traces
     lines = [Series(*_late(even.time, even.deviation), "even rail", BLUE)]
     if varied is not None:
@@ -169,6 +171,7 @@ def _late(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _maps(result: CycleComparison) -> Figure:
+    """Draw maps over the correlation length and the deviation of friction."""
     lengths, deviations = (
         [with_unit(length, "m") for length in result.lengths],
         [percent(length) for length in result.deviations],
@@ -198,6 +201,7 @@ def _medians(values: np.ndarray) -> np.ndarray:
 
 
 def _by_asymmetry(result: CycleComparison) -> Figure:
+    """Draw the slowness of cycles over the asymmetry of friction about the target."""
     size, slow = np.abs(result.asymmetry).ravel(), result.slower(result.field).ravel()
     alive = np.isfinite(slow)
     largest = float(size.max())
@@ -227,6 +231,7 @@ def _by_asymmetry(result: CycleComparison) -> Figure:
 
 
 def _level_maps(result: CycleComparison) -> Figure:
+    """Draw maps of period and swing over the levels of static and Coulomb friction."""
     x, y = Axis("Static friction over the file's", ""), Axis("Coulomb friction over the file's", "")
     quantities = (
         ("Period over the file's", result.slower(result.levels)),

@@ -164,6 +164,7 @@ class _Search:
         self.failed = (beyond & at_crossovers.failed[which]).any(axis=1)
 
     def halve(self) -> None:
+        """Halve the step behind the last crossover at which a cycle attracts."""
         middle = (self.low + self.high) / 2
         at_crossovers = _at_crossovers(self.stages, self.which, np.exp(middle))
         inside, flips = at_crossovers.attracts, ~at_crossovers.attracts & np.isfinite(at_crossovers.multiplier)

@@ -74,6 +74,7 @@ class Sweep:
 
     @property
     def edge(self) -> np.ndarray:
+        """Return the edges of the samples."""
         return self.edges.crossover
 
     @property
