@@ -32,7 +32,7 @@ MOST_TURNS = 1 << 20
 
 
 MORE = 2
-"""How many times as many steps a run has to be allowed that is run again because those that it had did not suffice."""
+"""Factor on the step budget of a run that is repeated because its budget was used up."""
 
 
 @dataclass(frozen=True)

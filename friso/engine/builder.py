@@ -15,7 +15,7 @@ from pathlib import Path
 from friso.platform.helper_process import answer_questions
 
 GARBAGE = 100_000, 50, 100
-"""How often unused objects are looked for: as often as is usual takes a tenth of the time."""
+"""Threshold of the garbage collector: the usual one takes a tenth of the time."""
 
 
 def main(folder: Path) -> None:

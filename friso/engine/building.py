@@ -27,10 +27,10 @@ from friso.platform.system import usable_cores
 from friso.progress import WORK_CLOCK
 
 _PATIENCE = 0.1
-"""How long [s] is waited before it is looked whether there is still need."""
+"""Time [s] between checks that a build is still needed."""
 
 _AT_THE_END = 2.0
-"""How long [s] it is waited at the end of the process until builders have ended."""
+"""Time [s] to wait at the end of the process until builders have ended."""
 
 
 def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:

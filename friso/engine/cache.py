@@ -104,7 +104,7 @@ def _in_words(error: OSError | RuntimeError) -> str:
 
 
 _PASSING = "friso-kernels-"
-"""How the name of a temporary folder begins in which there is a cache."""
+"""First letters of the name of a temporary folder that holds a cache."""
 
 
 def is_passing(folder: Path) -> bool:

@@ -30,8 +30,8 @@ from friso.stage.plug_ins import plug_ins
 from friso.stage.tables import friction_law
 
 KernelForm = Structure | Imposed | Driven | AsBuilt
-"""What a kernel may be made for: stages, friction under an imposed motion, stages that follow a log, and stages with
-their drive as built."""
+"""Forms for which a kernel can be made: stages, friction under an imposed motion, stages that follow a log, and stages
+with their drive as built."""
 
 
 STEP, OPERATION, CALL = 3.5, 0.0011, 0.126
@@ -231,7 +231,7 @@ _CIRCUMSTANCES = {
     Driven: "following a log",
     AsBuilt: "drive as built",
 }
-"""What a form is for that is not a stage by itself, for people."""
+"""Words for forms that are not a stage by itself."""
 
 
 def kernel(
@@ -264,7 +264,7 @@ _kernels: dict[KernelRequest, Kernel] = {}
 _loading = Lock()
 
 DRIVER = CodeRequest("driver", "the loops that run any kernel", "friso.engine.build")
-"""What is compiled once for all kernels."""
+"""Request for the loops that are compiled once for all kernels."""
 
 
 def _request(request: KernelRequest) -> CodeRequest:

@@ -80,7 +80,7 @@ LOOKED_UP = ("seen_states", "place_states", "walked")
 over which of these, or time after them, each table is."""
 
 FUNCTIONS = ("step", "locate", "update")
-"""What is written for a model and called by the driver."""
+"""Functions written for each model, which the driver calls."""
 
 BLOCKS = (
     "x",
@@ -101,7 +101,7 @@ BLOCKS = (
 """Blocks of rows whose first row depends on the model; after the last of them the buffer ends."""
 
 ModelLayout = namedtuple("ModelLayout", (*SIZES, *BLOCKS, "rows", *LOOKED_UP, *FUNCTIONS))
-"""What the driver knows of a model: sizes, first rows of blocks, arrays, and addresses of functions."""
+"""Layout of a model for the driver: sizes, first rows of blocks, arrays, and addresses of functions."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ from friso.engine.simd_math import clipped, exp, gaussian, power, quantised, sin
 
 
 _LOG = "from friso.engine.simd_math import log"
-"""Of the few modules that need it: those with the derivative of a power to its exponent."""
+"""Import for the few modules with the derivative of a power to its exponent."""
 
 
 def write_module(model: Model, tableau: Tableau, title: str, lanes: int = LANES) -> str:

@@ -24,7 +24,7 @@ _FLAG: ContextVar[np.ndarray | None] = ContextVar("flag", default=None)
 
 
 ASKER: ContextVar[object] = ContextVar("asker", default=None)
-"""Who asks for what is computed: a question of the app, which is told of it alone; None on the command line."""
+"""The question of the app for which a computation runs, and which receives its messages; None on the command line."""
 
 
 def current_flag() -> np.ndarray:
@@ -54,8 +54,8 @@ def go_on() -> None:
 
 
 AHEAD = 0.5
-"""How long [s] something goes first at most: what takes longer, somebody has ceased to look at, and a kernel that has
-to be compiled for it keeps nobody else waiting."""
+"""Longest time [s] for which a question goes first. A longer one is no longer watched, and a kernel that has to be
+compiled for it must keep nobody waiting."""
 
 _FIRST: ContextVar[bool] = ContextVar("first", default=False)
 _ahead: dict[object, float] = {}

@@ -18,7 +18,7 @@ _T = TypeVar("_T")
 _Other = TypeVar("_Other")
 
 _PATIENCE = 0.1
-"""How long [s] is waited before it is looked again whether anybody waits for all of it still."""
+"""Time [s] between checks that someone still waits for all results."""
 
 
 @dataclass(frozen=True)

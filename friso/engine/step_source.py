@@ -19,7 +19,7 @@ from friso.equations.component import TICK, TIME
 from friso.equations.model import Model
 
 THIRDS = (1 / 3, 2 / 3)
-"""Where inside a step the kinks are looked at; with both ends they fix a cubic."""
+"""Places inside a step at which kinks are evaluated; with both ends they fix a cubic."""
 
 
 POINTS = ("near", "third", "far", "last")
@@ -54,7 +54,7 @@ NO_SWING = 1e-6
 """A deviation whose rate stays below this share of the velocity's tolerance turns by rounding noise alone."""
 
 HAPPENED = "entered | turned | (now >= next_sample)"
-"""What wants attention besides the end of a piece of the reference."""
+"""Events that need attention besides the end of a piece of the reference."""
 
 DIVERGED = 1e6
 """A run ends when its deviation is so many times the length scale of the motion."""

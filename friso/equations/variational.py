@@ -19,7 +19,7 @@ from friso.equations.component import TIME, Kink, Role, State, Switch, key, stat
 from friso.equations.model import Model
 
 PREFIX = "small_"
-"""How the names of the deviations begin."""
+"""First letters of the names of deviations."""
 
 
 def along(name: str) -> str:

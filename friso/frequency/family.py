@@ -32,7 +32,7 @@ _T = TypeVar("_T")
 
 
 NEAR = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
-"""Where a member is looked at about its own closed-loop resonances, in units of their half widths."""
+"""Frequencies about a member's own closed-loop resonances at which it is evaluated, in units of their half widths."""
 
 
 @dataclass(frozen=True)

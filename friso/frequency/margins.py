@@ -19,7 +19,7 @@ from friso.frequency.settings import FrequencySettings
 from friso.frequency.system import Complex
 
 AROUND = np.tan(np.linspace(-1.5, 1.5, 15))
-"""Where a resonance is looked at, in units of its half width."""
+"""Frequencies about a resonance at which the loop is evaluated, in units of its half width."""
 
 
 LoopResponse = Callable[[np.ndarray], Complex]

@@ -79,11 +79,12 @@ def ends_in(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Run stages to see which end in one of their attractors.
 
-    The stages are flat keys to SI numbers or arrays (count,). A run ends in an attractor if, long after its motion, it
-    still swings by half of the smallest attracting swing or more, peak to peak. Returns which runs end there, which
-    were completed, and how far each swings at the end, peak to peak [m], all of shape (count,). `target` is common to
-    all runs, or has one row for each. Where its swings were only observed, half of each other run is inspected, as it
-    may swing less often. `options` are those of `RunOptions`.
+    The stages are flat keys to SI numbers or arrays (count,). Long after its motion, a run in an attractor still swings
+    by half of the smallest attracting swing or more, peak to peak. Returns which runs end there, which were completed,
+    and how far each swings at the end, peak to peak [m], all of shape (count,).
+
+    `target` is common to all runs, or has one row for each. Where its swings were only observed, half of each other run
+    is inspected, as it may swing less often. `options` are those of `RunOptions`.
     """
     ends, completed, swing = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count)
     observed = np.broadcast_to(target.observed, (count,))
@@ -207,6 +208,8 @@ def displacements_that_hunt(
     flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Release the stage from some displacements: return which end in hunting,
+        and for which this is known."""
         return _caught({**flat, "motion.displacement": kicks}, len(kicks), target, widest, landing_map)
 
     return kick_windows(hunts, target.amplitude)
@@ -239,6 +242,8 @@ def pushes_that_hunt(
     stages = Ensemble.held(stage.flat(), 1)
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Push the stage at some velocities: return which end in hunting,
+        and for which this is known."""
         several = stages.take(np.zeros(len(kicks), np.int64))
         released = {**several.flat, "motion.displacement": float(stages.length[0])}
         return _caught(released, len(kicks), target, widest, landing_map, pushed(several, kicks))

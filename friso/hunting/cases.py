@@ -40,7 +40,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Solver:
-    """How a run went: its status in words, steps attempted and rejected, relative tolerance."""
+    """Course of a run for the solver: status in words, steps attempted and rejected,
+    relative tolerance."""
 
     status: str
     steps: int

@@ -24,7 +24,7 @@ from friso.stage.transmission import BACKLASH, MOTOR_FRICTION
 
 @dataclass(frozen=True)
 class Decline:
-    """How hunting ends as one cause is scaled down.
+    """Decline of hunting as one cause is scaled down.
 
     `lasts` is the smallest share at which something still attracts. `gone` is the largest share below it at which
     nothing does. It is None if something attracts down to the last share, and 0 if the cycle shrinks in proportion to
@@ -43,7 +43,7 @@ class Decline:
 
 @dataclass(frozen=True)
 class Feeding:
-    """How hunting declines without the dry friction (None: there is none),
+    """Decline of hunting without the dry friction (None: there is none),
     and without the backlash."""
 
     friction: Decline | None

@@ -131,6 +131,7 @@ def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
     done = results.statuses == Status.DONE
 
     def finished(array: np.ndarray) -> np.ndarray:
+        """Replace the measures of runs that were not completed by NaN."""
         return np.where(done, array, np.nan)
 
     return Measures(

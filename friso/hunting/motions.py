@@ -28,7 +28,7 @@ from friso.hunting.turning import HALF, WINDOW
 
 @dataclass(frozen=True)
 class Motions(ArrayRows):
-    """How the stages' own motions went, arrays of shape (count,).
+    """Results of the stages' own motions, arrays of shape (count,).
 
     Runs were `completed`, or ran `away` from the reference. `peaks` is the thesis's peak count and `swing` [m] peak to
     peak of the last quarter. `settling` [s] is the time from the last corner of the reference until the deviation stays

@@ -227,6 +227,7 @@ class EdgeSearch:
         assert cycles is not None
 
         def family(_: np.ndarray, places: np.ndarray) -> Ensemble:
+            """Return the stages at places, which are logarithms of the factor from the start."""
             return self._stages(at * np.exp(ahead * places))
 
         length = abs(float(np.log(self.farthest / at)))
@@ -249,6 +250,8 @@ class EdgeSearch:
         farthest = start
 
         def over(_: Point, point: Point) -> bool:
+            """Tell whether the orbit has lost stability or turned back;
+            otherwise note the farthest point."""
             nonlocal farthest
             ended = not abs(point.multiplier) < 1 or point.place <= farthest.place
             farthest = farthest if ended else point

@@ -25,7 +25,7 @@ WITHIN = np.array([2, 4])
 
 
 class Undecided(Exception):
-    """It is not known whether attraction changes on a side."""
+    """The search could not decide whether attraction changes on a side."""
 
 
 Scaled = Callable[[np.ndarray], Mapping[str, Any]]
@@ -47,8 +47,8 @@ class MarginEnd:
 
 @dataclass(frozen=True)
 class ParameterMargin:
-    """How far a parameter of a stage may change before hunting ends,
-    if something `attracts` the stage, or begins.
+    """Range of a parameter of a stage before hunting ends, if something `attracts` the stage,
+    or begins.
 
     `below` and `above` are the nearest factors of the parameter at which it does (None: at no factor tried up to the
     end of the `range`). On the `open_sides`, -1 or 1, this is not known.

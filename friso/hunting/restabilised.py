@@ -1,6 +1,6 @@
 """Find where unstable cycles become stable again, farther along their branch.
 
-A cycle whose multiplier has passed -1 goes on as an unstable one. To end in a fold, where its multiplier is 1, the
+A cycle whose multiplier has passed -1 goes on as an unstable one. At a fold its multiplier is 1. To get there, the
 multiplier has to come back through the stable range, unless the branch breaks off at a corner of the equations. This
 happens next to the fold, where bandwidth hardly changes along the branch. Such windows of bandwidth may be as narrow as
 1e-5 of it, and no survey of bandwidths meets them.
@@ -46,9 +46,11 @@ def windows_again(
     ahead, form = 1.0 if farthest > at else -1.0, shared_structure(flat)
 
     def factor(place: float | np.ndarray) -> Any:
+        """Return the factor of the bandwidth at a place."""
         return at * np.exp(ahead * place)
 
     def family(_: np.ndarray, places: np.ndarray) -> Ensemble:
+        """Return the stages at places along the bandwidth."""
         return Ensemble.held(faster(flat, factor(places)), len(places), form=form)
 
     def end(place: float, error: float, outward: float) -> AttractionEnd:

@@ -277,7 +277,7 @@ def _with_a_target(
 
 @dataclass(frozen=True)
 class OwnMotion:
-    """How a stage's own motion ends.
+    """End of a stage's own motion.
 
     It `ends` in the attractor or not, its run was `completed`, and `swing` [m] is its final swing, peak to peak.
     `doubt` is the reason why this is uncertain, "" if it is not: a tiny change of mass may change the end.

@@ -34,7 +34,7 @@ SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SI
 """The signals that end a command."""
 
 IS_COMMAND = _IS_MODULE or os.path.splitext(os.path.basename(sys.argv[0]))[0] == "friso"
-"""Whether this process was started as friso, or as python -m friso."""
+"""True if this process was started as friso, or as python -m friso."""
 
 came: list[int] = []
 """The signals that came, in their order."""

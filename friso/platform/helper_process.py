@@ -16,7 +16,7 @@ from threading import Thread, Timer
 from typing import Any
 
 PATIENCE = 60.0
-"""How long [s] one waits for the next question: it may hold 150 MB."""
+"""Time [s] to wait for the next question: a waiting process may hold 150 MB."""
 
 
 class HelperProcess:

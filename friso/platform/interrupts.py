@@ -27,12 +27,12 @@ _AGAIN = 0.02
 """After how long [s] it is looked again whether an import has ended."""
 
 PATIENCE = 10.0
-"""How long [s] after a signal a command may take to end."""
+"""Time [s] that a command may take to end after a signal."""
 
 _raising = _said = False
 _bounded = True
 _waits = False
-"""Whether a signal came during an import, after which it is raised."""
+"""True if a signal came during an import, after which it is raised."""
 
 _held = 0
 """Blocks in which signals wait for the end (`hold_interrupts`), one within another."""

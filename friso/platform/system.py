@@ -21,8 +21,7 @@ from typing import TypeVar
 _T = TypeVar("_T")
 
 PATIENCE = 2.0
-"""How long [s] a file that another program holds open is waited for: virus scanners and indexers look at every
-file that appears."""
+"""Time [s] to wait for a file that another program holds open: virus scanners and indexers open every new file."""
 
 
 def _quoted(word: str) -> str:
@@ -343,21 +342,21 @@ else:
 
 
 MODES_TELL = sys.platform != "win32"
-"""Whether the mode of a folder tells who may look into it: on Windows its access list does."""
+"""True if the mode of a folder decides who may read it; on Windows its access list does."""
 
 MOVES_OPEN_FOLDERS = sys.platform != "win32"
-"""Whether a folder can be renamed, or deleted, in which a file is open: not on Windows."""
+"""True if a folder with an open file can be renamed or deleted: not on Windows."""
 
 DRAFT_MODE = 0o700 if sys.platform != "win32" else 0o777
 """Mode of a folder in which files are made that are then moved elsewhere: on Windows 0o700 would give them an access
 list that keeps everybody else out, wherever they are (python/cpython#118486)."""
 
 HAS_JIT_LINK = sys.platform != "win32"
-"""Whether llvmlite has the linker of LLVM that places code and its constants close to each other (JITLink): not on
-Windows. The older one aborts a large process where they come to lie too far apart (numba/numba#8567, #9001)."""
+"""True if llvmlite has LLVM's linker that places code and its constants close to each other (JITLink): not on Windows.
+The older one aborts a large process where they lie too far apart (numba/numba#8567, #9001)."""
 
 MOST_PROCESSES = 61 if sys.platform == "win32" else 10_000
-"""How many processes one can wait for at a time."""
+"""Largest number of processes that can be waited for at a time."""
 
 LIBRARIES = (
     "install the Microsoft Visual C++ runtime, https://aka.ms/vs/17/release/vc_redist.x64.exe"
@@ -367,4 +366,4 @@ LIBRARIES = (
 """What is to be done where a compiled library, such as llvmlite's, cannot be loaded."""
 
 LIMITS_MEMORY = sys.platform == "linux"
-"""Whether a process can be held to an amount of memory: Windows has no such limit, and macOS does not keep it."""
+"""True if a process can be held to an amount of memory: Windows has no such limit, and macOS ignores it."""

@@ -14,7 +14,7 @@ from typing import BinaryIO
 from friso.platform.system import delete_file, name_new_file, replace_file
 
 PARTIAL = ".partial"
-"""How the names of files end that are being written, these and Zarr's, after 32 digits."""
+"""Ends of the names of files being written, friso's and Zarr's, after 32 digits."""
 
 _PARTIAL = re.compile(rf".*\.[0-9a-f]{{32}}{re.escape(PARTIAL)}")
 FOR_ALL, FOR_USER = 0o666, 0o600

@@ -273,7 +273,7 @@ def _crossings(result: Plane, along: int, value: float) -> list[float]:
 
 
 EndKind = Literal["range", "closed", "meets", "lost"]
-"""How a curve ends: at the end of the range, as a ring, on another curve, or where its cycle was lost."""
+"""Ends of a curve: at the end of the range, as a ring, on another curve, or where its cycle was lost."""
 
 
 class CurveEnd(NamedTuple):

@@ -35,11 +35,11 @@ Columns = dict[str, np.ndarray]
 """Names to arrays of shape (cells,)."""
 
 INFERRED = "inferred"
-"""How the status of a cell begins that was not run, but lies among cells that agree."""
+"""First words of the status of a cell that was not run, but lies among cells that agree."""
 
 
 SURVEYS: Mapping[MetricBasis, Callable[..., StageAttractors]] = {"sketch": sketch_attractors, "survey": find_attractors}
-"""How what attracts a stage is looked for, by the source of a metric."""
+"""Searches for attractors, by the source of a metric."""
 
 
 def run_cells(

@@ -34,7 +34,7 @@ class Crew:
     cancel: np.ndarray = field(default_factory=lambda: np.zeros(1, np.int64))
     failures: tuple[type[BaseException], ...] = ()
     broken: bool = False
-    """Whether the executor has given up: it ends what is in flight itself, and nothing more comes of it."""
+    """True once the executor has given up: it ends the blocks in flight itself, and they give no result."""
 
     def __enter__(self) -> Self:
         return self

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from friso.hunting.measures import Measures
 
 MetricBasis = Literal["run", "sketch", "survey"]
-"""What a metric is computed from: the run of a cell, a sketch of what attracts its stage, or a full survey of it."""
+"""Basis of a metric: the run of a cell, a sketch of the attractors of its stage, or a full survey of them."""
 
 
 @dataclass(frozen=True)

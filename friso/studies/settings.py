@@ -54,7 +54,7 @@ class StudySettings(Settings):
     """A hundred runs are needed for each cell: larger blocks report progress too rarely."""
 
     look_interval: float = setting(0.05, "s")
-    """How often it is looked whether anybody waits; rarer looks are felt after Ctrl-C."""
+    """Interval between checks that someone still waits; longer ones are felt after Ctrl-C."""
 
     block_timeout: float = setting(10.0, "s")
     """Blocks that were told to end do so within a step of all lanes."""
@@ -78,7 +78,7 @@ class StudySettings(Settings):
     """Within so many scatters of 0 no curve is told to bend."""
 
     least_noise: float = setting(0.01, "")
-    """Where points are too few to show their noise, they have at least this share of the end."""
+    """Least noise, as a share of the end, where points are too few to show their noise."""
 
     fit_steps: int = setting(10_000, "")
     """A fit that needs more goes round in circles."""

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CELLS = "cells of the map"
-"""What a sweep reports to its progress."""
+"""Progress message of a sweep."""
 
 
 def sweep(

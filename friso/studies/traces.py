@@ -18,7 +18,7 @@ from friso.studies.settings import StudySettings
 from friso.studies.study import Study
 
 DRAWING = "drawing runs"
-"""What a progress is told."""
+"""Progress message while traces are drawn."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ class RigSettings(Settings):
     """Longer delays take memory for every sample of every run."""
 
     sample_memory: float = setting(2.5e8, "B")
-    """What the samples of the runs at hand may take; larger machines gain nothing from more."""
+    """Memory for the samples of the runs in progress; larger machines gain nothing from more."""
 
     points_per_length: int = setting(12, "")
     """Fewer points show corners in the rail's friction; tables grow in proportion."""
@@ -33,7 +33,7 @@ class RigSettings(Settings):
     """Stages that overshoot further leave the rail."""
 
     table_share: float = setting(0.5, "")
-    """The same for long moves, as a share of their way."""
+    """Spacing of tables in long moves, as a share of their way."""
 
     points_per_period: int = setting(10, "")
     """Fewer points flatten the highest frequency of the floor by some percent."""

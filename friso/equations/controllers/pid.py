@@ -18,7 +18,7 @@ class Pid(ControllerSection):
     kind: Literal["pid"]
 
     written: ClassVar[str]
-    """What the keys of a form stand for, in a message."""
+    """Words for the keys of a form in a message."""
     needed: ClassVar[tuple[str, ...]]
     """Names of the keys of which a table of this form has at least one."""
     asked: ClassVar[str]

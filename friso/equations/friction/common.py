@@ -32,7 +32,7 @@ STEADY_LOAD = Rule(
 
 
 LEVEL_WORDS = {"static": "Static friction", "coulomb": "Coulomb friction", "viscous": "Viscous friction"}
-"""What these keys are called on the axes of maps."""
+"""Names of these keys on the axes of maps."""
 
 
 class Friction:

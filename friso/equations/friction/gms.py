@@ -52,7 +52,8 @@ FITTED, EVEN = 4, 1.5
 
 
 class Elements(NamedTuple):
-    """What the equations depend on: the Stribeck curve, the number of elements, and whether they are damped."""
+    """Choices on which the equations depend: the Stribeck curve, the number of elements,
+    and whether they are damped."""
 
     curve: StribeckCurve
     number: int

@@ -12,12 +12,12 @@ from friso.hunting.rows import ArrayRows
 
 @dataclass(frozen=True)
 class Recurrence(ArrayRows):
-    """How runs repeat themselves, arrays of shape (runs,).
+    """Repetition of runs, arrays of shape (runs,).
 
     `swings` is the smallest number of swings after which a run repeats itself (0: it does not), and `time` [s] the time
     they take. `better` is the number after which it repeats best, and `better_time` [s] the time of these. `size` [m]
-    is peak to peak, `deviation` the error of the best repetition as a share of it, and `earlier` that error some swings
-    before. `mean` [m] is the mean size of single swings.
+    is peak to peak. `deviation` is the error of the best repetition as a share of it, and `earlier` that error some
+    swings before. `mean` [m] is the mean size of single swings.
     """
 
     swings: np.ndarray

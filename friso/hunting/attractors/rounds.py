@@ -44,7 +44,7 @@ class Pending(ArrayRows):
 
 @dataclass(frozen=True)
 class Ends(ArrayRows):
-    """How a round of runs ended, arrays of shape (runs,).
+    """End of a round of runs, arrays of shape (runs,).
 
     `states`, (runs, kept), are the final states. Runs were `completed`, ran `away` from their reference, or surely
     `rest`; `steps` counts solver steps. `repeats` says how the last swings repeat; `values` [m] and `times` [s] are

@@ -450,7 +450,7 @@ def _kinds(
     cycles, leaves_first = beside.cycles, beside.leave_first
 
     def same_kind(k: int, j: int) -> bool:
-        """Tell whether two runs of a stage repeat themselves in the same time, with the same swing."""
+        """Tell whether two runs of a stage repeat in equal times, with equal swings."""
         same = (
             abs(sizes[k] - sizes[j]) <= near[k] * sizes[j]
             and abs(times[k] - times[j]) <= settings.same_motion_share * times[j]

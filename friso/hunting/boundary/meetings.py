@@ -25,7 +25,7 @@ MeetingKind = Literal["cross", "together", "end"]
 
 @dataclass(frozen=True)
 class Meeting:
-    """How two curves of a plane meet; the curves have equal numbers where one crosses itself.
+    """Meeting of two curves of a plane; the curves have equal numbers where one crosses itself.
 
     `places` in the box of the keys have the shape (1, 2), or (2, 2) for both ends of a stretch. `error` is their error
     along each key (infinite: not refined). At the meeting either both curves are changes of the `same_cycle`, or of two
@@ -57,7 +57,7 @@ def find_meetings(space: Space, curves: Sequence[Curve], rtol: float) -> tuple[M
 
 
 def _lies_on(place: np.ndarray, meeting: Meeting) -> bool:
-    """Tell whether a place, shape (2,), belongs to a meeting: it is near its point, or near its stretch."""
+    """Tell whether a place, shape (2,), belongs to a meeting: it is near its point or stretch."""
     path = np.vstack([meeting.places, meeting.places[-1:]])
     shares = leg_shares(path, place)
     away = np.linalg.norm(path[:-1] + shares[:, None] * np.diff(path, axis=0) - place, axis=1).min()
@@ -91,7 +91,10 @@ def _nearest(curve: Curve, at: np.ndarray) -> _Nearest:
 
 
 def leg_shares(path: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Compute where on each leg of a path, (n, 2), the point nearest to a place, (2,), lies: shares from 0 to 1."""
+    """Return where on each leg of a path, (n, 2), the point nearest to a place, (2,), lies.
+
+    The results are shares of the leg from 0 to 1.
+    """
     legs = np.diff(path, axis=0)
     return np.clip(((at - path[:-1]) * legs).sum(axis=1) / np.maximum((legs**2).sum(axis=1), 1e-30), 0, 1)
 

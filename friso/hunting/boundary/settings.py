@@ -70,7 +70,7 @@ class ContinuationSettings(Settings):
     """Along a line at a smaller angle to the curve, the change of the multiplier across it is lost."""
 
     fold_search_depth: float = setting(0.5, "")
-    """How far a fold may lie from its prediction in logarithms of distance and time."""
+    """Largest distance of a fold from its prediction, in logarithms of distance and time."""
 
     range_stages: int = setting(33, "")
     """Branches that are narrower than a step are missed; more stages take longer."""

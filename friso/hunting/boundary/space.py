@@ -23,7 +23,10 @@ FlatAt = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class KeyRange:
-    """A key (or a free name that others follow) from `low` to `high` [SI `unit`], on a logarithmic scale if `log`."""
+    """Range of a key, or of a free name that others follow, from `low` to `high` [SI `unit`].
+
+    The scale is logarithmic if `log`.
+    """
 
     key: str
     low: float
@@ -113,6 +116,7 @@ class Space:
         """
 
         def length(place: float) -> float:
+            """Return the length at a place on the line."""
             steps = zip(self.ranges, origin + place * direction, direction, strict=True)
             return min(swept.hundredth(float(at)) / abs(float(way)) for swept, at, way in steps if way)
 

@@ -1,7 +1,7 @@
 """Define the words and numbers on hunting, all on arrays.
 
-`stage_verdict` has the verdict on a stage, `run_outcome` the outcome of a run, `settling` the settling time, and
-`peak_count` the thesis's peak count of a run.
+`stage_verdict` has the verdict on a stage, and `run_outcome` the outcome of a run. `settling` has the settling time,
+and `peak_count` the thesis's peak count of a run.
 """
 
 from friso.hunting.criteria.peak_count import (

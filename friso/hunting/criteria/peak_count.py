@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 PEAK_RULE = f"after {COUNTED_AFTER:g} s, higher than {1e3 * COUNTED_ABOVE:g} mm, {SEPARATION:g} s apart"
-"""Which maxima count."""
+"""Rule for maxima that count."""
 
 PEAK_CRITERION = f"peak count of the thesis: maxima {PEAK_RULE}, the tallest kept first"
 

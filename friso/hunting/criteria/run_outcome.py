@@ -44,7 +44,7 @@ OUTCOME_CRITERION = (
 
 @dataclass(frozen=True)
 class End:
-    """How runs end, arrays of shape (runs,).
+    """State of runs at their end, arrays of shape (runs,).
 
     `completed`: the run came to its end. `swing` [m] is peak to peak over the last quarter, `earlier` [m] over the last
     half. `period` [s] is that of the swing (NaN: none). `turned` [s] is the time of the last turn (-inf: never),

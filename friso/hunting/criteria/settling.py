@@ -1,10 +1,10 @@
 """Define the settling time for `friso check`, `compare`, `simulate`, `sweep`,
 `map` and `tune`.
 
-It is the time from the last corner of the reference until the deviation stays within a band for as long as the
-reference stands there. For a motion there and back it is the longer of the times at both ends. It is infinite if the
-deviation is outside the band when the reference leaves, or when the run ends. So a stage that never leaves is in
-position once the reference is back, but it has not settled.
+The time runs from the last corner of the reference until the deviation stays within a band while the reference stands
+there. For a motion there and back it is the longer of the times at both ends. It is infinite if the deviation is
+outside the band when the reference leaves, or when the run ends. So a stage that never leaves is in position once the
+reference is back, but it has not settled.
 """
 
 from __future__ import annotations

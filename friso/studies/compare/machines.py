@@ -47,14 +47,15 @@ it differs between bearings of one type and preload, masses as weighed, bristles
 they are identified."""
 
 ELEMENTS: Mapping[str, float] = MappingProxyType({"friction.element_stiffness": 50.0, "friction.element_damping": 50.0})
-"""The same of arrays, all elements of which vary by one common factor."""
+"""Half-widths of the 95 % intervals [%] of arrays for which the stage file gives none. All elements of an array vary by
+one common factor."""
 
 SLIP = "friction.breakaway_deflection"
 """Deflection at which elasto-plastic bristles begin to slip. It is drawn as a share of that of sliding, F_c/sigma_0, at
 which it has to stay below: what varies by its spread is that share over what is left of it."""
 
 TINY = 1e-6
-"""What it is multiplied by while the others are drawn, so that it rules out none of them."""
+"""Factor on this deflection while the other keys are drawn, so that it rules out none of them."""
 
 TOGETHER, TOGETHER_BY = ("friction.static", "friction.coulomb"), 0.8
 """Keys that follow the preload together, and their correlation, where neither is uncertain in the file: our choice."""
@@ -63,13 +64,13 @@ HELD = (
     *(f"{CONTROLLER}.", "motion.", "drive.sample_time", "drive.velocity_sample_time", "drive.position_sample_time"),
     *("drive.delay", "drive.velocity_samples"),
 )
-"""What is set, not identified: the same on all machines, even where the file calls it uncertain."""
+"""Keys that are set, not identified: equal on all machines, even where the file calls them uncertain."""
 
 SIGNS = int.from_bytes(b"signs")
 """Which of a seed's random numbers: Philox takes them as the second half of its key."""
 
 FROM_LEAVES = ("joint.stiffness", "parasitic.")
-"""What follows from leaf springs, where the stage has these."""
+"""Keys that follow from leaf springs, where the stage has these."""
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,8 @@ SPEEDS = np.geomspace(1e-2, 1e3, 201)
 
 
 MeasuredKind = Literal["curve", "static", "stiffness", "virgin", "damping", "viscous", "conditions"]
-"""What measurements show: steady friction over speed, break-away, stiffness before sliding, the virgin curve, damping
-at rest, viscous damping; and the conditions under which they were taken."""
+"""Measured quantities: steady friction over speed, break-away, stiffness before sliding, the virgin curve, damping at
+rest, viscous damping; and the conditions under which they were taken."""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from friso.studies.laws.conversion import (
 )
 
 NEEDED: frozenset[MeasuredKind] = frozenset(("curve", "static", "stiffness", "viscous"))
-"""What a law has to keep to be tried."""
+"""Measured quantities that a law has to keep to be tried."""
 
 
 @dataclass(frozen=True)

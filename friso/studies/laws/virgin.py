@@ -21,7 +21,7 @@ EXAMPLE = "displacement [um],force [N]"
 
 
 ELSEWHERE = (-0.2, -0.1, -0.05, 0.05, 0.1, 0.2)
-"""Where the force may begin, in units of the displacement at which it is a third of static friction."""
+"""Displacements from which the force may begin, in units of that at which it is a third of static friction."""
 
 
 @dataclass(frozen=True)

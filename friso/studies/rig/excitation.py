@@ -43,7 +43,8 @@ class Excitation:
 
 
 SLIDING = Excitation(2.0, 100.0, 150, 625.0)
-"""It moves the cart, up to 800 Hz on the thesis's rig, logged every 0.2 ms; the thesis states no strength."""
+"""Excitation that moves the cart, up to 800 Hz on the thesis's rig, logged every 0.2 ms; the thesis states no strength.
+"""
 
 
 def excite(

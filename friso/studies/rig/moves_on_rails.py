@@ -35,7 +35,7 @@ BAND = COUNTED_ABOVE
 """Band about the reference [m] within which a run rests: the height from which the thesis counts peaks."""
 
 ROUND = (1.0, 2.0, 5.0, 10.0)
-"""What a length is rounded to, times a power of ten."""
+"""Numbers to which a length is rounded, times a power of ten."""
 
 
 def distance(stage: Stage) -> float:

@@ -25,7 +25,7 @@ WAY = 5 / 3
 """Way at constant speed over that of the stage's own motion: 150 mm for 90 mm (Sec. 4.2.3)."""
 
 ALPHA = 0.1
-"""That of the van Dijk controller to which plain gains are compared, as in the thesis."""
+"""The alpha of the van Dijk controller to which plain gains are compared, as in the thesis."""
 
 FIXED = 1e9
 """Mass [kg] of a cart that does not move."""

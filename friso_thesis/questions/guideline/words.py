@@ -19,7 +19,7 @@ BASES = {
     "joint": "sqrt(k_j/m)",
     "stroke": "sqrt(F_s/(m S_j))",
 }
-"""What each rate is but for its factor and powers [rad/s]."""
+"""Base of each rate, without its factor and powers [rad/s]."""
 
 
 RULE = 2.0

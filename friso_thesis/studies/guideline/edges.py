@@ -47,7 +47,7 @@ KINDS = {
     ABOVE: "a cycle attracts up to the highest crossover tried",
     UNKNOWN: "a decisive simulation failed, or after a jump hunting did not end within the steps allowed",
 }
-"""What is known of an edge, and of stages without one in the range."""
+"""Kinds of an edge, and of stages without one in the range."""
 
 Stages = Callable[[np.ndarray, np.ndarray], Ensemble]
 """Stages from their numbers and crossovers, both of shape (count,)."""

@@ -19,8 +19,8 @@ from friso.hunting.criteria import lasts
 from friso.hunting.measures import swing_of
 
 DISTANCES = np.geomspace(0.02, 2.0, 95)
-"""Where a stage sticks at first, in units of the deflection of the loop by the break-away force: 5 % apart, about every
-cycle, whose own distance is 0.03 (at the smallest friction gaps) to 1.5 of them."""
+"""Start distances, in deflections of the loop by the break-away force: 5 % apart, about every cycle, whose own distance
+is 0.03 (at the smallest friction gaps) to 1.5 of them."""
 
 SMALL = 0.005
 """Band about the reference, in the same units, within which a motion rests: the smallest cycles of the sweeps, those of

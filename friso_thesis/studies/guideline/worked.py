@@ -41,7 +41,7 @@ STUDIED: Mapping[str, Callable[[Mapping[str, Any]], float]] = {
     "stroke": lambda changes: changes["joint.stroke"],
     "parasitic": lambda changes: changes["parasitic.frequency"],
 }
-"""What each study varies, SI, from the changes of a case."""
+"""Value that each study varies, SI, from the changes of a case."""
 
 
 @dataclass(frozen=True)

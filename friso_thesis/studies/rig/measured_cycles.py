@@ -53,7 +53,7 @@ STATIC, COULOMB = (0.75, 1.0, 1.25, 1.5, 2.0), (0.5, 0.75, 1.0, 1.25, 1.5, 1.75,
 """Friction levels over those of the stage, on an even rail: our choice."""
 
 STARTS = (0.0, 0.005, 0.01, 0.02)
-"""What starts a cycle: the move (0), or a release from this share of its distance."""
+"""Starts of a cycle: the move (0), or a release from this share of its distance."""
 
 LONGER = 1.5
 """Over the time of other runs: slow cycles shall come often enough."""

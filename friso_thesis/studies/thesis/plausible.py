@@ -39,7 +39,7 @@ DOUBT = 0.05
 """Probability of a separation by chance from which it is not reported, over all values of a claim together."""
 
 PARTS = {**NEEDS, **EXPERIMENTS}
-"""What evidence has besides maps and responses."""
+"""Parts of the evidence besides maps and responses."""
 
 
 @dataclass(frozen=True)

@@ -165,4 +165,4 @@ CONVENTIONS = (
     "the swing, interpolated in its logarithm, falls below what counts, or halfway where nothing is left of it; none "
     "beyond it keeps moving."
 )
-"""How the criteria read the words of the claims: one reading for all."""
+"""Reading of the claims' words that all criteria share."""
