@@ -33,7 +33,7 @@ class RigSettings(Settings):
     """Stages that overshoot further leave the rail."""
 
     table_share: float = setting(0.5, "")
-    """Spacing of tables in long moves, as a share of their way."""
+    """Margin of tables in long moves, as a share of their way: stages that overshoot further leave the rail."""
 
     points_per_period: int = setting(10, "")
     """Fewer points flatten the highest frequency of the floor by some percent."""
