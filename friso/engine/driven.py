@@ -65,7 +65,7 @@ class DrivenRuns:
 def run_driven(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, inputs: Inputs, starts: np.ndarray, rtol: float = 1e-5
 ) -> Iterator[DrivenRuns]:
-    """Yield runs of stages of one structure, given as flat keys to SI numbers or arrays of shape
+    """Run stages of one structure, given as flat keys to SI numbers or arrays of shape
     (runs,), from the states `starts`, shape (runs, kept); they come chunk by chunk. A failed run is NaN from there on,
     and has its status."""
     count, segments = len(inputs.reference), inputs.segments

@@ -68,7 +68,7 @@ def run(
     changes: Mapping[str, Any] | None = None,
     threads: int | None = None,
 ) -> Iterator[RecordedRuns]:
-    """Yield runs of a stage, each with noise of its own seed, logged every `interval` [s],
+    """Run a stage several times, each with noise of its own seed, logged every `interval` [s],
     a whole number of samples.
 
     `changes` are flat keys to SI numbers, or arrays of one for each run: of a sweep, or of machines drawn at random.

@@ -95,7 +95,7 @@ class PidGains(Pid):
 
     @classmethod
     def takes_velocity(cls, flat: Mapping[str, Any]) -> bool:
-        """Return where the derivative is that of the measurement."""
+        """Tell whether the controller takes the derivative of the measurement."""
         return bool(flat[KD] > 0 and flat[DERIVATIVE_ON] == "measurement")
 
     @classmethod

@@ -55,7 +55,7 @@ def excite(
     changes: Mapping[str, Any] | None = None,
     kind: Excitation = SLIDING,
 ) -> RecordedRuns:
-    """Return runs at a standstill at a place [m] with the multisine of a seed;
+    """Excite runs at a standstill at a place [m] with the multisine of a seed;
     `changes` are arrays of shape (runs,)."""
     step, slow = as_built_keys(stage)["drive.sample_time"], interval(stage, 1 / (kind.samples * pace(stage)))
     period = round(PERIOD / pace(stage) / slow) * slow

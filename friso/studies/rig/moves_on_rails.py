@@ -188,7 +188,7 @@ def run_moves(
     progress: Progress = silent,
     label: str = "",
 ) -> RailRuns:
-    """Return runs of a task and what became of them; the samples are forgotten chunk by chunk."""
+    """Run a task and evaluate the runs; the samples are forgotten chunk by chunk."""
     parts: list[RailRuns] = []
     progress(0, len(seeds), label)
     for chunk in run(stage, task, seeds, interval(stage, INTERVAL), changes):

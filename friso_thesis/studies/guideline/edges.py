@@ -98,8 +98,10 @@ class _AtCrossovers:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _at_crossovers(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> _AtCrossovers:
-    """Return where an orbit may be but could not be closed,
-    a long simulation tells whether anything hunts on."""
+    """Search stages for attractors at some crossovers.
+
+    Where an orbit may exist but could not be closed, a long simulation shows whether the stage keeps hunting.
+    """
     part = stages(which, crossover)
     cycles = find_cycles(part)
     attracts, failed, unsure = cycles.attracting, np.zeros(part.count, bool), np.flatnonzero(cycles.uncertain)

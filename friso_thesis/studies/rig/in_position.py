@@ -175,7 +175,10 @@ def with_noise(task: MoveTask, force: float, seed: int, step: float) -> MoveTask
 
 
 def _silenced(stage: Stage, source: str) -> dict[str, Any]:
-    """Return the encoder's noise and its resolution are there with its own source, and with all."""
+    """Return the drive's keys that switch off the encoder's noise and resolution.
+
+    Both stay on for their own source, and for all sources together.
+    """
     if source in ("encoder", "all") or stage.drive is None:
         return {}
     return {key: 0.0 for key in ("drive.encoder_noise", "drive.encoder_resolution") if key in stage.flat()}

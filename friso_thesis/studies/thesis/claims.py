@@ -37,7 +37,7 @@ class Claim:
 
     @property
     def place(self) -> tuple[int, ...]:
-        """Return where the thesis makes it, by section, to sort by."""
+        """Return the section of the thesis with the claim, to sort by."""
         return tuple(int(number) for number in self.section.split("."))
 
 
