@@ -1,4 +1,4 @@
-"""What stands in a figure beside its own: the pinned machine in grey; on maps, the edge of hunting."""
+"""Add to a figure what is compared with it: the pinned machine in grey, or the edge of hunting."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ GHOST = "#a9a9a9"
 
 
 def ghosts_of(pinned: Answer | None) -> Callable[[Figure], Figure]:
-    """What puts the lines of a pinned machine's answer behind those of a figure of the same name."""
+    """Return a function that draws the pinned machine's lines behind those of a figure.
+
+    Figures are matched by name. Without a pinned answer, figures stay as they are."""
     if pinned is None:
         return lambda figure: figure
     others = {figure.name: figure for figure in pinned.figures()}
@@ -25,7 +27,9 @@ def ghosts_of(pinned: Answer | None) -> Callable[[Figure], Figure]:
 
 
 def _ghosted(figure: Figure, other: Figure) -> Figure:
-    """The figure with the lines of another one's panels behind its own: of those that show the same."""
+    """Draw the lines of another figure in grey behind those of this one.
+
+    Panels are matched by title and axis labels."""
     ghosts = {_subject(panel): panel for panel in other.panels}
 
     def both(panel: Panel) -> Panel:
@@ -44,11 +48,12 @@ _OWN = re.compile(r" \(as given\)|, \S+ k?Hz$")
 
 
 def _subject(panel: Panel) -> tuple[str, str, str]:
+    """Return title and axis labels of a panel, without what the title says of one machine alone."""
     return _OWN.sub("", panel.title), panel.x.label, panel.y.label
 
 
 def with_edge(figure: Figure, edge: Answer | None) -> Figure:
-    """A map over two keys with the curves on which hunting ends over the same two."""
+    """Add to a map over two keys the curves on which hunting ends."""
     if edge is None:
         return figure
     curves = edge.figures()[0].panels[0].series

@@ -1,5 +1,6 @@
-"""How every command answers: it asks the function of friso of the same name, and shows the answer: the conclusion
-first, small tables, what to do next, and details if they are wanted."""
+"""Answer every command: ask the friso function of its name and show the answer.
+
+The conclusion comes first, then small tables and what to do next. Details follow if they are asked for."""
 
 from __future__ import annotations
 
@@ -31,7 +32,9 @@ DRAWING = "drawing the page"
 
 @dataclass(frozen=True)
 class Shown:
-    """Where a command's answer goes: a folder for its files, what may be replaced there, and what is printed."""
+    """Where an answer goes: the folder for its files, and the form of what is printed.
+
+    `overwrite` allows the command to replace files in the folder."""
 
     out: Path | None = None
     overwrite: bool = False
@@ -66,8 +69,9 @@ def ask(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
 
 
 def tried(write: Callable[[], list[Path]], nothing: str = "no file was written") -> tuple[list[Path], str]:
-    """The files that `write` writes, and why it could not, "" where it could: what was computed is shown all the
-    same. `nothing` says what is missing then."""
+    """Write files and return them, or return none and the reason why writing failed.
+
+    What was computed is shown all the same. `nothing` says what is missing then."""
     try:
         return write(), ""
     except OSError as error:
@@ -79,8 +83,9 @@ def tried(write: Callable[[], list[Path]], nothing: str = "no file was written")
 def show(
     answer: Answer, files: Iterable[Path], as_json: bool = False, details: bool = False, unwritten: str = ""
 ) -> None:
-    """Print the answer with the `files` written, or why they are `unwritten`. Raises typer.Exit with the status of a
-    failure, KeyboardInterrupt after an answer that was interrupted."""
+    """Print an answer with its `files`, or with the reason why they are `unwritten`.
+
+    Raises typer.Exit with the status of a failure. Raises KeyboardInterrupt after an answer that was interrupted."""
     written = [*files]
     if as_json:
         print_document(answer.to_dict(details), written)
@@ -113,7 +118,7 @@ def show(
 
 @contextmanager
 def named_as_options(names: Collection[str]) -> Iterator[None]:
-    """An InputError about a keyword speaks of the option of the same name."""
+    """Let an InputError about a keyword name the command-line option instead."""
     try:
         yield
     except InputError as error:
@@ -129,12 +134,12 @@ def named_as_options(names: Collection[str]) -> Iterator[None]:
 
 
 def option_of(keyword: str) -> str:
-    """The option on the command line for a keyword of Python: "--sample-time" for "sample_time"."""
+    """Return the command-line option for a Python keyword, such as "--sample-time" for "sample_time"."""
     return f"--{keyword.strip('_').replace('_', '-')}"
 
 
 def _paths(about: Iterable[Any]) -> Iterator[Path]:
-    """The files among what is asked about."""
+    """Yield the files among the arguments, also from nested lists."""
     for item in about:
         if isinstance(item, list | tuple):
             yield from _paths(item)

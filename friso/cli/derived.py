@@ -1,4 +1,4 @@
-"""Commands made of questions: options from the signature of a function, their help from its docstring."""
+"""Derive commands from questions: options from the function's signature, help from its docstring."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ IN_PYTHON_ALONE = (
 
 @dataclass(frozen=True)
 class CommandParameter:
-    """A parameter of a function as its command has it."""
+    """A parameter of a question's function as its command shows it."""
 
     name: str
     kind: ArgumentKind
@@ -68,7 +68,7 @@ def command_help(question: Question) -> str:
 
 
 def _asked(question: Question) -> Iterator[Parameter]:
-    """The parameters that are asked about: arguments in the order of `takes`, then options."""
+    """Yield the parameters of a question: arguments in the order of `takes`, then options."""
     parameters = question.parameters
     for name in (*question.takes, *(name for name in parameters if name not in question.takes)):
         parameter = parameters[name]
@@ -81,7 +81,7 @@ def _asked(question: Question) -> Iterator[Parameter]:
 
 
 def _kind_of(annotation: str) -> ArgumentKind | None:
-    """The kind that a command line gives a parameter; None for one that it has no form for."""
+    """Return the kind of value that a parameter takes on the command line; None if it has no form there."""
     parts = [part for part in alternatives(annotation) if part not in ("None", *IN_PYTHON_ALONE)]
     several = [part for part in parts if KINDS[part].several]
     paths = [part for part in parts if KINDS[part].command_type is Path]
@@ -94,6 +94,9 @@ def _argument(parameter: CommandParameter) -> Parameter:
 
 
 def _option(parameter: CommandParameter) -> Parameter:
+    """Build an option of a command, with its name, default and help.
+
+    A boolean becomes a flag. Defaults are shown as short numbers."""
     kind, default = parameter.kind, parameter.default
     names = [option_of(parameter.name)]
     needed = default is Parameter.empty
@@ -114,7 +117,7 @@ def _typed(parameter: CommandParameter, info: Any, default: Any) -> Parameter:
 
 
 def _of_the_shell(question: Question) -> Iterator[Parameter]:
-    """The options that say where the answer goes."""
+    """Yield the options that say where the answer goes: --out, --overwrite, --json and --details."""
 
     def option(name: str, default: Any, annotation: Any, declared: str, help: str, **more: Any) -> Parameter:
         info = typer.Option(declared, help=help, **more)
