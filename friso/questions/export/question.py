@@ -10,7 +10,7 @@ from friso.progress import Progress, silent
 
 
 class ExportAnswer(Answer):
-    """Gains in the terms of drives: `result` is a `Gains`."""
+    """Gains in the terms of drives; `result` is a `Gains`."""
 
 
 @question
