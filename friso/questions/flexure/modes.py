@@ -88,9 +88,9 @@ def best_view(mechanism: Mechanism, mode: Mode) -> str:
 
 
 def drawable_share(mechanism: Mechanism, mode: Mode) -> float:
-    """Return the share of a mode's kinetic energy in the stage and the middle lines of the leaves.
+    """Return the share of a mode's kinetic energy that its picture shows.
 
-    The rest is torsion of the leaves, which is not drawn."""
+    This is the energy of the stage and of the middle lines of the leaves. The rest is torsion of the leaves."""
     speed = _rigid(mechanism, mode, _centre(mechanism)[None, :])[0]
     stage = mechanism.body.mass * np.sum(speed**2) + np.sum(
         np.array(mechanism.body.inertia, dtype=float) * mode.stage[3:] ** 2

@@ -1,4 +1,4 @@
-"""Where machines stand in a figure over two keys."""
+"""Mark where machines stand in a figure over two keys."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ SHOWN = "this machine"
 
 
 def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Sequence[str]) -> Figure:
-    """A figure over two keys with the places of some stages, by label, that have both, where they lie inside of it."""
+    """Add to a figure over two keys the places of stages that have both keys.
+
+    `stands` gives label and stage. Places outside the axes are left out."""
     places = []
     for label, stage in stands:
         right, up = ({**dict.fromkeys(SCALINGS, 1.0), **stage.flat()}.get(key) for key in keys)
@@ -35,4 +37,5 @@ def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Seque
 
 
 def _is_on(axis: Axis, value: float) -> bool:
+    """Tell whether a value lies within the limits of an axis."""
     return axis.limits is None or axis.limits[0] <= value <= axis.limits[1]
