@@ -40,9 +40,10 @@ _QUIET = ("transient", "settles")
 
 
 def headline(runs: xr.Dataset, name: str) -> str:
-    """Return the first statement of a map: in which share and which ranges the metric's finding holds.
+    """Return the first statement of a map: where, and in which share of it, its finding holds.
 
-    Doubts follow. It is empty if the runs have no outcome."""
+    The finding is what the metric is asked for (`Metric.findings`). Doubts follow. It is empty if the runs have no
+    outcome."""
     every = metrics()
     asked = name if name in runs and name in every and every[name].findings else ""
     asked = asked or (every[name].answered_by if name in every else "outcome")

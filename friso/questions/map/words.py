@@ -1,4 +1,4 @@
-"""What the axes, variables and cells of a map are called, and how many cells have which word."""
+"""Name the axes, variables and cells of a map, and count the cells with each word."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ PALETTE = {"vermillion": VERMILLION, "orange": ORANGE, "pink": PINK, "quiet": QU
 
 
 def quantity(key: Hashable) -> str:
-    """An axis in words: "joint.stroke" is "Joint stroke", a free name is itself."""
+    """Return a key in words: "joint.stroke" is "Joint stroke"; a free name stays as it is."""
     name = str(key)
     of_laws = {f"friction.{key}": word for law in friction_laws().values() for key, word in law.words.items()}
     scalings = {name: scaling.words for name, scaling in SCALINGS.items()}
@@ -54,7 +54,7 @@ def quantity(key: Hashable) -> str:
 
 
 def in_sentence(key: Hashable) -> str:
-    """An axis within a sentence: "joint stroke"; names of people keep their capital."""
+    """Return a key in words within a sentence: "joint stroke"; names of people keep their capital."""
     name = quantity(key)
     return name if name.startswith(("Coulomb", "Stribeck")) else name[0].lower() + name[1:]
 
@@ -89,7 +89,7 @@ def no_number(name: str, reason: str | None = None) -> Category:
 
 
 def grouped(number: int) -> str:
-    """A count in groups of three digits: 1 000 000."""
+    """Write a count in groups of three digits: 1 000 000."""
     return f"{number:,}".replace(",", " ")
 
 
@@ -102,13 +102,13 @@ def in_order(categories: Iterable[Category]) -> tuple[Category, ...]:
 
 
 def unit_of(array: xr.DataArray) -> str:
-    """SI unit of a variable or coordinate; none for counts and words."""
+    """Return the SI unit of a variable or coordinate; empty for counts and words."""
     unit = str(array.attrs.get("units", ""))
     return "" if unit == "1" else unit
 
 
 def words_of(runs: xr.Dataset, name: str) -> tuple[np.ndarray, list[str]]:
-    """The texts of a variable: their numbers, of its shape, and each text once (by its first place)."""
+    """Return the texts of a variable as codes of its shape, and each text once by first place."""
     import pandas as pd
 
     values = runs[name].values
@@ -117,7 +117,9 @@ def words_of(runs: xr.Dataset, name: str) -> tuple[np.ndarray, list[str]]:
 
 
 def text_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
-    """How many cells have each text of a variable, the most frequent first; none where there is no such variable."""
+    """Count the cells with each text of a variable, the most frequent first.
+
+    A missing variable gives no counts."""
     if name not in runs:
         return {}
     cells: Counter[str] = Counter()
@@ -130,7 +132,7 @@ def text_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
 
 
 def failures(runs: xr.Dataset) -> dict[str, int]:
-    """How many cells have no result, by the reason in their status."""
+    """Count the cells without a result by the reason in their status."""
     return {
         reason: number
         for reason, number in text_counts(runs, "status").items()
@@ -139,7 +141,9 @@ def failures(runs: xr.Dataset) -> dict[str, int]:
 
 
 def word_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
-    """How many cells have each word of the metric `name`, in the order of the legend; none without that variable."""
+    """Count the cells with each word of a metric, in the order of the legend.
+
+    A missing metric gives no counts."""
     cells = {word_category(name, word): number for word, number in text_counts(runs, name).items()}
     return {category.label: cells[category] for category in in_order(cells)}
 
