@@ -1,4 +1,4 @@
-"""Remedies for a stage that hunts: settings and isolators optimised one remedy at a time, verified by cycles."""
+"""Find what stops a stage from hunting: settings and isolators, each optimised and verified by cycles."""
 
 from typing import Literal
 
