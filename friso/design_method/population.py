@@ -60,7 +60,7 @@ def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
 def _falls(population: Population, flat: Mapping[str, Any]) -> None:
     """Raise InputError if sliding friction is nowhere below static friction.
 
-    A law without both kinds of friction is not checked."""
+    Nothing is checked for a law without both kinds of friction."""
     static, coulomb = (population.keys.get(f"friction.{name}") for name in ("static", "coulomb"))
     if static is not None and coulomb is not None and np.all(coulomb >= static):
         text = f"static friction up to {static.max():g} N with Coulomb friction from {coulomb.min():g} N on"

@@ -82,7 +82,7 @@ def support_y(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
 
 
 def _cubic_twist(mechanism: Mechanism) -> Any:
-    """Return the compliance of a leaf under a torque that goes with s^3, relative to free warping.
+    """Return the torsional compliance relative to free warping, for a torque that goes with s^3.
 
     The rate of twist p solves p - p''/rate^2 = s^3, with p = 0 at the clamps: p = s^3 + 6 s/rate^2 - A sinh(rate s)."""
     half = plate.warping_rate(mechanism.width, mechanism.poisson) * mechanism.length / 2
@@ -245,7 +245,7 @@ def _symmetric(mechanism: Mechanism, entries: dict[tuple[int, int], Any]) -> np.
 
 
 def modes(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
-    """Return frequencies, shape (..., 7), ascending, and shapes, (..., 7, 7), of the stage and leaves.
+    """Return frequencies (..., 7), ascending, and mode shapes (..., 7, 7) of stage and leaves.
 
     Shapes stand in columns at unit modal mass. Six coordinates are the stage's. The seventh is the first bending mode
     of all leaves in phase, at its unit modal mass. Besides, the leaves follow the stage statically (Craig & Bampton

@@ -60,9 +60,9 @@ def _mode(mechanism: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
 
 
 def following(mechanism: Mechanism, stage: np.ndarray) -> np.ndarray:
-    """Return how the leaves' middle lines follow a motion of the stage (6,), (leaves, POINTS, 3).
+    """Return how the leaves' middle lines follow a motion of the stage, (leaves, POINTS, 3).
 
-    They follow statically."""
+    The motion has shape (6,), and the leaves follow statically."""
     settings = LeafSpringSettings.current()
     s = np.linspace(0.0, 1.0, settings.mode_shape_points)
     by_place, by_slope = 3 * s**2 - 2 * s**3, mechanism.length * (s**3 - s**2)

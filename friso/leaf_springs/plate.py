@@ -82,10 +82,10 @@ def _decay(rate: Any, s: Any, length: Any, odd: bool) -> Any:
 
 
 def stiffening(length: Any, width: Any, poisson: Any, odd: bool = True) -> Any:
-    """Return by what factor the leaf is stiffer than a beam: from 1 (narrow) to 1/(1 - nu^2) (wide).
+    """Return the factor by which clamps make a leaf stiffer than a beam.
 
-    Odd: for the parallel motion of its ends, k = factor 12 E I/L^3. Even: for turning them against each other, k =
-    factor E I/L."""
+    It grows from 1 for a narrow leaf to 1/(1 - nu^2) for a wide one. Odd: for the parallel motion of its ends, k =
+    factor 12 E I/L^3. Even: for turning them against each other, k = factor E I/L."""
     curl = Curl.of(length, width, poisson, odd)
     # compliance: integral of f'' m over that of m^2, times (1 - nu^2) for a beam
     share = poisson**2 / (1 - poisson**2)
