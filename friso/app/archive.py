@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 def archive(answer: Answer, more: Mapping[str, str]) -> bytes:
     """Return a ZIP file with everything that an answer's command would write.
 
-    It holds the files, the figures in all formats, and the answer as JSON. `more` adds texts by name."""
+    It holds the files, the figures in all formats, and the answer as JSON. `more` adds texts by name.
+    """
     held = io.BytesIO()
     packing = zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED)
     with temporary_folder("friso-app-") as folder, packing as file:

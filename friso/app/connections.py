@@ -1,6 +1,7 @@
 """Limit who holds a connection, and for how long.
 
-Nobody without a key can keep others from the server."""
+Nobody without a key can keep others from the server.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ class Connection(H11Protocol):
     """A connection that is cut off when it rests too long, or is held too long without a key.
 
     If all places are taken, the connection that has rested longest makes way for a new one. A connection that answers
-    somebody with a key is never cut."""
+    somebody with a key is never cut.
+    """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Take a place; abort the connection that has rested longest if all are taken."""
@@ -77,7 +79,8 @@ class Connection(H11Protocol):
 class Once(logging.Filter):
     """A filter that lets each message and its error through only once.
 
-    Anybody who reaches the server can repeat a request that fails, and would otherwise fill the log."""
+    Anybody who reaches the server can repeat a request that fails, and would otherwise fill the log.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -94,7 +97,8 @@ class Once(logging.Filter):
 def failed(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
     """Log an error of the server's event loop.
 
-    Too many open connections are reported in one sentence, without a traceback."""
+    Too many open connections are reported in one sentence, without a traceback.
+    """
     error = context.get("exception")
     if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM):
         LOGGER.warning(OUT_OF_FILES)

@@ -2,7 +2,8 @@
 
 A frame begins with two whole numbers of four bytes, least significant byte first. They are the lengths of the text and
 of the numbers, which follow. In the text, an array is an object {"array": place of its first byte, "shape": [...]}.
-Arrays are float32."""
+Arrays are float32.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ def frame(value: Any) -> bytes:
     """Return a value as a frame.
 
     The value may hold dictionaries, lists, texts, numbers and NumPy arrays. Numbers that are not finite become null; in
-    arrays they become NaN."""
+    arrays they become NaN.
+    """
     arrays = _Arrays()
     text = json.dumps(_plain(value, arrays), separators=(",", ":"), allow_nan=False).encode()
     numbers = b"".join(arrays.parts)
@@ -55,7 +57,8 @@ class _Arrays:
 def _plain(value: Any, arrays: _Arrays) -> Any:
     """Replace arrays by references and numbers by what JSON can hold.
 
-    Arrays are added to `arrays` as float32. Numbers that are not finite become None."""
+    Arrays are added to `arrays` as float32. Numbers that are not finite become None.
+    """
     if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size:
         place = arrays.add(np.ascontiguousarray(value, "<f4").tobytes())
         return {"array": place, "shape": [*value.shape]}

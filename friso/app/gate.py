@@ -1,6 +1,7 @@
 """Let in the browser that opened the address with the token, and nobody else.
 
-The browser exchanges the token for a key, which it sends with every later request."""
+The browser exchanges the token for a key, which it sends with every later request.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +67,8 @@ cookies, which also go to every other server of the same name, whatever its port
 class Access:
     """The names under which the server answers, and the secrets that let a browser in.
 
-    `hosts` holds names with the port. `token` begins the long session, and `session` is its key."""
+    `hosts` holds names with the port. `token` begins the long session, and `session` is its key.
+    """
 
     hosts: frozenset[str]
     token: str = field(default_factory=lambda: secrets.token_urlsafe(32))
@@ -80,7 +82,8 @@ class Access:
     def at(cls, host: str, port: int) -> Access:
         """Return the access to a server at a host and port.
 
-        Names of this machine alone stand for each other, such as localhost and 127.0.0.1."""
+        Names of this machine alone stand for each other, such as localhost and 127.0.0.1.
+        """
         named = (f"[{host}]" if ":" in host else host).lower()
         names = {named, "localhost", "127.0.0.1", "[::1]"} if host in LOOPBACK else {named}
         hosts = {f"{name}:{port}" for name in names} | (names if port == HTTP else set())
@@ -89,7 +92,8 @@ class Access:
     def token_for_once(self) -> str:
         """Return a token that is valid once.
 
-        Other users can see running commands, and with them the address that friso opens in a browser."""
+        Other users can see running commands, and with them the address that friso opens in a browser.
+        """
         token = secrets.token_urlsafe(32)
         self.once[token] = time.monotonic(), ""
         return token
@@ -97,7 +101,8 @@ class Access:
     def is_host(self, host: str) -> bool:
         """Tell whether the server goes by this name, in small or capital letters.
 
-        A foreign name would mean that another site made its name lead to this server."""
+        A foreign name would mean that another site made its name lead to this server.
+        """
         return host.lower() in self.hosts
 
     def is_origin(self, origin: str | None) -> bool:
@@ -108,7 +113,8 @@ class Access:
         """Return the key of the session that a token begins; empty for a wrong token.
 
         A token that is valid once may return from the browser that used it, with the session's key. If it returns
-        without that key, two people have seen it, and its session ends."""
+        without that key, two people have seen it, and its session ends.
+        """
         for own, (made, session) in self.once.items():
             if not _same(token, own):
                 continue
@@ -137,7 +143,8 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 class Gate:
     """Pass requests with a key on to the application, and refuse all others with status 403.
 
-    Paths in `public` need no key: they are the page itself, which holds nothing of the user's."""
+    Paths in `public` need no key: they are the page itself, which holds nothing of the user's.
+    """
 
     def __init__(self, application: ASGIApp, access: Access, public: Set[str]) -> None:
         self.application, self.access, self.public = application, access, public
@@ -161,7 +168,8 @@ class Gate:
     def _own(self, scope: Scope) -> Response | None:
         """Return the gate's own answer, or None for a request that is let in.
 
-        Requests under foreign names and from foreign pages are refused first."""
+        Requests under foreign names and from foreign pages are refused first.
+        """
         headers, access, path = Headers(scope=scope), self.access, scope["path"]
         if not access.is_host(headers.get("host", "")) or not access.is_origin(headers.get("origin")):
             return _refused()

@@ -19,7 +19,8 @@ GHOST = "#a9a9a9"
 def ghosts_of(pinned: Answer | None) -> Callable[[Figure], Figure]:
     """Return a function that draws the pinned machine's lines behind those of a figure.
 
-    Figures are matched by name. Without a pinned answer, figures stay as they are."""
+    Figures are matched by name. Without a pinned answer, figures stay as they are.
+    """
     if pinned is None:
         return lambda figure: figure
     others = {figure.name: figure for figure in pinned.figures()}
@@ -29,7 +30,8 @@ def ghosts_of(pinned: Answer | None) -> Callable[[Figure], Figure]:
 def _ghosted(figure: Figure, other: Figure) -> Figure:
     """Draw the lines of another figure in grey behind those of this one.
 
-    Panels are matched by title and axis labels."""
+    Panels are matched by title and axis labels.
+    """
     ghosts = {_subject(panel): panel for panel in other.panels}
 
     def both(panel: Panel) -> Panel:

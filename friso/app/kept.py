@@ -1,6 +1,7 @@
 """Keep answers for later, since the same machine is often asked about again.
 
-A tab is opened again, a change is undone, a machine is pinned, or the files of an answer are downloaded."""
+A tab is opened again, a change is undone, a machine is pinned, or the files of an answer are downloaded.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ MOST = 4
 class KeptAnswers:
     """Answers of friso's functions about machines, with the notes on each.
 
-    Only the answers asked for last are kept. Several threads may use the object."""
+    Only the answers asked for last are kept. Several threads may use the object.
+    """
 
     def __init__(self) -> None:
         self._kept: dict[Callable[..., Answer], OrderedDict[tuple[Machine, str], tuple[Answer, list[str]]]] = {}
@@ -33,7 +35,8 @@ class KeptAnswers:
     ) -> Any:
         """Return a function's answer about a machine, computed now or kept from before.
 
-        The notes on a kept answer are added to the work again. Raises whatever the function raises."""
+        The notes on a kept answer are added to the work again. Raises whatever the function raises.
+        """
         place = _place(machine, options)
         with self._turn:
             kept = self._kept.setdefault(function, OrderedDict())

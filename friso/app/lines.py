@@ -12,7 +12,8 @@ from friso.quantities import as_toml
 def command_line(command: str, files: Sequence[str], options: Mapping[str, Any]) -> str:
     """Return a friso command with its files and options, quoted for this system's shell.
 
-    `options` holds the options by their names in Python."""
+    `options` holds the options by their names in Python.
+    """
     words = ["friso", command, *files]
     for name, value in _each(options):
         option = f"--{name.strip('_').replace('_', '-')}"

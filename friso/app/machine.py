@@ -24,7 +24,8 @@ class Machine:
     """A stage file by its text and name, and the keys changed on the page.
 
     `changed` holds the changes as JSON, in which null removes a key. `made` says that the machine was made on the page,
-    so that no file has its text."""
+    so that no file has its text.
+    """
 
     text: str
     name: str
@@ -51,14 +52,16 @@ class Machine:
     def is_of_page(self) -> bool:
         """Tell whether only a stage file saved by the page describes this machine.
 
-        A machine made on the page has no other file. No option of a command can remove a key, either."""
+        A machine made on the page has no other file. No option of a command can remove a key, either.
+        """
         return self.made or None in self.changes.values()
 
     @property
     def to_set(self) -> dict[str, Any]:
         """Return the changed keys as the option `set` of a command.
 
-        Returns nothing if the stage file that the page saves holds the changes already."""
+        Returns nothing if the stage file that the page saves holds the changes already.
+        """
         return {"set": self.changes} if self.changes and not self.is_of_page else {}
 
     @property
@@ -79,7 +82,8 @@ questions are about the same one."""
 def _stage(machine: Machine) -> Stage:
     """Build the stage of a machine, or return it from the cache.
 
-    Changes that remove a key which the file does not have are ignored."""
+    Changes that remove a key which the file does not have are ignored.
+    """
     base = loads(machine.text, machine.name)
     written = base.as_written()
     changes = {key: value for key, value in machine.changes.items() if value is not None or _has(written, key)}
@@ -122,7 +126,8 @@ def machine_on_page(machine: Machine) -> dict[str, Any]:
 def _variant(node: Mapping[str, Any], present: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the form of a table that the stage file uses.
 
-    The form has all keys that are present, and allows the kind or model that is written."""
+    The form has all keys that are present, and allows the kind or model that is written.
+    """
 
     def fits(form: Mapping[str, Any]) -> bool:
         keys = form["properties"]
@@ -143,7 +148,8 @@ def _key(
 ) -> dict[str, Any]:
     """Describe a key for the page: its value, kind, unit and example.
 
-    `plain` marks a certain value. A number also gets its value in SI and the range of its slider."""
+    `plain` marks a certain value. A number also gets its value in SI and the range of its slider.
+    """
     key = path.partition(".")[2]
     value, field = present.get(key), fields.get(path)
     about = {"path": path, "value": value, "description": node.get("description", ""), "kind": _kind(node)}
@@ -166,7 +172,8 @@ def _kind(node: Mapping[str, Any]) -> str:
 def _range(field: Quantity | Number, value: float) -> dict[str, Any]:
     """Return the range of a slider [SI], and whether it moves by ratio.
 
-    The slider reaches from a tenth of the value to ten times the value, within the bounds of the key."""
+    The slider reaches from a tenth of the value to ten times the value, within the bounds of the key.
+    """
     if value == 0:
         most = abs(float(field.read(field.example))) * REACH if isinstance(field, Quantity) else 1.0
         return {"low": 0.0, "high": most, "log": False}
@@ -182,7 +189,8 @@ def _schema() -> dict[str, Any]:
     """Return the schema of the stage file, which is read once and by one thread.
 
     Python 3.11 cannot parse in several threads at a time ("AST constructor recursion depth mismatch",
-    github.com/python/cpython/issues/106905)."""
+    github.com/python/cpython/issues/106905).
+    """
     with _reading:
         return _read_schema()
 

@@ -16,7 +16,8 @@ LONGEST = 150
 def plain_name(name: str, otherwise: str) -> str:
     """Return the last part of a path as a safe file name, or `otherwise` if nothing is left.
 
-    The name cannot lead to another folder, hide the file, or read as an option of a command."""
+    The name cannot lead to another folder, hide the file, or read as an option of a command.
+    """
     last = _OUTSIDE.sub("_", name.replace("\\", "/").rpartition("/")[2])
     plain = last.encode()[-LONGEST:].decode(errors="ignore").lstrip(".- ").rstrip(". ") or otherwise
     return f"_{plain}" if name_refused(Path(plain)) else plain

@@ -48,7 +48,8 @@ KEPT = KeptAnswers()
 class PageRequest:
     """What a page asks about: the machine shown, the pinned one, the options, and dropped files.
 
-    `pinned` is None if no machine is pinned."""
+    `pinned` is None if no machine is pinned.
+    """
 
     machine: Machine
     pinned: Machine | None
@@ -76,7 +77,8 @@ class PageRequest:
 def parts_of(answer: Answer, beside: Callable[[Figure], Figure] = lambda figure: figure, **more: Any) -> AnswerPart:
     """Return an answer as the page shows it.
 
-    `beside` adds to each figure what it is compared with. `more` adds further entries."""
+    `beside` adds to each figure what it is compared with. `more` adds further entries.
+    """
     return {**figures_of(answer, beside), **words_of(answer), **more}
 
 
@@ -116,14 +118,16 @@ def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def others_of_stages() -> list[str]:
     """Return the questions of installed packages that need a stage alone.
 
-    The page shows each of them as a picture."""
+    The page shows each of them as a picture.
+    """
     return [name for name in DECLARED.others if name not in {*QUESTIONS, *COMMANDS} and _takes_a_stage_alone(name)]
 
 
 def _takes_a_stage_alone(name: str) -> bool:
     """Tell whether a question needs a stage and no option.
 
-    Returns False for a package that cannot be loaded; `friso --help` reports it."""
+    Returns False for a package that cannot be loaded; `friso --help` reports it.
+    """
     try:
         declared = DECLARED[name]
         options = (item for key, item in declared.parameters.items() if key != "stage")
@@ -165,7 +169,8 @@ def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the verdict of each case in one word, judged by the attracting cycles.
 
-    The verdict is computed as a map of one cell, or of two cells for the joint locked and free."""
+    The verdict is computed as a map of one cell, or of two cells for the joint locked and free.
+    """
     stage = asked.machine.stage
     key, cases = _cases(stage)
     runs = friso.sweep(stage, {key: list(cases.values())}, metric="verdict", progress=work.progress)
@@ -196,7 +201,8 @@ def bode(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def loops(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the Bode plots while a slider moves.
 
-    Figures that need no family of friction states come first."""
+    Figures that need no family of friction states come first.
+    """
     asked.chosen()
     ghosts, lines = _ghosts(asked, work, friso.bode), _lines("bode", asked)
     answer = KEPT.answer(friso.bode, asked.machine, work)
@@ -234,7 +240,8 @@ COARSE_TO_FINE = (6, 21, 41)
 def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield a map over two keys from coarse to fine, with the places of the machines in it.
 
-    If asked for, the edge of hunting is added last. A stage that cannot hunt gets a sentence instead."""
+    If asked for, the edge of hunting is added last. A stage that cannot hunt gets a sentence instead.
+    """
     options = asked.chosen(*OPTIONS["map"])
     axes = {name: str(options.get(name, "")) for name in ("x", "y")}
     keys = {name: text.partition("=")[0].strip() for name, text in axes.items()}
@@ -273,7 +280,8 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def _on_map(figure: Figure, asked: PageRequest, keys: Sequence[str]) -> Figure:
     """Mark the machines on a map over two keys.
 
-    The note of the figure is removed, because the sentences below say the same."""
+    The note of the figure is removed, because the sentences below say the same.
+    """
     return with_places(replace(figure, note=""), _stands(asked), keys)
 
 
@@ -281,7 +289,8 @@ def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield where hunting ends, over one key or in the plane of two keys.
 
     Following the edge may take minutes, so a coarse map of verdicts comes first in a plane. It stays if there is no
-    edge."""
+    edge.
+    """
     options = asked.chosen(*OPTIONS["boundary"])
     keys = [str(options[name]).partition("=")[0].strip() for name in ("x", "y") if name in options]
     lines, rough = _lines("boundary", asked, options), None
@@ -360,7 +369,8 @@ def _looked_into(asked: PageRequest, work: Work) -> LogsAnswer:
 def identify(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the machine identified from dropped logs, with its uncertainties.
 
-    With the option `assumed`, the machine shown counts as prior knowledge."""
+    With the option `assumed`, the machine shown counts as prior knowledge.
+    """
     answer = _identified(asked, work)
     stages = [] if answer.stage is None else [{"name": "identified", "toml": answer.stage.to_toml()}]
     if stages and answer.result.correlations.keys:
@@ -371,7 +381,8 @@ def identify(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def _identified(asked: PageRequest, work: Work) -> IdentifyAnswer:
     """Identify a machine from the dropped logs.
 
-    The logs' own folder is searched for further files, not the folder in which friso was started."""
+    The logs' own folder is searched for further files, not the folder in which friso was started.
+    """
     files, assigned = _dropped(asked)
     stage = asked.machine.stage if asked.options.get("assumed") is True else None
     beside = files[0].parent  # else a file of that name in the folder where friso was started would have its say
@@ -397,7 +408,8 @@ CORRELATED = (
 def _dropped(asked: PageRequest) -> tuple[list[Path], dict[str, Any]]:
     """Return the files of a question about logs, and what the user said of their channels.
 
-    Raises InputError if no file was dropped, or for options that are no texts."""
+    Raises InputError if no file was dropped, or for options that are no texts.
+    """
     names, options = asked.options.get("files"), {}
     if not isinstance(names, list) or not names:
         raise InputError("files", "none", "files that were dropped on the page")
@@ -472,7 +484,8 @@ COMMANDS: Mapping[str, Callable[[PageRequest, Work], Answer]] = {
 def job_of(name: str) -> Callable[[PageRequest, Work], Iterator[AnswerPart]] | None:
     """Return the function that answers a question of the page; None for an unknown name.
 
-    A name that ends in ".zip" asks for the files of a command."""
+    A name that ends in ".zip" asks for the files of a command.
+    """
     command = name.removesuffix(".zip")
     if name in QUESTIONS:
         return QUESTIONS[name]
@@ -505,7 +518,8 @@ def _lines(
 def _lines_of_logs(command: str, asked: PageRequest) -> AnswerPart:
     """Return the shell command and the line of Python for a question about logs.
 
-    They name the machine shown if it counts as prior knowledge."""
+    They name the machine shown if it counts as prior knowledge.
+    """
     paths, assigned = _dropped(asked)
     options, of = {name: item for name, item in assigned.items() if item}, "the files dropped here"
     if asked.options.get("assumed") is True and command == "identify":
@@ -558,7 +572,8 @@ def _labelled(stage: Stage, verdicts: Mapping[str, str]) -> list[dict[str, str]]
 def _cases(stage: Stage) -> tuple[str, dict[str, Any]]:
     """Return a key and the value that it has in each case.
 
-    The key locks or frees the joint. A stage without a joint has one case, set by its mass as given."""
+    The key locks or frees the joint. A stage without a joint has one case, set by its mass as given.
+    """
     if stage.joint is not None:
         values = {"locked": True, "free": False}
         cases = {name: values[name] for name in stage.variants() if name in values}

@@ -43,7 +43,8 @@ def serve(stage: Path | None, host: str, port: int | None, insecure: bool, brows
     """Print the address of the page and serve it until interrupted.
 
     Raises InputError for a stage file that cannot be read, or if no port is free. A host that others can reach is
-    refused unless `insecure` is set."""
+    refused unless `insecure` is set.
+    """
     file = example("thesis_rig") if stage is None else stage
     load(file)
     begin = {"name": file.name, "text": text_of(file, "a stage file"), "asked": stage is not None}
@@ -72,7 +73,8 @@ class Server(uvicorn.Server):
     """A server that ends in good order on any signal.
 
     Questions at work are ended before the server waits for their answers. Afterwards the signal takes its usual
-    effect."""
+    effect.
+    """
 
     def __init__(self, app: ASGIApp, workshop: Workshop, grace: int = GRACE) -> None:
         """Configure the server; `grace` [s] is the longest wait for answers at the end."""
@@ -118,7 +120,8 @@ class Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """End the questions, then the connections.
 
-        An upload that is still coming is cut off, which is no error."""
+        An upload that is still coming is cut off, which is no error.
+        """
         self.workshop.overtake()
         errors = logging.getLogger("uvicorn.error")
         usual = errors.level
@@ -137,7 +140,8 @@ def listening(host: str, port: int | None) -> socket.socket:
     """Return a socket that listens at a free port.
 
     It is the port asked for; without one, the first free port from the usual one on. Raises InputError if none is
-    free."""
+    free.
+    """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     wanted = [port] if port is not None else [*range(PORT, PORT + TRIES)]
     problem = ""

@@ -37,7 +37,8 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
     """Build the server's application behind its gate.
 
     `begin` holds name and text of the first stage file, and whether the user `asked` for it. The workshop is closed
-    when the server ends."""
+    when the server ends.
+    """
     uploads = Uploads()
 
     async def ask(request: Request) -> Response:
@@ -150,7 +151,8 @@ def _file(request: Request, content: bytes, kind: str) -> Response:
 async def _json(request: Request) -> dict[str, Any]:
     """Return the JSON object in the body of a request.
 
-    Raises InputError for another content type, a body that is too large, or anything but a JSON object."""
+    Raises InputError for another content type, a body that is too large, or anything but a JSON object.
+    """
     if request.headers.get("content-type", "").partition(";")[0] != "application/json":
         raise InputError("Content-Type", request.headers.get("content-type", "nothing")[:60], "application/json")
     body = bytearray()

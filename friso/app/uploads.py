@@ -27,7 +27,8 @@ class Uploads:
     """Dropped files by the names under which the page knows them.
 
     The page can name no other file. Names are random, so a page left open cannot reach files of a later server. The
-    next server deletes what a killed one left."""
+    next server deletes what a killed one left.
+    """
 
     def __init__(self) -> None:
         self.held = ExitStack()
@@ -37,7 +38,8 @@ class Uploads:
     async def keep(self, name: str, chunks: AsyncIterable[bytes]) -> str:
         """Store a file as it arrives, and return the name under which it is asked for.
 
-        Raises InputError for a file that is too large, or one file too many. Raises OSError if it cannot be written."""
+        Raises InputError for a file that is too large, or one file too many. Raises OSError if it cannot be written.
+        """
         place = self.folder / secrets.token_hex(8)  # several may come at the same time
         if sum(1 for entry in self.folder.iterdir() if entry.is_dir()) >= MOST_FILES:
             most = f"at most {MOST_FILES}: Other files lets those go that are shown"

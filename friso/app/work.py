@@ -35,7 +35,8 @@ class Work:
     """A question at work.
 
     `put` sends a part of its answer to the page. `number` orders the questions of a page. Another thread sets `flag` to
-    end the work."""
+    end the work.
+    """
 
     put: Callable[[dict[str, Any] | None], object]
     number: int = 0
@@ -66,7 +67,8 @@ class Work:
     def run(self, job: Job) -> None:
         """Do the job in this thread and send each part of its answer.
 
-        Errors become parts, too: a page is answered whatever happens. None is sent last."""
+        Errors become parts, too: a page is answered whatever happens. None is sent last.
+        """
         token = ASKER.set(self)
         try:
             with ended_by(self.flag):
@@ -95,7 +97,8 @@ class Work:
 class Messages(logging.Handler):
     """A log handler that sends each message to the question that caused it.
 
-    Messages stay below the answer, except those on the compilation of kernels."""
+    Messages stay below the answer, except those on the compilation of kernels.
+    """
 
     def emit(self, record: logging.LogRecord) -> None:
         """Send a message to the question in whose context it was logged."""
@@ -121,7 +124,8 @@ class Workshop:
     """The questions at work, one on every lane of a page.
 
     A newer question, which has a larger number, overtakes the older one on its lane. The order of arrival does not
-    matter."""
+    matter.
+    """
 
     def __init__(self) -> None:
         self.pool = ThreadPoolExecutor(THREADS, thread_name_prefix="friso-app", initializer=_import_libraries)
@@ -134,7 +138,8 @@ class Workshop:
         """Yield the frames of an answer as they come. The work ends when the reader stops.
 
         A `quick` question computes nothing and does not wait for others. All others wait for the first part of a
-        question that goes `first`."""
+        question that goes `first`.
+        """
         loop, parts = asyncio.get_running_loop(), asyncio.Queue[dict[str, Any] | None]()
 
         def put(part: dict[str, Any] | None) -> None:

@@ -1,6 +1,7 @@
 """Run the command line: `friso COMMAND STAGE.toml`.
 
-Exit status: 0 done, 1 the computation could not be completed, 2 the input is wrong, 130 interrupted."""
+Exit status: 0 done, 1 the computation could not be completed, 2 the input is wrong, 130 interrupted.
+"""
 
 from __future__ import annotations
 
@@ -75,7 +76,8 @@ def command_line(*names: str, for_list: bool = False) -> typer.Typer:
     """Build the command line with the named commands, or with all of them.
 
     Commands stand in the order of their places. With `for_list` they have no options, so that their functions need not
-    be imported."""
+    be imported.
+    """
     app = typer.Typer(
         cls=ByQuestion,
         rich_markup_mode=None,
@@ -97,7 +99,8 @@ GARBAGE = 20_000, 20, 10
 def main() -> NoReturn:
     """Run the command line and end the process with its status.
 
-    Wrong input ends in one message and status 2, never in a traceback."""
+    Wrong input ends in one message and status 2, never in a traceback.
+    """
     gc.set_threshold(*GARBAGE)
     sys.stdout, sys.stderr = sys.stdout or _nowhere(), sys.stderr or _nowhere()  # None where the caller closed them
     for stream in (sys.stdout, sys.stderr):
@@ -139,7 +142,8 @@ def _status() -> int:
 def _run() -> int:
     """Run the command and return its status.
 
-    Only the named command is loaded, because the options of all commands take seconds to build."""
+    Only the named command is loaded, because the options of all commands take seconds to build.
+    """
     messages, log = logging.StreamHandler(sys.stderr), logging.getLogger("friso")
     messages.setFormatter(logging.Formatter("friso: %(message)s"))
     log.addHandler(messages)
@@ -161,7 +165,8 @@ def _run() -> int:
 def _failed(error: BaseException) -> int:
     """Report an error in one message and return the exit status.
 
-    Raises errors that only a fault of friso can cause."""
+    Raises errors that only a fault of friso can cause.
+    """
     if isinstance(error, typer.Exit):
         return error.exit_code
     exits = isinstance(error, SystemExit)  # which typer makes of it

@@ -61,7 +61,8 @@ _NUMBERS = {int: "a whole number", float: "a number"}
 def number_refused(error: BaseException, arguments: Sequence[str]) -> InputError | None:
     """Return friso's error for an option with a missing number, or one out of range.
 
-    Returns None for any other error."""
+    Returns None for any other error.
+    """
     parameter, context = (getattr(error, name, None) for name in ("param", "ctx"))
     command = getattr(context, "info_name", None) or ""
     if not isinstance(error, BadParameter) or parameter is None or command not in COMMANDS:
@@ -92,7 +93,8 @@ def _value_of(option: str, arguments: Sequence[str]) -> str:
 def parted_path(words: Sequence[str]) -> str:
     """Return a hint if several words together are the path of an existing file.
 
-    Such a path contains blanks and lacks its quotes. Otherwise the hint is empty."""
+    Such a path contains blanks and lacks its quotes. Otherwise the hint is empty.
+    """
     paths = (" ".join(words[first : first + count]) for first in range(len(words) - 1) for count in range(2, 7))
     path = next((path for path in paths if os.path.isfile(path)), "")
     return f"\n  a path with blanks needs quotes: {shell_word(path)}" if path else ""

@@ -1,6 +1,7 @@
 """Answer every command: ask the friso function of its name and show the answer.
 
-The conclusion comes first, then small tables and what to do next. Details follow if they are asked for."""
+The conclusion comes first, then small tables and what to do next. Details follow if they are asked for.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ DRAWING = "drawing the page"
 class Shown:
     """Where an answer goes: the folder for its files, and the form of what is printed.
 
-    `overwrite` allows the command to replace files in the folder."""
+    `overwrite` allows the command to replace files in the folder.
+    """
 
     out: Path | None = None
     overwrite: bool = False
@@ -71,7 +73,8 @@ def ask(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
 def tried(write: Callable[[], list[Path]], nothing: str = "no file was written") -> tuple[list[Path], str]:
     """Write files and return them, or return none and the reason why writing failed.
 
-    What was computed is shown all the same. `nothing` says what is missing then."""
+    What was computed is shown all the same. `nothing` says what is missing then.
+    """
     try:
         return write(), ""
     except OSError as error:
@@ -85,7 +88,8 @@ def show(
 ) -> None:
     """Print an answer with its `files`, or with the reason why they are `unwritten`.
 
-    Raises typer.Exit with the status of a failure. Raises KeyboardInterrupt after an answer that was interrupted."""
+    Raises typer.Exit with the status of a failure. Raises KeyboardInterrupt after an answer that was interrupted.
+    """
     written = [*files]
     if as_json:
         print_document(answer.to_dict(details), written)

@@ -34,7 +34,8 @@ class Command:
     The docstring of `function` is its help. `place` orders commands below their `topic` in `friso --help`.
 
     Raises ValueError for a topic that is not one of TOPICS. Raises TypeError or NameError for a function whose options
-    typer could not read."""
+    typer could not read.
+    """
 
     function: Callable[..., None]
     place: float
@@ -79,7 +80,8 @@ class QuestionCommand:
     def function(self) -> Callable[..., None]:
         """Return the function that typer calls.
 
-        Raises InputError for a question of another package that cannot be read."""
+        Raises InputError for a question of another package that cannot be read.
+        """
         from friso.cli.derived import command_function
 
         try:
@@ -117,7 +119,8 @@ class _Commands(Mapping[str, AnyCommand]):
     def usable(self) -> Iterator[tuple[str, AnyCommand]]:
         """Yield the commands by name.
 
-        A command of another package that cannot be used is reported and left out."""
+        A command of another package that cannot be used is reported and left out.
+        """
         for name in self:
             try:
                 command = self[name]

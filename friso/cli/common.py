@@ -28,7 +28,8 @@ def say(message: str) -> None:
 def print_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, list[str]]]) -> None:
     """Print a table with named rows.
 
-    Columns that do not fit side by side go into further tables below."""
+    Columns that do not fit side by side go into further tables below.
+    """
     from rich.table import Table
 
     screen = console(sys.stdout, highlight=False, markup=False)
@@ -69,7 +70,8 @@ def _narrow(texts: Sequence[str]) -> int:
 def _side_by_side(narrow: Sequence[int], room: int) -> list[list[int]]:
     """Return which columns stand together in each table.
 
-    The first column, which names the rows, stands in every table with at least one other."""
+    The first column, which names the rows, stands in every table with at least one other.
+    """
     parts = [[0]]
     for k in range(1, len(narrow)):
         if len(parts[-1]) > 1 and sum(narrow[j] + _BORDER for j in [*parts[-1], k]) > room:

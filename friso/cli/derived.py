@@ -96,7 +96,8 @@ def _argument(parameter: CommandParameter) -> Parameter:
 def _option(parameter: CommandParameter) -> Parameter:
     """Build an option of a command, with its name, default and help.
 
-    A boolean becomes a flag. Defaults are shown as short numbers."""
+    A boolean becomes a flag. Defaults are shown as short numbers.
+    """
     kind, default = parameter.kind, parameter.default
     names = [option_of(parameter.name)]
     needed = default is Parameter.empty

@@ -30,7 +30,8 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     Where standard error is no terminal, a line is printed every `LINES` seconds.
 
     The bar is a `friso.progress.Progress`. Without a total it shows `label` and only moves. If fewer steps are done
-    than before, or the total changes, new work has begun, and its time counts from there."""
+    than before, or the total changes, new work has begun, and its time counts from there.
+    """
 
     def __init__(self, label: str = "") -> None:
         self.label = label

@@ -1,7 +1,8 @@
 """Write to the terminal safely.
 
 Texts from files cannot steer the terminal (`friso.escapes`); friso's own tables and bars can. Characters that the
-terminal's encoding lacks are spelled out."""
+terminal's encoding lacks are spelled out.
+"""
 
 from __future__ import annotations
 
@@ -59,7 +60,8 @@ def escaping() -> Iterator[None]:
 def console(stream: TextIO, **options: Any) -> Console:
     """Return rich's console for a stream.
 
-    Its own escape sequences reach the stream, so texts have to be escaped beforehand. Names such as ":x:" stay text."""
+    Its own escape sequences reach the stream, so texts have to be escaped beforehand. Names such as ":x:" stay text.
+    """
     from rich.console import Console
 
     plain = cast("TextIO", Piped(stream.stream)) if isinstance(stream, Escaping) else stream
@@ -84,7 +86,8 @@ def _spelled(error: UnicodeError) -> tuple[str, int]:
 def _spelling(character: str) -> str:
     """Spell a character in ASCII.
 
-    Exponents follow "^", Greek letters become their names, and unknown characters become "?"."""
+    Exponents follow "^", Greek letters become their names, and unknown characters become "?".
+    """
     if character.isascii() or character in _SPELLINGS:
         return _SPELLINGS.get(character, character)
     if unicodedata.decomposition(character).startswith("<super>"):

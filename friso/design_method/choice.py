@@ -1,6 +1,7 @@
 """Choose from the front the softest leaf springs that meet all requirements.
 
-Sizes are rounded so that the leaves can be made, and the beam model confirms the choice."""
+Sizes are rounded so that the leaves can be made, and the beam model confirms the choice.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ from friso.leaf_springs.joint import first_interfering
 class Confirmed:
     """A candidate by the beam model: drive stiffness [N/m] and first interfering frequency [Hz].
 
-    Both are NaN if the model could not be evaluated; `failure` gives the reason."""
+    Both are NaN if the model could not be evaluated; `failure` gives the reason.
+    """
 
     candidate: Candidate
     stiffness: float
@@ -35,7 +37,8 @@ class ChosenLeaves:
     """The geometry chosen, evaluated by the beam model, with its requirements.
 
     `excess` is the factor by which it breaks each requirement by closed forms, at most 1. `passed_over` says why softer
-    geometries were not taken."""
+    geometries were not taken.
+    """
 
     geometry: Geometry
     beams: Evaluation
@@ -47,7 +50,8 @@ class ChosenLeaves:
     def frequency(self) -> float:
         """Return the first interfering frequency [Hz], the lower one of both models.
 
-        In one model, two modes may hide each other."""
+        In one model, two modes may hide each other.
+        """
         mode = self.beams.interfering
         return min(mode.frequency if mode else np.inf, float(first_interfering(self.beams.mechanism)))
 
@@ -55,7 +59,8 @@ class ChosenLeaves:
 def chosen(task: LeafTask, candidates: Sequence[Candidate]) -> ChosenLeaves | None:
     """Return the softest geometry that meets all requirements by closed forms and by beams.
 
-    Returns None if there is none."""
+    Returns None if there is none.
+    """
     needs, passed = requirements(task), []
     for geometry, excess in _in_order(task, needs, candidates):
         try:
@@ -111,7 +116,8 @@ def evaluated(task: LeafTask, geometry: Geometry) -> Evaluation:
 def confirmed(task: LeafTask, candidates: Sequence[Candidate]) -> Iterable[Confirmed]:
     """Evaluate evenly picked candidates of the front by the beam model.
 
-    A candidate that the model cannot evaluate keeps the reason."""
+    A candidate that the model cannot evaluate keeps the reason.
+    """
     settings = DesignSettings.current()
     for k in np.unique(np.linspace(0, len(candidates) - 1, settings.confirmed_candidates).astype(int)):
         candidate = candidates[k]

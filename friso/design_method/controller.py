@@ -25,7 +25,8 @@ RATIOS = np.geomspace(0.02, 0.7, 9)
 class Damping:
     """Joint dampings tried [N s/m], with the least modulus margin of each (0: unstable).
 
-    The stage's own damping comes first."""
+    The stage's own damping comes first.
+    """
 
     tried: np.ndarray
     margins: np.ndarray
@@ -34,7 +35,8 @@ class Damping:
     def worth(self) -> int:
         """Return the number of the least damping that brings nearly all of the possible gain.
 
-        It is 0 if the stage's own damping already does."""
+        It is 0 if the stage's own damping already does.
+        """
         settings = DesignSettings.current()
         return int(np.flatnonzero(self.margins >= settings.enough_margin * self.margins.max())[0])
 
@@ -44,7 +46,8 @@ class DesignedController:
     """Gains by van Dijk's rules at the chosen `crossover` [Hz].
 
     `margin` is the least modulus margin of the settled states as designed, and `corners` that of each corner, shape
-    (n,). `damping` tells what joint damping would add."""
+    (n,). `damping` tells what joint damping would add.
+    """
 
     crossover: float
     gains: Tuning
@@ -62,7 +65,8 @@ def comfortable_below(ranges: Sequence[Range], highest: float) -> float | None:
 def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tuple[Range, ...]:
     """Return the crossovers [Hz] with a modulus margin of 0.5 in all settled states.
 
-    They hold for the masses of the stage and for those of the whole population."""
+    They hold for the masses of the stage and for those of the whole population.
+    """
     flat = stage.flat()
     ranges = Modal.of(flat, leaves).comfortable
     masses = {

@@ -1,7 +1,8 @@
 """Find the edge of hunting over the corners of a specification.
 
 The edge is the highest crossover at which anything attracts. It is found to within 1 or 2 % in seconds, since a design
-simulates all its moves afterwards."""
+simulates all its moves afterwards.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ class Corners:
     `edges` [Hz], shape (n,), is the highest crossover at which anything attracts. It is 0 if nothing attracts from
     `searched[0]` on, and infinite if something still attracts at `searched[1]`. In `unknown` corners the edge is not
     certain: simulations below it failed or had not settled, which counts as hunting. There may also be attractors above
-    it that no simulation starts from."""
+    it that no simulation starts from.
+    """
 
     population: Population
     edges: np.ndarray
@@ -41,7 +43,8 @@ class Corners:
     def highest(self) -> float:
         """Return the highest crossover [Hz] at which anything attracts in any corner.
 
-        It is never below the beginning of the search."""
+        It is never below the beginning of the search.
+        """
         return float(max(self.searched[0], self.edges.max()))
 
     @property
@@ -62,7 +65,8 @@ def edges_over(
     """Find the edges of the stage `flat` in all corners, tuned by van Dijk's rules.
 
     The search goes down from `high` to `low` [Hz] on a grid of `steps`, until something attracts. Then it refines
-    between that point and the one above. `label` names the search to the progress."""
+    between that point and the one above. `label` names the search to the progress.
+    """
     settings = DesignSettings.current()
     corners = population.over({**flat, CROSSOVER: np.nan, "motion.kind": "release"})  # whatever the stage's motion
     grid, count = np.log(np.geomspace(low, high, steps)), population.count
@@ -88,7 +92,8 @@ def edges_over(
 def worst_edges(by_law: Mapping[str, Corners]) -> Corners:
     """Return in each corner the highest edge of hunting under several friction laws.
 
-    All laws must have been searched over the same corners and range."""
+    All laws must have been searched over the same corners and range.
+    """
     several = [*by_law.values()]
     edges = np.max([corners.edges for corners in several], axis=0)
     return replace(several[0], edges=edges, unknown=sum(corners.unknown for corners in several))
@@ -99,7 +104,8 @@ class OtherLaws:
     """Friction of stages under other laws, as flat keys by the name of the law.
 
     Keys that differ between stages are arrays of shape (stages,). `lost` names the laws that do not keep what is
-    measured, with the numbers of those stages."""
+    measured, with the numbers of those stages.
+    """
 
     frictions: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     lost: Mapping[str, Sequence[int]] = field(default_factory=dict)
@@ -114,7 +120,8 @@ def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str,
 def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tell whether anything attracts, or may attract, in corners at logarithms of crossovers.
 
-    The second array tells whether that is certain."""
+    The second array tells whether that is certain.
+    """
     settings = DesignSettings.current()
     some = {key: value[which] if np.ndim(value) else value for key, value in corners.items()}
     attracted = find_attractors({**some, CROSSOVER: np.exp(crossover)}, len(which), settings.orbit_rtol)
@@ -124,5 +131,6 @@ def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarra
 def rigid(flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return the stage without isolator.
 
-    Cart and stage become one mass, as when fixtures lock the joint."""
+    Cart and stage become one mass, as when fixtures lock the joint.
+    """
     return {key: value for key, value in flat.items() if not key.startswith(("joint.", "flexure.", "parasitic."))}

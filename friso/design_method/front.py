@@ -1,6 +1,7 @@
 """Find the Pareto front of drive stiffness and first interfering frequency of leaf springs.
 
-All leaf springs on it meet the requirements."""
+All leaf springs on it meet the requirements.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ class Candidate:
 def front(task: LeafTask) -> list[Candidate]:
     """Return the Pareto front by rising stiffness (NSGA-II, doi:10.1109/4235.996017).
 
-    It is empty if no geometry meets the requirements. The requirement on the frequency is an objective here."""
+    It is empty if no geometry meets the requirements. The requirement on the frequency is an objective here.
+    """
     settings = DesignSettings.current()
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.operators.crossover.sbx import SBX
@@ -69,7 +71,8 @@ def front(task: LeafTask) -> list[Candidate]:
 def _ends(task: LeafTask) -> tuple[np.ndarray, np.ndarray]:
     """Return the least and the largest variables, each of shape (4,).
 
-    They are the logarithms of the sizes, and the number of the sheet."""
+    They are the logarithms of the sizes, and the number of the sheet.
+    """
     low, high = box(task.spec)
     return np.append(np.log(low), 0.0), np.append(np.log(high), len(sheets(task.spec)) - 1e-9)
 
@@ -94,7 +97,8 @@ def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
     """Return a geometry that meets the requirements with the most to spare; None if none does.
 
     It is found by differential evolution, and given as logarithms of its sizes with the number of its sheet, shape
-    (4,)."""
+    (4,).
+    """
     settings = DesignSettings.current()
     bought = sheets(task.spec)
 
@@ -121,7 +125,8 @@ class GeometryScores:
     """How good geometries are: drive stiffness [N/m] and first interfering frequency [Hz].
 
     Both have shape (count,). `excess` is the factor by which each requirement is broken, shape (count,
-    requirements)."""
+    requirements).
+    """
 
     stiffness: np.ndarray
     frequency: np.ndarray

@@ -68,7 +68,8 @@ class Geometry:
 def mechanisms(flat: Mapping[str, Any], sizes: np.ndarray, bought: list[Sheet]) -> Mechanism:
     """Build mechanisms from lengths, widths and spacings [m], shape (count, 3), and sheets.
 
-    They stand in the stage `flat`."""
+    They stand in the stage `flat`.
+    """
     sheet_materials = [materials()[sheet.material] for sheet in bought]
     columns = {
         "leaves": [sheet.leaves for sheet in bought],
@@ -104,7 +105,8 @@ def sizes_of(geometries: Sequence[Geometry]) -> np.ndarray:
 def round_geometries(spec: Spec, geometry: Geometry, step: float) -> list[Geometry]:
     """Return the geometries next to one whose sizes are whole multiples of a step [m].
 
-    Geometries beyond the space allowed are left out."""
+    Geometries beyond the space allowed are left out.
+    """
     low, high = box(spec)
     near = [{float(np.round(size / step + side, 0) * step) for side in (-0.5, 0.5)} for size in sizes_of([geometry])[0]]
     corners = [np.array(corner) for corner in product(*map(sorted, near))]

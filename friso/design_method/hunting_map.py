@@ -19,7 +19,8 @@ class HuntingMap:
     """The share of corners that are not in position, over crossover and stroke.
 
     Crossovers [Hz] have shape (n,), strokes [m] (m,), and shares (m, n). A corner counts if the stage is not in
-    position a quarter of a minute after a typical move. The share is NaN where a run failed."""
+    position a quarter of a minute after a typical move. The share is NaN where a run failed.
+    """
 
     crossovers: np.ndarray
     strokes: np.ndarray

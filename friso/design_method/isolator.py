@@ -31,7 +31,8 @@ def isolated(stage: Stage, stroke: float = STROKE, young: float = STEEL) -> Stag
     """Return the stage with a free joint: its own, or one to begin a search with.
 
     The new joint has a stroke [m] and leaves with a Young's modulus `young` [Pa]. The controller stays tuned for the
-    whole mass. Raises StageError if the result is not a valid stage."""
+    whole mass. Raises StageError if the result is not a valid stage.
+    """
     settings = DesignSettings.current()
     free = stage.variants().get("free")
     if free is not None:

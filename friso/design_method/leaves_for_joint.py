@@ -36,7 +36,8 @@ def leaves_for_joint(stage: Stage, present: Stage) -> Stage | None:
     factors of safety are those that `friso init --spec` begins with. Returns None if no leaves bear stroke and load.
 
     If the stage `present` has [flexure], its points keep their distance from the leaf ends. Raises InputError for a
-    joint that leaf springs cannot make."""
+    joint that leaf springs cannot make.
+    """
     spec = read_spec(outline(stage))
     low, high = box(spec)
     first = Geometry.of(np.array([low[0], *high[1:]]), sheets(spec)[-1])  # what bears the largest load
@@ -72,7 +73,8 @@ class _Search:
         """Prepare the search for leaves of a `stiffness` [N/m].
 
         Two requirements are left to a later check on the whole stage: that the cart stays, and that no mode
-        interferes."""
+        interferes.
+        """
         self.task, self.stiffness = task, stiffness
         self.bought = sheets(task.spec)
         self.low, self.high = box(task.spec)
@@ -100,7 +102,8 @@ class _Search:
         """Return what is minimised over lengths and spacings [m], (count, 2).
 
         It is how far leaves break a requirement. For leaves that break none, it falls as their interfering frequency
-        rises."""
+        rises.
+        """
         settings = DesignSettings.current()
         sizes = self.with_width(spans, bought)
         worst = self.broken(sizes, bought)
@@ -119,7 +122,8 @@ class _Search:
     def broken(self, sizes: np.ndarray, bought: list[Sheet]) -> np.ndarray:
         """Return the logarithm of the factor by which leaves break a requirement.
 
-        The space for their width is one requirement. The result is 0 or less for leaves that break none."""
+        The space for their width is one requirement. The result is 0 or less for leaves that break none.
+        """
         settings = DesignSettings.current()
         scores = evaluate_geometries(self.task, self.needs, sizes, bought)
         space = np.stack([self.low[1] / sizes[:, 1], sizes[:, 1] / self.high[1]], axis=1)
@@ -130,7 +134,8 @@ class _Search:
         """Return the geometries in sizes that can be made, next to one of shape (3,).
 
         They have the stiffness wanted and break no requirement. Those that interfere at the highest frequency come
-        first."""
+        first.
+        """
         settings = DesignSettings.current()
         sheet = self.bought[int(best[2])]
         near = [

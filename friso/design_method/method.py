@@ -1,6 +1,7 @@
 """Design an isolator from a specification: leaf springs, stroke, crossover and gains.
 
-The method is that of the thesis, Sec. 3.4."""
+The method is that of the thesis, Sec. 3.4.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +52,8 @@ def own_law(stages: Sequence[Stage]) -> OtherLaws:
 class Need:
     """The result that decides whether a machine needs an isolator.
 
-    `without` holds the edges of hunting without an isolator over the corners of the specification."""
+    `without` holds the edges of hunting without an isolator over the corners of the specification.
+    """
 
     without: Corners
     spec: Spec
@@ -65,7 +67,8 @@ class Need:
 class NoDesign(Exception):
     """Raised if no design meets the specification, with the reason and what to relax.
 
-    `need` tells whether an isolator is needed at all; None means that this was not examined."""
+    `need` tells whether an isolator is needed at all; None means that this was not examined.
+    """
 
     def __init__(self, reason: str, relaxed: tuple[Relaxation, ...] = (), need: Need | None = None) -> None:
         super().__init__(reason)
@@ -81,7 +84,8 @@ class LeavesAndCrossover:
     """Leaf springs and a crossover that fit each other.
 
     It holds the task for which the leaves were chosen, the choice, and the stage with both. `comfortable` are the
-    ranges of crossovers [Hz] with a good modulus margin."""
+    ranges of crossovers [Hz] with a good modulus margin.
+    """
 
     task: LeafTask
     choice: ChosenLeaves
@@ -100,7 +104,8 @@ class Design:
 
     `damped` is the joint damping with which the crossover could be `faster` [Hz], if margins limit it. `by_law` holds
     the edges without and with isolator under each friction law; `without` and `edges` are the worst. `lost` names laws
-    that were not tried, with the numbers of the corners in which they do not keep what is measured."""
+    that were not tried, with the numbers of the corners in which they do not keep what is measured.
+    """
 
     spec: Spec
     original: Stage
@@ -127,7 +132,8 @@ class Design:
         """Return what to relax if moves settle too late: the settling time, with the time needed.
 
         More joint damping is named before it, if that allows a higher crossover. Moves that do not come to rest are
-        reported by the verification itself."""
+        reported by the verification itself.
+        """
         settings = DesignSettings.current()
         limit, settling = self.spec.position.settling_time, self.verification.free.slower_than(settings.slow_share)
         if limit is None or settling <= limit or not np.isfinite(settling):
@@ -158,7 +164,8 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
     """Design leaf springs, stroke and controller of an isolator.
 
     Edges of hunting are the worst over the stage's own friction and other `laws`. Raises InputError for unusable input,
-    and NoDesign if nothing meets the specification."""
+    and NoDesign if nothing meets the specification.
+    """
     settings = DesignSettings.current()
     base = prepared(stage, spec)
     flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit
@@ -236,7 +243,8 @@ def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
     """Return the least joint damping that no longer limits the crossover.
 
     The crossover [Hz] that leaves and machine then allow is returned with it. Returns nothing if the crossover is that
-    high already, or if no damping tried helps."""
+    high already, or if no damping tried helps.
+    """
     settings = DesignSettings.current()
     flat, spec = fit.stage.flat(), fit.task.spec
     target = min(spec.limit, fit.choice.frequency / spec.safety.parasitic)
@@ -255,7 +263,8 @@ def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTa
     """Return the front for the largest stroke that allows the machine's limit.
 
     Otherwise it is the front that allows the highest crossover. Raises NoDesign if no leaf springs meet the
-    requirements."""
+    requirements.
+    """
     settings = DesignSettings.current()
     stroke, choices = spec.leaves.stroke, []
     several = stroke.high > stroke.low
@@ -277,7 +286,8 @@ def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTa
 def allowed_crossover(task: LeafTask, candidates: list[Candidate]) -> float:
     """Return the highest crossover [Hz] that a front allows.
 
-    Its multiple is still below a first interfering frequency of the front."""
+    Its multiple is still below a first interfering frequency of the front.
+    """
     return max(candidate.frequency for candidate in candidates) / task.spec.safety.parasitic
 
 

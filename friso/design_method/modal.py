@@ -1,6 +1,7 @@
 """Analyse the loop with all modes of the leaf springs that actuator and sensor see.
 
-The equations of motion contain only one of these modes."""
+The equations of motion contain only one of these modes.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ class Modal:
 
     `bare` are the plants without parasitic mode, and `with_modes` those with the modes of the leaf springs. Both have
     shape (members, frequencies) [m/N] and include the drive. Modes add to the motion of the stage as a rigid mass,
-    whatever the cart does far below them."""
+    whatever the cart does far below them.
+    """
 
     flat: Mapping[str, Any]
     members: Members
@@ -49,7 +51,8 @@ class Modal:
     def margin(self, crossover: np.ndarray) -> np.ndarray:
         """Return the least modulus margin of all states at each crossover [Hz], shape (n,).
 
-        It is 0 if a state is unstable."""
+        It is 0 if a state is unstable.
+        """
         factors = np.atleast_1d(crossover) / bandwidth(self.flat)
         keys = faster(self.flat, np.repeat(factors, len(self.members)))
         settled = stability_by_poles(keys, self.members.repeated(len(factors))).abscissa.reshape(len(factors), -1) < 0
@@ -80,7 +83,8 @@ def _turns(ratio: np.ndarray) -> np.ndarray:
 def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
     """Return what all modes but the drive mode add to the plant [m/N].
 
-    `omega` are frequencies [rad/s]; the result has shape (frequencies,)."""
+    `omega` are frequencies [rad/s]; the result has shape (frequencies,).
+    """
     zeta = float(leaves.mechanism.damping_ratio)
     parts = [
         mode.actuator

@@ -1,6 +1,7 @@
 """Write a specification to begin with from a stage file.
 
-Ranges lie around the stage's own numbers, and leaves have sizes that are sold."""
+Ranges lie around the stage's own numbers, and leaves have sizes that are sold.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ def outline(stage: Stage) -> str:
 
     The present crossover becomes the machine's limit. Ranges follow from uncertain keys of the stage file, or are
     assumed. Moves go up to the travel, and sheets are spring steel in usual gauges. Raises InputError for a stage that
-    `friso design` cannot design for."""
+    `friso design` cannot design for.
+    """
     settings = DesignSettings.current()
     check_designable(stage)
     flat = stage.flat()
@@ -92,7 +94,8 @@ def _aligned(lines: Sequence[str]) -> str:
 def _line(stage: Stage, key: str, share: float) -> str:
     """Return the range of a key: its own, or a share around its value.
 
-    Coulomb friction does not exceed the static friction."""
+    Coulomb friction does not exceed the static friction.
+    """
     flat, own = stage.flat(), stage.uncertain().get(key)
     name, unit = key.split(".")[1], numeric_keys(flat)[key].unit
     low, high = (own.low, own.high) if own else ((1 - share) * flat[key], (1 + share) * flat[key])

@@ -37,7 +37,8 @@ def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
 
     For static friction and gap, the middles are included. Static friction and gap are combined with each other, and
     with masses that are all light or all heavy. The rest of the friction goes together, except that viscous friction
-    goes against it because it damps. Raises InputError if friction never falls."""
+    goes against it because it damps. Raises InputError if friction never falls.
+    """
     settings = DesignSettings.current()
     friction, masses = _friction(spec, flat), _masses(spec)
     main = [name for name in ("static", "coulomb", "gap") if name in friction]
@@ -60,7 +61,8 @@ def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
 def _falls(population: Population, flat: Mapping[str, Any]) -> None:
     """Raise InputError if sliding friction is nowhere below static friction.
 
-    Nothing is checked for a law without both kinds of friction."""
+    Nothing is checked for a law without both kinds of friction.
+    """
     static, coulomb = (population.keys.get(f"friction.{name}") for name in ("static", "coulomb"))
     if static is not None and coulomb is not None and np.all(coulomb >= static):
         text = f"static friction up to {static.max():g} N with Coulomb friction from {coulomb.min():g} N on"
@@ -72,7 +74,8 @@ def random_machines(spec: Spec, flat: Mapping[str, Any], count: int, softening: 
     """Draw machines and moves evenly from all ranges.
 
     Friction, masses, stiffness, travel and acceleration vary; travel and acceleration evenly in the logarithm.
-    Stiffness varies by its tolerance, and falls by up to the share `softening` that the load may take."""
+    Stiffness varies by its tolerance, and falls by up to the share `softening` that the load may take.
+    """
     settings = DesignSettings.current()
     ranges = _friction(spec, flat) | _masses(spec)
     names = [*ranges, "stiffness", "travel", "acceleration"]
@@ -131,7 +134,8 @@ def _population(
 ) -> Population:
     """Return machines at shares of the ranges.
 
-    Sliding friction is held at or below the static friction. Machines where both are equal cannot hunt, but exist."""
+    Sliding friction is held at or below the static friction. Machines where both are equal cannot hunt, but exist.
+    """
     values = {name: interval.at(shares[name]) for name, interval in ranges.items()}
     keys = {f"masses.{name}": values.pop(name) for name in ("cart", "stage") if name in values}
     if "friction.static" not in flat:

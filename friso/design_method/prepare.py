@@ -24,7 +24,8 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
 
     The leaf springs are a start, to be replaced. Masses, for which the controller is tuned, lie in the middle of their
     ranges. Points of the stage keep their distance from the leaf ends, and the load is the specification's. Raises
-    InputError for a stage that cannot have an isolator."""
+    InputError for a stage that cannot have an isolator.
+    """
     check_designable(stage)
     stage = complete_joint(by_rules(stage), spec)
     section = spec.leaves
@@ -59,7 +60,8 @@ def by_rules(stage: Stage) -> Stage:
     """Return the stage with a controller by van Dijk's rules.
 
     Its own is kept if it follows these rules. Otherwise the new one has the same bandwidth for the whole mass, and the
-    same force limit."""
+    same force limit.
+    """
     if CROSSOVER in stage.flat():
         return stage
     written = stage.as_written()
@@ -70,7 +72,8 @@ def by_rules(stage: Stage) -> Stage:
 def complete_joint(stage: Stage, spec: Spec) -> Stage:
     """Return the stage with masses of cart and stage and a whole joint.
 
-    What the stage file lacks, such as damping and limiter of the joint, is assumed."""
+    What the stage file lacks, such as damping and limiter of the joint, is assumed.
+    """
     if stage.joint is not None:
         return stage
     material = spec.leaves.materials[0]

@@ -20,7 +20,8 @@ class Relaxation:
     """A `key` of the specification that must change from `value` to `needed` [unit].
 
     Changed alone, it lets the requirement be met, by leaf springs of a `geometry`. The geometry is None for
-    requirements on other parts."""
+    requirements on other parts.
+    """
 
     requirement: str
     key: str
@@ -33,7 +34,8 @@ class Relaxation:
 def relaxed_requirements(task: LeafTask) -> tuple[Relaxation, ...]:
     """Return for each requirement by how much it must be relaxed if all others stand.
 
-    The least change comes first. The result is empty if no single relaxation is enough."""
+    The least change comes first. The result is empty if no single relaxation is enough.
+    """
     needs = [*requirements(task), *_space(task)]
     all_relaxations = [relaxation for k in range(len(needs)) for relaxation in _alone(task, needs, k)]
     return tuple(sorted(all_relaxations, key=_change))
@@ -72,7 +74,8 @@ class _Trials:
     """Geometries in more space than allowed, as variables.
 
     The variables are logarithms of length, width, spacing and thickness, and the number of the kind. The thickness is
-    `free`, or is rounded to the next available sheet."""
+    `free`, or is rounded to the next available sheet.
+    """
 
     task: LeafTask
     free: bool

@@ -1,6 +1,7 @@
 """Define what a specification requires of leaf springs, each requirement as a ratio.
 
-Closed forms evaluate many geometries at once."""
+Closed forms evaluate many geometries at once.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ class LeafTask:
     """The task that leaf springs are designed for.
 
     It holds the specification, a stroke [m], the crossover [Hz], the least static friction [N], and the stage's flat
-    keys without leaves. A multiple of the crossover must lie below the first interfering frequency."""
+    keys without leaves. A multiple of the crossover must lie below the first interfering frequency.
+    """
 
     spec: Spec
     stroke: float
@@ -35,7 +37,8 @@ class LeafTask:
         """Return the force along the leaves [N].
 
         It is the specification's load plus the weight of the heaviest stage, or the stage file's load if that is
-        larger."""
+        larger.
+        """
         masses = self.spec.masses.stage
         heaviest = masses.high if masses else float(self.flat["masses.stage"])
         return max(float(self.spec.load.force_x) + GRAVITY * heaviest, self.flat.get("flexure.load", 0.0))
@@ -46,7 +49,8 @@ class RelaxableKey:
     """A key of the specification that relaxes a requirement.
 
     It holds the `key`, its `value` and `unit`, and a function from the factor by which a geometry breaks the
-    requirement to the value needed. That value is None if no change of the key is enough."""
+    requirement to the value needed. That value is None if no change of the key is enough.
+    """
 
     key: str
     value: float
@@ -58,7 +62,8 @@ class RelaxableKey:
 class Requirement:
     """A requirement in words, with the keys that relax it.
 
-    Its `excess` is the factor by which geometries break it: 1 if they just meet it."""
+    Its `excess` is the factor by which geometries break it: 1 if they just meet it.
+    """
 
     name: str
     keys: tuple[RelaxableKey, ...]
@@ -166,7 +171,8 @@ def buckling_share(mechanism: Mechanism, task: LeafTask, buckling: Any) -> Any:
     """Return the load on the leaves as a share of what makes them give way.
 
     It adds two shares: the largest force along a leaf, as if it pressed on all, over the `buckling` load [N]; and the
-    force across the leaves over that at which they give way sideways."""
+    force across the leaves over that at which they give way sideways.
+    """
     across = float(task.spec.load.force_y) / closed_forms.lateral_load(mechanism)
     return leaf_load(mechanism, task) * mechanism.leaves / buckling + across
 
@@ -174,7 +180,8 @@ def buckling_share(mechanism: Mechanism, task: LeafTask, buckling: Any) -> Any:
 def leaf_load(mechanism: Mechanism, task: LeafTask) -> Any:
     """Return the largest force along a leaf [N]: its share of the load, plus a moment's part.
 
-    The moment acts about the width of the leaves."""
+    The moment acts about the width of the leaves.
+    """
     outermost = mechanism.depth / 2 / mechanism.offset_squares
     return task.load / mechanism.leaves + float(task.spec.load.moment_y) * outermost
 
@@ -182,7 +189,8 @@ def leaf_load(mechanism: Mechanism, task: LeafTask) -> Any:
 def static_stress(mechanism: Mechanism, task: LeafTask) -> Any:
     """Return the largest stress at the clamps [Pa] at full stroke under all loads at once.
 
-    The concentration of stress at the clamps is included."""
+    The concentration of stress at the clamps is included.
+    """
     return mechanism.stress_concentration * closed_forms.max_stress(mechanism, task.stroke) + load_stress(
         mechanism, task
     )
@@ -192,7 +200,8 @@ def load_stress(mechanism: Mechanism, task: LeafTask) -> Any:
     """Return the stress at the clamps that the loads make [Pa].
 
     A force across the leaf ends bends leaves in their plane as cantilevers, since nothing else holds the stage about z.
-    A moment about x bends them as leaves whose ends stay parallel."""
+    A moment about x bends them as leaves whose ends stay parallel.
+    """
     load, middle = task.spec.load, mechanism.width / 2 / mechanism.edgewise
     about_x = float(load.moment_x) * mechanism.depth / 2 / mechanism.offset_squares * mechanism.length / 2
     edgewise = (float(load.force_y) * mechanism.length + float(load.moment_z)) / mechanism.leaves + about_x

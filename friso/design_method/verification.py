@@ -1,6 +1,7 @@
 """Try the design in simulated moves of machines drawn from the specification.
 
-The joint is free, and locked for comparison."""
+The joint is free, and locked for comparison.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +41,8 @@ class MachineOutcomes:
     `words` say what the run does at its end (`friso.hunting.criteria.run_outcome`), with the position window as band. A
     machine rests if it stays in the window for the last quarter of the run. For other machines, the words are those of
     a run ten times as long. `settling` [s] is the time after the reference's last corner from which the stage stays in
-    the window; NaN if it does not rest. `swing` [m] is the peak-to-peak motion in the last quarter."""
+    the window; NaN if it does not rest. `swing` [m] is the peak-to-peak motion in the last quarter.
+    """
 
     words: np.ndarray
     settling: np.ndarray
@@ -79,7 +81,8 @@ class MachineOutcomes:
     def slower_than(self, share: float) -> float:
         """Return the settling time [s] that a share of the moves exceeds.
 
-        It is infinite if more moves than that do not settle."""
+        It is infinite if more moves than that do not settle.
+        """
         times = np.where(np.isnan(self.settling), np.inf, self.settling)[self.completed]
         return float(np.quantile(times, 1 - share, method="higher")) if times.size else np.inf
 
@@ -93,7 +96,8 @@ class MachineOutcomes:
     def worst(self) -> int:
         """Return the number of the worst move.
 
-        It is the restless move with the largest swing, or else the move that settles last."""
+        It is the restless move with the largest swing, or else the move that settles last.
+        """
         rank = np.where(self.restless, self.swing + 1e9, np.nan_to_num(self.settling, nan=-1.0))
         return int(np.where(self.completed, rank, -np.inf).argmax())
 
@@ -102,7 +106,8 @@ class MachineOutcomes:
 class Verification:
     """The machines and moves drawn, with their outcomes for the joint `free` and `locked`.
 
-    `worst` is the worst machine with a free joint, as a stage."""
+    `worst` is the worst machine with a free joint, as a stage.
+    """
 
     population: Population
     free: MachineOutcomes
@@ -113,7 +118,8 @@ class Verification:
 def verification(stage: Stage, spec: Spec, softening: float, progress: Progress) -> Verification:
     """Try the design in machines and moves drawn from the specification.
 
-    The load takes up to the share `softening` of the drive stiffness."""
+    The load takes up to the share `softening` of the drive stiffness.
+    """
     settings = DesignSettings.current()
     flat = stage.flat()
     machines = random_machines(spec, flat, settings.verified_moves, softening)
@@ -137,7 +143,8 @@ def move_machines(
     """Simulate the moves of stages given as flat keys, arrays of shape (count,).
 
     If `patient`, machines that are not in position are simulated again for longer. `window` is the position window
-    [m]."""
+    [m].
+    """
     settings = DesignSettings.current()
     first = _followed_moves(flat, count, window, settings.followed_time, progress, label)
     again = np.flatnonzero(first.restless & patient)
@@ -189,7 +196,8 @@ def _followed_moves(
 def _worst_stage(stage: Stage, keys: dict[str, float], time: float) -> Stage:
     """Return one of the machines with its move as a stage, for a time [s] after the move.
 
-    Its joint has plain numbers, since the deviation of its stiffness belongs to no single size of the leaves."""
+    Its joint has plain numbers, since the deviation of its stiffness belongs to no single size of the leaves.
+    """
     flat = stage.flat()
     follow = ("joint.stiffness", "parasitic.frequency", "parasitic.mass", "parasitic.damping_ratio")
     joint = {key: float(flat[key]) for key in (*follow, TUNED_MASS)}

@@ -25,7 +25,8 @@ _OTHER = re.compile(r"\d(?!e[+-]?\d)[a-z_]|\\", re.IGNORECASE)
 def number_in(text: str) -> float | None:
     """Return the number that a text stands for, or None if it is no number.
 
-    Arithmetic with +, -, *, /, brackets, pi and inf is worked out. Python code is never executed."""
+    Arithmetic with +, -, *, /, brackets, pi and inf is worked out. Python code is never executed.
+    """
     if len(text) > LONGEST or _OTHER.search(text):
         return None
     try:

@@ -1,7 +1,8 @@
 """Convert the gains of a stage to the units that drives use.
 
 One turn of the motor moves the load by a travel L, in m, or in rad on a rotary axis. A force F then equals a torque F
-L/(2 pi). A velocity v equals v/L turns per second. A torque equals a current times the motor's constant."""
+L/(2 pi). A velocity v equals v/L turns per second. A torque equals a current times the motor's constant.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ Other = tuple[float, str]
 class Conversion:
     """One gain of a controller: its name, its symbol, and its value in several units.
 
-    The first of the values is in SI. Each value stands beside its unit."""
+    The first of the values is in SI. Each value stands beside its unit.
+    """
 
     name: str
     symbol: str
@@ -46,7 +48,8 @@ class Conversion:
 def travel_of(flat: Mapping[str, Any]) -> float | None:
     """Return how far one turn of the motor moves the load [m or rad].
 
-    The transmission's ratio or lead gives it. Returns None for a stage without a transmission."""
+    The transmission's ratio or lead gives it. Returns None for a stage without a transmission.
+    """
     if "transmission.ratio" in flat:
         return 2 * pi / flat["transmission.ratio"]
     return flat.get("transmission.lead")
@@ -57,7 +60,8 @@ class Turn:
     """What motor and screw convert: the travel of a turn and the force of an ampere.
 
     `travel` is how far one turn moves the load [m or rad]. `per_ampere` is the force or torque at the load per ampere
-    [N/A or N m/A]. Either is None where it is unknown."""
+    [N/A or N m/A]. Either is None where it is unknown.
+    """
 
     travel: float | None
     per_ampere: float | None
@@ -67,7 +71,8 @@ class Turn:
         """Collect travel and force per ampere from the stage file and the user's answers.
 
         The transmission gives the travel, the actuator gives `per_ampere` [N/A or N m/A]; the user may add what is
-        missing. Raises InputError for an answer in a wrong unit, or one that contradicts the stage."""
+        missing. Raises InputError for an answer in a wrong unit, or one that contradicts the stage.
+        """
         kind, travel = axis_of(flat), travel_of(flat)
         if TRAVEL in answers:
             answer = answers.value(TRAVEL, TRAVELS[kind])
@@ -99,7 +104,8 @@ def conversions(
     """Return every gain of a stage in SI and in the units that drives use.
 
     `flat` holds the stage by flat keys. Units that need an unknown travel or motor constant are left out. Raises
-    InputError for gains too large or too small to convert, and for answers that contradict the stage."""
+    InputError for gains too large or too small to convert, and for answers that contradict the stage.
+    """
     turn = Turn.of(flat, answers, per_ampere)
     try:
         return tuple(row for row in _rows(flat, turn) if row.finite)
@@ -153,7 +159,8 @@ def _force(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
 def _per(unit: str, *per: tuple[str, float]) -> Convert:
     """Build a converter for gains that are a force per motion, such as N/m or N s/m.
 
-    The converter also gives the gain per turn of the motor, as torque and as current."""
+    The converter also gives the gain per turn of the motor, as torque and as current.
+    """
 
     def others(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
         values = []

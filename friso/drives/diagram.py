@@ -19,12 +19,14 @@ ASIDE = 6
 class Canvas:
     """A drawing of the loop from the error to the force.
 
-    Boxes and sums are added from left to right. Feedback and feedforward enter on lines above and below."""
+    Boxes and sums are added from left to right. Feedback and feedforward enter on lines above and below.
+    """
 
     def __init__(self, flat: Mapping[str, Any]) -> None:
         """Start the drawing with the reference, the first sum and the fed-back position.
 
-        `flat` is the stage by flat keys; it tells which filters and limits to draw."""
+        `flat` is the stage by flat keys; it tells which filters and limits to draw.
+        """
         self.paths = {flat[f"{place}.path"] for place in row_keys(flat, FILTERS_KEY)}
         self.limited = FORCE_LIMIT in flat
         self.lines = [""] * 5
@@ -45,7 +47,8 @@ class Canvas:
     def sum(self, above: str = "", below: str = "", minus: bool = True, deep: bool = False) -> None:
         """Add a sum of the signal and of what enters from above or below.
 
-        What enters from below is subtracted, or added if `minus` is False. It is drawn one line lower if `deep`."""
+        What enters from below is subtracted, or added if `minus` is False. It is drawn one line lower if `deep`.
+        """
         self.lines[MAIN] += "--(+)"
         place = len(self.lines[MAIN]) - 2
         if above:

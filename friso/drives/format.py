@@ -26,7 +26,8 @@ class AxisParameters:
     """The parameters of one axis, as a parameter file holds them.
 
     `name` is the axis's name in the file, and `letter` is what users of the machine call it. `values` holds texts or
-    numbers by name. `machine` holds the settings of the whole machine that matter for the axis."""
+    numbers by name. `machine` holds the settings of the whole machine that matter for the axis.
+    """
 
     name: str
     values: Mapping[str, Any]
@@ -40,7 +41,8 @@ class AxisParameters:
         """Return a parameter as a finite number.
 
         A text may be one of the `symbols`, which stand for numbers. Raises InputError if the parameter is no number, or
-        if it is absent and has no `default`."""
+        if it is absent and has no `default`.
+        """
         entry = self.values.get(name, self.machine.get(name, default))
         if entry is None:
             raise InputError(name, "nothing", "a number", f"{name} = 1.0")
@@ -63,7 +65,8 @@ class AxisParameters:
     def flag(self, name: str, default: bool = False) -> bool:
         """Tell whether a switch is on.
 
-        Raises InputError if its value is neither true nor false, 0 nor 1."""
+        Raises InputError if its value is neither true nor false, 0 nor 1.
+        """
         entry = self.values.get(name, default)
         if not isinstance(entry, bool) and entry not in (0, 1):
             raise InputError(name, quoted(str(entry)), "true or false", f"{name} = true")
@@ -90,7 +93,8 @@ ENDLESS = ("", "inf", "+inf", "infinity")
 class AsStage:
     """The stage that an axis's parameters describe, as tables of a stage file.
 
-    `left_out` says in sentences which settings of the drive a stage cannot describe."""
+    `left_out` says in sentences which settings of the drive a stage cannot describe.
+    """
 
     tables: Mapping[str, Mapping[str, Any]]
     left_out: tuple[str, ...] = ()
@@ -118,7 +122,8 @@ class ParameterFormat:
 
     `questions_back`, `parameters` and `text` lead from a stage back to the drive. They list what is still unknown,
     compute the parameters, and write them as a file. `whole` takes in other files of the same folder through
-    `Beside`."""
+    `Beside`.
+    """
 
     title: str
     firmware: str

@@ -21,7 +21,8 @@ class Gains:
     """The gains of a stage, with its loop drawn and its gains in the units of drives.
 
     For a `kind` of drive, `parameters` holds its parameters by name. `not_held` lists the keys of the stage that these
-    parameters cannot hold."""
+    parameters cannot hold.
+    """
 
     stage: Stage
     diagram: str
@@ -40,7 +41,8 @@ def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None
     """Return the gains of a stage, and the parameters of the drive `to` if one is named.
 
     Raises InputError for a controller that the drive does not have. Values that are still missing are refused
-    together."""
+    together.
+    """
     flat = stage.flat()
     answers = UserAnswers({**_told(stage, flat), **user_values})
     kind = None if to is None else FORMATS[FORMATS.checked(to, "--to", "--to {}")]
@@ -61,7 +63,8 @@ def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None
 def _told(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return the answers that `friso init --from` kept in the stage file.
 
-    An uncertain answer counts by the centre of its range."""
+    An uncertain answer counts by the centre of its range.
+    """
     fields = stage.numeric_keys()
     kept = {name: flat[key] for name in TOLD if (key := f"drive.{name}") in flat}
     return {
@@ -73,7 +76,8 @@ def _told(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
 def _not_held(flat: Mapping[str, Any], held: frozenset[str]) -> tuple[str, ...]:
     """Return the keys of [controller] that the parameters cannot hold.
 
-    A filter counts once. Values of 0 and mere choices are left out."""
+    A filter counts once. Values of 0 and mere choices are left out.
+    """
     before = f"{CONTROLLER}."
     names = [key.removeprefix(before) for key, value in flat.items() if key.startswith(before) and value]
     numbers = [name for name in names if name not in held and not isinstance(flat[before + name], str)]

@@ -30,7 +30,8 @@ class OpenQuestion:
 class UserAnswers:
     """The values that the user gives beside a file: texts by key, as --set reads them.
 
-    The object remembers which keys were asked for, so that misspelled ones can be refused."""
+    The object remembers which keys were asked for, so that misspelled ones can be refused.
+    """
 
     def __init__(self, texts: Mapping[str, Any]) -> None:
         """Keep the texts that the user gave. No key has been asked for yet."""
@@ -50,7 +51,8 @@ class UserAnswers:
         """Raise InputError for an answer that nothing asked for, such as a misspelled key.
 
         Keys of tables, which contain a dot, are left to the check of the stage. Raises nothing where every answer was
-        wanted."""
+        wanted.
+        """
         for key in self.texts:
             if "." not in key and key not in self.wanted:
                 wanted = sorted(name for name in self.wanted if "." not in name)
@@ -74,7 +76,8 @@ class UserAnswers:
     def kind_of(self, key: str, fields: Mapping[AxisKind, Quantity]) -> tuple[AxisKind, float]:
         """Return the kind of axis that an answer's unit implies, and the answer in SI.
 
-        Raises InputError if the unit fits no kind of axis."""
+        Raises InputError if the unit fits no kind of axis.
+        """
         for kind, field in fields.items():
             try:
                 return kind, float(field.read(self.texts[key]))
@@ -89,7 +92,8 @@ def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = 
     """List what no drive knows of its machine and the user has not said yet.
 
     Moving mass and friction are asked for. A move to try is asked for unless the file gives one (`moved`). Raises
-    InputError for an unknown friction law."""
+    InputError for an unknown friction law.
+    """
     asked: list[OpenQuestion] = []
     if not {"masses.cart", "masses.stage"} & answers.texts.keys():
         asked += _of_table("masses", Masses, ("stage",), {"stage": "what moves"}, kind)
@@ -113,7 +117,8 @@ def _of_table(
 ) -> list[OpenQuestion]:
     """Build one open question for each named key of a table of the stage file.
 
-    Unit and example follow from the kind of axis, linear or rotary."""
+    Unit and example follow from the kind of axis, linear or rotary.
+    """
     fields = {name: field.on(kind) for name, field in numeric_fields(section).items()}
     return [OpenQuestion(f"{table}.{name}", meaning[name], fields[name].written_example) for name in names]
 

@@ -1,6 +1,7 @@
 """Turn a parameter file into a stage file.
 
-The text was written by others, so its size is limited and no value is trusted unchecked."""
+The text was written by others, so its size is limited and no value is trusted unchecked.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ from friso.stage.files import text_of
 class StageOfAxis:
     """A stage read from a parameter file, with where it came from.
 
-    It holds the file's path and kind, the name of the axis, and sentences on what the stage leaves out."""
+    It holds the file's path and kind, the name of the axis, and sentences on what the stage leaves out.
+    """
 
     stage: Stage
     path: Path
@@ -42,7 +44,8 @@ class StageOfAxis:
 def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) -> StageOfAxis:
     """Read one axis of a parameter file as a stage, completed by the user's answers.
 
-    Raises InputError for a file that cannot be read. Values that are still missing are refused together."""
+    Raises InputError for a file that cannot be read. Values that are still missing are refused together.
+    """
     kind, axes = read(path)
     chosen = _chosen(axes, axis, path)
     try:
@@ -60,7 +63,8 @@ def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) ->
 def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
     """Return the kind of a parameter file, and its axes that have gains.
 
-    Raises InputError for a file of no known kind, or one that its kind cannot read."""
+    Raises InputError for a file of no known kind, or one that its kind cannot read.
+    """
     titles = ", ".join(FORMATS[name].title for name in FORMATS)
     expected = f"a parameter file: {titles}"
     text = text_of(path, expected, "friso init stage.toml --from machine.ini", latin=True)
@@ -77,7 +81,8 @@ def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
 def _beside(path: Path, name: str) -> str | None:
     """Return the text of a file in the folder of another file, or below it.
 
-    Returns None if the name leads outside that folder or to nothing. Raises InputError for a file that is no text."""
+    Returns None if the name leads outside that folder or to nothing. Raises InputError for a file that is no text.
+    """
     place = None if flaw_of(name) else Path(os.path.realpath(path.parent / name))
     if place is None or not place.is_relative_to(os.path.realpath(path.parent)) or not os.path.lexists(place):
         return None
@@ -87,7 +92,8 @@ def _beside(path: Path, name: str) -> str | None:
 def _chosen(axes: tuple[AxisParameters, ...], name: str | None, path: Path) -> AxisParameters:
     """Return the axis with a name or letter; without a name, the only axis.
 
-    Raises InputError if no axis, or more than one, fits."""
+    Raises InputError if no axis, or more than one, fits.
+    """
     names = ", ".join(f"{axis.name} ({axis.letter})" if axis.letter else axis.name for axis in axes)
     if name is None and len(axes) == 1:
         return axes[0]
@@ -103,7 +109,8 @@ def _with_answers(
 ) -> Stage:
     """Build the stage from the tables of an axis with the user's answers laid over them.
 
-    Answers whose key has a dot are keys of the stage file. Friction model and motion get defaults."""
+    Answers whose key has a dot are keys of the stage file. Friction model and motion get defaults.
+    """
     source = (
         f"Controller: {one_line(path.name)}, {axis.name}, by the formulas of {kind.firmware} ({kind.source}); "
         "machine: as given to friso init"

@@ -34,7 +34,8 @@ def question(function: Callable[Arguments, Returned]) -> Callable[Arguments, Ret
     """Turn the function of a question into a function of friso.
 
     Its arguments are checked, shared parameters are added to its docstring, and the kind of axis that it speaks of
-    stays its own."""
+    stays its own.
+    """
     function.__doc__ = described(function)
     answer = check_arguments(function)
 
@@ -49,7 +50,8 @@ def question(function: Callable[Arguments, Returned]) -> Callable[Arguments, Ret
 class AnswerTable:
     """A small table: labelled columns, and rows that have names.
 
-    A table `behind` the answer is shown only with its details."""
+    A table `behind` the answer is shown only with its details.
+    """
 
     title: str
     columns: Sequence[str]
@@ -111,7 +113,8 @@ class Answer:
     def __init__(self, result: Any, **parts: Any) -> None:
         """Keep the result, and other `parts` as attributes.
 
-        The axis is that of the stage, unless it is one of the parts."""
+        The axis is that of the stage, unless it is one of the parts.
+        """
         stage = parts.get("stage") or getattr(result, "stage", None)
         self.result, self.axis_kind = result, LINEAR if stage is None else stage.axis_kind
         vars(self).update(parts)
@@ -139,7 +142,8 @@ class Answer:
     def subject(self) -> Any:
         """Return what the functions that show the answer take.
 
-        It is the result, or the answer itself if that holds more."""
+        It is the result, or the answer itself if that holds more.
+        """
         return self.result
 
     @property
@@ -155,7 +159,8 @@ class Answer:
     def _shown_by(self, module: str, function: str, otherwise: Any, *more: Any) -> Any:
         """Return what a function of the question's folder makes of the answer.
 
-        Returns `otherwise` if the folder has no such function."""
+        Returns `otherwise` if the folder has no such function.
+        """
         name = f"{self.package}.{module}"
         shown = getattr(import_module(name), function, None) if self.package and find_spec(name) else None
         return otherwise if shown is None else shown(self.subject, *more)

@@ -1,6 +1,7 @@
 """Turn the numbers of a JSON document into an xarray.Dataset.
 
-Units come from the ends of keys, and dimensions from tables of equal form."""
+Units come from the ends of keys, and dimensions from tables of equal form.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ def dataset_of(document: Mapping[str, Any]) -> xr.Dataset:
     """Return what a document holds as a Dataset.
 
     The first table of tables, such as "cases" or "models", gives a dimension of its name, and each of its numbers a
-    variable along it. The document's own numbers become variables, and its texts attributes."""
+    variable along it. The document's own numbers become variables, and its texts attributes.
+    """
     import xarray as xr
 
     name = next((key for key, value in document.items() if _records(value)), None)

@@ -1,6 +1,7 @@
 """Write files that appear under their names together, or not at all.
 
-Drafts are written first and renamed in the end."""
+Drafts are written first and renamed in the end.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ _LEVELS = 4
 class Drafts:
     """Drafts of files, on the disk where the files are to be.
 
-    They are deleted at the end of the `with` block unless they were put in place."""
+    They are deleted at the end of the `with` block unless they were put in place.
+    """
 
     def __init__(self) -> None:
         self.folders: dict[Path, Path] = {}
@@ -69,7 +71,8 @@ class Drafts:
 
         After an error, all is as it was before. Ctrl-C waits until the drafts are gone. At any moment, a name has
         either the earlier file or the new one. Raises FileExistsError if any other file is in the way by now, or
-        another OSError."""
+        another OSError.
+        """
         undo: list[Callable[[], object]] = []
         raise_what_waits()
         self.held.enter_context(hold_interrupts())
@@ -98,7 +101,8 @@ class Drafts:
     def _tidy(self, path: Path) -> None:
         """Remove drafts near `path` that killed processes left behind.
 
-        Folders further up are searched as well, since the folder of the file may not have existed."""
+        Folders further up are searched as well, since the folder of the file may not have existed.
+        """
         for folder in {*path.absolute().parents[:_LEVELS]} - self.tidied:
             self.tidied.add(folder)
             if folder.is_dir():
@@ -125,7 +129,8 @@ def _duplicate(path: Path, spare: Path) -> None:
 def made(folder: Path) -> list[Path]:
     """Make a folder and the missing ones above it; return those made, the outermost first.
 
-    Raises OSError, and then leaves none of them behind."""
+    Raises OSError, and then leaves none of them behind.
+    """
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     done: list[Path] = []
     try:

@@ -106,7 +106,8 @@ def read_stage(
     """Return a stage with keys overridden, and log what is doubtful about it.
 
     The logger "friso" says if centres of uncertain keys are used, unless `uncertain_too`. It also names the tables that
-    the analysis `leaves_out`. Raises InputError."""
+    the analysis `leaves_out`. Raises InputError.
+    """
     stage = stage_of(source, changes)
     for doubt in (*implausible_values(stage), *idle_encoder(stage)):
         LOGGER.warning(doubt)
@@ -131,7 +132,8 @@ def read_stage(
 def mention_unstable_loop(stage: Stage) -> None:
     """Log that the loop of a stage is unstable, if it is.
 
-    The logger "friso" says so before work that may take minutes and whose answer depends on it."""
+    The logger "friso" says so before work that may take minutes and whose answer depends on it.
+    """
     from friso.hunting import unstable
     from friso.shown.loop_words import unstable_loop
 
@@ -154,7 +156,8 @@ _LONGEST_STEM = 150
 def stem_of(source: StageLike, usual: str = "stage") -> str:
     """Return the stem of names of files about a stage: the name of its file without suffix.
 
-    Bytes that are no text become "_". A long name is cut, so that suffixes still fit."""
+    Bytes that are no text become "_". A long name is cut, so that suffixes still fit.
+    """
     if isinstance(source, Stage | Mapping):
         return usual
     return re.sub("[\ud800-\udfff]", "_", Path(source).stem).encode()[:_LONGEST_STEM].decode(errors="ignore")

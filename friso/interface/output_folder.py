@@ -2,7 +2,8 @@
 
 The folder must be new, empty, a store of friso map, or the command's own from an earlier run, which a small marker file
 shows. Otherwise the command refuses and names --overwrite. A file that the user names must be new, too. No command ever
-replaces a file that it reads."""
+replaces a file that it reads.
+"""
 
 from __future__ import annotations
 
@@ -95,7 +96,8 @@ class OutputFolder:
     ) -> list[Path]:
         """Write the files, and some `beside` the inputs, all of them or none.
 
-        Returns the paths in the folder. Raises InputError if one must not be written, and OSError if one cannot."""
+        Returns the paths in the folder. Raises InputError if one must not be written, and OSError if one cannot.
+        """
         self.check(files)
         others = [name for name in files if name not in self.files and os.path.lexists(self.folder / name)]
         contents = {self.folder / name: content for name, content in files.items()}
@@ -123,7 +125,8 @@ def refuse_place(option: str, path: Path) -> None:
     """Raise InputError if nothing can be written to a path.
 
     That holds for unusable paths (`paths.unwritable`), and for paths inside a store, which takes only its own files.
-    Raises nothing for other paths."""
+    Raises nothing for other paths.
+    """
     from friso.studies.metadata import is_store
 
     example = f"{option} report" if option.startswith("--") else ""
@@ -136,7 +139,8 @@ def refuse_place(option: str, path: Path) -> None:
 def check_store_folder(folder: Path) -> None:
     """Raise InputError if a folder cannot become a store, or holds anything but a store.
 
-    A store is the whole folder, so --overwrite does not put one beside other files."""
+    A store is the whole folder, so --overwrite does not put one beside other files.
+    """
     maker, _ = marked(folder)
     if _entries(folder):
         if maker != STORE_MAKER:
@@ -160,7 +164,8 @@ def check_file(
     """Raise InputError if a file that the user names must not be written.
 
     It must not be among the `inputs`, which are read. It must be new, unless it `is_own` or may be overwritten. The
-    message suggests another name, or `example`."""
+    message suggests another name, or `example`.
+    """
     refuse_place(option, path)
     another = f"{path.stem}-2{path.suffix}"
     example = example or (f"{option} {another}" if option.startswith("--") else another)
@@ -180,7 +185,8 @@ def check_file(
 def write_file(option: str, path: Path, content: Content, overwrite: bool) -> None:
     """Write a file that the user names, whole or not at all.
 
-    Raises InputError if it must not be written, or cannot."""
+    Raises InputError if it must not be written, or cannot.
+    """
     check_file(option, path, overwrite)
     place = Path(os.path.realpath(path))  # a link stays one
     try:
@@ -206,7 +212,8 @@ def write(files: Mapping[Path, Content], may_replace: Collection[Path], progress
     """Write files, all of them or none at any moment, and return their paths.
 
     Files that `may_replace` does not name have to be new. Raises FileExistsError if one is not, and another OSError if
-    it cannot be written."""
+    it cannot be written.
+    """
     with drafts_of(files, progress) as drafts:
         drafts.put_in_place(may_replace)
     return written(files)
@@ -241,7 +248,8 @@ def marker(command: str, names: Iterable[str]) -> str:
 def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
     """Return the command that made a folder, and the files that it wrote there.
 
-    Both are empty for a folder that no command of friso made."""
+    Both are empty for a folder that no command of friso made.
+    """
     try:
         document = parsed(text_of(folder / MARKER, "a marker"), "a marker")
     except InputError:
@@ -257,7 +265,8 @@ def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
 def _of_others(folder: Path, maker: str, expected: str) -> InputError:
     """Build the refusal of a folder that is not new, empty or the command's own.
 
-    `expected` says what else the folder may be."""
+    `expected` says what else the folder may be.
+    """
     made = f"made by friso {maker}" if maker else f"with {_first_names(_entries(folder))} in it"
     holds = "a store of friso map" if maker == STORE_MAKER else made
     return InputError("--out", f"{folder}, {holds}", f"a new or empty folder, {expected}", _beside(folder))
@@ -298,6 +307,7 @@ def _check_writable(folder: Path) -> None:
 def _try_draft(path: Path) -> None:
     """Raise OSError if no draft of a file can be made.
 
-    On Windows and on network shares, nothing else tells whether a file can be written."""
+    On Windows and on network shares, nothing else tells whether a file can be written.
+    """
     with Drafts() as drafts:
         drafts.add(path, "")

@@ -2,7 +2,8 @@
 
 A question is a function of friso with a command of the same name. Its folder declares a `QUESTION`. From that, from the
 function's signature and its docstring come the command, its options and help, and the entry in `friso --help`. Nothing
-heavy is imported here, because the list of commands is printed before arrays and units are loaded."""
+heavy is imported here, because the list of commands is printed before arrays and units are loaded.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +39,8 @@ TOPICS = (HUNTS, WHERE, WHY, STOPS, MACHINE, HELP)
 class Choices:
     """A list below the help of a command: names, each with one line on it.
 
-    It is read only when the help is asked for."""
+    It is read only when the help is asked for.
+    """
 
     title: str
     rows: Callable[[], Iterable[tuple[str, str]]]
@@ -48,7 +50,8 @@ class Choices:
 class Question:
     """One question: where its function stands, and how its command takes and shows it.
 
-    Raises ValueError for a topic that is not one of TOPICS, TypeError for a place that is no number."""
+    Raises ValueError for a topic that is not one of TOPICS, TypeError for a place that is no number.
+    """
 
     package: str
     """The package whose module `question` holds the function."""
@@ -125,7 +128,8 @@ class Question:
     def function(self) -> Callable[..., Any]:
         """Return the function, and import what it needs.
 
-        Raises InputError if the module of another package has none."""
+        Raises InputError if the module of another package has none.
+        """
         if self.package.startswith("friso."):
             return getattr(import_module(self.module), self.in_python)
         _ = self.summary  # which refuses a function without docstring
@@ -145,7 +149,8 @@ class Question:
     def summary(self) -> str:
         """Return the first line of the function's docstring without its full stop.
 
-        The module is not imported. Raises InputError if there is no such function, or it has no docstring."""
+        The module is not imported. Raises InputError if there is no such function, or it has no docstring.
+        """
         text = ""
         try:
             spec = find_spec(self.module)
@@ -171,7 +176,8 @@ QUESTIONS = Registry[Question]("friso.questions", "QUESTION", GROUP, Question)
 def function_of(name: str) -> Callable[..., Any]:
     """Return the function friso.NAME of a question.
 
-    Raises KeyError for an unknown name, and InputError if another package's module has no such function."""
+    Raises KeyError for an unknown name, and InputError if another package's module has no such function.
+    """
     own = name.replace("_", "-")
     if own in QUESTIONS and QUESTIONS[own].in_python == name:
         return QUESTIONS[own].function

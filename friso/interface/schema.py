@@ -1,6 +1,7 @@
 """Derive JSON Schemas of the stage file and of a specification from their tables.
 
-Editors complete and check files by them, and the reference pages are made from them."""
+Editors complete and check files by them, and the reference pages are made from them.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """Declare once the parameters that several questions share.
 
 They appear in docstrings and in the help of commands. A function names such a parameter in its signature and leaves it
-out of its docstring; `described` adds it."""
+out of its docstring; `described` adds it.
+"""
 
 from __future__ import annotations
 
@@ -57,7 +58,8 @@ SHARED: Mapping[str, SharedOption] = {
 def described(function: Callable[..., Any]) -> str:
     """Return the docstring of a function with an entry for every parameter in order.
 
-    Raises TypeError for a parameter that is neither in the docstring nor shared."""
+    Raises TypeError for a parameter that is neither in the docstring nor shared.
+    """
     text = inspect.getdoc(function) or ""
     before, own, after = _parts(text)
     entries, lines = {name: block for names, block in own for name in names}, []
@@ -76,7 +78,8 @@ def meaning(function: Callable[..., Any], name: str) -> str:
     """Return what a command's help says of a parameter.
 
     It is the first paragraph of the parameter's description. Numbers in SI are left out, since a command line takes
-    texts with units."""
+    texts with units.
+    """
     own = {parameter: block for names, block in _parts(function.__doc__ or "")[1] for parameter in names}
     shared = SHARED.get(name)
     if shared is not None and shared.help and own[name].endswith(shared.meaning):

@@ -26,7 +26,8 @@ def examples_folder() -> Path:
 def example_names() -> list[str]:
     """Return the names of the examples that come with friso.
 
-    Specifications stand after "specs/". Parameter files of drives stand after "drives/", with their endings."""
+    Specifications stand after "specs/". Parameter files of drives stand after "drives/", with their endings.
+    """
     return sorted(_examples())
 
 
@@ -129,7 +130,8 @@ def _start(
 ) -> str:
     """Return the text of a file to start from.
 
-    It is a specification, the stage of an axis in a parameter file, or the commented stage file. Raises InputError."""
+    It is a specification, the stage of an axis in a parameter file, or the commented stage file. Raises InputError.
+    """
     if spec is not None and source is not None:
         raise InputError("spec", "together with --from", "one of the two", "friso init --from machine.ini")
     if spec is not None:

@@ -2,7 +2,8 @@
 
 Stiffness and mass of one leaf suffice. A leaf between held ends moves along x, y and z and twists, each independently
 of the others. Its lowest modes of each kind describe it completely, together with the shapes that it takes statically
-when the stage moves (Craig & Bampton 1968, doi:10.2514/3.4741)."""
+when the stage moves (Craig & Bampton 1968, doi:10.2514/3.4741).
+"""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ class Reduced:
 
     `static` (nodes, 6, 6) holds its shapes for unit motions of the stage end. `inner` (nodes, 6, modes) holds its modes
     between held ends at unit modal mass, and `squares` (modes,) their circular frequencies squared [1/s^2]. `stiffness`
-    and `mass` (6, 6) are those at the stage end. `coupling` (modes, 6) is the mass between both kinds of motion."""
+    and `mass` (6, 6) are those at the stage end. `coupling` (modes, 6) is the mass between both kinds of motion.
+    """
 
     static: np.ndarray
     inner: np.ndarray
@@ -43,7 +45,8 @@ class Reduced:
     def of(cls, mechanism: Mechanism, stiffness: np.ndarray, mass: np.ndarray) -> Reduced:
         """Reduce the stiffness [N/m, N, N m] and mass [kg, kg m, kg m^2] of the nodes of a leaf.
 
-        Torsion is replaced by that of a plate."""
+        Torsion is replaced by that of a plate.
+        """
         size = len(stiffness)
         stiffness, mass = stiffness.copy(), mass.copy()
         stiffness[3::COORDINATES, 3::COORDINATES], mass[3::COORDINATES, 3::COORDINATES] = _torsion(
@@ -75,7 +78,8 @@ def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
     """Return torsional stiffness and mass of the nodes of a leaf that cannot warp at its ends.
 
     Elements are cubic, and rates of twist at inner nodes follow statically. Beams lack warping, which matters more for
-    modes than for statics."""
+    modes than for statics.
+    """
     h = float(mechanism.length) / (nodes - 1)
     rigidity = float(mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness))
     warping = rigidity / float(plate.warping_rate(mechanism.width, mechanism.poisson)) ** 2
@@ -130,7 +134,8 @@ def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
 def _mode(mechanism: Mechanism, frequency: float, stage: np.ndarray, leaves: np.ndarray) -> Mode:
     """Build a mode from the motion of stage and leaves.
 
-    Its sign makes the largest displacement of a leaf positive."""
+    Its sign makes the largest displacement of a leaf positive.
+    """
     actuator, sensor = (
         float(along_motion(mechanism, point, stage[:, None])[0]) for point in (mechanism.actuation, mechanism.sensor)
     )
@@ -163,7 +168,8 @@ def _gathered(ends: np.ndarray, matrix: np.ndarray) -> np.ndarray:
 def _rows(offsets: np.ndarray) -> np.ndarray:
     """Return orthonormal patterns of the leaves, one in each row.
 
-    The first is uniform, the second linear in the position of the leaf, and the rest complete the set."""
+    The first is uniform, the second linear in the position of the leaf, and the rest complete the set.
+    """
     powers = np.vander(np.arange(len(offsets)) - (len(offsets) - 1) / 2, increasing=True)
     return np.linalg.qr(powers)[0].T
 
@@ -171,7 +177,8 @@ def _rows(offsets: np.ndarray) -> np.ndarray:
 def buckling_load(mechanism: Mechanism, leaves: LeafBeams, straight: np.ndarray, load: float) -> float:
     """Return the least load [N] along the leaves, shared by them, at which the stage sways.
 
-    `straight` is the stiffness of a leaf without load. `load` [N] is a guess, at which the problem is linearised."""
+    `straight` is the stiffness of a leaf without load. `load` [N] is a guess, at which the problem is linearised.
+    """
     state = np.zeros((1, leaves.nodes, COORDINATES))
     strain = load / float(mechanism.leaves * axial(mechanism))
     state[:, :, 0] = -strain * np.linspace(0, float(mechanism.length), leaves.nodes)

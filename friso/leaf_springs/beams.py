@@ -2,7 +2,8 @@
 
 The stage is pushed along z. Leaves and stage then move in the x-z plane alone. The stiffness of the deflected mechanism
 has all six coordinates: those in the plane (x, z, about y) and those across it (y, about x, about z) stay independent.
-Nodes between cart and stage are eliminated leaf by leaf."""
+Nodes between cart and stage are eliminated leaf by leaf.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ PLANE, ACROSS = slice(0, None, 2), slice(1, None, 2)
 class HeldEquilibrium:
     """The equilibrium with the stage held at z.
 
-    It holds the place and its rate per z, the force along z, and the tangent stiffness (6, 6) of the stage."""
+    It holds the place and its rate per z, the force along z, and the tangent stiffness (6, 6) of the stage.
+    """
 
     place: Configuration
     rate: Configuration
@@ -36,7 +38,8 @@ class HeldEquilibrium:
 def beams(mechanism: Mechanism, stroke: float, elements: int = ELEMENTS) -> Evaluation:
     """Evaluate the mechanism at 5 deflections up to the stroke [m].
 
-    Raises BeamFailure where it has no solution."""
+    Raises BeamFailure where it has no solution.
+    """
     _check(mechanism, stroke)
     try:
         with np.errstate(all="ignore"):  # what comes out as no number is found by Leaves
@@ -107,7 +110,8 @@ def _pushed(mechanism: Mechanism, leaves: LeafBeams, held: list[HeldEquilibrium]
 def _predicted(reached: list[HeldEquilibrium], z: float) -> Configuration:
     """Extrapolate to z from the last two equilibria and their rates.
 
-    With a single equilibrium, its rate is used."""
+    With a single equilibrium, its rate is used.
+    """
     last = reached[-1]
     if len(reached) == 1:
         return last.place.plus(last.rate, z - last.place.stage[1])
@@ -148,7 +152,8 @@ def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) 
 class LinearisedLeaves:
     """A configuration linearised in the plane.
 
-    It holds the change that leads to equilibrium at the same z, and the energy of that change."""
+    It holds the change that leads to equilibrium at the same z, and the energy of that change.
+    """
 
     plane: Condensed
     change: Configuration

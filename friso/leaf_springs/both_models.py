@@ -18,7 +18,8 @@ BEAMS, CLOSED = "Beams", "Closed forms"
 class BothModels:
     """The leaf springs of a stage at a stroke, by closed forms and by beams.
 
-    `beams` is None where the beam model has no solution; `failure` gives the reason."""
+    `beams` is None where the beam model has no solution; `failure` gives the reason.
+    """
 
     stage: Stage
     closed: Evaluation

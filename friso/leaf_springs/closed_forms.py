@@ -32,7 +32,8 @@ theta'' = -p^2 m (m theta - mean of m theta), m = 1 - x/L, theta = 0 at both cla
 def drive_stiffness(mechanism: Mechanism) -> Any:
     """Return the stiffness along the motion with the stage kept parallel.
 
-    It is n 12 E I/L^3, stiffened as a plate."""
+    It is n 12 E I/L^3, stiffened as a plate.
+    """
     beam = 12 * mechanism.young * mechanism.bending / mechanism.length**3
     return mechanism.leaves * beam * plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
 
@@ -40,7 +41,8 @@ def drive_stiffness(mechanism: Mechanism) -> Any:
 def loaded_drive_stiffness(mechanism: Mechanism) -> Any:
     """Return the stiffness along the motion under the load along the leaves.
 
-    It vanishes at the buckling load."""
+    It vanishes at the buckling load.
+    """
     return drive_stiffness(mechanism) * (1 - mechanism.load / buckling_load(mechanism))
 
 
@@ -62,7 +64,8 @@ def edgewise_shear(mechanism: Mechanism) -> Any:
 def support_x(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
     """Return the stiffness along the leaves with all else held.
 
-    It falls as the leaves deflect, because deflected leaves bend under the force. Leaves count as plates."""
+    It falls as the leaves deflect, because deflected leaves bend under the force. Leaves count as plates.
+    """
     straight = mechanism.leaves * axial(mechanism) / mechanism.length
     stiffened = plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
     return straight / (1 + 12 / 700 * (deflection / mechanism.thickness) ** 2 / stiffened)
@@ -72,7 +75,8 @@ def support_y(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
     """Return the stiffness along the width with all else held.
 
     It contains bending and shear in the plane of the leaves. A force across a deflected leaf also twists it by 4 delta
-    (s/L)^3, with s from its middle, without the warping that its clamps forbid."""
+    (s/L)^3, with s from its middle, without the warping that its clamps forbid.
+    """
     flat = mechanism.length**3 / (12 * mechanism.young * mechanism.edgewise) + mechanism.length / edgewise_shear(
         mechanism
     )
@@ -84,7 +88,8 @@ def support_y(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
 def _cubic_twist(mechanism: Mechanism) -> Any:
     """Return the torsional compliance relative to free warping, for a torque that goes with s^3.
 
-    The rate of twist p solves p - p''/rate^2 = s^3, with p = 0 at the clamps: p = s^3 + 6 s/rate^2 - A sinh(rate s)."""
+    The rate of twist p solves p - p''/rate^2 = s^3, with p = 0 at the clamps: p = s^3 + 6 s/rate^2 - A sinh(rate s).
+    """
     half = plate.warping_rate(mechanism.width, mechanism.poisson) * mechanism.length / 2
     free = half**7 / 7
     end = half**3 + 6 * half
@@ -106,7 +111,8 @@ def shortening(mechanism: Mechanism, deflection: Any) -> Any:
 def buckling_load(mechanism: Mechanism) -> Any:
     """Return the load along all leaves together at which the stage sways.
 
-    It is n pi^2 E I/L^2, stiffened as a plate."""
+    It is n pi^2 E I/L^2, stiffened as a plate.
+    """
     return (
         mechanism.leaves
         * np.pi**2
@@ -120,7 +126,8 @@ def buckling_load(mechanism: Mechanism) -> Any:
 def leaf_bending(mechanism: Mechanism) -> Any:
     """Return the frequency of the first bending mode of a leaf between its clamps.
 
-    It is 1.028 t/L^2 sqrt(E/rho), stiffened."""
+    It is 1.028 t/L^2 sqrt(E/rho), stiffened.
+    """
     beam = (
         CLAMPED**2
         / (2 * np.pi * mechanism.length**2)
@@ -132,14 +139,16 @@ def leaf_bending(mechanism: Mechanism) -> Any:
 def _mode_stiffening(mechanism: Mechanism) -> Any:
     """Return the stiffening for moments that change sign along the leaf, as in a mode.
 
-    It is that of parallel motion. The even share of the moments lies far from the clamps and has little influence."""
+    It is that of parallel motion. The even share of the moments lies far from the clamps and has little influence.
+    """
     return plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
 
 
 def leaf_torsion(mechanism: Mechanism) -> Any:
     """Return the frequency of the first torsional mode of a leaf between its clamps.
 
-    It is Rayleigh's quotient of the twist that an even torque along the leaf makes."""
+    It is Rayleigh's quotient of the twist that an even torque along the leaf makes.
+    """
     rate = plate.warping_rate(mechanism.width, mechanism.poisson)
     nodes, weights = np.polynomial.legendre.leggauss(24)
     half = np.asarray(rate * mechanism.length / 2)[..., None]
@@ -153,7 +162,8 @@ def leaf_torsion(mechanism: Mechanism) -> Any:
 def lateral_load(mechanism: Mechanism) -> Any:
     """Return the force along the leaves' width at which they give way sideways.
 
-    The force acts at the leaf ends, on all leaves together."""
+    The force acts at the leaf ends, on all leaves together.
+    """
     twist = mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness)
     return mechanism.leaves * LATERAL * np.sqrt(mechanism.young * mechanism.bending * twist) / mechanism.length**2
 
@@ -190,7 +200,8 @@ def stage_stiffness(mechanism: Mechanism) -> np.ndarray:
 def stage_mass(mechanism: Mechanism) -> np.ndarray:
     """Return the mass of stage and leaves at the reference point, shape (..., 6, 6).
 
-    The leaves follow the stage statically."""
+    The leaves follow the stage statically.
+    """
     leaf, length, spread = mechanism.leaf_mass, mechanism.length, mechanism.offset_squares
     leaves = _symmetric(
         mechanism,
@@ -249,7 +260,8 @@ def modes(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
 
     Shapes stand in columns at unit modal mass. Six coordinates are the stage's. The seventh is the first bending mode
     of all leaves in phase, at its unit modal mass. Besides, the leaves follow the stage statically (Craig & Bampton
-    1968, doi:10.2514/3.4741). Numbers that make no mechanism give NaN."""
+    1968, doi:10.2514/3.4741). Numbers that make no mechanism give NaN.
+    """
     mass, stiffness = stage_mass(mechanism), stage_stiffness(mechanism)
     mass, stiffness = (np.pad(matrix, [(0, 0)] * (matrix.ndim - 2) + [(0, 1), (0, 1)]) for matrix in (mass, stiffness))
     together = np.sqrt(mechanism.leaves * mechanism.leaf_mass)
@@ -269,6 +281,7 @@ def modes(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
 def drive_mode(frequencies: np.ndarray, shapes: np.ndarray) -> np.ndarray:
     """Return the number of the drive mode, which yields most to a steady force along the motion.
 
-    `frequencies` [Hz] have shape (..., modes), and shapes (..., 7, modes)."""
+    `frequencies` [Hz] have shape (..., modes), and shapes (..., 7, modes).
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.argmax(np.nan_to_num((shapes[..., 2, :] / frequencies) ** 2, posinf=np.inf), axis=-1)

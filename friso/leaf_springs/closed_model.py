@@ -18,7 +18,8 @@ from friso.leaf_springs.settings import LeafSpringSettings
 def closed_form_model(mechanism: Mechanism, stroke: float) -> Evaluation:
     """Evaluate the mechanism by closed forms over its stroke [m].
 
-    Its drive stiffness is equal at all deflections."""
+    Its drive stiffness is equal at all deflections.
+    """
     settings = LeafSpringSettings.current()
     deflections = np.linspace(0.0, stroke, settings.closed_deflections)
     drive = closed_forms.drive_stiffness(mechanism) * np.ones(settings.closed_deflections)
@@ -62,7 +63,8 @@ def _mode(mechanism: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
 def following(mechanism: Mechanism, stage: np.ndarray) -> np.ndarray:
     """Return how the leaves' middle lines follow a motion of the stage, (leaves, POINTS, 3).
 
-    The motion has shape (6,), and the leaves follow statically."""
+    The motion has shape (6,), and the leaves follow statically.
+    """
     settings = LeafSpringSettings.current()
     s = np.linspace(0.0, 1.0, settings.mode_shape_points)
     by_place, by_slope = 3 * s**2 - 2 * s**3, mechanism.length * (s**3 - s**2)

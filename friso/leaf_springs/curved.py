@@ -1,6 +1,7 @@
 """Model a deflected leaf as a curved beam.
 
-Its 6 x 6 stiffness follows from the energy of unit loads at its end (Castigliano)."""
+Its 6 x 6 stiffness follows from the energy of unit loads at its end (Castigliano).
+"""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ def stage_stiffness_at(mechanism: Mechanism, deflection: float) -> np.ndarray:
     """Return the stiffness of the deflected stage [m] at its reference point, (6, 6).
 
     The stage is kept parallel. Elasticity is linear about the deflected shape. The forces that hold the shape are too
-    small to matter as long as they are small against the buckling load."""
+    small to matter as long as they are small against the buckling load.
+    """
     leaf = leaf_stiffness(mechanism, deflection)
     stiffness = np.zeros((6, 6))
     for offset in mechanism.offsets:
@@ -65,7 +67,8 @@ def _resultants(
 ) -> np.ndarray:
     """Return forces and moments at the points per unit load at the end, shape (points, 6, 6).
 
-    They act along and about tangent, width and normal."""
+    They act along and about tangent, width and normal.
+    """
     cosine, sine = 1 / np.sqrt(1 + slope**2), slope / np.sqrt(1 + slope**2)
     turn = np.zeros((len(x), 3, 3))
     turn[:, 0, 0], turn[:, 0, 2], turn[:, 1, 1], turn[:, 2, 0], turn[:, 2, 2] = cosine, sine, 1.0, -sine, cosine

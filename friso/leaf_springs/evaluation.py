@@ -72,14 +72,16 @@ class Evaluation:
     def loaded_drive(self) -> float:
         """Return the drive stiffness [N/m] at deflection 0 under the load along the leaves.
 
-        It vanishes at the buckling load."""
+        It vanishes at the buckling load.
+        """
         return float(self.drive[0] * (1 - self.mechanism.load / self.buckling))
 
     @property
     def buckling_margin(self) -> float:
         """Return the buckling load over the load along the leaves.
 
-        Without a load, the weight of the stage counts. The margin is infinite if the load pulls."""
+        Without a load, the weight of the stage counts. The margin is infinite if the load pulls.
+        """
         load = self.mechanism.load if self.mechanism.load else self.mechanism.weight
         return float(self.buckling / load) if load > 0 else np.inf
 
@@ -128,7 +130,8 @@ def peak_of(mechanism: Mechanism, actuator: float, sensor: float) -> float:
     """Return how far a mode's resonance rises above the line of the stage's mass.
 
     It follows from the mode's motion [1/sqrt(kg)] at actuator and sensor. The residue is phi_a phi_s against 1/m of the
-    mass, and the resonance divides by 2 zeta."""
+    mass, and the resonance divides by 2 zeta.
+    """
     return abs(actuator * sensor) * float(mechanism.body.mass) / (2 * float(mechanism.damping_ratio))
 
 

@@ -19,7 +19,8 @@ from friso.stage.flexure import register_derivation
 def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return `joint.stiffness` and the keys of [parasitic] for given leaves, by closed forms.
 
-    Raises InputError if a single mechanism buckles under its load."""
+    Raises InputError if a single mechanism buckles under its load.
+    """
     with np.errstate(all="ignore"):  # numbers that make no mechanism are found out by the rules of the stage file
         mechanism = Mechanism.of(flat)
         frequency, share = parasitic_mode(mechanism)
@@ -43,7 +44,8 @@ class VisibleModes:
     """The modes of mechanisms other than the drive mode, arrays of shape (..., 7).
 
     They hold frequency [Hz], and residue times the mass of the stage. A residue is positive where actuator and sensor
-    move in phase. Entries at the drive mode are 0."""
+    move in phase. Entries at the drive mode are 0.
+    """
 
     frequency: np.ndarray
     residue: np.ndarray
@@ -65,7 +67,8 @@ class VisibleModes:
     def at(self, mode: np.ndarray) -> tuple[Any, Any]:
         """Return frequency [Hz] and residue, each (...), of one mode of each mechanism.
 
-        They are infinite and 0 if no mode is visible."""
+        They are infinite and 0 if no mode is visible.
+        """
         picked = [
             np.take_along_axis(quantity, mode[..., None], axis=-1)[..., 0]
             for quantity in (self.frequency, self.residue)
@@ -77,7 +80,8 @@ class VisibleModes:
 def first_interfering(mechanism: Mechanism) -> Any:
     """Return the frequency [Hz] of the lowest interfering mode; infinite if there is none.
 
-    Actuator and sensor both see the mode, and it is not the drive mode."""
+    Actuator and sensor both see the mode, and it is not the drive mode.
+    """
     visible = VisibleModes.of(mechanism)
     return visible.at(np.argmin(np.where(visible.visible, visible.frequency, np.inf), axis=-1))[0]
 
@@ -89,7 +93,8 @@ def parasitic_mode(mechanism: Mechanism) -> tuple[Any, Any]:
     none is visible, the leaves' own mode is returned without weight.
 
     In the equations, a part m_p of the stage's mass m moves on a spring, with the residue m_p/(m (m - m_p)). That is
-    never negative. If actuator and sensor move against each other, only the size of the residue counts."""
+    never negative. If actuator and sensor move against each other, only the size of the residue counts.
+    """
     settings = LeafSpringSettings.current()
     visible = VisibleModes.of(mechanism)
     height = np.where(visible.visible, np.abs(visible.residue), 0.0) / np.maximum(visible.frequency, 1e-9) ** 2

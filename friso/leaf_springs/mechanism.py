@@ -27,7 +27,8 @@ class MovingBody:
     """The stage as a rigid body: mass [kg], moments of inertia [kg m^2], and centre of mass [m].
 
     Moments of inertia are about axes through the centre of mass. Each triple stands for x, y, z. Products of inertia
-    are 0."""
+    are 0.
+    """
 
     mass: Any
     inertia: tuple[Any, Any, Any]
@@ -65,7 +66,8 @@ class Mechanism:
     def of(cls, flat: Mapping[str, Any]) -> Mechanism:
         """Build the mechanism of a stage given as flat keys to SI numbers or arrays.
 
-        Raises KeyError for a stage without [flexure]."""
+        Raises KeyError for a stage without [flexure].
+        """
         section = {key.removeprefix("flexure."): value for key, value in flat.items() if key.startswith("flexure.")}
         names = ("leaves", "length", "width", "thickness", "spacing", "young", "poisson", "density")
         shape = {name: section[name] for name in names}
@@ -151,7 +153,8 @@ class Mechanism:
 def cube_inertia(mass: Any) -> tuple[Any, Any, Any]:
     """Return the moments of inertia [kg m^2] of an aluminium cube of a mass [kg].
 
-    The cube stands in for a stage of unknown inertia. It does not depend on the leaves."""
+    The cube stands in for a stage of unknown inertia. It does not depend on the leaves.
+    """
     moment = mass / 6 * (mass / ALUMINIUM) ** (2 / 3)
     return moment, moment, moment
 
@@ -164,6 +167,7 @@ def _triple(section: Mapping[str, Any], name: str, default: tuple[Any, Any, Any]
 def along_motion(mechanism: Mechanism, point: tuple[Any, Any, Any], shapes: np.ndarray) -> np.ndarray:
     """Return the displacement of a point of the stage along z, (..., modes).
 
-    `shapes` (..., 6, modes) are motions of the stage about its reference point, the middle of the leaf ends."""
+    `shapes` (..., 6, modes) are motions of the stage about its reference point, the middle of the leaf ends.
+    """
     x, y = (np.asarray(coordinate, dtype=float)[..., None] for coordinate in (point[0] - mechanism.length, point[1]))
     return shapes[..., 2, :] + shapes[..., 3, :] * y - shapes[..., 4, :] * x

@@ -27,7 +27,8 @@ def mode_name(
     [m] (3,) away from the reference point.
 
     `leaves` (leaves, points, 3) are displacements of the middle lines at even places from cart to stage. `leaf_mass`
-    [kg] is the mass of one leaf. Energy that is found nowhere else is torsion of the leaves."""
+    [kg] is the mass of one leaf. Energy that is found nowhere else is torsion of the leaves.
+    """
     speed = stage[:3] + np.cross(stage[3:], arm)
     energies = np.concatenate([mass * speed**2, np.asarray(inertia, dtype=float) * stage[3:] ** 2])
     _, y, z = leaf_mass * np.sum(_mean(leaves**2), axis=0)
@@ -64,7 +65,8 @@ def _dynamic_part(shapes: np.ndarray) -> np.ndarray:
 def _number(shapes: np.ndarray) -> str:
     """Return what is added to the name of a shape with two waves or more.
 
-    Waves are counted on the leaf that moves most."""
+    Waves are counted on the leaf that moves most.
+    """
     settings = LeafSpringSettings.current()
     shape = shapes[np.argmax(np.sum(shapes**2, axis=1))]
     signs = np.sign(shape[np.abs(shape) > settings.shape_ripple * np.max(np.abs(shape))])

@@ -33,7 +33,8 @@ class Curl:
     The moment is odd in the parallel motion of its ends, and even where the ends turn against each other.
 
     g = -nu/(1 - nu^2) (m - a h1 - b h2), where m = s or 1 is the moment per flexural rigidity D w. h1 and h2 decay from
-    the clamps (`rates` [1/m]). a and b make g and its slope 0 there."""
+    the clamps (`rates` [1/m]). a and b make g and its slope 0 there.
+    """
 
     poisson: Any
     rates: tuple[Any, Any]
@@ -45,7 +46,8 @@ class Curl:
         # w^4/720 g'''' - (1 - nu) w^2/6 g'' + (1 - nu^2) g = -nu m; both squares are positive up to nu = 1/2
         """Return the curvature of leaves of a length and width [m].
 
-        `odd` stands for a moment that changes sign in the middle."""
+        `odd` stands for a moment that changes sign in the middle.
+        """
         middle, square = (1 - poisson) / 6, 4 * (1 - poisson**2) / 720
         root = np.sqrt(middle**2 - square)
         fast, slow = (np.sqrt(360 * (middle + sign * root)) / width for sign in (1, -1))
@@ -85,7 +87,8 @@ def stiffening(length: Any, width: Any, poisson: Any, odd: bool = True) -> Any:
     """Return the factor by which clamps make a leaf stiffer than a beam.
 
     It grows from 1 for a narrow leaf to 1/(1 - nu^2) for a wide one. Odd: for the parallel motion of its ends, k =
-    factor 12 E I/L^3. Even: for turning them against each other, k = factor E I/L."""
+    factor 12 E I/L^3. Even: for turning them against each other, k = factor E I/L.
+    """
     curl = Curl.of(length, width, poisson, odd)
     # compliance: integral of f'' m over that of m^2, times (1 - nu^2) for a beam
     share = poisson**2 / (1 - poisson**2)
@@ -100,7 +103,8 @@ def stiffening(length: Any, width: Any, poisson: Any, odd: bool = True) -> Any:
 def compliance_profile(s: Any, length: Any, width: Any, poisson: Any) -> Any:
     """Return the bending compliance at s relative to a beam.
 
-    A beam with this compliance has the stiffness of the plate in the parallel motion of its ends."""
+    A beam with this compliance has the stiffness of the plate in the parallel motion of its ends.
+    """
     curl = Curl.of(length, width, poisson, odd=True)
     stiff = 1 - (1 - poisson**2) * curl.curvature(s, length) / s
     factor = stiffening(length, width, poisson)
@@ -117,7 +121,8 @@ def stress_factors(length: Any, width: Any, poisson: Any) -> tuple[Any, Any]:
     """Return the bending stress at the clamp relative to a beam, 3 E t delta/L^2.
 
     The first factor is the mean over the width. The second is the largest, except at the very corners, where theory has
-    no bound."""
+    no bound.
+    """
     curl = Curl.of(length, width, poisson, odd=True)
     half = length / 2
     mean = stiffening(length, width, poisson)
@@ -146,7 +151,8 @@ def cubic_twist(s: Any, length: Any, width: Any, poisson: Any) -> Any:
     """Return the rate of twist at s under a torque that goes with s^3.
 
     A force across a deflected leaf makes such a torque. A leaf free to warp would twist at the rate s^3. The clamps
-    change it: p - p''/rate^2 = s^3, with p = 0 at the clamps. s is in half lengths, from -1 to 1."""
+    change it: p - p''/rate^2 = s^3, with p = 0 at the clamps. s is in half lengths, from -1 to 1.
+    """
     rate = warping_rate(width, poisson) * length / 2
     return s**3 + 6 * s / rate**2 - (1 + 6 / rate**2) * _decay(rate, s, 2.0, odd=True)
 
@@ -155,7 +161,8 @@ def tilted(shares: np.ndarray, torques: np.ndarray, places: np.ndarray, weighted
     """Change compliances in torsion along a leaf (n,) by exp(tilt place^2).
 
     Their sum stays, so that an even torque twists the leaf as before. Their sum weighted by the square of the `torques`
-    (n,) becomes `weighted_sum`."""
+    (n,) becomes `weighted_sum`.
+    """
     settings = LeafSpringSettings.current()
     tilt, total = 0.0, shares.sum()
     for _ in range(settings.tilt_iterations):
@@ -177,14 +184,16 @@ def stretching(length: Any, width: Any, poisson: Any) -> Any:
     """Return by what factor a leaf is stiffer along its length than a rod.
 
     Its clamps forbid it to grow narrower. The factor is fitted to shells (tests/shells.py) of 0.6 to 6 times the width
-    in length, with Poisson's ratios from 0 to 0.45."""
+    in length, with Poisson's ratios from 0 to 0.45.
+    """
     return 1 / (1 - 0.28 * poisson**2 * width / length)
 
 
 def edgewise_shear_factor(length: Any, width: Any, poisson: Any) -> Any:
     """Return by what factor a leaf is stiffer against shear in its plane than a beam.
 
-    Its bending in that plane is taken as that of a beam. The factor is fitted to shells, as in `stretching`."""
+    Its bending in that plane is taken as that of a beam. The factor is fitted to shells, as in `stretching`.
+    """
     ratio = length / width
     beam = 2.4 * (1 + poisson) * ratio
     return beam / np.maximum(beam - 0.55 * poisson**2 * ratio**2 - 0.076 - 0.13 * poisson, beam / 2)

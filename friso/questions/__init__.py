@@ -1,3 +1,4 @@
 """The questions that friso answers, one folder each.
 
-A folder holds the question's function, and what its answer says, shows and writes."""
+A folder holds the question's function, and what its answer says, shows and writes.
+"""

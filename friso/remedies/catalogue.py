@@ -30,7 +30,8 @@ class Remedy:
     """A remedy: its `name`, the stage that it starts from, and the variables that it changes.
 
     Variables are applied in their order. `buys_joint` says that a joint is needed; otherwise only the controller
-    changes. `makes` names the remedy whose joint this one builds from leaf springs."""
+    changes. `makes` names the remedy whose joint this one builds from leaf springs.
+    """
 
     name: str
     stage: Stage
@@ -41,7 +42,8 @@ class Remedy:
     def changes(self, shares: np.ndarray) -> dict[str, Any]:
         """Return the keys that change at points, which are shares of the ranges (points, variables).
 
-        Each key has an array of shape (points,)."""
+        Each key has an array of shape (points,).
+        """
         flat, changed = self.stage.flat(), dict[str, Any]()
         for variable, share in zip(self.variables, shares.T, strict=True):
             change = variable.change({**flat, **changed}, variable.at(share))
@@ -66,7 +68,8 @@ class Remedy:
     def tuned(self, shares: np.ndarray) -> Stage:
         """Return the stage at shares of the ranges, shape (variables,).
 
-        Numbers are rounded to four digits, unless they are the present ones."""
+        Numbers are rounded to four digits, unless they are the present ones.
+        """
         numbers = {key: float(values[0]) for key, values in self.changes(shares[None]).items()}
         present = {variable.name: variable.present for variable in self.variables}
         return self.stage.with_numbers(
@@ -157,7 +160,8 @@ def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
 def _isolators(stage: Stage, goal: Goal) -> Iterator[Remedy]:
     """Return an isolator, alone and together with the gains.
 
-    Leaf springs of the stage file are replaced by a joint with plain numbers."""
+    Leaf springs of the stage file are replaced by a joint with plain numbers.
+    """
     try:
         free = isolated(stage)
     except InputError:

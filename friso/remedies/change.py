@@ -21,7 +21,8 @@ class ChangeSize:
     """The size of a change, which orders changes from small to large.
 
     Changes are compared first by whether a part is `bought`, then by the number of `keys` of the controller that
-    change. Last comes the `factor`: the product of the factors by which `scaled` numbers change."""
+    change. Last comes the `factor`: the product of the factors by which `scaled` numbers change.
+    """
 
     bought: bool
     keys: int

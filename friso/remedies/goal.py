@@ -23,7 +23,8 @@ class Goal:
     limits it.
 
     All settled states must keep the modulus `margin` and the `distance` from hunting. `controller` and `joint` tell
-    what may be changed."""
+    what may be changed.
+    """
 
     within: float = 1e-6
     settle: float | None = None
@@ -39,5 +40,6 @@ class Goal:
         """Return the share of a sample of machines that must meet the goal.
 
         It is one standard error above the share wanted of all machines. Otherwise, settings at the edge of what works
-        would pass half of the time."""
+        would pass half of the time.
+        """
         return min(1.0, self.share + float(np.sqrt(self.share * (1 - self.share) / machines)))

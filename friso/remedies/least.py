@@ -29,7 +29,8 @@ def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
     """Return a remedy that varies each changed key of the controller by itself.
 
     Each key ranges from its value `before` to its `tuned` value, and somewhat beyond. All else is as `tuned`. Returns
-    None if no key of the controller changed."""
+    None if no key of the controller changed.
+    """
     old, new = before.flat(), tuned.flat()
     variables = [
         _between(tuned, key, old[key], new[key])
@@ -67,7 +68,8 @@ def least_changes(search: Search) -> Iterator[np.ndarray]:
     """Return the least changes found for a remedy of `least_remedy`, each of shape (variables,).
 
     Fewer keys come first, then smaller factors. Single keys are tried before all else, because any such change is
-    smaller than a change of several keys."""
+    smaller than a change of several keys.
+    """
     yield from _of_one_key(search)
     search.optimise(partial(change_costs, search.remedy), _beginnings(search.remedy))
     yield from candidates(search)
@@ -76,7 +78,8 @@ def least_changes(search: Search) -> Iterator[np.ndarray]:
 def _of_one_key(search: Search) -> Iterator[np.ndarray]:
     """Return changes of a single key that work, the least first.
 
-    They break no constraint, enough fresh machines meet the goal, and nothing attracts the machines."""
+    They break no constraint, enough fresh machines meet the goal, and nothing attracts the machines.
+    """
     settings = RemedySettings.current()
     wanted = partial(change_costs, search.remedy)
     home, _ = _ends(search.remedy).T
@@ -99,7 +102,8 @@ def _of_one_key(search: Search) -> Iterator[np.ndarray]:
 def _robust(search: Search, points: np.ndarray) -> Iterator[np.ndarray]:
     """Return the points (points, variables) that work on fresh machines.
 
-    Enough of them meet the goal by their moves and margins, and nothing attracts the machines."""
+    Enough of them meet the goal by their moves and margins, and nothing attracts the machines.
+    """
     settings = RemedySettings.current()
     robust = points[search.share(points) >= search.goal.surely(search.fresh.count)] if len(points) else points
     for few in np.array_split(robust, -(-len(robust) // settings.survey_batch)) if len(robust) else ():
@@ -109,7 +113,8 @@ def _robust(search: Search, points: np.ndarray) -> Iterator[np.ndarray]:
 def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
     """Return how large the changes of points are, shape (points,).
 
-    The integer part counts the keys that change; the fraction grows with the factor."""
+    The integer part counts the keys that change; the fraction grows with the factor.
+    """
     logarithms = np.stack(
         [
             np.abs(np.log(variable.at(share) / variable.present))
@@ -124,7 +129,8 @@ def _beginnings(remedy: Remedy) -> np.ndarray:
     """Return points to start a search from, shape (points, variables).
 
     They are the working settings, then settings with some keys restored, wholly or half-way in the logarithm. Fewest
-    changed keys come first."""
+    changed keys come first.
+    """
     home, works = _ends(remedy).T
     _, *some, every = sorted(product((0.0, 1.0), repeat=len(home)), key=sum)
     masks = [every, *some]
@@ -141,7 +147,8 @@ def candidates(search: Search) -> Iterator[np.ndarray]:
     """Return points to verify, each of shape (variables,), the least change first.
 
     They are the least change tried that breaks no constraint, the same change taken further, and points between it and
-    the working settings. Other points tried follow. Points that work on fresh machines come before all others."""
+    the working settings. Other points tried follow. Points that work on fresh machines come before all others.
+    """
     settings = RemedySettings.current()
     wanted, points = partial(change_costs, search.remedy), search.points
     free = points.shares[points.meets(search.goal)]

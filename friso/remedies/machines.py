@@ -34,7 +34,8 @@ class Fleet:
 
     `ratios` multiply a key on each machine, and `shifts` are added to keys that are 0. `travel` is each machine's share
     of the travel. `from_file` lists the keys that the file calls uncertain, and `spreads` [%] the default spreads of
-    others. `left_out` counts invalid draws, which were replaced."""
+    others. `left_out` counts invalid draws, which were replaced.
+    """
 
     ratios: Mapping[str, np.ndarray]
     shifts: Mapping[str, np.ndarray]
@@ -59,7 +60,8 @@ class Fleet:
         """Return flat keys of all machines at all `points`, whose arrays have shape (points,).
 
         All machines at the first point come first. The controller is tuned for the stage and does not know the drawn
-        values."""
+        values.
+        """
         flat = stage.flat()
         tuned = as_tuned(flat)
         for key, value in {**tuned, **changes}.items():
@@ -75,7 +77,8 @@ class Fleet:
     def _of(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
         """Return the ratios of the keys that the stage has.
 
-        Both parts of a mass that was split vary with the whole mass."""
+        Both parts of a mass that was split vary with the whole mass.
+        """
         ratios = {key: ratio for key, ratio in self.ratios.items() if key in flat}
         masses = [key for key in self.ratios if key.startswith("masses.")]
         for key in ("masses.cart", "masses.stage"):
@@ -88,7 +91,8 @@ def draw_fleet(stage: Stage, correlations: Correlations, count: int, seed: int) 
     """Draw machines around a stage as `friso compare` does.
 
     The first is the stage file's own, with its own move. Joints that the file does not have vary by the default
-    spreads. Raises InputError."""
+    spreads. Raises InputError.
+    """
     settings = RemedySettings.current()
     sample, flat = draw_machines(stage, correlations, max(count, LEAST), seed), stage.flat()
     keys = {key: values[:count] for key, values in sample.keys.items() if key in flat and not key.startswith("rail.")}

@@ -60,7 +60,8 @@ class Advice:
     works, and `interrupted` whether the search was ended early.
 
     The tables `as_built` are not used in the search; they and the `correlations` are added to stage files that are
-    written. `unmade` gives the reason why no leaf springs make the joint of a remedy."""
+    written. `unmade` gives the reason why no leaf springs make the joint of a remedy.
+    """
 
     stage: Stage
     goal: Goal
@@ -90,7 +91,8 @@ class Advice:
     def complete(self, tuned: Stage) -> Stage:
         """Return a tuned stage with the tables of the machine as built.
 
-        Tables that belong to another controller are left out."""
+        Tables that belong to another controller are left out.
+        """
         try:
             return tuned.replace(self.as_built)
         except StageError:
@@ -105,7 +107,8 @@ class Advice:
     def working(self) -> tuple[RemedyOutcome, ...]:
         """Return the remedies that work, the least change first.
 
-        Leaf springs count with the joint that they make."""
+        Leaf springs count with the joint that they make.
+        """
         works = (outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
         return tuple(sorted(works, key=self.size))
 
@@ -136,7 +139,8 @@ def tune(
 ) -> Advice:
     """Optimise and verify every remedy that the goal allows, or those named in `chosen`.
 
-    `begins` is called before the work starts. Raises InputError for a motion after which nothing has to settle."""
+    `begins` is called before the work starts. Raises InputError for a motion after which nothing has to settle.
+    """
     settings = RemedySettings.current()
     goal, budget, correlations = goal or Goal(), budget or Budget(), correlations or Correlations()
     _moves(stage)
@@ -210,7 +214,8 @@ def machines_of_search(
     """Return the machines on which searches try settings.
 
     A machine that is far less robust than nearly all others would count for too many in so small a sample. It is left
-    out, and another one counts twice. Sampling and delay are taken from the stage `drive`."""
+    out, and another one counts twice. Sampling and delay are taken from the stage `drive`.
+    """
     settings = RemedySettings.current()
     machines = draw_fleet(stage, correlations, settings.machine_factor * budget.machines, seed)
     many = draw_fleet(stage, correlations, settings.usual_machines, seed + settings.usual_seed)
@@ -228,7 +233,8 @@ def machines_of_search(
 class _Session:
     """The remedies of a stage, tried one after the other, with the `outcomes` so far.
 
-    `searching` is the search under way."""
+    `searching` is the search under way.
+    """
 
     stage: Stage
     drive: Stage
@@ -272,7 +278,8 @@ class _Session:
         The search starts from the working remedy of this controller that changes most. It starts again from the one
         that changes least, if that still is the smallest. If no change of this controller works, it starts from the
         least of the other changes. Keys that stay as they are lead to a further search of the remaining keys; its
-        result is taken if it changes less."""
+        result is taken if it changes less.
+        """
         working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and outcome.stage]
         own = [outcome for outcome in working if outcome.remedy.stage is self.stage]
         if not working or self.tried_less:
@@ -350,7 +357,8 @@ class _Session:
         """Measure a point on fresh machines, and verify it by its cycles if they meet the goal.
 
         The interval of the share of machines that meet the goal must lie at the share wanted or above. While it leaves
-        that open, further machines are measured."""
+        that open, further machines are measured.
+        """
         settings = RemedySettings.current()
         remedy, goal = search.remedy, search.goal
         tuned = remedy.tuned(shares)
@@ -376,7 +384,8 @@ def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
     """Return the settings against friction that came closest to the goal, with the bandwidth.
 
     They are tried only if nothing works that changes the controller alone. They change more than the bandwidth does,
-    and bring less than the gains do."""
+    and bring less than the gains do.
+    """
     settings = RemedySettings.current()
     if any(outcome.certainty == "works" and not outcome.remedy.buys_joint for outcome in outcomes):
         return []
@@ -423,7 +432,8 @@ def _generations(budget: Budget) -> int:
 class _Report:
     """Progress over all remedies, in steps.
 
-    A remedy that takes more steps than planned waits at the last of them."""
+    A remedy that takes more steps than planned waits at the last of them.
+    """
 
     def __init__(self, progress: Progress, total: int) -> None:
         self.progress, self.total, self.done, self.end = progress, total, 0, 0

@@ -23,7 +23,8 @@ from friso.stage import Stage
 class RelaxedGoal:
     """A goal relaxed in up to three parts, which a `remedy` then meets.
 
-    It holds the stage, the relaxed parts, and the product of the factors by which they are relaxed."""
+    It holds the stage, the relaxed parts, and the product of the factors by which they are relaxed.
+    """
 
     remedy: Remedy
     stage: Stage
@@ -34,7 +35,8 @@ class RelaxedGoal:
 def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) -> tuple[RelaxedGoal, ...]:
     """Return the cheapest relaxation of each kind, the smallest first.
 
-    The distance from hunting is never relaxed. Machines were surveyed at these points, and nothing attracts them."""
+    The distance from hunting is never relaxed. Machines were surveyed at these points, and nothing attracts them.
+    """
     best: dict[tuple[str, ...], RelaxedGoal] = {}
     for outcome in outcomes:
         if outcome.points is None or not outcome.remedy.verifiable:
@@ -117,7 +119,8 @@ def _relaxed_goal(remedy: Remedy, point: TriedPoints, names: tuple[str, ...], go
 def _tolerances(remedy: Remedy, shares: np.ndarray, goal: Goal, machines: Fleet) -> np.ndarray:
     """Return by which factor the tolerance must be wider for points, shape (points,).
 
-    It is the first of a few factors with which the machines settle, in the time of the goal if it has one."""
+    It is the first of a few factors with which the machines settle, in the time of the goal if it has one.
+    """
     settings = RemedySettings.current()
     factors = np.full(len(shares), settings.looser_tolerance)
     open_still = np.arange(min(len(shares), settings.most_relaxed))

@@ -1,7 +1,8 @@
 """Search the best points of one remedy, and survey what attracts the machines there.
 
 The search is differential evolution (Storn and Price 1997, doi:10.1023/A:1008202821328), as in SciPy. Whole generations
-are simulated at once in the engine's lanes."""
+are simulated at once in the engine's lanes.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ class Budget:
     """How much a search may try: points per variable in a generation, generations, and machines.
 
     `refined` generations follow around the best points. Machines for moves and surveys are fewer than the fresh
-    machines on which an answer is measured. `further` machines are added where these leave the answer open."""
+    machines on which an answer is measured. `further` machines are added where these leave the answer open.
+    """
 
     points: int = 10
     generations: int = 16
@@ -50,7 +52,8 @@ class TriedPoints:
     stage file's machine (see `loop_bandwidth`). How near machines are to settling runs from 0 to 1 (see
     `Search.measured`).
 
-    Points that are not `whole` were given up early, and the missing moves count as the best possible."""
+    Points that are not `whole` were given up early, and the missing moves count as the best possible.
+    """
 
     shares: np.ndarray
     settling: np.ndarray
@@ -84,7 +87,8 @@ class TriedPoints:
     def cost(self, goal: Goal, wanted: np.ndarray | None = None) -> np.ndarray:
         """Return what the search minimises: the settling time, or what is `wanted` small instead.
 
-        For points that break constraints, it is by how much they do."""
+        For points that break constraints, it is by how much they do.
+        """
         settings = RemedySettings.current()
         excess = np.maximum(0, goal.margin - self.margin)
         excess += np.where(np.isfinite(self.force), _excess(np.nan_to_num(self.force), goal.force_limit), 3.0)
@@ -111,7 +115,8 @@ class Search:
     """The search for the best points of a remedy on `machines`.
 
     Points that it returns must also work on `fresh` machines. `tried` holds all points so far. `attracted` counts
-    surveyed points at which something attracts the machines, or may. `cut` tells that the search took too much work."""
+    surveyed points at which something attracts the machines, or may. `cut` tells that the search took too much work.
+    """
 
     remedy: Remedy
     goal: Goal
@@ -143,7 +148,8 @@ class Search:
         """Try points until they improve no more, or until that takes too much work (`cut`).
 
         The search minimises the settling time, or what is `wanted` small: a function from points (points, variables) to
-        numbers (points,). A search of several variables may begin with the points `start`."""
+        numbers (points,). A search of several variables may begin with the points `start`.
+        """
         with self._allowed(self._work):
             self._optimise(wanted, start)
 
@@ -190,7 +196,8 @@ class Search:
         """Minimise the cost over the variables of the remedy.
 
         One variable is searched on a grid, which is then refined. Several variables are searched by differential
-        evolution, then again in smaller ranges around the best point."""
+        evolution, then again in smaller ranges around the best point.
+        """
         tuning = RemedySettings.current()
         variables = len(self.remedy.variables)
         if variables == 0:
@@ -259,7 +266,8 @@ class Search:
         A point counts as nearer to settling the more machines settle within the tolerance, the looser one, and the
         tolerance at the lower bandwidth. The search thus sees progress even before any machine is in position. A
         point is given up as soon as it must cost more than `most`. The machines that are slowest most often are
-        tried first."""
+        tried first.
+        """
         settings = RemedySettings.current()
         goal, count, machines = self.goal, len(shares), self.machines.count
         margin = quantile(-modulus_margins(self.remedy, shares, self.machines, self.drive), goal.share) * -1
@@ -326,7 +334,8 @@ class Search:
         """Return the share of fresh machines that meet the goal at points, shape (points,).
 
         Moves and margins count. `shares` has shape (points, variables). If too many machines lack the margin, the share
-        with enough margin is returned."""
+        with enough margin is returned.
+        """
         self.report(f"{self.remedy.name}: on other machines")
         goal = self.goal
         meets = modulus_margins(self.remedy, shares, self.fresh, self.drive) >= goal.margin
@@ -343,7 +352,8 @@ class Search:
         Points that settle soonest, or have least of what is `wanted` small, come first. Enough fresh machines must meet
         the goal. Nearly equal points count as one. After a batch without success, the next points are taken farther
         away, because the best points are often at the edge of what works. If there are none, the point that serves most
-        fresh machines is yielded."""
+        fresh machines is yielded.
+        """
         settings = RemedySettings.current()
         if not self.tried:
             return
@@ -390,7 +400,8 @@ class Search:
         """Return better points near one, (variables,), that was taken because better ones failed.
 
         Better points had attracted machines, or too few machines met the goal there. New points are drawn around the
-        one, then around the point that is taken next. The best comes first."""
+        one, then around the point that is taken next. The best comes first.
+        """
         settings = RemedySettings.current()
         goal, closer = self.goal, list[np.ndarray]()
         cost = self.measured(point[None]).cost(goal, None if wanted is None else wanted(point[None]))[0]
@@ -429,7 +440,8 @@ def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
 def _distance(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return the distance of points (points, variables) from the nearest other, shape (points,).
 
-    It is infinite if there are no others."""
+    It is infinite if there are no others.
+    """
     return np.abs(shares[:, None] - others[None]).max(axis=2, initial=0.0).min(axis=1, initial=np.inf)
 
 
@@ -442,7 +454,8 @@ def _evolve(
     """Run differential evolution from points (points, variables) between `ends`.
 
     A new point replaces its rival only if it costs less; `cost` is told the rival's cost so that it can give up
-    early."""
+    early.
+    """
     settings = RemedySettings.current()
     most: np.ndarray | float = np.inf
 
@@ -476,7 +489,8 @@ def _evolve(
 def _agree(intermediate_result: Any) -> bool:
     """Tell whether the points of a generation break no constraint and are equally good.
 
-    Points that break constraints may all be equally bad, and the search must then go on."""
+    Points that break constraints may all be equally bad, and the search must then go on.
+    """
     settings = RemedySettings.current()
     costs = intermediate_result.population_energies
     return bool(costs.max() < settings.worst_time and costs.std() <= settings.agreed_cost * costs.mean())

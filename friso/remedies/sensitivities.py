@@ -55,7 +55,8 @@ class EdgeDerivatives:
     """The edge of hunting as a bandwidth [Hz], and its derivatives to the keys [per SI unit].
 
     The derivatives have shape (keys,). For a controller that sets no bandwidth, the edge is a multiple of the present
-    one."""
+    one.
+    """
 
     edge: float
     by: np.ndarray
@@ -67,7 +68,8 @@ class SettlingDerivatives:
 
     The time runs from the last corner of the reference until the stage stays `within` [m]. Derivatives to the keys have
     shape (keys,). The time jumps where a turning point crosses the edge of the band. `jump` tells how far the nearest
-    turning point is from that edge, as a share of the band."""
+    turning point is from that edge, as a share of the band.
+    """
 
     within: float
     time: float
@@ -80,7 +82,8 @@ class MarginDerivatives:
     """The least modulus margin of all settled states, and its derivatives to the keys [1/SI].
 
     The derivatives have shape (keys,). They hold for the state and the frequency at which the loop comes closest to
-    -1."""
+    -1.
+    """
 
     margin: float
     by: np.ndarray
@@ -184,7 +187,8 @@ def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str
     """Return the stage with equations that contain all given keys.
 
     An exponent that is a whole number, for example, is otherwise built in. Raises InputError for a key that equations
-    never contain."""
+    never contain.
+    """
     decisive = [name for name in keys if name in decisive_keys(flat)]
     nearby = {**flat, **{name: np.nextafter(flat[name], np.inf) for name in decisive}}
     contained = Ensemble.held(nearby, 1).kernel.parameters if decisive else ()
@@ -214,7 +218,8 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     """Return the derivatives of the time at which the stage last enters the band `within` [m].
 
     A derivative is the change of position there over the speed of entry. Returns None if neighbouring motions do not
-    follow."""
+    follow.
+    """
     if pieces(flat, 1)[0, -1, 2]:
         return None  # the reference never stands still
     stages = Ensemble(flat, 1)
@@ -271,7 +276,8 @@ def _is_smooth(
 
     The stage `entered` the band at a time [s] in a `column` of its statistics, after `settling` [s]. Keys are changed a
     little either way, and the new times are compared with the derivatives. They differ if the stage bounces on its
-    limiter so often that neighbouring motions part."""
+    limiter so often that neighbouring motions part.
+    """
     settings = RemedySettings.current()
     step = settings.loop_change * np.array([flat[name] for name in keys])
     changes = np.concatenate([-np.diag(step), np.diag(step)])
@@ -295,7 +301,8 @@ def _starts(stages: Ensemble, flat: Mapping[str, Any], count: int) -> np.ndarray
 def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...]) -> np.ndarray:
     """Return derivatives of the starting states to the keys, shape (states, keys).
 
-    They are central differences of settled states."""
+    They are central differences of settled states.
+    """
     settings = RemedySettings.current()
     columns = []
     for name in keys:
@@ -309,7 +316,8 @@ def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...])
 def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivatives | None:
     """Return the least modulus margin and its derivatives by central differences.
 
-    Returns None if a settled state is unstable."""
+    Returns None if a settled state is unstable.
+    """
     settings = RemedySettings.current()
     members = settled_members(flat)
     loops = scan_stability(flat, members)

@@ -27,7 +27,8 @@ class Suggestion:
     """A joint tried in a rigid stage, and the `stage` with it.
 
     `settles` tells that nothing attracts the stage at its bandwidth and down to the distance below it. `margin` is the
-    least modulus margin of all settled states. If no joint settles, it is the last one tried."""
+    least modulus margin of all settled states. If no joint settles, it is the last one tried.
+    """
 
     stage: Stage
     settles: bool
@@ -38,7 +39,8 @@ class Suggestion:
 def suggestion(stage: Stage) -> Suggestion | None:
     """Return the shortest of a few strokes with which an isolator settles a stage.
 
-    The joint is the softest that does not move the cart. Returns None for a stage that has a joint or can have none."""
+    The joint is the softest that does not move the cart. Returns None for a stage that has a joint or can have none.
+    """
     settings = RemedySettings.current()
     if stage.joint:
         return None

@@ -34,7 +34,8 @@ class Moves:
 
     `settling` [s] is the time until the stage stays within the tolerance (see `friso.hunting.criteria.settling`). A
     second time holds for the looser tolerance. Both are infinite if the stage is not in position when the reference
-    leaves or the run ends. `force` [N] is the largest force."""
+    leaves or the run ends. `force` [N] is the largest force.
+    """
 
     settling: np.ndarray
     looser: np.ndarray
@@ -57,7 +58,8 @@ def moves_of_points(
 ) -> Moves:
     """Simulate the moves of points, given as shares (points, variables) of a remedy's ranges.
 
-    The bandwidth is lower by the factor `slower`. `rtol` is the solver's relative tolerance."""
+    The bandwidth is lower by the factor `slower`. `rtol` is the solver's relative tolerance.
+    """
     settings = RemedySettings.current()
     count = len(shares) * machines.count
     flat = faster(machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), 1 / slower)
@@ -86,7 +88,8 @@ def modulus_margins(
     """Return the least modulus margin of the limit cases, shape (points, machines).
 
     An unstable case counts as 0. Sampling and delay are those of the stage `drive`, and the bandwidth is lower by the
-    factor `slower`. Controllers with other gains at standstill get the smaller margin of both sets."""
+    factor `slower`. Controllers with other gains at standstill get the smaller margin of both sets.
+    """
     flat = {**machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), **timing(drive)}
     flat = faster(flat, 1 / slower)
     count = len(shares) * machines.count
@@ -99,7 +102,8 @@ class Attraction:
     """Whether hunting attracts machines, all arrays of shape (points, machines).
 
     `attracts` holds for their bandwidth and down to the distance below it. Further arrays tell whether simulations
-    decided that, and whether it is `certain` because nothing else can exist."""
+    decided that, and whether it is `certain` because nothing else can exist.
+    """
 
     attracts: np.ndarray
     decided: np.ndarray
@@ -133,7 +137,8 @@ def attraction(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal) 
     """Survey what attracts the machines at points.
 
     The bandwidth is that of the point, and lower ones down to the goal's distance. Simulations start from many states;
-    closed orbits have to confirm the final answer."""
+    closed orbits have to confirm the final answer.
+    """
     flat = machines.laid_over(remedy.stage, remedy.changes(shares), len(shares))
     shape = len(shares), machines.count
     attracts, decided, certain = np.zeros(shape, bool), np.ones(shape, bool), np.ones(shape, bool)

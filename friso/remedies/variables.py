@@ -28,7 +28,8 @@ DAMPING_RATIOS = (0.01, 0.3)
 class Variable:
     """A number between `low` and `high` (SI) on a logarithmic scale.
 
-    Close to the `present` number it takes exactly that; NaN means that there is none."""
+    Close to the `present` number it takes exactly that; NaN means that there is none.
+    """
 
     name: str
     low: float

@@ -39,7 +39,8 @@ class Performance:
     `moves`, modulus margins and what attracts, as single rows.
 
     `own_margin` is the least modulus margin of the stage itself in all settled states. `stiffness` [N/m] is its
-    stiffness against a load. For `further` machines, shape (n,), it is only known whether they meet the whole goal."""
+    stiffness against a load. For `further` machines, shape (n,), it is only known whether they meet the whole goal.
+    """
 
     moves: Moves
     margin: np.ndarray
@@ -113,7 +114,8 @@ class RemedyOutcome:
     reasons why it is not sure to work; it works if there are none. `windows` tell how far each number may vary.
 
     `points` are all settings tried; `attracted` counts those given up because something attracted machines. `shares`
-    locate the stage in the remedy's ranges. `cut` tells that the search took too much work."""
+    locate the stage in the remedy's ranges. `cut` tells that the search took too much work.
+    """
 
     remedy: Remedy
     stage: Stage | None
@@ -131,7 +133,8 @@ class RemedyOutcome:
     def certainty(self) -> Certainty:
         """Return whether the remedy works: surely, unsurely, or not at all.
 
-        A search without result may also have been given up."""
+        A search without result may also have been given up.
+        """
         if self.interrupted:
             return "unsure"
         if self.stage is None:
@@ -147,7 +150,8 @@ class RemedyOutcome:
 def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
     """Measure a stage on machines, with sampling and delay of the stage `drive` for its margins.
 
-    What attracts is surveyed only for machines that meet the rest of the goal; for others nothing is reported."""
+    What attracts is surveyed only for machines that meet the rest of the goal; for others nothing is reported.
+    """
     settings = RemedySettings.current()
     remedy = Remedy.settled_on("", stage)
     flat = stage.flat()
@@ -169,7 +173,8 @@ def _stiffness(flat: Mapping[str, Any]) -> float:
     """Return the loop's stiffness [N/m] against a load on the stage, before the integral acts.
 
     Gains are those at standstill. A joint does not reduce it, because actuator and sensor are on the stage. A
-    transmission does, if the position is measured at the motor."""
+    transmission does, if the position is measured at the motor.
+    """
     proportional, _ = slow_gains(gain_states(flat)[-1])
     if flat.get("encoder.position") == "motor":
         return float(in_series(proportional, flat["transmission.stiffness"]))
@@ -184,7 +189,8 @@ def verified(stage: Stage) -> Case:
 def unmet_goals(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
     """Return which parts of the goal a stage misses, or may miss.
 
-    They are names of `friso.questions.tune.words.DOUBTS`."""
+    They are names of `friso.questions.tune.words.DOUBTS`.
+    """
     return (*unsettled_parts(case, measured, goal), *missed_parts(measured, goal))
 
 
@@ -224,7 +230,8 @@ def missed_parts(measured: Performance, goal: Goal) -> tuple[str, ...]:
 def _near(low: object, high: object, distance: float) -> bool:
     """Tell whether a window of bandwidths comes within the distance.
 
-    Its ends are factors; None means as far as the search goes."""
+    Its ends are factors; None means as far as the search goes.
+    """
     first = getattr(low, "outside", 0.0) if low is not None else 0.0
     last = getattr(high, "outside", np.inf) if high is not None else np.inf
     return bool(first < distance and last > 1 / distance)

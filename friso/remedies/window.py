@@ -19,7 +19,8 @@ class VariableWindow:
     """The range from `low` to `high` of a variable in which machines meet the goal.
 
     Its ends are in SI, or factors. All else is as tuned. `open_below` and `open_above` tell that the range reaches an
-    end of the search."""
+    end of the search.
+    """
 
     name: str
     low: float
@@ -33,7 +34,8 @@ def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
 
     Moves and margins are tried on a grid, and the ends are refined by bisection. The ends are then drawn in until
     nothing attracts the machines there. Returns None if the point itself misses the goal on these machines, or takes
-    too much work."""
+    too much work.
+    """
     settings = RemedySettings.current()
     variables, grid = search.remedy.variables, np.linspace(0, 1, settings.window_points)
     inside, outside = np.empty((len(variables), 2)), np.full((len(variables), 2), np.nan)
@@ -72,7 +74,8 @@ def _halve(
 ) -> None:
     """Bisect between the last places that work and the next ones that do not, (variables, 2).
 
-    `ends` selects some of the ends by numbers of variables and sides, (n, 2)."""
+    `ends` selects some of the ends by numbers of variables and sides, (n, 2).
+    """
     settings = RemedySettings.current()
     rows, sides = ends.T
     for _ in range(settings.window_halvings if len(ends) else 0):
@@ -84,7 +87,8 @@ def _halve(
 def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Tell whether points meet the goal by moves and margins if one variable each is moved.
 
-    `numbers` (n,) select the variables, and `places` (n,) are their new shares."""
+    `numbers` (n,) select the variables, and `places` (n,) are their new shares.
+    """
     return search.measured(_moved(shares, numbers, places)).meets(search.goal)
 
 

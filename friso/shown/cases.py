@@ -37,7 +37,8 @@ class ShownCase:
 def shown_cases(cases: Mapping[str, Case]) -> tuple[ShownCase, ...]:
     """Return the cases, each once.
 
-    If "given" repeats the locked or the free case, that case is labelled "(as given)"."""
+    If "given" repeats the locked or the free case, that case is labelled "(as given)".
+    """
     labels = _labels([*cases], cases["given"].stage if "given" in cases else None)
     return tuple(ShownCase(key, label, COLOURS[key], cases[key]) for key, label in labels.items())
 

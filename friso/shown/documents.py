@@ -14,7 +14,8 @@ def plain_json(value: Any) -> Any:
     """Return a value as JSON knows it: plain numbers, texts, lists and tables.
 
     Infinite and undefined numbers become null. Units at the end of keys follow the kind of axis: "amplitude_m" becomes
-    "amplitude_rad" on a rotary one."""
+    "amplitude_rad" on a rotary one.
+    """
     if isinstance(value, dict):
         axis = axis_shown()
         return {axis.suffix(key) if isinstance(key, str) else key: plain_json(item) for key, item in value.items()}

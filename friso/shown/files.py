@@ -19,7 +19,8 @@ Files = Mapping[str, Content]
 def pictures(figures: Iterable[Figure], forms: Iterable[str] | None = None) -> dict[str, Content]:
     """Return every figure in all forms ("png", "svg", "pdf").
 
-    Each is drawn when it is written, or when a page shows it."""
+    Each is drawn when it is written, or when a page shows it.
+    """
     forms = FORMATS if forms is None else (*forms,)
     several = [image_files(figure, figure.name, forms, shown=[ON_PAGE]) for figure in figures]
     return {name: content for images in several for name, content in images.items()}
@@ -30,7 +31,8 @@ def image_files(
 ) -> dict[str, Content]:
     """Return a figure in some forms, in files whose names begin with a stem.
 
-    It may also be `shown` as such images on a page."""
+    It may also be `shown` as such images on a page.
+    """
     forms = [*forms]
     draw_beforehand([figure], [*shown, *map(Image, forms)])
     return {f"{stem}.{form}": partial(save, figure) for form in forms}

@@ -39,7 +39,8 @@ def entries() -> Mapping[str, GlossaryRow]:
     """Return the rows of the glossary by their words in small letters.
 
     Words with this meaning in one context only stand there as "slope (of the return map)". They are left out, since
-    pages use them in other contexts, too."""
+    pages use them in other contexts, too.
+    """
     text = (resources.files("friso.shown") / "templates" / "glossary.md").read_text(encoding="utf-8")
     plain = re.sub(r"[*`]", "", text)
     rows = [

@@ -99,7 +99,8 @@ def environment(package: str = OWN_TEMPLATES) -> Environment:
     """Return the templates of a package and of friso/shown/templates, for one page.
 
     Texts are escaped, and a name without a value is an error. Words of `explained` texts are linked to the
-    `glossary`."""
+    `glossary`.
+    """
     templates = Environment(
         loader=ChoiceLoader([PackageLoader(name) for name in dict.fromkeys((package, OWN_TEMPLATES))]),
         autoescape=True,
@@ -121,7 +122,8 @@ def _escaped_text(value: Any) -> Any:
 def print_image(figure: Figure, form: str = "svg", noted: bool = True) -> Markup:
     """Return the figure as a data address in quotation marks.
 
-    It is printed, and seen in browsers without scripts."""
+    It is printed, and seen in browsers without scripts.
+    """
     content = image(figure, form, headed=False, noted=noted)
     if form == "svg":
         return Markup(f"data:image/svg+xml,{_plain(content.decode())}")
@@ -150,7 +152,8 @@ TENTHS = 10
 def _shortened(path: re.Match[str]) -> str:
     """Write the lines of an SVG path in less text.
 
-    Lines are straight from each place to the next, to a tenth of a point."""
+    Lines are straight from each place to the next, to a tenth of a point.
+    """
     if not _STRAIGHT.fullmatch(path[0]):
         return _SPACED.sub(r"\1", path[0])
     parts, here, last = [], (0, 0), ""

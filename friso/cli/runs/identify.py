@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], shown: Shown) -> None:
     """Identify a machine from logs, and keep what the user said of them for the next time.
 
-    Raises InputError with the command to type if a question about a log is open."""
+    Raises InputError with the command to type if a question about a log is open.
+    """
     from friso.identification.sources import OpenQuestions
     from friso.interface.output_folder import OutputFolder
     from friso.questions.identify.page import STAGE
@@ -59,7 +60,8 @@ def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], show
 def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> list[Path]:
     """Store what the user said of each log, and return the files written.
 
-    A log whose record already says the same is left out."""
+    A log whose record already says the same is left out.
+    """
     from friso.identification.logs.mapping import load_mapping, mapping_text
     from friso.identification.sources import kept_at
     from friso.interface.output_folder import write

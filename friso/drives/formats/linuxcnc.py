@@ -107,7 +107,8 @@ def recognises(name: str, text: str) -> bool:
 def whole(text: str, beside: Beside) -> str:
     """Replace each #INCLUDE line by the text of the file that it names.
 
-    Only files in the folder of the INI file are taken in. Included files cannot include others."""
+    Only files in the folder of the INI file are taken in. Included files cannot include others.
+    """
 
     def taken_in(line: re.Match[str]) -> str:
         included = beside(line[1])
@@ -119,7 +120,8 @@ def whole(text: str, beside: Beside) -> str:
 def axes(text: str) -> tuple[AxisParameters, ...]:
     """Return the joints (LinuxCNC 2.8 and later) or axes that have a gain P.
 
-    Raises InputError if there is none, or if the text is no INI file."""
+    Raises InputError if there is none, or if the text is no INI file.
+    """
     sections = _sections(text)
     included = _INCLUDE.findall(text)[:3]
     machine = {
@@ -160,7 +162,8 @@ def _sections(text: str) -> dict[str, dict[str, str]]:
     """Read the variables of an INI file by section.
 
     LinuxCNC takes the first of several equal names, and so does this reader. The entry REPEATED lists the names whose
-    later values differ. Raises InputError for lines that are no INI syntax."""
+    later values differ. Raises InputError for lines that are no INI syntax.
+    """
     sections: dict[str, dict[str, str]] = {}
     section: dict[str, str] = {}
     repeated: dict[tuple[str, str], None] = {}
@@ -192,7 +195,8 @@ def _sections(text: str) -> dict[str, dict[str, str]]:
 def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """List what the file leaves open: the machine, its unit, and what an output of 1 does.
 
-    Raises InputError for a stepper without an encoder, which has no loop that could hunt."""
+    Raises InputError for a stepper without an encoder, which has no loop that could hunt.
+    """
     stepped = any(name.startswith("STEPGEN") or name in ("STEPLEN", "STEPSPACE") for name in axis.values)
     if stepped and not any(name.startswith("ENCODER") for name in axis.values):
         raise InputError("", "a stepper: its steps are counted, not its position", "a servo axis, whose loop can hunt")
@@ -222,7 +226,8 @@ def _in_velocity(axis: AxisParameters, answers: UserAnswers) -> bool:
     """Tell whether the output of `pid` is a velocity and not a force.
 
     An answer of the user decides: a gain of the drive's loop, or a force per output. Otherwise the output counts as a
-    velocity if FF1 is about 1 and D is 0."""
+    velocity if FF1 is about 1 and D is 0.
+    """
     if FORCE in answers or VELOCITY in answers or "controller.kp" in answers:
         return FORCE not in answers
     return _unity(axis) and not axis.is_set("D")
@@ -231,7 +236,8 @@ def _in_velocity(axis: AxisParameters, answers: UserAnswers) -> bool:
 def _of_the_velocity_loop(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> list[OpenQuestion]:
     """List what an INI file cannot tell of the drive's velocity loop.
 
-    Its gain and its sample time are asked for, and the scale of the output unless FF1 is about 1."""
+    Its gain and its sample time are asked for, and the scale of the output unless FF1 is about 1.
+    """
     gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
     meaning = "gain of the drive's velocity loop, whose integral time, if any, is controller.velocity_integral_time"
     if _unity(axis) and VELOCITY not in answers:
@@ -252,7 +258,8 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
 
     Raises InputError for what friso cannot describe.
 
-    Parameters without a place in a stage are listed in sentences."""
+    Parameters without a place in a stage are listed in sentences.
+    """
     kind = _kind(axis)
     unit = _metres(axis, answers, kind)
     left = [text.format(axis.number(key)) for key, text in NOT_CARRIED.items() if axis.is_set(key)]
@@ -296,7 +303,8 @@ def _torque(
 
     `unit` is the machine unit [m or rad].
 
-    Raises InputError for a negative gain."""
+    Raises InputError for a negative gain.
+    """
     scale = answers.value(FORCE, FORCE_FIELD.on(kind)) / unit
     gain = {name: axis.number(name, 0.0) * scale for name in ("P", "I", "D", "FF1", "FF2")}
     for name in ("P", "I", "D"):
@@ -326,7 +334,8 @@ def _velocity(
     """Build the table [controller] of a cascade whose outer loop commands a velocity.
 
     `unit` is the machine unit [m or rad]. Raises InputError for a D, which has no place in a cascade, and for a P that
-    is not positive."""
+    is not positive.
+    """
     if axis.is_set("D"):
         expected = f"D = 0 with an output that is a velocity; or {FORCE}, with one that is a force"
         raise InputError("D", f"{axis.number('D'):g}", expected, f'--set {FORCE}="20 N"')
@@ -371,7 +380,8 @@ def _unit_of(axis: AxisParameters) -> str | None:
     """Return the machine unit of an axis, as the file gives it.
 
     Returns None if the file gives none, or if axis and machine give different units. LinuxCNC's manual then uses the
-    axis's unit, but its program uses the machine's."""
+    axis's unit, but its program uses the machine's.
+    """
     kind = _kind(axis)
     names = (axis.machine.get("unit" if kind == LINEAR else "angle"), axis.values.get("UNITS"))
     units = {_unit_named(str(name), kind) for name in names if name is not None}
@@ -381,7 +391,8 @@ def _unit_of(axis: AxisParameters) -> str | None:
 def _unit_named(name: str, kind: AxisKind) -> str:
     """Return the name of a machine unit.
 
-    Older files give the unit as a number: how many units make a millimetre or a degree."""
+    Older files give the unit as a number: how many units make a millimetre or a degree.
+    """
     units, base = (LENGTHS, 1e-3) if kind == LINEAR else (ANGLES, ANGLES["deg"])
     try:
         size = base / float(name)
@@ -402,7 +413,8 @@ def _metres(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> float
 def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """List what is needed to write parameters: the machine unit, and what an output of 1 does.
 
-    An output of 1 is a velocity for a cascade, and a force for any other controller."""
+    An output of 1 is a velocity for a cascade, and a force for any other controller.
+    """
     kind = axis_of(flat)
     asked = [OpenQuestion(UNIT, "unit of the machine", '"mm"' if kind == LINEAR else '"deg"')]
     if flat["controller.kind"] == "cascade":
@@ -416,7 +428,8 @@ def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion,
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
     """Compute the parameters of the `pid` component from a stage.
 
-    Raises InputError for a controller that the component cannot be."""
+    Raises InputError for a controller that the component cannot be.
+    """
     kind = axis_of(flat)
     units = LENGTHS if kind == LINEAR else ANGLES
     unit = units[answers.choice(UNIT, tuple(units))]
@@ -453,7 +466,8 @@ def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
 def _of_cascade(flat: FlatStage, unit: float, scale: float) -> Parameters:
     """Compute the parameters of a cascade's outer loop, whose output commands a velocity.
 
-    `unit` is the machine unit [m or rad]. An output of 1 stands for `scale` machine units per second."""
+    `unit` is the machine unit [m or rad]. An output of 1 stands for `scale` machine units per second.
+    """
     kv, time = flat["controller.kv"], flat.get("controller.position_integral_time")
     ahead = flat["controller.velocity_feedforward"] / scale
     kv /= scale

@@ -142,7 +142,8 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
     """Return the axes that have gains.
 
     Raises InputError for a text that is neither JSON nor lines for odrivetool. Firmware with other units or names is
-    refused, too."""
+    refused, too.
+    """
     in_lines = not text.lstrip().startswith("{")
     held: dict[tuple[str, str], dict[str, Any]] = {}
     for key, value in (_settings(text) if in_lines else _entries(text)).items():
@@ -168,7 +169,8 @@ def _settings(text: str) -> dict[str, Any]:
     """Read the parameters that lines for odrivetool set; the last of equal names counts.
 
     Values are numbers, arithmetic, true, false, or texts. Raises InputError for a line that odrivetool would not
-    take."""
+    take.
+    """
     values: dict[str, Any] = {}
     lines = text.splitlines()
     if len(lines) > MOST_KEYS:
@@ -241,7 +243,8 @@ def _entries(text: str) -> dict[str, Any]:
 def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """List what the file leaves open: the machine, and how far a turn of the motor moves it.
 
-    Raises InputError for an axis that does not control a position."""
+    Raises InputError for an axis that does not control a position.
+    """
     mode = _mode(axis, "control_mode", POSITION_CONTROL)
     if mode != POSITION_CONTROL:
         raise InputError(f"{CONFIG}.control_mode", f"{mode:g}", "3, control in position", '"control_mode": 3')
@@ -272,7 +275,8 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
 
     Raises InputError for what friso cannot describe.
 
-    Settings without a place in a stage are listed in sentences."""
+    Settings without a place in a stage are listed in sentences.
+    """
     kind, travel = answers.kind_of(TRAVEL, TRAVELS)
     force = 2 * pi / travel  # [N] for a torque of 1 N m
     number = lambda name, default=None: axis.number(f"{CONFIG}.{name}", default)  # noqa: E731
@@ -320,7 +324,8 @@ def _torque_limit(axis: AxisParameters) -> float:
 def _motion(axis: AxisParameters, kind: AxisKind, travel: float) -> dict[str, Mapping[str, Any]]:
     """Build the move that the drive's own trajectory generator makes; empty without one.
 
-    `travel` is how far one turn moves the load [m or rad]."""
+    `travel` is how far one turn moves the load [m or rad].
+    """
     if not all(axis.is_set(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit")):
         return {}
     fastest, acceleration = (axis.number(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit"))
@@ -391,7 +396,8 @@ def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion,
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
     """Compute the parameters of an ODrive axis from a stage.
 
-    Raises InputError for a controller other than a position loop with P over a velocity loop with P or PI."""
+    Raises InputError for a controller other than a position loop with P over a velocity loop with P or PI.
+    """
     name = "controller."
     if flat["controller.kind"] != "cascade":
         raise lacks(f'kind = "{flat["controller.kind"]}"', "a cascade, the only structure that this drive has")

@@ -79,7 +79,8 @@ def _limiter(bode: Bode, touched: bool) -> str | None:
 def _limits(margins: Limits, unit: str) -> dict[str, Any]:
     """Return the ranges of the crossover that are stable or have a good modulus margin.
 
-    `unit` is part of the names: "hz", or "factor" for multiples of the bandwidth."""
+    `unit` is part of the names: "hz", or "factor" for multiples of the bandwidth.
+    """
     return {
         f"highest_stable_crossover_{unit}": margins.highest_stable,
         "still_stable_there": margins.open_ended,

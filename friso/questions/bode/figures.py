@@ -1,6 +1,7 @@
 """Draw a linear analysis: plant, open loop, Nyquist plot and sensitivity.
 
-Each figure shows the limit cases, and some show the whole family of states behind them."""
+Each figure shows the limit cases, and some show the whole family of states behind them.
+"""
 
 from __future__ import annotations
 
@@ -91,7 +92,8 @@ def phases(responses: Sequence[np.ndarray]) -> list[Array]:
     """Return phases [deg] of complex responses (k,) without jumps of 360 degrees.
 
     The first phase begins between -315 and 45 degrees. The others are shifted by whole turns until they agree with it
-    at high frequencies, where all loops behave alike."""
+    at high frequencies, where all loops behave alike.
+    """
     angles = [np.angle(response) for response in responses]
     lagging = [np.where(angle > np.pi - 1e-9, angle - 2 * np.pi, angle) for angle in angles]  # half a turn is a lag
     first, *others = [np.degrees(np.unwrap(angle)) for angle in lagging]
@@ -140,7 +142,8 @@ def _loop(bode: Bode) -> Figure:
 def _cascade(bode: Bode) -> Iterator[Figure]:
     """Yield the figures of a cascade: the plant of its velocity loop, then each loop opened.
 
-    A drive's own software shows such Bode plots."""
+    A drive's own software shows such Bode plots.
+    """
     if not bode.cascades:
         return
     from_sliding = sorted(bode.cascades, key=lambda name: name.startswith("stuck"))  # whose phase begins at 0
@@ -168,7 +171,8 @@ def _cascade(bode: Bode) -> Iterator[Figure]:
 def _speeds(bode: Bode) -> Figure:
     """Draw the open loop at prescribed speeds of the cart (thesis, Fig. 8).
 
-    A stage without friction gives a figure without panels."""
+    A stage without friction gives a figure without panels.
+    """
     caption = (
         "The same while the cart slides at a prescribed speed"
         f"{', limiter free' if has_limiter(bode) else ''} (thesis, Fig. 8): the faster it slides, the sooner the "
@@ -257,7 +261,8 @@ def _sensitivity(bode: Bode) -> Figure:
 def loop_panels(hertz: Array, curves: Sequence[ResponseCurve]) -> tuple[Panel, ...]:
     """Return panels of magnitude [dB] and phase [deg] of loops over frequencies (k,) [Hz].
 
-    Lines mark 0 dB and odd multiples of 180 degrees. Without loops there are no panels."""
+    Lines mark 0 dB and odd multiples of 180 degrees. Without loops there are no panels.
+    """
     if not curves:
         return ()
     sizes = np.concatenate([magnitude(curve.response) for curve in curves])
@@ -278,7 +283,8 @@ def _magnitudes(hertz: Array, curves: Sequence[ResponseCurve], axis: Axis, of: C
 def _phases(hertz: Array, curves: Sequence[ResponseCurve]) -> Panel:
     """Return the panel of phases over frequencies (k,) [Hz], without labels.
 
-    The labels stand in the panel of magnitudes above."""
+    The labels stand in the panel of magnitudes above.
+    """
     angles = zip(curves, phases([curve.response for curve in curves]), strict=True)
     lines = tuple(Series(hertz, y, "", curve.colour, curve.dash, curve.width) for curve, y in angles)
     least = QUARTER * np.floor((min(line.y.min() for line in lines) + 1) / QUARTER)
@@ -303,7 +309,8 @@ def _loop_of(name: str, case: BodeCase) -> ResponseCurve:
 def _masses(bode: Bode) -> list[float]:
     """Return the moving masses [kg]: all that moves, and the part that moves without the cart.
 
-    Only a free joint lets the actuator move without the cart."""
+    Only a free joint lets the actuator move without the cart.
+    """
     flat = bode.stage.flat()
     free = "joint.locked" in flat and not flat["joint.locked"]
     return [float(moving_mass(flat)), *([float(moving_mass({**flat, "masses.cart": 0.0}))] if free else [])]

@@ -74,7 +74,8 @@ def bode(
 def _band(entry: str | tuple[float, float], stage: Stage) -> tuple[float, float]:
     """Return both ends [Hz] of a range of frequencies.
 
-    Raises InputError for a text that is no increasing range, or a range beyond half the sampling frequency."""
+    Raises InputError for a text that is no increasing range, or a range beyond half the sampling frequency.
+    """
     text = entry if isinstance(entry, str) else f"{text_of(entry[0], 'Hz')}..{text_of(entry[1], 'Hz')}"
     first, _, last = text.partition("..")
     if not (first.strip() and last.strip()):

@@ -26,7 +26,8 @@ class ShownState:
     """A state with its margins, label and colour.
 
     `where` says which state it is, if the label does not. `loops` holds the margins of each loop of a cascade in a
-    limit case."""
+    limit case.
+    """
 
     label: str
     colour: str
@@ -38,7 +39,8 @@ class ShownState:
 def shown_states(bode: Bode) -> tuple[ShownState, ...]:
     """Return the states shown: the limit cases, the worst settled state, and the worst of all.
 
-    The worst of all is left out if it is the worst settled state."""
+    The worst of all is left out if it is the worst settled state.
+    """
     cases = [
         ShownState(label(name), colour(name), _speed(case.members), case.margins, _loops(bode, name))
         for name, case in bode.cases.items()
@@ -99,7 +101,8 @@ def side(touched: bool) -> str:
 def has_limiter(bode: Bode) -> bool:
     """Tell whether the limiter can be both free and touched.
 
-    It cannot where the joint is locked or has no stroke."""
+    It cannot where the joint is locked or has no stroke.
+    """
     return bool(np.ptp(bode.scan.members.touched.astype(int)))
 
 

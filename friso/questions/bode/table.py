@@ -45,7 +45,8 @@ def decibels(factor: float) -> float:
 def growth(margins: Margins) -> str:
     """Say how fast a deviation from an unstable state grows.
 
-    On the edge of stability it neither decays nor grows."""
+    On the edge of stability it neither decays nor grows.
+    """
     if margins.on_the_edge:
         return "neither decays nor grows"
     pole = margins.poles[margins.poles.real.argmax()]
@@ -56,7 +57,8 @@ def growth(margins: Margins) -> str:
 def _number(value: float, none: float, text: Callable[[float], str]) -> str:
     """Write a margin in words.
 
-    `none` is the margin's value if no change of gain, phase or delay reaches the edge of stability."""
+    `none` is the margin's value if no change of gain, phase or delay reaches the edge of stability.
+    """
     if math.isnan(value):
         return NOTHING
     return ANY if value == none else text(value)

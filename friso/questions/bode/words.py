@@ -42,7 +42,8 @@ def sentences(bode: Bode) -> list[str]:
 def stability(bode: Bode) -> list[str]:
     """Say whether the controller is stable in the settled states, and with which margin.
 
-    Then say whether it is stable in all other states, and why not."""
+    Then say whether it is stable in all other states, and why not.
+    """
     if len(bode.scan.members) == 1:
         margins = bode.settled[1]
         state = f"stable, {_margin(margins)}" if margins.stable else f"not stable: a deviation {growth(margins)}"
@@ -83,7 +84,8 @@ def crossover_heading(bode: Bode) -> str:
 def crossovers(bode: Bode) -> dict[str, str]:
     """Say by state of the joint at which crossovers the loop is stable, and with a good margin.
 
-    A controller given by gains has bandwidths in place of crossovers."""
+    A controller given by gains has bandwidths in place of crossovers.
+    """
     joint = bode.stage.joint
     as_given = "" if joint is None else ("locked" if joint.locked else "free")
     labels = {name: f"{name.capitalize()}{' (as given)' if name == as_given else ''}" for name in bode.limits}
@@ -100,7 +102,8 @@ def caveats(bode: Bode) -> list[str]:
     """Return the limits of the analysis in sentences.
 
     The loop is analysed on one flank of a backlash. If the search found no upper limit, effects that the stage file
-    leaves out will set one."""
+    leaves out will set one.
+    """
     ends = {limits.searched[1] for limits in bode.limits.values() if limits.open_ended}
     flanks = [BACKLASH] if structure(bode.stage.flat()).plays else []
     if not ends:

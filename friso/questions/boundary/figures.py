@@ -85,7 +85,8 @@ def boundary_figure(traced: Diagram | Plane, keys: tuple[ShownKey, ...], subject
 def _diagram(traced: Diagram, key: ShownKey) -> Figure:
     """Draw amplitude, period and multiplier of all cycles over one key.
 
-    The legend stands above the first panel."""
+    The legend stands above the first panel.
+    """
     branches, x = lines(traced), _axis(traced.space.ranges[0])
     sizes = [size for line in branches for size in line.amplitude]
     log = max(sizes, default=0.0) > LOGARITHMIC * min(sizes, default=0.0)
@@ -124,7 +125,8 @@ def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: Show
 def _runs(line: Line) -> Iterator[tuple[bool, np.ndarray]]:
     """Yield the parts of a branch between changes of stability.
 
-    Each part comes with whether its cycles attract, and with the numbers of its points."""
+    Each part comes with whether its cycles attract, and with the numbers of its points.
+    """
     changes = np.flatnonzero(np.diff(line.attracts)) + 1
     for legs in np.split(np.arange(line.attracts.size), changes):
         if legs.size:

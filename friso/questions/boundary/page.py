@@ -39,7 +39,8 @@ def boundary_html(traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: St
 def _write_table(traced: Diagram | Plane, path: Path) -> None:
     """Write a CSV table with one row per point of a line.
 
-    Special points have a kind and an error."""
+    Special points have a kind and an error.
+    """
     import pandas as pd
 
     keys = [f"{swept.key} [{swept.unit}]" if swept.unit else swept.key for swept in traced.space.ranges]

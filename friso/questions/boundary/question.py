@@ -38,7 +38,8 @@ if TYPE_CHECKING:
 class BoundaryAnswer(Answer):
     """Where hunting ends: `result` is a `Diagram` over one key or a `Plane` of two.
 
-    `texts` holds the ranges as the user gave them."""
+    `texts` holds the ranges as the user gave them.
+    """
 
     stage: Stage
     texts: Sequence[str]
@@ -141,7 +142,8 @@ def boundary(
 def _in_its_unit(swept: KeyRange, text: str, axis: AxisKind) -> ShownKey:
     """Return a key with the unit in which its range was given.
 
-    The unit of the upper end counts; without one, values are in SI."""
+    The unit of the upper end counts; without one, values are in SI.
+    """
     from friso.questions.boundary.words import ShownKey
 
     match = re.search(r"\.\.\s*[-+.\deE]*\s*([^:]*)", text)

@@ -112,7 +112,8 @@ def sentences(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
     """Say where hunting is possible and where it ends.
 
-    First of all, say where the loop is unstable even without friction."""
+    First of all, say where the loop is unstable even without friction.
+    """
     return " ".join([*_unstable(traced, keys), _where(traced, keys)])
 
 
@@ -150,7 +151,8 @@ def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
 def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
     """Describe an edge of hunting that runs across the whole plane.
 
-    The sentence gives the values of one key at both ends of the other, and the farthest values in between."""
+    The sentence gives the values of one key at both ends of the other, and the farthest values in between.
+    """
     along, across = keys[edge.along], keys[1 - edge.along]
     side, other = ("below", "above") if edge.below else ("above", "below")
 
@@ -251,7 +253,8 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
 def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors: Mapping[float, float]) -> list[str]:
     """Say between which of the values tried a cycle attracts as well.
 
-    `turns` are the values at which a cycle begins (true) or ceases to attract, in ascending order."""
+    `turns` are the values at which a cycle begins (true) or ceases to attract, in ascending order.
+    """
     text = {value: key.as_known(value, errors[value]) for value, _ in turns}
     ranges = [(low, high) for (low, begins), (high, begins_too) in pairwise(turns) if begins and not begins_too]
     within = {value for ends in ranges for value in ends}
@@ -272,7 +275,8 @@ def _if_unstable(traced: Diagram, change: StabilityChange) -> str:
 def _between(change: StabilityChange, key: ShownKey, errors: Mapping[float, float]) -> str:
     """Say at which value, or between which values, hunting begins or ends.
 
-    `errors` holds the errors of special points [SI] by their values."""
+    `errors` holds the errors of special points [SI] by their values.
+    """
     if change.low == change.high:
         return f"at {key.key} = {key.as_known(change.low, errors[change.low])}"
     return f"between {key.key} = {key.text(change.low)} and {key.text(change.high)}, where no cycle could be followed"

@@ -48,7 +48,8 @@ def return_map_figure(cases: list[ShownCase]) -> Figure:
 def _return_map(item: ShownCase) -> list[Panel]:
     """Return the panel of a case's return map; none if swings were not followed.
 
-    It shows the map, the diagonal, the swings of this motion, the cycles, and the basin of hunting."""
+    It shows the map, the diagonal, the swings of this motion, the cycles, and the basin of hunting.
+    """
     hunting = item.case.judgement.hunting
     if hunting.returns is None or not np.any(hunting.returns.returns > 0):
         return []
@@ -75,7 +76,8 @@ def _mirrored(hunting: Hunting) -> bool:
 def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:
     """Return strips over the distances up to `reach` [m] from which hunting goes on for ever.
 
-    The return map is followed from swing to swing. The stage has to be its own mirror image."""
+    The return map is followed from swing to swing. The stage has to be its own mirror image.
+    """
     starts = np.linspace(0.0, reach, _STARTS)
     at = starts
     for _ in range(_FOLLOWED):
@@ -99,7 +101,8 @@ def _swings(item: ShownCase) -> Array:
 def _fixed_points(cycles: tuple[Cycle, ...]) -> tuple[Markers, ...]:
     """Return marks of the cycles by their two turning points, by attracting and repelling.
 
-    For a stage that is its own mirror image, the mirror images are marked, too."""
+    For a stage that is its own mirror image, the mirror images are marked, too.
+    """
     mirrored = any(cycle.symmetric for cycle in cycles)
     markers = []
     for attracts, label in _WORDS.items():

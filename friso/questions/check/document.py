@@ -28,7 +28,8 @@ def check_document(
 ) -> dict[str, Any]:
     """Return the cases with their verdicts as a JSON document.
 
-    Results on drawn stages, on an isolator and across friction laws are added if they were computed."""
+    Results on drawn stages, on an isolator and across friction laws are added if they were computed.
+    """
     document = {name: _case(case) for name, case in cases.items()}
     if draws is not None:
         for name, case in document.items():
@@ -166,7 +167,8 @@ def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
 def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
     """Return the multiples of a parameter at which hunting begins or ends.
 
-    Each end gives the last multiple with the same verdict and the next one with another verdict."""
+    Each end gives the last multiple with the same verdict and the next one with another verdict.
+    """
 
     def end(one: MarginEnd | None) -> dict[str, Any] | None:
         return one and {"same_at_factor": one.same, "other_at_factor": one.other, "certain": one.certain}

@@ -44,7 +44,8 @@ _PERIODS = 4  # hunting periods shown of the force shares
 def check_figures(cases: Mapping[str, Case]) -> tuple[Figure, ...]:
     """Return every figure for which the cases have data, the most telling first.
 
-    Cases without traces have no figures."""
+    Cases without traces have no figures.
+    """
     with_trace = [item for item in shown_cases(cases) if item.case.trace is not None]
     if not with_trace:
         return ()
@@ -80,7 +81,8 @@ def response_figure(trace: xr.Dataset) -> Figure:
 def _late(trace: xr.Dataset) -> float:
     """Return the time [s] from which a run shows its final behaviour.
 
-    It is half-way between the last change of the reference and the end of the run."""
+    It is half-way between the last change of the reference and the end of the run.
+    """
     time, reference = samples(trace, "time"), samples(trace, "reference")
     changes = np.flatnonzero(np.diff(reference))
     begin = time[changes[-1]] if len(changes) and changes[-1] < 0.9 * len(time) else time[0]
@@ -159,7 +161,8 @@ def _overview(cases: list[ShownCase]) -> Figure:
 def _force_limit(cases: list[ShownCase]) -> tuple[Limit, ...]:
     """Return the controller's force limit if a case comes near it.
 
-    A distant limit would flatten all curves."""
+    A distant limit would flatten all curves.
+    """
     bound = cases[0].case.stage.controller.force_limit
     forces = np.abs(np.concatenate([samples(trace_of(item), "force") for item in cases]))
     if bound is None or not np.any(forces[np.isfinite(forces)] > bound / 2):
@@ -170,7 +173,8 @@ def _force_limit(cases: list[ShownCase]) -> tuple[Limit, ...]:
 def _shares(cases: list[ShownCase]) -> Figure:
     """Draw the P, I and D shares of the actuator force after the move (thesis, Fig. 13).
 
-    All cases have one scale."""
+    All cases have one scale.
+    """
     start, end = _window(cases)
     periods = [item.case.period for item in cases if item.case.period and np.isfinite(item.case.period)]
     if periods:
@@ -220,7 +224,8 @@ def _joint(cases: list[ShownCase]) -> Figure:
 def _friction(with_trace: list[ShownCase]) -> Figure:
     """Draw friction against velocity and displacement of the cart.
 
-    If a case hunts, only the settled part of the runs is drawn; otherwise the whole runs."""
+    If a case hunts, only the settled part of the runs is drawn; otherwise the whole runs.
+    """
     cases = [item for item in with_trace if "friction_force" in trace_of(item)]
     hunting = any(item.case.peaks for item in cases)
     start, end = _window(with_trace) if hunting else (-np.inf, np.inf)
@@ -260,7 +265,8 @@ def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
 def _window(cases: list[ShownCase]) -> tuple[float, float]:
     """Return begin and end [s] of the settled part of the runs.
 
-    It begins where peaks are counted, or half-way through a shorter run."""
+    It begins where peaks are counted, or half-way through a shorter run.
+    """
     end = max(float(samples(trace_of(item), "time")[-1]) for item in cases)
     return (COUNTED_AFTER if end > COUNTED_AFTER else end / 2), end
 

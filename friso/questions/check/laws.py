@@ -26,7 +26,8 @@ COUNTS = {3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9:
 def laws_sentences(laws: VerdictsByLaw) -> list[str]:
     """Say case by case whether the verdict depends on the friction law.
 
-    Then say which measurement would decide, and name the laws that were not tried."""
+    Then say which measurement would decide, and name the laws that were not tried.
+    """
     labels = case_labels(laws.stage)
     says = [f"{labels[case]}: {_sentence(laws, case)}{_beyond(laws, case)}" for case in labels]
     if laws.left_out:
@@ -78,7 +79,8 @@ def _all(laws: VerdictsByLaw) -> str:
 def _does(verdicts: set[str]) -> str:
     """Return what a stage with these verdicts does, such as "can hunt".
 
-    All verdicts must agree on whether the stage hunts."""
+    All verdicts must agree on whether the stage hunts.
+    """
     if verdicts <= {"hunts"}:
         return "hunts"
     if verdicts <= {"hunts", "bistable"}:
@@ -131,7 +133,8 @@ def _edges(laws: VerdictsByLaw, case: str) -> str:
 def _beyond(laws: VerdictsByLaw, case: str) -> str:
     """Warn that advice keeps clear of the edge under the stage's own law alone.
 
-    The warning is empty if that edge is the highest."""
+    The warning is empty if that edge is the highest.
+    """
     own, *others = laws.verdicts
     edges = own.edges(case)
     highest = max((other[1] for verdict in others if (other := verdict.edges(case))), default=0.0)
@@ -157,7 +160,8 @@ def laws_columns(laws: VerdictsByLaw) -> list[str]:
 def laws_rows(laws: VerdictsByLaw) -> list[tuple[str, list[str]]]:
     """Return the rows of the table with one column per law.
 
-    Verdict, amplitude and edge come case by case, then what was varied and what is not reproduced."""
+    Verdict, amplitude and edge come case by case, then what was varied and what is not reproduced.
+    """
     rows = []
     for case, label in case_labels(laws.stage).items():
         rows += [
@@ -205,7 +209,8 @@ def _not_kept(verdict: LawVerdict) -> str:
 def laws_document(laws: VerdictsByLaw) -> dict[str, Any]:
     """Return the verdicts law by law and case by case, with every trial.
 
-    For each case the document says whether the verdict depends on the law, and what would decide."""
+    For each case the document says whether the verdict depends on the law, and what would decide.
+    """
     cases = {}
     for case in case_labels(laws.stage):
         cases[case] = {

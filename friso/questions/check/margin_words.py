@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 def friction_sentences(case: Case) -> list[str]:
     """Say at which static friction hunting begins or ends.
 
-    Nothing is said if this was not searched, or if the friction law does not separate static from Coulomb friction."""
+    Nothing is said if this was not searched, or if the friction law does not separate static from Coulomb friction.
+    """
     margin = case.static_friction
     if margin is None:
         return []
@@ -29,7 +30,8 @@ def margin_sentence(name: str, margin: ParameterMargin, remark: str = "", lowest
     """Say at which values of a parameter hunting begins or ends.
 
     `name` is the parameter in words, and `remark` is added to the sentence. `lowest` names the parameter at the lowest
-    value searched, if that has a name."""
+    value searched, if that has a name.
+    """
     does, starts = ("ends", "ends") if margin.attracts else ("begins", "starts")
     sure = all(end.certain for end in (margin.below, margin.above) if end)
     doubt = "" if sure else "; this is not certain"
@@ -47,14 +49,16 @@ def margin_sentence(name: str, margin: ParameterMargin, remark: str = "", lowest
 def joint_sentences(margins: Mapping[str, ParameterMargin]) -> list[str]:
     """Say at which stroke or stiffness of the joint hunting begins or ends.
 
-    `margins` holds the margins by their keys."""
+    `margins` holds the margins by their keys.
+    """
     return [margin_sentence(key.replace(".", " "), margin, " (joint free)") for key, margin in margins.items()]
 
 
 def margin_ways(margin: ParameterMargin) -> list[str]:
     """Return the multiples of a parameter beyond which the verdict changes, in words.
 
-    Numbers are rounded to the safe side: hunting never begins sooner, and never ends later, than stated."""
+    Numbers are rounded to the safe side: hunting never begins sooner, and never ends later, than stated.
+    """
     return [_way(margin, side, end) for side in (-1, 1) if (end := margin.end(side))]
 
 
@@ -89,7 +93,8 @@ def _way(margin: ParameterMargin, side: int, end: MarginEnd) -> str:
 def _gap(case: Case, margin: ParameterMargin) -> str:
     """Write the gap between static and Coulomb friction [N] at the nearest end.
 
-    It is empty for a stage with several friction laws, or with no single end."""
+    It is empty for a stage with several friction laws, or with no single end.
+    """
     flat = case.stage.flat()
     pairs = static_frictions(flat)
     ends = [end for end in (margin.below, margin.above) if end]

@@ -1,6 +1,7 @@
 """Write the report of `friso check`: one page that opens offline and prints.
 
-Every run of the command gives the same bytes."""
+Every run of the command gives the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +51,8 @@ def check_html(
     """Return the report for the cases "given" and, with a joint, "locked" and "free".
 
     Traces may be missing. `draws`, `isolator` and `laws` add what drawn stages do, what an isolator would do, and the
-    verdict across friction laws."""
+    verdict across friction laws.
+    """
     in_order = shown_cases(cases)
     stage = in_order[0].case.stage if "given" not in cases else cases["given"].stage
     tolerances = sorted({f"{item.case.solver.rtol:g}" for item in in_order})

@@ -44,7 +44,8 @@ class CheckAnswer(Answer):
     """The verdict on a stage.
 
     `result` holds a `Case` for "given" and, with a joint, for "locked" and "free". `draws` holds the fates of stages
-    drawn from uncertain keys, or None. `laws` holds the verdicts across friction laws, or None."""
+    drawn from uncertain keys, or None. `laws` holds the verdicts across friction laws, or None.
+    """
 
     stage: Stage
     draws: Draws | None
@@ -66,7 +67,8 @@ class CheckAnswer(Answer):
     def verdict(self) -> str:
         """Return the verdict on the stage as given.
 
-        It is "hunts", "bistable", "transient", "settles" or "failed"."""
+        It is "hunts", "bistable", "transient", "settles" or "failed".
+        """
         return self.result["given"].verdict
 
     @property
@@ -230,7 +232,8 @@ def check(
 def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
     """Log the verdict on a case as soon as it is certain, while other parts are still computed.
 
-    The message is information of the logger "friso"."""
+    The message is information of the logger "friso".
+    """
     from friso.questions.check.words import IN_SHORT
     from friso.shown.cases import case_labels
 
@@ -241,7 +244,8 @@ def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
 def _drawable(stage: Stage, correlations: Correlations, seed: int) -> Correlations | None:
     """Return the correlations of an uncertain stage if machines can be drawn from it.
 
-    Returns None, with a warning, if nearly every draw is invalid."""
+    Returns None, with a warning, if nearly every draw is invalid.
+    """
     settings = StudySettings.current()
 
     try:

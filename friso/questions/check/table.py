@@ -156,7 +156,8 @@ def _moves(case: Case) -> str:
 def _peaks(case: Case) -> str:
     """Write the peak count, and why it may contradict the verdict.
 
-    A run that ends too early has no peak count."""
+    A run that ends too early has no peak count.
+    """
     if case.stage.motion.duration <= COUNTED_AFTER:
         return (
             f"{NOTHING} (counted from {COUNTED_AFTER:g} s on, and the run ends at {case.stage.motion.duration:.4g} s)"

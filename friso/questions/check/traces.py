@@ -28,7 +28,8 @@ def samples(trace: xr.Dataset, name: str) -> Array:
 def common_range(arrays: Sequence[Array], least: float = 0.0) -> tuple[float, float] | None:
     """Return a range that holds all finite data with a margin, at least `least` wide.
 
-    Returns None if the range would be empty."""
+    Returns None if the range would be empty.
+    """
     gathered = np.concatenate([np.empty(0), *arrays])
     finite = gathered[np.isfinite(gathered)]
     if finite.size == 0 or max(np.ptp(finite), least) == 0:

@@ -62,7 +62,8 @@ ROUGH = 5e-4
 def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     """Say what a case does, and what to do about it.
 
-    `cases` holds all cases of the check, so that advice on one may use the others."""
+    `cases` holds all cases of the check, so that advice on one may use the others.
+    """
     case = item.case
     loop = _loop(case)
     says = {"hunts": _hunting, "bistable": _bistable, "transient": _transient, "settles": _settling}
@@ -93,7 +94,8 @@ def answer(cases: Mapping[str, Case]) -> list[str]:
 def conclusion(cases: Mapping[str, Case]) -> str | None:
     """Say what the joint does to the hunting.
 
-    Returns None unless both cases of the joint have a certain verdict."""
+    Returns None unless both cases of the joint have a certain verdict.
+    """
     both = [cases[key] for key in ("locked", "free") if key in cases]
     words = [case.verdict for case in both]
     if len(words) < 2 or "failed" in words or not all(case.judgement.hunting.certain for case in both):
@@ -137,7 +139,8 @@ def _hunting(case: Case) -> str:
 def _bistable(case: Case) -> str:
     """Describe a case that settles after this move but hunts after others.
 
-    The sentence names the smallest kicks and the share of moves that start hunting."""
+    The sentence names the smallest kicks and the share of moves that start hunting.
+    """
     kicks = (("displacement", case.judgement.displacement, "m"), ("push", case.judgement.push, "m/s"))
     starts = [_kick(name, kick, unit) for name, kick, unit in kicks if kick and kick.windows]
     if (moves := case.judgement.moves) and moves.hunting:
@@ -170,7 +173,8 @@ def _kick(name: str, kick: Kick, unit: str) -> str:
 def _transient(case: Case) -> str:
     """Describe a case that has no attracting cycle, but has not settled at the end of its run.
 
-    The sentences say how fast it settles afterwards, or what keeps it from its reference."""
+    The sentences say how fast it settles afterwards, or what keeps it from its reference.
+    """
     judgement, end = case.judgement, _end(case)
     if not judgement.hunting.possible:
         cannot = f"cannot hunt, because {judgement.hunting.reason}; but this motion "
@@ -312,7 +316,8 @@ def _unsearched(case: Case) -> list[str]:
 def edge_text(case: Case, end: AttractionEnd) -> str:
     """Write a bandwidth at which hunting ends.
 
-    An uncertain edge is given by where hunting was found and where it was not."""
+    An uncertain edge is given by where hunting was found and where it was not.
+    """
     if not end.certain:
         ends = sorted((end.inside, end.outside))
         low, high = _bandwidth(case, ends[0], up=False, digits=4), _bandwidth(case, ends[1], digits=4)
@@ -333,7 +338,8 @@ def _present_bandwidth(case: Case) -> float | None:
 def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 3) -> str:
     """Write a bandwidth that is a multiple of the case's own.
 
-    It is rounded upward, downward or, with None, to the nearest number."""
+    It is rounded upward, downward or, with None, to the nearest number.
+    """
     crossover = _present_bandwidth(case)
     value = factor * (crossover or 1.0)
     if up is not None:
@@ -373,7 +379,8 @@ def _window(case: Case, window: BandwidthWindow) -> str:
 def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
     """Say what the survey of bandwidths may have missed between its steps.
 
-    Windows too narrow for any machine to stay in are listed as well."""
+    Windows too narrow for any machine to stay in are listed as well.
+    """
     if all(case.judgement.margin is None for case in cases.values()):
         return []
     low, high = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
@@ -415,7 +422,8 @@ def _slower(case: Case, end: AttractionEnd) -> str:
 def _faster(case: Case, edge: Margin) -> str:
     """Say how much faster the controller has to be for the stage to settle.
 
-    The bandwidth advised keeps a distance from the edge of hunting."""
+    The bandwidth advised keeps a distance from the edge of hunting.
+    """
     controller, highest = case.stage.controller, _bandwidth(case, edge.factor, up=False, digits=4)
     apart = _distance(case, edge)
     kept = (
@@ -449,7 +457,8 @@ def _with_other_friction(case: Case) -> str:
 def _distance(case: Case, edge: Margin) -> float:
     """Return the distance from the edge that advice keeps, as a factor.
 
-    The factor is 1 if something attracts again within that distance, over a range wide or close enough to matter."""
+    The factor is 1 if something attracts again within that distance, over a range wide or close enough to matter.
+    """
     distance = SEARCH_LIMITS.edge_distance
     to = edge.quiet * distance
 

@@ -17,7 +17,8 @@ from friso.studies.compare.study import Comparison, OptionResult
 def compare_document(comparison: Comparison) -> dict[str, Any]:
     """Return the JSON document in SI, with the unit as suffix of each key.
 
-    A time that is infinite, because a machine never settles, becomes null."""
+    A time that is infinite, because a machine never settles, becomes null.
+    """
     machines = comparison.machines
     conclusion, *details = sentences(comparison)
     return plain_json(

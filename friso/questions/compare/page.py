@@ -1,6 +1,7 @@
 """Write the page of `friso compare`: one file that opens offline and prints.
 
-Every run of the command gives the same bytes."""
+Every run of the command gives the same bytes.
+"""
 
 from __future__ import annotations
 

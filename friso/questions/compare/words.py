@@ -97,7 +97,8 @@ def _bandwidth(option: Option, comparison: Comparison) -> str:
 def table_rows(comparison: Comparison) -> list[PairedRow]:
     """Return one row for each option, with its texts under `COLUMNS`.
 
-    Brackets hold 95 % intervals."""
+    Brackets hold 95 % intervals.
+    """
     return [
         (
             label(result),
@@ -119,7 +120,8 @@ def table_rows(comparison: Comparison) -> list[PairedRow]:
 def paired_rows(comparison: Comparison) -> list[PairedRow]:
     """Return one row for each option except a, with its texts under `PAIRED`.
 
-    Each machine is compared with itself under option a."""
+    Each machine is compared with itself under option a.
+    """
     rows = []
     for result in comparison.results[1:]:
         pair = comparison.paired(result)

@@ -22,7 +22,8 @@ DRAWN = 40
 def convert_figures(conversion: LawConversion) -> list[Figure]:
     """Return virgin curves and steady friction over speed, before and after the conversion.
 
-    Measured points are drawn if the virgin curve comes from a file."""
+    Measured points are drawn if the virgin curve comes from a file.
+    """
     levels, before = conversion.before.levels, conversion.before
     stages = (
         (conversion.source, before, VERMILLION, "solid"),

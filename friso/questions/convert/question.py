@@ -20,7 +20,8 @@ MOST = 12
 class ConvertAnswer(Answer):
     """A stage under another friction law.
 
-    `result` is the `LawConversion`, and ``answer.stage`` is the converted stage."""
+    `result` is the `LawConversion`, and ``answer.stage`` is the converted stage.
+    """
 
     title: str
     name: str

@@ -46,7 +46,8 @@ def sentences(conversion: LawConversion) -> list[str]:
 def _stiffness(ends: tuple[float, float], stiffness: float) -> str:
     """Say which stiffness before sliding measured points allow, from `ends` [N/m].
 
-    `stiffness` [N/m] is the value taken."""
+    `stiffness` [N/m] is the value taken.
+    """
     low, high, value = (with_unit(x, "N/m") for x in (*ends, stiffness))
     if np.isinf(ends[1]):
         return (
@@ -63,7 +64,8 @@ def _stiffness(ends: tuple[float, float], stiffness: float) -> str:
 def activity_sentences(condition: str) -> list[str]:
     """Say that a law may give energy back, with the `condition` under which it is passive.
 
-    An empty condition means that the law is passive, and nothing is said."""
+    An empty condition means that the law is passive, and nothing is said.
+    """
     return [f"The law may give energy back, which no friction does. It is passive where {condition}."] * bool(condition)
 
 

@@ -1,6 +1,7 @@
 """Build the JSON document of a design, in SI with the unit as suffix of each key.
 
-Numbers that are unknown or not finite become null."""
+Numbers that are unknown or not finite become null.
+"""
 
 from __future__ import annotations
 

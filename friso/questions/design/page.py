@@ -1,6 +1,7 @@
 """Write the page of `friso design`: one file that opens offline and prints.
 
-Every run of the command gives the same bytes."""
+Every run of the command gives the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ LEAVES = 2
 def design_files(design: Design) -> dict[str, Content]:
     """Return the stage files, the page, the drawing, and every figure in all formats.
 
-    The stage files are the design and the worst machine that was tried with it."""
+    The stage files are the design and the worst machine that was tried with it.
+    """
     figures = design_figures(design)
     images = pictures(figures)
     return {

@@ -92,7 +92,8 @@ def design(
 def specification_of(stage: Stage, spec: Spec | str | os.PathLike[str] | None) -> Spec:
     """Return the specification from a file or an object; without one, make it from the stage.
 
-    Raises InputError for a file that is no specification."""
+    Raises InputError for a file that is no specification.
+    """
     if spec is None:
         return read_spec(outline(stage))
     return spec if isinstance(spec, Spec) else load_spec(Path(spec))

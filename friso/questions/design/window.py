@@ -28,7 +28,8 @@ def comfortable(design: Design) -> Range:
 def stiffest(design: Design) -> float:
     """Return the highest crossover [Hz] that the Pareto front allows.
 
-    It is a fraction of the highest first interfering frequency on the front."""
+    It is a fraction of the highest first interfering frequency on the front.
+    """
     return max(candidate.frequency for candidate in design.candidates) / design.spec.safety.parasitic
 
 

@@ -181,7 +181,8 @@ def corner(corners: Corners, flat: Mapping[str, Any], number: int) -> str:
 def gaps(corners: Corners, flat: Mapping[str, Any]) -> np.ndarray | None:
     """Return static minus Coulomb friction in the corners [N], shape (n,).
 
-    Returns None for a friction law that does not have both."""
+    Returns None for a friction law that does not have both.
+    """
     if not {"friction.static", "friction.coulomb"} <= flat.keys():
         return None
     static, coulomb = (corners.population.over(flat)[f"friction.{name}"] for name in ("static", "coulomb"))
@@ -191,7 +192,8 @@ def gaps(corners: Corners, flat: Mapping[str, Any]) -> np.ndarray | None:
 def refusal(failure: NoDesign) -> str:
     """Say why no design meets the specification, and what to relax.
 
-    If no isolator is needed, that is said first."""
+    If no isolator is needed, that is said first.
+    """
     if failure.need and not failure.need.isolator:
         return f"{need_words(failure.need)}\nNor is there a design of one that meets the specification: {_why(failure)}"
     return f"no design: {_why(failure)}"

@@ -12,7 +12,8 @@ from friso.shown.documents import plain_json
 def export_document(gains: Gains) -> dict[str, Any]:
     """Return the gains of a stage in all units, and the parameters of a drive.
 
-    Without a kind of drive, parameters and firmware are None."""
+    Without a kind of drive, parameters and firmware are None.
+    """
     return plain_json(
         {
             "stage": gains.stage.name,

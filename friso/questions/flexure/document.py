@@ -1,6 +1,7 @@
 """Build the JSON document of leaf springs, in SI with the unit as suffix of each key.
 
-Numbers that are unknown become null."""
+Numbers that are unknown become null.
+"""
 
 from __future__ import annotations
 

@@ -37,7 +37,8 @@ CLOSE = 1e-6
 def drawing_svg(mechanism: Mechanism, stroke: float, *, title: str = "", material: str = "") -> str:
     """Return the drawing of a mechanism as SVG, at the largest scale that fits the sheet.
 
-    `stroke` [m] is the gap to the limiter on each side."""
+    `stroke` [m] is the gap to the limiter on each side.
+    """
     fitting = next(
         (candidate for candidate in (PaperDrawing(mechanism, stroke, scale) for scale in SCALES) if candidate.fits),
         None,
@@ -86,7 +87,8 @@ def _bent(drawing: PaperDrawing, height: float, side: int) -> list[SheetPoint]:
 def _stop(drawing: PaperDrawing, end: float, edge: float, side: int) -> list[str]:
     """Return a stop of the limiter, which belongs to the cart.
 
-    It lies one stroke away from the stage's clamp."""
+    It lies one stroke away from the stage's clamp.
+    """
     near, far = edge + side * drawing.travel, edge + side * (drawing.travel + STOP)
     return [box((end, near), (end + CLAMP, far), fill="url(#leaf-hatch)")]
 
@@ -132,7 +134,8 @@ def _stage_note(drawing: PaperDrawing) -> list[str]:
 def _block(drawing: PaperDrawing, view: int, middle: float) -> list[str]:
     """Return the stage as a block in the view from the side (1) or from above (2).
 
-    Parts without room on the sheet are cut off."""
+    Parts without room on the sheet are cut off.
+    """
     (x1, x2), (low, high) = drawing.block[0], drawing.block[view]
     (left, right), (bottom, top) = drawing.spans[0], drawing.spans[view]
     cut = max(x1, left), min(x2, right), max(low, bottom), min(high, top)

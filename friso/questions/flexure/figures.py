@@ -93,7 +93,8 @@ def _odd(x: Array, y: Array, at: Array) -> Array:
 def _even_falling(x: Array, y: Array, at: Array) -> Array:
     """Interpolate a stiffness that is even in x.
 
-    Its inverse grows about as the square of x and is therefore interpolated instead."""
+    Its inverse grows about as the square of x and is therefore interpolated instead.
+    """
     return 1 / CubicSpline(np.concatenate([-x[:0:-1], x]), 1 / np.concatenate([y[:0:-1], y]))(at)
 
 

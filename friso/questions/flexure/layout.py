@@ -37,7 +37,8 @@ FOOT = 26.0
 def block_size(mechanism: Mechanism) -> tuple[float, float, float]:
     """Return the edges [m] along x, y, z of the block with the stage's mass and inertia.
 
-    An edge that the moments of inertia do not allow is 0."""
+    An edge that the moments of inertia do not allow is 0.
+    """
     x, y, z = (6 * float(moment) / float(mechanism.body.mass) for moment in mechanism.body.inertia)
     return math.sqrt(max(0.0, y + z - x)), math.sqrt(max(0.0, x + z - y)), math.sqrt(max(0.0, x + y - z))
 
@@ -46,7 +47,8 @@ def block_size(mechanism: Mechanism) -> tuple[float, float, float]:
 class PaperDrawing:
     """A mechanism on paper at a scale.
 
-    Places are in paper millimetres, with y downwards. `stroke` is in metres [m]."""
+    Places are in paper millimetres, with y downwards. `stroke` is in metres [m].
+    """
 
     mechanism: Mechanism
     stroke: float
@@ -91,7 +93,8 @@ class PaperDrawing:
     def spans(self) -> tuple[tuple[float, float], ...]:
         """Return the extents of the views along x, z and y.
 
-        They hold all that must be seen, and as much of the stage's block as there is room for."""
+        They hold all that must be seen, and as much of the stage's block as there is room for.
+        """
         low, high = self.core
         room = WIDTH - 10 - LEFT - RIGHT - (high - low)
         left = max(0.0, min(low - self.block[0][0], room / 3))
@@ -103,7 +106,8 @@ class PaperDrawing:
     def _upwards(self, half: float, axis: int) -> tuple[float, float]:
         """Return the extent of a view along its upward axis.
 
-        It holds `half` to both sides, the marked points, and a part of the block."""
+        It holds `half` to both sides, the marked points, and a part of the block.
+        """
         marked = [self.size(point[axis]) for point in self.points.values()]
         low, high = min(-half, *marked), max(half, *marked)
         bottom, top = self.block[3 - axis]

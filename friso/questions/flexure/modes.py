@@ -1,6 +1,7 @@
 """Draw the modes of leaf springs: leaves and stage at rest and deformed.
 
-Each mode is seen from where most of it moves."""
+Each mode is seen from where most of it moves.
+"""
 
 from __future__ import annotations
 
@@ -90,7 +91,8 @@ def best_view(mechanism: Mechanism, mode: Mode) -> str:
 def drawable_share(mechanism: Mechanism, mode: Mode) -> float:
     """Return the share of a mode's kinetic energy that its picture shows.
 
-    This is the energy of the stage and of the middle lines of the leaves. The rest is torsion of the leaves."""
+    This is the energy of the stage and of the middle lines of the leaves. The rest is torsion of the leaves.
+    """
     speed = _rigid(mechanism, mode, _centre(mechanism)[None, :])[0]
     stage = mechanism.body.mass * np.sum(speed**2) + np.sum(
         np.array(mechanism.body.inertia, dtype=float) * mode.stage[3:] ** 2
@@ -128,7 +130,8 @@ def _block(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> Shape:
 def _leaves(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> list[Shape]:
     """Return the lines of the leaves in a view.
 
-    They are middle lines from the side, outlines from above, and cross-sections along the leaves."""
+    They are middle lines from the side, outlines from above, and cross-sections along the leaves.
+    """
     draw = {(0, 2): _middle, (0, 1): _outline, (1, 2): _sections}[axes]
     return [
         shape
@@ -146,7 +149,8 @@ def _middle(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> lis
 def _outline(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
     """Return the outline of a leaf from above: both long edges and both ends.
 
-    Cross-sections turn as the middle line does."""
+    Cross-sections turn as the middle line does.
+    """
     x, leaf = _smooth(mechanism, leaf)
     turn = np.gradient(leaf[:, 1], x)
     turn -= turn[0]  # what is left at the clamp is shear, of nearly the same size all along the leaf
@@ -167,7 +171,8 @@ def _smooth(mechanism: Mechanism, leaf: Array) -> tuple[Array, Array]:
 def _sections(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
     """Return a few cross-sections between cart and stage.
 
-    Their turn grows evenly up to the turn of the stage."""
+    Their turn grows evenly up to the turn of the stage.
+    """
     shapes = []
     for k in np.linspace(0, len(leaf) - 1, 5).astype(int):
         share = k / (len(leaf) - 1)

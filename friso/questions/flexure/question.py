@@ -91,7 +91,8 @@ def _mechanism(stage: Stage, origin: str) -> Mechanism:
 def _stroke(entry: str | float | None, stage: Stage, mechanism: Mechanism) -> float:
     """Return the stroke [m] of the option, or of the joint.
 
-    Raises InputError for a missing stroke, or one of more than half the leaves' length."""
+    Raises InputError for a missing stroke, or one of more than half the leaves' length.
+    """
     if entry is None:
         stroke = stage.joint and stage.joint.stroke
         if stroke is None:

@@ -1,6 +1,7 @@
 """Write the strokes of a technical drawing as SVG: lines, texts, dimensions, leaders.
 
-All lengths are paper millimetres, with y downwards."""
+All lengths are paper millimetres, with y downwards.
+"""
 
 from __future__ import annotations
 
@@ -119,7 +120,8 @@ def arrow(tip: SheetPoint, towards: SheetPoint, fill: str = "#222222") -> str:
 def across(x1: float, x2: float, y: float, edge: float, text: str) -> list[str]:
     """Return a horizontal dimension at height y from x1 to x2, with extension lines from `edge`.
 
-    A text too long to stand between the arrows is placed beside them."""
+    A text too long to stand between the arrows is placed beside them.
+    """
     parts = [_extension((x, edge), (x, y)) for x in (x1, x2)]
     parts += _arrows((x1, y), (x2, y), (1.0, 0.0))
     if fits(text, x2 - x1):
@@ -130,7 +132,8 @@ def across(x1: float, x2: float, y: float, edge: float, text: str) -> list[str]:
 def upwards(y1: float, y2: float, x: float, edge: float, text: str) -> list[str]:
     """Return a vertical dimension at place x from y1 to y2, with extension lines from `edge`.
 
-    Its text is read from the right."""
+    Its text is read from the right.
+    """
     parts = [_extension((edge, y), (x, y)) for y in (y1, y2)]
     parts += _arrows((x, y1), (x, y2), (0.0, 1.0))
     if fits(text, y2 - y1):
@@ -141,7 +144,8 @@ def upwards(y1: float, y2: float, x: float, edge: float, text: str) -> list[str]
 def leader(tip: SheetPoint, knee: SheetPoint, lines: list[str]) -> list[str]:
     """Return a note whose line ends in an arrow at `tip`.
 
-    From the knee the line continues level to the right."""
+    From the knee the line continues level to the right.
+    """
     end = (knee[0] + REACH, knee[1])
     parts = [path([tip, knee, end], "thin"), arrow(tip, (tip[0] - knee[0], tip[1] - knee[1]))]
     return parts + [words((end[0] + 0.8, end[1] + TEXT * (0.35 + 1.35 * k)), line) for k, line in enumerate(lines)]
@@ -150,7 +154,8 @@ def leader(tip: SheetPoint, knee: SheetPoint, lines: list[str]) -> list[str]:
 def _arrows(start: SheetPoint, end: SheetPoint, direction: SheetPoint) -> list[str]:
     """Return a line with arrows at both ends.
 
-    The arrows point inwards from outside if there is no room between the ends."""
+    The arrows point inwards from outside if there is no room between the ends.
+    """
     back = (-direction[0], -direction[1])
     if math.dist(start, end) > 3 * ARROW:
         return [path([start, end], "thin"), arrow(start, back), arrow(end, direction)]

@@ -50,7 +50,8 @@ def _plain(value: float) -> str:
 def _modes(flexure: BothModels) -> list[tuple[str, list[str]]]:
     """Return a row for each mode that a model knows, in the order of frequency.
 
-    The drive mode comes first."""
+    The drive mode comes first.
+    """
     named = [(evaluation, evaluation.named_modes) for evaluation in flexure.models.values()]
     frequencies: dict[str, float] = {}
     for _, modes in named:

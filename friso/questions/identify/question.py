@@ -54,7 +54,8 @@ class IdentifyAnswer(Answer):
     """The machine that logs show.
 
     `result` is an `Identification` with the estimates. It holds a `stage` if the logs describe a whole machine.
-    `inputs` are the files read, and `predictions` the predictions of other logs."""
+    `inputs` are the files read, and `predictions` the predictions of other logs.
+    """
 
     inputs: Sequence[LogFile]
     predictions: Sequence[Prediction]

@@ -24,7 +24,8 @@ LogFiles = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 class LogsAnswer(Answer):
     """What files of logs hold.
 
-    `result` has a `LogContent` for each file that could be read. `errors` says what is wrong with the others."""
+    `result` has a `LogContent` for each file that could be read. `errors` says what is wrong with the others.
+    """
 
     status = 2
     errors: Sequence[InputError]
@@ -74,7 +75,8 @@ def options_of(
 ) -> Any:
     """Return what the user said of channels, from dictionaries or texts.
 
-    `dt` is the sample time, a text or a number [s]. Raises LogError for a text that cannot be read."""
+    `dt` is the sample time, a text or a number [s]. Raises LogError for a text that cannot be read.
+    """
     roles, units, scales = (
         [f"{key}={text}" for key, text in item.items()] if isinstance(item, Mapping) else item or ()
         for item in (map, unit, scale)

@@ -41,7 +41,8 @@ class CellAxis:
     """A swept key with the places of its cells, in ascending order, shape (n,).
 
     `positions` are values in SI, or 0, 1, 2, ... if the cells are named by `words`. `places` gives the index in the
-    runs of each cell."""
+    runs of each cell.
+    """
 
     key: str
     quantity: str
@@ -75,7 +76,8 @@ class CellAxis:
     def position(self, value: object) -> float:
         """Return the place of a value [SI] or word on the axis.
 
-        Raises ValueError for a word that is not on the axis."""
+        Raises ValueError for a word that is not on the axis.
+        """
         if not self.words:
             return float(value)  # type: ignore[arg-type]
         word = _word(self.key, value) if not isinstance(value, float | int) or isinstance(value, bool) else None
@@ -90,7 +92,8 @@ class Look:
     """The colouring of a variable wherever it is shown: quantity, range, scale and categories.
 
     `numbers` and `codes` have the dimensions of the runs. Codes are indices of `categories`, and NaN where a number
-    counts."""
+    counts.
+    """
 
     quantity: str
     unit: str
@@ -110,7 +113,8 @@ class Look:
 def axes_of(runs: xr.Dataset) -> tuple[CellAxis, ...]:
     """Return the swept axes in the order of the runs, or the keys of sampled runs.
 
-    Raises ValueError for runs without axes."""
+    Raises ValueError for runs without axes.
+    """
     if SAMPLE in runs.dims:
         order = json.loads(runs.attrs.get("axes", "[]"))  # a store forgets the order of its coordinates
         keys = [key for key in runs.coords if runs[key].dims == (SAMPLE,) and key != SAMPLE]
@@ -136,7 +140,8 @@ def dims_of(runs: xr.Dataset) -> tuple[Hashable, ...]:
 def _gridded(runs: xr.Dataset, key: Hashable) -> CellAxis:
     """Return the axis of a swept key.
 
-    A logarithmic axis that includes 0 gets cells of equal width, each named by its value."""
+    A logarithmic axis that includes 0 gets cells of equal width, each named by its value.
+    """
     coordinate = runs[key]
     unit, log = unit_of(coordinate), coordinate.attrs.get("scale") == "log"
     if coordinate.dtype.kind not in "iuf":
@@ -181,7 +186,8 @@ def _value(value: float, unit: str) -> str:
 def plane_first(axes: Sequence[CellAxis]) -> list[CellAxis]:
     """Return the axes with the two that span the map first.
 
-    Numbers with more than one value go before words and single values."""
+    Numbers with more than one value go before words and single values.
+    """
     x, y, *_ = sorted(axes, key=lambda axis: (len(axis.places) == 1, bool(axis.words)))
     return [x, y, *(axis for axis in axes if axis is not x and axis is not y)]
 
@@ -216,7 +222,8 @@ def _range(name: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, 
     """Return the limits of a colour scale, whether it is logarithmic, and the colours of counts.
 
     A count of 0 has the colour of rest. Positive numbers over more than three decades get a logarithmic scale of at
-    most six decades, because the motion of a stage at rest is solver noise."""
+    most six decades, because the motion of a stage at rest is solver noise.
+    """
     finite, metric = numbers[np.isfinite(numbers)], metrics().get(name)
     if not finite.size:
         return None, False, ()
@@ -234,7 +241,8 @@ def _range(name: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, 
 def _without_number(runs: xr.Dataset, metric: str, values: np.ndarray) -> tuple[tuple[Category, ...], np.ndarray]:
     """Return the categories of cells that have no number, and their codes.
 
-    Codes are NaN where a number counts."""
+    Codes are NaN where a number counts.
+    """
     shape, dims = runs[metric].shape, runs[metric].dims
     outcome = _texts(runs, "outcome", dims)
     status = _texts(runs, "status", dims)
@@ -272,7 +280,8 @@ def _state(outcome: str | None, status: str | None) -> Category | None:
 def pick(sizes: Sequence[int], most: int) -> tuple[np.ndarray, ...]:
     """Return evenly spread indices along dimensions, of at most `most` combinations.
 
-    The longest dimension is thinned first."""
+    The longest dimension is thinned first.
+    """
     counts = list(sizes)
     while math.prod(counts) > most and max(counts) > 1:
         counts[counts.index(max(counts))] -= 1

@@ -1,6 +1,7 @@
 """Collect what a map page knows of its runs: axes, variables and colours.
 
-The page's script reads it as JSON."""
+The page's script reads it as JSON.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +41,8 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
     """Return everything that the page's script reads, ready for JSON.
 
     Arrays are base64 of little-endian numbers. They run cell by cell in the order of the axes, the last axis fastest.
-    `drawn` holds the runs of all cells. Raises ValueError as `look` and `axes_of` do."""
+    `drawn` holds the runs of all cells. Raises ValueError as `look` and `axes_of` do.
+    """
     axes = axes_of(runs)
     sampled = SAMPLE in runs.dims
     chosen = picked(runs)
@@ -64,7 +66,8 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
 def machine_of(runs: xr.Dataset) -> Stage | None:
     """Return the machine around which keys were swept.
 
-    Returns None if keys are tied to others, or if the runs are no study of friso."""
+    Returns None if keys are tied to others, or if the runs are no study of friso.
+    """
     if json.loads(runs.attrs.get("links", "{}")):
         return None
     try:
@@ -76,7 +79,8 @@ def machine_of(runs: xr.Dataset) -> Stage | None:
 def picked(runs: xr.Dataset) -> tuple[np.ndarray, ...]:
     """Return which positions along each axis the page holds, or which samples.
 
-    A map that is too large is thinned evenly."""
+    A map that is too large is thinned evenly.
+    """
     if SAMPLE in runs.dims:
         return pick([runs.sizes[SAMPLE]], MOST)
     return pick([len(axis.places) for axis in axes_of(runs)], MOST)
@@ -115,7 +119,8 @@ def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
     """Return the runs as lines, for each cell.
 
     Each run has the range that shows its final behaviour. Heights are bytes from 0 to HIGHEST, from half a range below
-    it to half a range above it; lines are cut there."""
+    it to half a range above it; lines are cut there.
+    """
     outcome = runs["outcome"]
     of_cell = cells.take(outcome.copy(data=np.arange(outcome.size).reshape(outcome.shape)))
     deviations, late = drawn.deviations[of_cell], drawn.late[of_cell]
@@ -131,7 +136,8 @@ def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
 def _axis(axis: CellAxis, positions: np.ndarray, flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return an axis with its values, and where the machine with the keys `flat` stands.
 
-    The machine's place is null beyond the ends of the axis."""
+    The machine's place is null beyond the ends of the axis.
+    """
     values = axis.positions[positions]
     factor, unit = choose(axis.positions, axis.unit, log=axis.log)
     own = None if axis.words else flat.get(axis.key)

@@ -32,7 +32,8 @@ def map_figure(runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, f
 
     Samples are drawn as points. `runs` is what friso.sweep returns, and `metric` a variable of it. `marker` is the
     evaluation point: SI values or words by key. Raises ValueError for a missing metric, runs without dimensions, or a
-    marker that lacks an axis."""
+    marker that lacks an axis.
+    """
     axes, colouring = axes_of(runs), look(runs, metric)
     caption, columns = "", 1
     if SAMPLE in runs.dims:
@@ -67,7 +68,8 @@ def map_panel(
 
     The first axis points to the right. Arguments are as for `map_figure`. By default, the title is the variable with
     the values at which a larger map was cut. Raises ValueError for runs without exactly two axes, and as `map_figure`
-    does."""
+    does.
+    """
     axes = axes_of(runs)
     if len(axes) != 2 or SAMPLE in runs.dims:
         raise ValueError(
@@ -99,7 +101,8 @@ def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float
 def _edges(x: CellAxis, y: CellAxis, colouring: Look, codes: np.ndarray) -> tuple[Series, ...]:
     """Return the curve that separates cells in which hunting attracts from the others.
 
-    It runs half-way between cells of a map of verdicts. Maps with words on an axis have no such curve."""
+    It runs half-way between cells of a map of verdicts. Maps with words on an axis have no such curve.
+    """
     attracted = [k for k, kind in enumerate(colouring.categories) if kind.label in ATTRACTED]
     if min(codes.shape) < 2 or x.words or y.words or not attracted:
         return ()

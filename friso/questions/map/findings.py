@@ -43,7 +43,8 @@ def headline(runs: xr.Dataset, name: str) -> str:
     """Return the first statement of a map: where, and in which share of it, its finding holds.
 
     The finding is what the metric is asked for (`Metric.findings`). Doubts follow. It is empty if the runs have no
-    outcome."""
+    outcome.
+    """
     every = metrics()
     asked = name if name in runs and name in every and every[name].findings else ""
     asked = asked or (every[name].answered_by if name in every else "outcome")
@@ -104,7 +105,8 @@ def _flags(runs: xr.Dataset, name: str, words: tuple[str, ...]) -> tuple[np.ndar
 def _box(axis: CellAxis, cells: np.ndarray) -> np.ndarray:
     """Mark the positions between the first and the last at which a finding holds.
 
-    On an axis of words, only the words at which it holds are marked."""
+    On an axis of words, only the words at which it holds are marked.
+    """
     held = axis.positions[cells]
     if axis.words:
         return np.isin(axis.positions, held)
@@ -135,7 +137,8 @@ def _percent(part: int, total: int) -> str:
 def verification(runs: xr.Dataset) -> str:
     """Say how many checked outcomes survive a tighter tolerance, with the 95 % interval.
 
-    The interval is that of Clopper and Pearson."""
+    The interval is that of Clopper and Pearson.
+    """
     checked = int(runs.attrs.get("verified_cells", 0))
     if not checked:
         return "Not verified: no outcome was checked at a tighter tolerance."
@@ -197,7 +200,8 @@ def _extent(runs: xr.Dataset) -> str:
 def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
     """Return all sentences for the terminal.
 
-    An unstable loop comes first, then the share of the map that swings or hunts."""
+    An unstable loop comes first, then the share of the map that swings or hunts.
+    """
     words = "; ".join(filter(None, (tally(runs, name) for name in tallied())))
     size = " x ".join(map(str, study.shape))
     reasons = [f"{count} cells without a result: {reason}" for reason, count in failures(runs).items()]
@@ -209,7 +213,8 @@ def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
 def own_place(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
     """Say how far the stage as given is from the next edge of hunting along each axis.
 
-    Nothing is said for a stage that is not on the map, or a map without verdicts."""
+    Nothing is said for a stage that is not on the map, or a map without verdicts.
+    """
     if (
         metric == "outcome"
         or metric not in worded(verdicts=True)
@@ -247,7 +252,8 @@ def _spans(axis: CellAxis, value: float) -> bool:
 def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
     """Return between which cells along an axis hunting begins or ends, next to a cell.
 
-    A side on which a cell without a verdict lies nearer gives no result."""
+    A side on which a cell without a verdict lies nearer gives no result.
+    """
     attracted = np.isin(words, ATTRACTED)
     differ = np.flatnonzero((attracted != attracted[at]) | ~np.isin(words, (*ATTRACTED, *_QUIET)))
     ends = [(k, k + 1) for k in differ[differ < at][-1:] if words[k] in (*ATTRACTED, *_QUIET)]

@@ -1,6 +1,7 @@
 """Write the page of a map, which opens offline.
 
-A click on a cell shows its run and the command that repeats it."""
+A click on a cell shows its run and the command that repeats it.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +37,8 @@ PRINTED = ON_PAGE._replace(noted=False)
 def map_files(runs: xr.Dataset, metric: str, rerun: str, draw: Callable[[], Traces | None]) -> dict[str, Content]:
     """Return the figure in all formats and the page of a map, by suffix in the order of `FORMS`.
 
-    `rerun` is as in `map_html`. `draw` makes the runs that the page draws, while the figure is drawn."""
+    `rerun` is as in `map_html`. `draw` makes the runs that the page draws, while the figure is drawn.
+    """
     figure = marked_figure(runs, metric)
     draw_beforehand([figure], [*map(Image, FORMATS), PRINTED])
     files: dict[str, Content] = {form: partial(save, figure) for form in FORMS[:-1]}
@@ -50,7 +52,8 @@ def map_html(
 
     `drawn` holds the runs of all cells, of which the page draws the chosen one. `rerun` is the command that repeats a
     run, with {indices} for the indices of its cell: "friso simulate --cell map.zarr {indices}". `figure` is the figure
-    of the variable, if it is already drawn. Raises ValueError if {indices} is missing, and as `map_figure` does."""
+    of the variable, if it is already drawn. Raises ValueError if {indices} is missing, and as `map_figure` does.
+    """
     if "{indices}" not in rerun:
         raise ValueError(
             f"rerun: got {rerun!r}, expected {{indices}} in it, e.g. 'friso simulate --cell x {{indices}}'"

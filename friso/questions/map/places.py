@@ -21,7 +21,8 @@ SHOWN = "this machine"
 def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Sequence[str]) -> Figure:
     """Add to a figure over two keys the places of stages that have both keys.
 
-    `stands` gives label and stage. Places outside the axes are left out."""
+    `stands` gives label and stage. Places outside the axes are left out.
+    """
     places = []
     for label, stage in stands:
         right, up = ({**dict.fromkeys(SCALINGS, 1.0), **stage.flat()}.get(key) for key in keys)

@@ -71,7 +71,8 @@ LARGE = 10_000_000
 class SweepAnswer(Answer):
     """The runs of a sweep; `result` is an xarray.Dataset with a dimension for each axis.
 
-    `metric` colours its map. `store` is the folder that holds it, or None."""
+    `metric` colours its map. `store` is the folder that holds it, or None.
+    """
 
     study: Study
     metric: str
@@ -91,7 +92,8 @@ class SweepAnswer(Answer):
     def cell(self, *numbers: int | str) -> Stage:
         """Return the stage of a cell, by its numbers along the axes.
 
-        Both ``answer.cell(3, 4)`` and ``answer.cell("3 4")`` are understood."""
+        Both ``answer.cell(3, 4)`` and ``answer.cell("3 4")`` are understood.
+        """
         parts = [int(part) for number in numbers for part in str(number).split()]
         return self.study.cell_stage(parts)
 
@@ -130,7 +132,8 @@ class SweepAnswer(Answer):
         """Return the figure and the page beside the store, and the exports.
 
         A map of too many cells has no figure or page. The runs that the page draws are computed here, and reported to
-        `progress`."""
+        `progress`.
+        """
         views = {} if self.store is None else self._views(progress)
         beside = {path_beside(self.store, form): content for form, content in views.items() if self.store is not None}
         return {**beside, **export_files(self.result, [*self.exports])}
@@ -341,7 +344,8 @@ def _another_study(store: Path) -> InputError:
 def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
     """Return the relative tolerance asked for.
 
-    With "auto", it is chosen on a sample of the cells, and logged."""
+    With "auto", it is chosen on a sample of the cells, and logged.
+    """
     settings = StudySettings.current()
     if entry != "auto":
         return tolerance_of(entry)
@@ -361,7 +365,8 @@ def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
 def _crew(workers: int | None, scheduler: Address | None) -> Iterator[Crew]:
     """Provide the workers that run the cells: threads, processes or a Dask cluster.
 
-    Raises InputError for a number of workers that cannot be had."""
+    Raises InputError for a number of workers that cannot be had.
+    """
     if workers is not None and scheduler is not None:
         raise InputError("workers", "--workers and --scheduler", "one of the two", "workers=4")
     most = min(usable_cores(), MOST_PROCESSES)
@@ -389,7 +394,8 @@ def _filled(
     """Run what the store lacks, and return the runs and whether the store can take notes.
 
     If the run ends early, a message says how much is stored and how to resume. A complete store that cannot be written
-    is read instead, unless figures `beside` it have to be noted in it."""
+    is read instead, unless figures `beside` it have to be noted in it.
+    """
     stored = 0
 
     def counted(done: int, total: int, what: str, /) -> None:

@@ -78,7 +78,8 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
     """Return the study asked for.
 
     Raises InputError for unusable options, or for a study of more than `most` cells; the message then gives its
-    cost."""
+    cost.
+    """
     settings = StudySettings.current()
     axes, links, samples = varied.axes, varied.links, varied.samples
     if not axes and not isinstance(samples, Samples):
@@ -102,7 +103,8 @@ def stored_study(store: Path, metric: str | None, most: int | None) -> tuple[Stu
     """Return the study of a store that is resumed, and the metric that colours its map.
 
     Without a `metric`, the store's own is used. Raises InputError for a metric that the store does not hold, or if more
-    than `most` cells are unfinished."""
+    than `most` cells are unfinished.
+    """
     from friso.studies.metadata import checked_metadata
     from friso.studies.store import Store, read_store
 
@@ -125,7 +127,8 @@ def stored_study(store: Path, metric: str | None, most: int | None) -> tuple[Stu
 def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
     """Return the study with all metrics of its store, if the store differs in nothing else.
 
-    Raises InputError if the store lacks some of the metrics asked for and must not be replaced."""
+    Raises InputError if the store lacks some of the metrics asked for and must not be replaced.
+    """
     from friso.studies.store import read_store
     from friso.studies.store_folder import remove_leftovers
 
@@ -178,7 +181,8 @@ def drawn_runs(study: Study, runs: xr.Dataset, progress: Progress = silent) -> T
 def place_of_store(folder: str | os.PathLike[str]) -> Path:
     """Return the folder of a store, with a name of its own even for "." or "..".
 
-    Raises InputError for a folder without a name, such as the root."""
+    Raises InputError for a folder without a name, such as the root.
+    """
     path = Path(folder)
     path = path if path.name not in ("", "..") else Path(os.path.abspath(path))
     if not path.name:
@@ -198,7 +202,8 @@ def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite
     """Refuse to write over anything but earlier results of this study.
 
     `beside` is the example of the refusal if figure and page are written beside the store. Raises InputError for
-    foreign files, and StoreError for a store with another study."""
+    foreign files, and StoreError for a store with another study.
+    """
     from friso.studies.metadata import is_store
     from friso.studies.store import refuse_other
 
@@ -223,7 +228,8 @@ def write_beside(
     first, if it can.
 
     Raises StoreError if another process holds the store or nothing can be noted. Raises OSError if a file cannot be
-    written."""
+    written.
+    """
     from friso.studies.metadata import annotate_metadata
     from friso.studies.store_folder import lock_store
 
@@ -254,7 +260,8 @@ def _views(store: Path) -> list[Path]:
 def _own_files(store: Path, exports: Iterable[Path]) -> list[Path]:
     """Return the files beside a store that are still as the store wrote them.
 
-    They are recognised by the digests that the store notes."""
+    They are recognised by the digests that the store notes.
+    """
     noted = _noted_digests(store)
     named = {path: noted[path.name] for path in (*_views(store), *exports) if path.name in noted}
     return [path for path, earlier in named.items() if (digest := _digest(path)) is not None and digest in earlier]

@@ -119,7 +119,8 @@ def words_of(runs: xr.Dataset, name: str) -> tuple[np.ndarray, list[str]]:
 def text_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
     """Count the cells with each text of a variable, the most frequent first.
 
-    A missing variable gives no counts."""
+    A missing variable gives no counts.
+    """
     if name not in runs:
         return {}
     cells: Counter[str] = Counter()
@@ -143,7 +144,8 @@ def failures(runs: xr.Dataset) -> dict[str, int]:
 def word_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
     """Count the cells with each word of a metric, in the order of the legend.
 
-    A missing metric gives no counts."""
+    A missing metric gives no counts.
+    """
     cells = {word_category(name, word): number for word, number in text_counts(runs, name).items()}
     return {category.label: cells[category] for category in in_order(cells)}
 

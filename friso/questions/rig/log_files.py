@@ -21,7 +21,8 @@ UNITS = {"force": "N", "disturbance": "N", "velocity": "m/s", "cart_velocity": "
 def log_files(log: RigLog, stage: Stage) -> dict[str, Content]:
     """Return a log as the drive writes it, and how to read it.
 
-    The true signals and the stage of the log go into a folder of their own."""
+    The true signals and the stage of the log go into a folder of their own.
+    """
     heading, name = f"friso rig, seed {log.seed}", f"{log.name}.csv"
     csv = partial(write_csv, interval=log.interval)
     files: dict[str, Content] = {name: partial(csv, signals=log.logged, heading=heading)}
@@ -53,7 +54,8 @@ def stage_text(stage: Stage, seed: int) -> str:
 def write_csv(path: Path, interval: float, signals: abc.Mapping[str, np.ndarray], heading: str) -> None:
     """Write signals of shape (n,) by role, every `interval` [s], below a line of comment.
 
-    Numbers have twelve digits, which is a nanometre in a kilometre. Raises OSError if the file cannot be written."""
+    Numbers have twelve digits, which is a nanometre in a kilometre. Raises OSError if the file cannot be written.
+    """
     names = ["time [s]", *(f"{role} [{unit_shown(UNITS.get(role, 'm'))}]" for role in signals)]
     count = len(next(iter(signals.values())))
     columns = np.column_stack([np.arange(count) * interval, *signals.values()])

@@ -20,7 +20,8 @@ class OutcomeView:
     """The view of an experiment's outcome.
 
     It has sentences for the engineer who decides, figures arranged as in the thesis, and numbers for the JSON
-    document."""
+    document.
+    """
 
     sentences: Callable[[Outcome], list[str]]
     figures: Callable[[Outcome], list[Figure]]
@@ -35,7 +36,8 @@ under the name of its experiment."""
 def view_of(experiment: str) -> OutcomeView:
     """Return the view of an experiment, or one that shows only its logs.
 
-    A view of another package that cannot be used is reported and left out, because the experiment has run by then."""
+    A view of another package that cannot be used is reported and left out, because the experiment has run by then.
+    """
     try:
         if experiment in OUTCOME_VIEWS:
             return OUTCOME_VIEWS[experiment]

@@ -16,7 +16,8 @@ from friso.studies.rig.outcome import Outcome
 def rig_files(outcome: Outcome) -> dict[str, Content]:
     """Return the page, the logs and how to read them, and every figure in all formats.
 
-    The truth behind the logs goes into a folder of its own."""
+    The truth behind the logs goes into a folder of its own.
+    """
     drawn = rig_figures(outcome)
     images = pictures(drawn)
     logs = {name: content for log in outcome.logs for name, content in log_files(log, outcome.stage).items()}

@@ -9,7 +9,8 @@ from friso.studies.rig.outcome import Outcome
 def sentences(outcome: Outcome) -> list[str]:
     """Return the results for the engineer who decides, the answer first.
 
-    Logs that stopped early are reported before."""
+    Logs that stopped early are reported before.
+    """
     return [*_failures(outcome), *view_of(outcome.experiment).sentences(outcome)]
 
 

@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 class SimulateAnswer(Answer):
     """A time response; `result` is the Dataset over `time` [s].
 
-    A variable is read as ``answer["position"]``."""
+    A variable is read as ``answer["position"]``.
+    """
 
     stage: Stage
     name: str
@@ -160,7 +161,8 @@ def simulate(
 def _cell(store: Path, numbers: list[str], changes: Changes) -> tuple[Stage, str, float]:
     """Return the stage of a cell, a name for it, and the tolerance of its study.
 
-    Raises InputError for numbers that name no cell of the study."""
+    Raises InputError for numbers that name no cell of the study.
+    """
     from friso.studies.store import read_store
     from friso.studies.study import study_of
 

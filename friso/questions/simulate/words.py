@@ -16,7 +16,8 @@ GROWN = 1.1
 def conclusion(name: str, measures: Measures, deviation: np.ndarray) -> str:
     """Say what the run of a stage does.
 
-    `deviation` holds samples of its deviation [m], evenly over time, shape (n,)."""
+    `deviation` holds samples of its deviation [m], evenly over time, shape (n,).
+    """
     before, late = np.split(np.abs(deviation), [int(WINDOW * len(deviation))])
     grows = bool(late.max() > GROWN * before.max(initial=0.0))
     clauses = {
@@ -36,7 +37,8 @@ def conclusion(name: str, measures: Measures, deviation: np.ndarray) -> str:
 def _restless(farthest: float, final: float, moved: float, grows: bool) -> str:
     """Describe a run that is off its reference at the end but does not swing.
 
-    In its last quarter it `moved` [m] and was off by at most `farthest` [m]. At the end it is off by `final` [m]."""
+    In its last quarter it `moved` [m] and was off by at most `farthest` [m]. At the end it is off by `final` [m].
+    """
     if grows:
         return (
             f"goes ever farther off its reference, by up to {with_unit(farthest, 'm')} in the last quarter of the run"
@@ -48,7 +50,8 @@ def _restless(farthest: float, final: float, moved: float, grows: bool) -> str:
 def _settling(measures: Measures) -> str:
     """Write how long after the last corner of the reference the stage stays within the bands.
 
-    Settling at the far end of a move there and back is named if it takes longer."""
+    Settling at the far end of a move there and back is named if it takes longer.
+    """
     (fine, coarse), (last_fine, last_coarse) = (
         tuple(map(_value, times)) for times in (measures.settling_time, measures.in_the_end)
     )

@@ -15,7 +15,8 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
     """Return the JSON document in SI, with the unit as suffix of each key.
 
     A settling time is null if it is never reached. The upper end of its interval is also null if the machines are too
-    few to bound it."""
+    few to bound it.
+    """
     goal = tuning.goal
     first, *further = answer(tuning)
     return plain_json(

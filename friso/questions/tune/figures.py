@@ -78,7 +78,8 @@ def drawn_stages(tuning: Advice) -> list[ShownRemedy]:
     """Return the stages that are drawn, with their lines.
 
     These are the stage as it is, the least change and the fastest remedy, with the controller alone and with a joint.
-    If none works, remedies that are not sure to work are drawn."""
+    If none works, remedies that are not sure to work are drawn.
+    """
     lines: list[ShownRemedy] = [(tuning.stage, None, RemedyLine("as it is", INK, "solid"))]
     for outcome in _shown(tuning):
         assert outcome.stage is not None
@@ -109,7 +110,8 @@ def _name(outcome: RemedyOutcome) -> str:
 def _response(tuning: Advice, lines: Lines) -> Panel:
     """Return the panel of the deviation after the move, for each stage drawn.
 
-    The range shows what the stage as it is does in the end."""
+    The range shows what the stage as it is does in the end.
+    """
     flat = tuning.stage.flat()
     corner, series, shown_to = float(last_corner(flat)), [], 20 * tuning.goal.within
     for stage, outcome, line in lines:
@@ -170,7 +172,8 @@ def _windows(tuning: Advice) -> list[Panel]:
 def _sensitivity(tuning: Advice, lines: Lines) -> Panel:
     """Return the panel of the largest sensitivity of the limit cases.
 
-    The loops include the drive as built, up to half its sampling rate, just as the margins do."""
+    The loops include the drive as built, up to half its sampling rate, just as the margins do.
+    """
     omega, series = np.geomspace(1.0, 2e4, 600), []
     for stage, _, line in lines:
         built = tuning.complete(stage)

@@ -27,7 +27,8 @@ OF_LEAVES = "-of-leaf-springs"
 def tune_files(tuning: Advice) -> dict[str, Content]:
     """Return the stage files, the page, and every figure in all formats.
 
-    `tuned.toml` is the least change that works."""
+    `tuned.toml` is the least change that works.
+    """
     figures = tune_figures(tuning)
     images = pictures(figures)
     return {**stage_files(tuning), "tune.html": page(tuning, figures), **images}

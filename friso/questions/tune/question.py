@@ -70,7 +70,8 @@ class TuneAnswer(Answer):
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the commands that design or check the leaf springs of an isolator.
 
-        There are none if `friso design` does not know the controller."""
+        There are none if `friso design` does not know the controller.
+        """
         from friso.design_method.prepare import check_designable
         from friso.questions.tune.page import NOT_SURE, OF_LEAVES
 

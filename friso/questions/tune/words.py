@@ -106,7 +106,8 @@ def slowest_time(measured: Performance, goal: Goal) -> str:
 def changes(before: Stage, after: Stage) -> list[str]:
     """List the keys that differ, with their values before and after.
 
-    Texts and removed keys are listed for the controller only."""
+    Texts and removed keys are listed for the controller only.
+    """
     old, new = before.flat(), after.flat()
     keys = numeric_keys(new)
     numbers = [_change(key, old.get(key), new[key], keys[key].unit) for key in new if _changes(key, old, new, keys)]
@@ -399,7 +400,8 @@ def failing(tuning: Advice) -> list[str]:
 def _met_by_another(outcome: RemedyOutcome, tuning: Advice) -> bool:
     """Tell whether another working remedy changes the bandwidth alone.
 
-    The search for a bandwidth then found no setting although one exists."""
+    The search for a bandwidth then found no setting although one exists.
+    """
     key = tuning.stage.controller.bandwidth_key
     if outcome.stage is not None or key is None or [v.name for v in outcome.remedy.variables] != [BANDWIDTH]:
         return False
@@ -527,7 +529,8 @@ def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
 def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
     """Write the range of a number in which the remedy still works, all else as tuned.
 
-    The bandwidth is given by its key, or by where the loop last crosses 0 dB."""
+    The bandwidth is given by its key, or by where the loop last crosses 0 dB.
+    """
     stage, name, ends = outcome.stage, window.name, np.array([window.low, window.high])
     assert stage is not None
     if name == BANDWIDTH:

@@ -1,7 +1,8 @@
 """Turn a figure in SI units into the arrays that are drawn.
 
 Units get prefixes, lines are thinned, and limits are laid out. Both renderers start here, so that they draw the same
-arrays."""
+arrays.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +45,8 @@ def cell_edges(centres: Array, *, log: bool = False) -> Array:
     """Return the edges, shape (n + 1,), of the cells around ascending centres, shape (n,).
 
     Edges lie half-way between centres, on a logarithmic axis by ratio. A single cell reaches half its value, or 0.5, to
-    both sides; a single logarithmic one reaches a factor of two."""
+    both sides; a single logarithmic one reaches a factor of two.
+    """
     if log:
         return np.exp(cell_edges(np.log(centres))) if len(centres) > 1 else np.array([centres[0] / 2, centres[0] * 2])
     if len(centres) == 1:
@@ -57,14 +59,16 @@ def cell_edges(centres: Array, *, log: bool = False) -> Array:
 def colour_prefix(field: Coloured) -> tuple[float, str]:
     """Return factor and prefixed unit for the numbers of a map or cloud.
 
-    Its limits decide, or else all its numbers."""
+    Its limits decide, or else all its numbers.
+    """
     return choose(field.z if field.limits is None else np.array(field.limits), field.unit, log=field.log)
 
 
 def colour_key(figure: Figure) -> tuple[list[Category], list[Markers]]:
     """Return the categories and markers of all panels with maps or clouds, for one legend.
 
-    Only categories that occur are included, each once."""
+    Only categories that occur are included, each once.
+    """
     panels = [panel for panel in figure.panels if panel.coloured]
     categories = [
         field.categories[int(code)]
@@ -90,7 +94,8 @@ WORDS = 12
 def word_ticks(axis: Axis) -> tuple[list[int], list[str]]:
     """Return positions and words at an axis of words.
 
-    Only every second, third, ... word is written if there are more than `WORDS`."""
+    Only every second, third, ... word is written if there are more than `WORDS`.
+    """
     positions = list(range(0, len(axis.words), -(-len(axis.words) // WORDS)))
     return positions, [axis.words[position] for position in positions]
 

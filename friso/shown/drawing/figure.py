@@ -2,7 +2,8 @@
 
 An analysis answers with a `Figure`, and a renderer draws it. All data stand in the unit of their axis, which is an SI
 unit when the figure is made. `friso.shown.drawing.drawable` picks the prefix and thins the lines, once for both
-renderers."""
+renderers.
+"""
 
 from __future__ import annotations
 
@@ -83,7 +84,8 @@ class Markers:
 class Band:
     """The area between `low` and `high` over x, filled and never thinned.
 
-    All arrays are finite and of shape (n,)."""
+    All arrays are finite and of shape (n,).
+    """
 
     x: Array
     low: Array
@@ -102,7 +104,8 @@ class Band:
     def outline(self) -> tuple[Array, Array]:
         """Return the closed line around the band, each coordinate of shape (2 n + 1,).
 
-        It runs along the top, and back along the bottom."""
+        It runs along the top, and back along the bottom.
+        """
         there_and_back = np.concatenate([self.x, self.x[::-1], self.x[:1]])
         return there_and_back, np.concatenate([self.high, self.low[::-1], self.high[:1]])
 
@@ -121,7 +124,8 @@ class Limit:
 class Category:
     """A word in place of a number, with one flat colour.
 
-    It is a verdict, or the reason why there is no number."""
+    It is a verdict, or the reason why there is no number.
+    """
 
     label: str
     colour: str

@@ -1,7 +1,8 @@
 """Make images of figures for files and pages.
 
 A command that writes files has its figures drawn in other processes (`friso.shown.drawing.artist`) while it works. A
-figure takes up to half a second, and matplotlib as long to load."""
+figure takes up to half a second, and matplotlib as long to load.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ PROGRAM, MOST = "friso.shown.drawing.artist", 2
 class Image(NamedTuple):
     """A form of a figure: its format, one of FORMATS, and whether it has heading and note.
 
-    Without them, the image is cut off below the heading and above the note."""
+    Without them, the image is cut off below the heading and above the note.
+    """
 
     form: str
     headed: bool = True
@@ -64,7 +66,8 @@ def draw_beforehand(figures: Iterable[Figure], images: Iterable[Image]) -> None:
 def drawing_beside() -> Iterator[Artists | None]:
     """Let other processes draw figures in the `with` block.
 
-    The first process loads what it needs at once. Without a second core, no process is started."""
+    The first process loads what it needs at once. Without a second core, no process is started.
+    """
     if usable_cores() < 2:
         yield None
         return
@@ -102,7 +105,8 @@ class Artists:
     def drawn(self, figure: Figure, wanted: Image) -> bytes | None:
         """Return an image that was begun, once it is ready.
 
-        Returns None for any other image, or if the process that drew it has ended."""
+        Returns None for any other image, or if the process that drew it has ended.
+        """
         begun = self._begun.get((id(figure), wanted))
         return begun[1].result().get(wanted) if begun else None
 

@@ -96,7 +96,8 @@ def add_footer(
 ) -> None:
     """Draw the legend of all maps and clouds, and the note below it.
 
-    Both stand in the strip that `footer_height` reserved."""
+    Both stand in the strip that `footer_height` reserved.
+    """
     height = float(canvas.get_figheight())
     categories, markers = colour_key(figure)
     lines = note_lines(figure, width)

@@ -1,7 +1,8 @@
 """Draw figures on paper with matplotlib: PNG, SVG and PDF, with equal bytes on every run.
 
 The user's matplotlibrc does not matter: everything is drawn under matplotlib's defaults and the style below. Texts are
-drawn as they stand: a dollar sign in a stage's name starts no formula."""
+drawn as they stand: a dollar sign in a stage's name starts no formula.
+"""
 
 from __future__ import annotations
 
@@ -93,7 +94,8 @@ _SYMBOLS: dict[str, dict[str, Any]] = {
 def render(figure: Figure) -> Canvas:
     """Draw a figure on a matplotlib canvas.
 
-    Its lines carry the arrays of `drawable(figure)`, in that order."""
+    Its lines carry the arrays of `drawable(figure)`, in that order.
+    """
     with _style():
         prepared = drawable(figure)
         heading = ": ".join(text for text in (prepared.subject, prepared.title) if text)
@@ -115,7 +117,8 @@ def render(figure: Figure) -> Canvas:
 def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
     """Draw the panels on given axes, one each, or on a new figure of pyplot; return the axes.
 
-    Raises InputError unless there is one axes for each panel."""
+    Raises InputError unless there is one axes for each panel.
+    """
     prepared = drawable(figure)
     if axes is None:
         from matplotlib import pyplot
@@ -137,7 +140,8 @@ def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
 def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:
     """Return the figure as the bytes of a file, with or without heading and note.
 
-    `form` is one of FORMATS. Raises ValueError for any other."""
+    `form` is one of FORMATS. Raises ValueError for any other.
+    """
     if form not in FORMATS:
         raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(FORMATS)}, e.g. 'png'")
     with _style():
@@ -159,7 +163,8 @@ class _LaidOut:
     def image(self, form: str, headed: bool, noted: bool) -> bytes:
         """Return the figure as the bytes of a file.
 
-        Page and file show one drawing of the same lines and letters."""
+        Page and file show one drawing of the same lines and letters.
+        """
         height = self.canvas.get_figheight()
         low = 0.0 if noted else LINE * len(self.notes)
         high = height - (HEADER_HEIGHT if self.heading and not headed else 0.0)
@@ -211,7 +216,8 @@ def _letters_alone() -> Iterator[None]:
     """Embed fonts without the tables for placing letters.
 
     To cut these tables down to the letters that occur would take two thirds of the time of a PDF. Matplotlib sets the
-    options of FontTools, so they are replaced in the `with` block."""
+    options of FontTools, so they are replaced in the `with` block.
+    """
     from fontTools import subset
 
     usual = subset.Options
@@ -231,7 +237,8 @@ def _letters_alone() -> Iterator[None]:
 def _laid_out(figure: Figure) -> _LaidOut:
     """Lay a figure out, and keep the last figures for their next format.
 
-    A page shows a figure that is written as a file, too."""
+    A page shows a figure that is written as a file, too.
+    """
     for kept in tuple(_last):
         if kept.figure is figure:
             return kept
@@ -316,7 +323,8 @@ def _ticks(axes: Axes, panel: Panel, width: float) -> None:
 def _decades(axis: Any, even: Locator) -> None:
     """Set the ticks of a logarithmic axis.
 
-    They stand at powers of ten, also at 2 and 5 over a few decades, and evenly within one decade."""
+    They stand at powers of ten, also at 2 and 5 over a few decades, and evenly within one decade.
+    """
     low, high = axis.get_view_interval()
     few = high < 1000 * low
     fine = even if high < 10 * low else LogLocator(subs=(1.0, 2.0, 5.0))
@@ -328,7 +336,8 @@ def _decades(axis: Any, even: Locator) -> None:
 def _power_of_ten(value: float, _: int | None = None) -> str:
     """Return the label of a tick at a power of ten, in letters.
 
-    Formulas would take a tenth of the time of a figure."""
+    Formulas would take a tenth of the time of a figure.
+    """
     return "10" + str(round(math.log10(value))).translate(_RAISED)
 
 
@@ -368,7 +377,8 @@ def _legend_rows(labels: list[str], width: float) -> int:
 def _legend_columns(labels: list[str], width: float) -> int:
     """Return how many columns of a legend fit into `width` [inch].
 
-    An inch holds 12 letters; line and gap take 7 of them."""
+    An inch holds 12 letters; line and gap take 7 of them.
+    """
     room = 12 * (width - 0.9)
     for columns in range(len(labels), 1, -1):
         rows = -(-len(labels) // columns)

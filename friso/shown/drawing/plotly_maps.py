@@ -78,7 +78,8 @@ def _layer(panel: Panel, field: Coloured, values: Array, colouring: dict[str, An
 def _cells(centres: Array, axis: Axis) -> Array:
     """Return the centres or edges of cells along an axis, as plotly needs them.
 
-    Plotly finds edges between centres as `cell_edges` does, but not those of a single cell."""
+    Plotly finds edges between centres as `cell_edges` does, but not those of a single cell.
+    """
     return cell_edges(centres, log=axis.log) if len(centres) == 1 else centres
 
 
@@ -122,7 +123,8 @@ def key_traces(figure: Figure, legend: str) -> list[dict[str, Any]]:
 def key_rows(labels: Sequence[str], width: int) -> int:
     """Return the rows of a legend of some width [px].
 
-    Entries stand in columns as wide as the longest."""
+    Entries stand in columns as wide as the longest.
+    """
     entry = KEY_MARK + KEY_LETTER * max(map(len, labels), default=0)
     return math.ceil(len(labels) / max(1, int(width / entry)))
 
@@ -130,7 +132,8 @@ def key_rows(labels: Sequence[str], width: int) -> int:
 def footer(figure: Figure, legend: str, width: int) -> tuple[int, dict[str, Any], list[dict[str, Any]]]:
     """Return the area below the panels: its height [px], its legend by name, and its note.
 
-    The note is broken at a width [px] and given as annotations."""
+    The note is broken at a width [px] and given as annotations.
+    """
     lines = [line for part in figure.note.splitlines() for line in textwrap.wrap(part, int(width / _LETTER))]
     note = LINE * len(lines) + 6 if lines else 0
     below = {"x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "xref": "paper", "yref": "paper"}

@@ -2,7 +2,8 @@
 
 A page holds plotly's script once (`script()`) and any number of fragments (`fragment(figure)`). Their elements are
 named after the figure, so that equal figures give equal bytes. Both are compressed; `page.js` unpacks and draws them in
-the browser."""
+the browser.
+"""
 
 from __future__ import annotations
 
@@ -63,7 +64,8 @@ def script() -> str:
 def fragment(figure: Figure) -> str:
     """Return the figure as an HTML element with its packed data.
 
-    The data hold what plotly draws, and the layout and places of colour bars on a narrow screen."""
+    The data hold what plotly draws, and the layout and places of colour bars on a narrow screen.
+    """
     narrow = narrow_parts(figure)  # its traces are those of the wide one but for their colour bars' places
     narrow["layout"] = _checked([], narrow["layout"]).to_plotly_json()["layout"]
     drawn = _on_both(render(figure).to_plotly_json(), narrow)
@@ -93,7 +95,8 @@ def _single(part: Any) -> Any:
     """Return arrays with the precision of a screen, half as long as those of the engine.
 
     The first bytes of all numbers stand before the second ones, which packs better; `page.js` puts them together.
-    Numbers that are not finite become null."""
+    Numbers that are not finite become null.
+    """
     if isinstance(part, dict) and part.get("dtype") == "f8":
         numbers = np.frombuffer(base64.b64decode(part["bdata"]), "<f8").astype("<f4")
         planes = base64.b64encode(numbers.view(np.uint8).reshape(-1, 4).T.tobytes()).decode("ascii")
@@ -125,7 +128,8 @@ def parts(figure: Figure, width: int = WIDE) -> dict[str, Any]:
     """Return traces and layout as plain dictionaries that hold NumPy arrays.
 
     Plotly does not validate them, which would take ten times as long as making them. `width` is the least width [px]
-    for the axes of all columns."""
+    for the axes of all columns.
+    """
     return _laid_out(drawable(figure), width)
 
 
@@ -172,7 +176,8 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
 class _Head:
     """The part above the axes of a panel: the lines of its title, and the rows of its legend.
 
-    Entries of the legend stand one below the other if they are `stacked`."""
+    Entries of the legend stand one below the other if they are `stacked`.
+    """
 
     lines: tuple[str, ...]
     rows: int
@@ -183,7 +188,8 @@ class _Head:
         """Break title and legend of a panel where so many panels share a width [px].
 
         Entries stand in columns as wide as the longest. Plotly breaks a row at the width of the whole figure. Beside
-        other panels, entries that need several rows are therefore stacked."""
+        other panels, entries that need several rows are therefore stacked.
+        """
         labels, own = _labels(panel), width // panels
         rows = key_rows(labels, own)
         stacked = panels > 1 and rows > 1
@@ -198,7 +204,8 @@ class _Head:
     def over(self, left: float, top: float) -> dict[str, Any]:
         """Return the legend as plotly takes it, above axes at a place in shares of the figure.
 
-        The title stands above the entries, which take fewer rows if there is more room."""
+        The title stands above the entries, which take fewer rows if there is more room.
+        """
         place = {"x": left, "xanchor": "left", "y": top, "yanchor": "bottom", "bgcolor": "rgba(0,0,0,0)"}
         kind = {"orientation": "v", "maxheight": 1} if self.stacked else {"orientation": "h"}
         return {**kind, **place, **({"title": {**self._text, "side": "top"}} if self.lines else {})}
@@ -216,7 +223,8 @@ class _Head:
 def _labels(panel: Panel) -> list[str]:
     """Return the entries of a panel's legend.
 
-    There are none for a single line, or where colours stand for numbers."""
+    There are none for a single line, or where colours stand for numbers.
+    """
     labels = [item.label for item in (*panel.bands, *panel.series, *panel.markers) if item.label]
     return labels if len(labels) > 1 and not panel.coloured else []
 
@@ -286,7 +294,8 @@ def _log_ticks(limits: tuple[float, float] | None) -> dict[str, Any]:
     """Return the ticks of a logarithmic axis.
 
     They are decades, with 2 and 5 or more between them if decades are too few; plotly alone would write 0.5 as "5". If
-    even these are too few, there are about five round numbers."""
+    even these are too few, there are about five round numbers.
+    """
     decades = math.log10(limits[1] / limits[0]) if limits else math.inf
     if limits is None or decades >= 2:
         return {"dtick": 1}

@@ -31,7 +31,8 @@ def choose(values: Array, unit: str, *, log: bool = False) -> tuple[float, str]:
 
     The unit follows the kind of axis: "m" is "rad" on a rotary one. The largest magnitude falls between 1 and 1000 if a
     prefix allows it. On a logarithmic axis, the middle of the range does. Units without prefix (kg, m^2) keep the
-    factor 1. Only finite values count."""
+    factor 1. Only finite values count.
+    """
     unit = unit_shown(unit)
     symbol = unit.replace("**", "^").replace("/", "*").split("*")[0]
     text = pretty(unit)
@@ -70,7 +71,8 @@ def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
 def length_at_rest(value: float) -> str:
     """Write how far [m] something still moves.
 
-    Below a nanometre, digits would be the solver's."""
+    Below a nanometre, digits would be the solver's.
+    """
     return axis_shown().text("< 1 nm") if value < SOLVED else with_unit(value, "m")
 
 
@@ -94,7 +96,8 @@ def rounded_down(value: float, digits: int = 3) -> float:
 def range_with_unit(low: float, high: float, unit: str, digits: int = 3) -> str:
     """Write a range [unit] for a table or a sentence, e.g. "1.72 to 10.8 mm".
 
-    A wide range has two prefixes. A range whose ends have equal digits is a single number."""
+    A wide range has two prefixes. A range whose ends have equal digits is a single number.
+    """
     factor, text = choose(np.array([low, high]), unit)
     if 0 < low * factor < 0.01:
         return f"{with_unit(low, unit, digits)} to {with_unit(high, unit, digits)}"
@@ -105,7 +108,8 @@ def range_with_unit(low: float, high: float, unit: str, digits: int = 3) -> str:
 def window_with_unit(low: float, high: float, searched: tuple[float, float], unit: str) -> str:
     """Write the part of a searched range [unit] in words.
 
-    The part is open at an end that is an end of the search."""
+    The part is open at an end that is an end of the search.
+    """
     if (low, high) == searched:
         return f"all from {range_with_unit(low, high, unit)}"
     if low == searched[0]:

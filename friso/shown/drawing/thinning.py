@@ -18,7 +18,8 @@ def thin(x: Array, y: Array, buckets: int = BUCKETS) -> tuple[Array, Array]:
     with the smallest and largest y and x are kept, and the first gap. Of equal samples, the first counts.
 
     Buckets hold equally many samples. If x runs to and fro, as in a loop, they are equally long pieces of the path
-    instead. A state that rests for seconds then takes no samples from one that moves."""
+    instead. A state that rests for seconds then takes no samples from one that moves.
+    """
     if len(x) <= KEPT * buckets:
         return x, y
     starts = _starts(x, y, buckets)
@@ -50,7 +51,8 @@ def _starts(x: Array, y: Array, buckets: int) -> np.ndarray:
 def _steps(values: Array) -> Array:
     """Return the length of each step along one axis as a fraction of the axis, shape (n,).
 
-    Gaps have no length."""
+    Gaps have no length.
+    """
     finite = values[np.isfinite(values)]
     span = float(np.ptp(finite)) if finite.size else 0.0
     if span == 0.0:

@@ -49,7 +49,8 @@ def rails_text(share: Share, count: int) -> str:
 def sentences(outcome: Outcome) -> list[str]:
     """Say at which crossovers peaks are counted and the stage swings on.
 
-    Results on the stage's own rail stand beside results on repeated rails."""
+    Results on the stage's own rail stand beside results on repeated rails.
+    """
     moves: HuntingResult = outcome.result
     first = moves.plotted[0]
     count = len(moves.rails)
@@ -167,7 +168,8 @@ def _reach(traces: list[Trace]) -> float:
 def _crossovers(moves: HuntingResult) -> Figure:
     """Draw the error after the move at several crossovers, with the joint locked and free.
 
-    These are the thesis's crossovers, and the one beyond which no peaks are counted."""
+    These are the thesis's crossovers, and the one beyond which no peaks are counted.
+    """
     panels = []
     reach = _reach([moves.traces["locked", row] for row in moves.plotted])
     for case in COLOURS:
