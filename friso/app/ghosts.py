@@ -35,6 +35,7 @@ def _ghosted(figure: Figure, other: Figure) -> Figure:
     ghosts = {_subject(panel): panel for panel in other.panels}
 
     def both(panel: Panel) -> Panel:
+        """Draw the other figure's lines in grey behind those of a panel."""
         ghost = ghosts.get(_subject(panel))
         if ghost is None or not ghost.series:
             return panel

@@ -130,6 +130,7 @@ def _variant(node: Mapping[str, Any], present: Mapping[str, Any]) -> Mapping[str
     """
 
     def fits(form: Mapping[str, Any]) -> bool:
+        """Tell whether a form of the table allows all that is written."""
         keys = form["properties"]
         words = (present.get(key) in item["enum"] for key, item in keys.items() if key in ("kind", "model"))
         return all(words) and all(key in keys for key in present)

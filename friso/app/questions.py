@@ -46,7 +46,7 @@ KEPT = KeptAnswers()
 
 @dataclass(frozen=True)
 class PageRequest:
-    """What a page asks about: the machine shown, the pinned one, the options, and dropped files.
+    """A question of the page: the machine shown, the pinned one, options, and dropped files.
 
     `pinned` is None if no machine is pinned.
     """
@@ -58,7 +58,10 @@ class PageRequest:
 
     @classmethod
     def of(cls, data: Mapping[str, Any], uploads: Uploads) -> PageRequest:
-        """Read a request from the JSON that a page sent. Raises InputError for data of any other form."""
+        """Read a request from the JSON that a page sent.
+
+        Raises InputError for data of any other form.
+        """
         options = data.get("options") or {}
         if not isinstance(options, Mapping):
             raise InputError("options", type(options).__name__, "options by name")
@@ -67,7 +70,10 @@ class PageRequest:
         return cls(*both, options, uploads)
 
     def chosen(self, *names: str) -> dict[str, Any]:
-        """Return the options of these names that are set. Raises InputError for other names or values."""
+        """Return the options of these names that are set.
+
+        Raises InputError for other names or values.
+        """
         for name, value in self.options.items():
             if name not in names or not isinstance(value, str | int | float | bool | None):
                 raise InputError("options", name, f"one of {', '.join(names) or 'none'}, a text or a number")
@@ -248,12 +254,16 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     shown = {"metric": options.get("metric", "outcome"), "log": options.get("log", False)}
 
     def ranges(count: int) -> dict[str, Any]:
+        """Return the ranges of both axes with so many points."""
         return {name: f"{text}:{count}" for name, text in axes.items()}
 
     def swept(count: int) -> SweepAnswer:
+        """Return the map with so many points along each axis."""
         return KEPT.answer(friso.sweep, asked.machine, work, {**ranges(count), **shown})
 
     def part(answer: SweepAnswer, count: int, edge: Answer | None = None) -> AnswerPart:
+        """Return a map as the page shows it, with the machines and the edge of hunting on it."""
+
         def drawn(figure: Figure) -> Figure:
             return with_edge(_on_map(figure, asked, [*keys.values()]), edge)
 
@@ -309,6 +319,8 @@ def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         return
 
     def part(ghosts: Callable[[Figure], Figure]) -> AnswerPart:
+        """Return the boundary as the page shows it, with ghosts and machines."""
+
         def drawn(figure: Figure) -> Figure:
             return with_places(ghosts(figure), _stands(asked), keys) if len(keys) == 2 else ghosts(figure)
 
@@ -452,6 +464,7 @@ def _answered(function: Callable[..., Answer], command: str) -> Callable[[PageRe
     """Return a function that answers a command about the machine shown."""
 
     def answer(asked: PageRequest, work: Work) -> Answer:
+        """Answer the command with the options that the page gave."""
         options = asked.chosen(*OPTIONS.get(command, ()))
         return KEPT.answer(function, asked.machine, work, options)
 
@@ -459,7 +472,10 @@ def _answered(function: Callable[..., Answer], command: str) -> Callable[[PageRe
 
 
 def _mapped(asked: PageRequest, work: Work) -> Answer:
-    """Return the finest map. The edge of hunting belongs to the command boundary and is left out."""
+    """Return the finest map.
+
+    The edge of hunting belongs to the command boundary and is left out.
+    """
     options = asked.chosen(*OPTIONS["map"])
     options.pop("edge", None)
     options |= {name: f"{options[name]}:{COARSE_TO_FINE[-1]}" for name in ("x", "y") if name in options}

@@ -42,6 +42,7 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
     uploads = Uploads()
 
     async def ask(request: Request) -> Response:
+        """Answer a question of the page in frames, or refuse it with the reason."""
         name = request.path_params["question"]
         job = job_of(name)
         if job is None:
@@ -61,6 +62,7 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
         return JSONResponse(begin)
 
     async def upload(request: Request) -> Response:
+        """Keep a dropped file, or say why it cannot be kept."""
         try:
             return JSONResponse({"file": await uploads.keep(request.path_params["name"], request.stream())})
         except InputError as error:

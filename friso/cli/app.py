@@ -116,7 +116,10 @@ def _nowhere() -> TextIO:
 
 
 def _status() -> int:
-    """Run the command and return the status of the process. Interrupts give 130 or 128 plus the signal."""
+    """Run the command and return the status of the process.
+
+    Interrupts give 130 or 128 plus the signal.
+    """
     signal = 0
     try:
         with interrupts.raising():

@@ -33,7 +33,7 @@ DRAWING = "drawing the page"
 
 @dataclass(frozen=True)
 class Shown:
-    """Where an answer goes: the folder for its files, and the form of what is printed.
+    """Options that say where an answer goes: the folder for its files, and what is printed.
 
     `overwrite` allows the command to replace files in the folder.
     """

@@ -43,7 +43,10 @@ class Command:
     choices: Choices | None = None
 
     def __post_init__(self) -> None:
-        """Check that typer can read the function's options, and that the topic exists. Raises ValueError."""
+        """Check that typer can read the function's options, and that the topic exists.
+
+        Raises ValueError.
+        """
         signature(self.function, eval_str=True)
         if self.topic not in TOPICS:
             raise ValueError(f"topic {self.topic!r} is none of {', '.join(TOPICS)}")
@@ -56,7 +59,10 @@ class Command:
 
 @dataclass(frozen=True)
 class QuestionCommand:
-    """The command of a question. Its options are read from the question's function when needed."""
+    """The command of a question.
+
+    Its options are read from the question's function when needed.
+    """
 
     question: Question
 

@@ -41,6 +41,7 @@ def command_function(question: Question) -> Callable[..., None]:
     """Return the function that typer calls for a question; its signature and docstring are those of the command."""
 
     def command(**values: Any) -> None:
+        """Ask the question by the values of the command's options."""
         ask_by_values(question, values)
 
     parameters = [*_asked(question), *_of_the_shell(question)]
@@ -121,6 +122,7 @@ def _of_the_shell(question: Question) -> Iterator[Parameter]:
     """Yield the options that say where the answer goes: --out, --overwrite, --json and --details."""
 
     def option(name: str, default: Any, annotation: Any, declared: str, help: str, **more: Any) -> Parameter:
+        """Build an option with its default, type and help."""
         info = typer.Option(declared, help=help, **more)
         return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[annotation, info])
 

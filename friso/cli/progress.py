@@ -34,6 +34,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     """
 
     def __init__(self, label: str = "") -> None:
+        """Prepare a bar with a label; nothing is shown before the `with` block begins."""
         self.label = label
         self.begun = WORK_CLOCK.now()
         self.done = self.total = self.before = 0
@@ -115,7 +116,7 @@ def _display(to_go: Callable[[], str]) -> Display:
             return Text(f"{task.speed:,.0f}/s" if task.speed and task.speed >= 1 else "")
 
     class ToGo(ProgressColumn):
-        """How long the rest takes."""
+        """The time that the rest of the work takes."""
 
         def render(self, task: Task) -> Text:
             return Text(to_go())

@@ -122,7 +122,7 @@ def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
 
 @dataclass(frozen=True)
 class GeometryScores:
-    """How good geometries are: drive stiffness [N/m] and first interfering frequency [Hz].
+    """Scores of geometries: drive stiffness [N/m] and first interfering frequency [Hz].
 
     Both have shape (count,). `excess` is the factor by which each requirement is broken, shape (count,
     requirements).

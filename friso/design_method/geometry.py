@@ -18,7 +18,7 @@ SIZES = ("length", "width", "spacing")
 
 @dataclass(frozen=True)
 class Sheet:
-    """What is bought: the number of leaves, the sheet's thickness [m], and its material."""
+    """A purchase for leaf springs: number of leaves, thickness of the sheet [m], and material."""
 
     leaves: float
     thickness: float

@@ -292,7 +292,10 @@ def allowed_crossover(task: LeafTask, candidates: list[Candidate]) -> float:
 
 
 def fit_leaves(base: Stage, task: LeafTask, candidates: list[Candidate], population: Population) -> LeavesAndCrossover:
-    """Choose the softest leaves for the highest crossover that leaves and margins allow. Raises NoDesign."""
+    """Choose the softest leaves for the highest crossover that leaves and margins allow.
+
+    Raises NoDesign.
+    """
     settings = DesignSettings.current()
     target = min(task.spec.limit, allowed_crossover(task, candidates))
     for _ in range(settings.design_rounds):
@@ -322,7 +325,10 @@ def _down(crossover: float) -> float:
 
 
 def _does_not_hunt(fit: LeavesAndCrossover, edges: Corners, need: Need) -> None:
-    """Check the distance of the crossover from the edge of hunting. Raises NoDesign if it is too close."""
+    """Check the distance of the crossover from the edge of hunting.
+
+    Raises NoDesign if it is too close.
+    """
     spec, crossover = fit.task.spec, fit.stage.flat()[CROSSOVER]
     needed = spec.safety.hunting * edges.highest
     if not edges.hunts or needed <= crossover:

@@ -112,7 +112,10 @@ def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str
 
 
 def _friction(spec: Spec, flat: Mapping[str, Any]) -> dict[str, Interval]:
-    """Return the ranges of friction by key. Raises InputError for a key that the friction law lacks."""
+    """Return the ranges of friction by key.
+
+    Raises InputError for a key that the friction law lacks.
+    """
     values = {name: getattr(spec.friction, name) for name in type(spec.friction).model_fields}
     ranges = {name: interval for name, interval in values.items() if interval is not None}
     for name in ranges:

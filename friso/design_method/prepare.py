@@ -97,7 +97,10 @@ def with_leaves(base: Stage, geometry: Geometry, stroke: float) -> Stage:
 
 
 def check_designable(stage: Stage) -> None:
-    """Check that `friso design` can design an isolator for a stage. Raises InputError otherwise."""
+    """Check that `friso design` can design an isolator for a stage.
+
+    Raises InputError otherwise.
+    """
     if stage.axis_kind != LINEAR:
         expected = '"linear": leaf springs guide along a line (friso tune gives any axis a joint)'
         raise InputError("axis.kind", as_toml(stage.axis_kind.name), expected, '[axis] kind = "linear"')

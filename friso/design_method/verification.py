@@ -36,7 +36,7 @@ THERE_AND_BACK = {
 
 @dataclass(frozen=True)
 class MachineOutcomes:
-    """What machines do after their moves, as arrays of shape (count,).
+    """Outcomes of machines after their moves, as arrays of shape (count,).
 
     `words` say what the run does at its end (`friso.hunting.criteria.run_outcome`), with the position window as band. A
     machine rests if it stays in the window for the last quarter of the run. For other machines, the words are those of

@@ -36,7 +36,10 @@ def number_in(text: str) -> float | None:
 
 
 def _worked_out(node: ast.expr) -> float:
-    """Return the value of an arithmetic expression. Raises ValueError for anything but arithmetic of numbers."""
+    """Return the value of an arithmetic expression.
+
+    Raises ValueError for anything but arithmetic of numbers.
+    """
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             return float(value)

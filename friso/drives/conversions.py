@@ -57,7 +57,7 @@ def travel_of(flat: Mapping[str, Any]) -> float | None:
 
 @dataclass(frozen=True)
 class Turn:
-    """What motor and screw convert: the travel of a turn and the force of an ampere.
+    """Travel of a turn and force of an ampere, by which units of motor and load are converted.
 
     `travel` is how far one turn moves the load [m or rad]. `per_ampere` is the force or torque at the load per ampere
     [N/A or N m/A]. Either is None where it is unknown.
@@ -163,6 +163,7 @@ def _per(unit: str, *per: tuple[str, float]) -> Convert:
     """
 
     def others(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+        """Return the gain per ampere and per turn of the motor, as far as these are known."""
         values = []
         if turn.per_ampere:
             shown = kind.unit(unit).replace("N*m", "A", 1) if kind != LINEAR else unit.replace("N", "A", 1)

@@ -61,7 +61,10 @@ class UserAnswers:
                 raise InputError("--set", quoted(key), expected, f"--set {near}=...")
 
     def value(self, key: str, field: Quantity | Number) -> float:
-        """Return an answer as a number in SI. Raises InputError for an answer that does not fit the field."""
+        """Return an answer as a number in SI.
+
+        Raises InputError for an answer that does not fit the field.
+        """
         try:
             return float(field.read(self.texts[key]))
         except InputError as error:

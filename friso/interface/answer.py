@@ -1,4 +1,7 @@
-"""What every function of friso that has a command returns: one `Answer`, read by people, pages and programs alike."""
+"""Define `Answer`, which every function of friso with a command returns.
+
+People, pages and programs read one and the same answer.
+"""
 
 from __future__ import annotations
 

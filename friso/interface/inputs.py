@@ -142,7 +142,10 @@ def mention_unstable_loop(stage: Stage) -> None:
 
 
 def correlations_of(source: StageLike, stage: Stage) -> Correlations:
-    """Return the correlations of uncertain keys, from a file beside the stage file. Raises InputError."""
+    """Return the correlations of uncertain keys, from a file beside the stage file.
+
+    Raises InputError.
+    """
     correlations = Correlations()
     if not isinstance(source, Stage | Mapping) and correlations_file(Path(source)).exists():
         correlations = read_correlations(correlations_file(Path(source)), load(source))
@@ -233,7 +236,10 @@ def pairs_of(values: Changes, name: str, example: str) -> dict[str, str]:
 
 
 def axes_of(axes: Mapping[str, Any], texts: Mapping[str, str | None], example: str) -> dict[str, Any]:
-    """Collect axes from a dictionary and from texts KEY=RANGE, each key once. Raises InputError."""
+    """Collect axes from a dictionary and from texts KEY=RANGE, each key once.
+
+    Raises InputError.
+    """
     every = dict(axes)
     for name, text in texts.items():
         ranges = {} if text is None else pairs_of([text], name, example)

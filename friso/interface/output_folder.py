@@ -204,7 +204,10 @@ def _unwritable(option: str, path: Path, error: OSError, example: str) -> InputE
 def output_folder(
     command: str, folder: Path | None, overwrite: bool, inputs: Sequence[Path] = ()
 ) -> OutputFolder | None:
-    """Return the folder that a command writes into, if any. Raises InputError as `OutputFolder`."""
+    """Return the folder that a command writes into, if any.
+
+    Raises InputError as `OutputFolder`.
+    """
     return None if folder is None else OutputFolder(command, folder, overwrite, inputs)
 
 

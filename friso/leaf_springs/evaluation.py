@@ -14,12 +14,14 @@ from friso.leaf_springs.settings import LeafSpringSettings
 
 @dataclass(frozen=True)
 class Mode:
-    """A mode: its name, frequency [Hz], and displacement as (count, 3) triples at unit modal mass [1/sqrt(kg)]: of the
-    leaves, shape (leaves, points, 3), at even places from cart to stage, and the stage's motion (6,): translation of
-    the reference point (the middle of the leaf ends) and rotation [1/m] about it.
+    """A mode of the mechanism: its name, its frequency [Hz], and its displacements.
 
-    `actuator` and `sensor` [1/sqrt(kg)] tell how far the mode moves where the actuator pushes and where the sensor
-    looks, along the motion; `peak` how far its resonance rises over the line of the stage's mass.
+    Displacements are (count, 3) triples at unit modal mass [1/sqrt(kg)]. Those of the leaves have shape (leaves,
+    points, 3), at even places from cart to stage. The stage's motion (6,) is a translation of its reference point, the
+    middle of the leaf ends, and a rotation [1/m] about it.
+
+    `actuator` and `sensor` [1/sqrt(kg)] tell how far the mode moves along the motion, where the actuator pushes and
+    where the sensor measures. `peak` tells how far its resonance rises over the line of the stage's mass.
     """
 
     name: str

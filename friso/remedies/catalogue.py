@@ -52,7 +52,10 @@ class Remedy:
 
     @property
     def verifiable(self) -> bool:
-        """Tell whether cycles can verify the remedy. They cannot if a dither keeps the stage moving."""
+        """Tell whether cycles can verify the remedy.
+
+        They cannot if a dither keeps the stage moving.
+        """
         return not settings_of(self.stage.flat()).dither
 
     @property

@@ -15,7 +15,7 @@ SHARE = 0.95
 
 @dataclass(frozen=True)
 class Goal:
-    """What a tuned machine must achieve.
+    """The goal that a tuned machine must meet, and the parts that may be changed for it.
 
     A machine is in position `within` [m] of its reference. The slowest 5 % of machines and moves must be there `settle`
     [s] after the reference stands still; None means before the run ends. The actuator may use at most `force_limit`

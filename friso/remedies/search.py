@@ -27,10 +27,11 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class Budget:
-    """How much a search may try: points per variable in a generation, generations, and machines.
+    """The numbers of points, generations and machines that a search may try.
 
-    `refined` generations follow around the best points. Machines for moves and surveys are fewer than the fresh
-    machines on which an answer is measured. `further` machines are added where these leave the answer open.
+    `points` counts the points of a generation for each variable. `refined` generations follow around the best points.
+    Machines for moves and surveys are fewer than the fresh machines on which an answer is measured. `further` machines
+    are added where these leave the answer open.
     """
 
     points: int = 10

@@ -99,10 +99,10 @@ def modulus_margins(
 
 @dataclass(frozen=True)
 class Attraction:
-    """Whether hunting attracts machines, all arrays of shape (points, machines).
+    """The result of a survey of what attracts machines, with arrays of shape (points, machines).
 
-    `attracts` holds for their bandwidth and down to the distance below it. Further arrays tell whether simulations
-    decided that, and whether it is `certain` because nothing else can exist.
+    `attracts` tells whether hunting attracts a machine at its bandwidth or down to the distance below it. Further
+    arrays tell whether simulations decided that, and whether it is `certain` because nothing else can exist.
     """
 
     attracts: np.ndarray

@@ -34,12 +34,11 @@ Certainty = Literal["works", "unsure", "given up", "does not work"]
 
 @dataclass(frozen=True)
 class Performance:
-    """How a stage performs on machines:
+    """Measurements of a stage on machines, in rows of one point.
 
-    `moves`, modulus margins and what attracts, as single rows.
-
-    `own_margin` is the least modulus margin of the stage itself in all settled states. `stiffness` [N/m] is its
-    stiffness against a load. For `further` machines, shape (n,), it is only known whether they meet the whole goal.
+    They are its `moves`, the modulus margins, and what attracts the machines. `own_margin` is the least modulus margin
+    of the stage itself in all settled states. `stiffness` [N/m] is its stiffness against a load. For `further`
+    machines, shape (n,), it is only known whether they meet the whole goal.
     """
 
     moves: Moves

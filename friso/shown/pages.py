@@ -44,12 +44,11 @@ was `computed`, after the version of friso, without the full stop."""
 
 @dataclass(frozen=True)
 class Report:
-    """The page of a `command`: the name at its head, its figures, the stage file and its source, and its contents by
-    name, `values`: those of `CONTENTS`, and what else its template names.
+    """The page of a `command`: name, figures, stage file, and contents by name.
 
-    A template of the command's name, if there is one, extends `page.html`, and changes its blocks: answer, table,
-    figures, footer. It stands in the folder templates of a package, `templates`. `scripted` pages load plotly without
-    figures of their own kind.
+    `values` holds the contents named in `CONTENTS`, and what else the template of the command names. That template, if
+    there is one, extends `page.html` and changes its blocks: answer, table, figures, footer. It stands in the folder
+    templates of the package `templates`. `scripted` pages load plotly without figures of their own kind.
     """
 
     command: str

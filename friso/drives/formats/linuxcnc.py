@@ -111,6 +111,7 @@ def whole(text: str, beside: Beside) -> str:
     """
 
     def taken_in(line: re.Match[str]) -> str:
+        """Return the text that takes the place of an #INCLUDE line."""
         included = beside(line[1])
         return line[0] if included is None else _INCLUDE.sub("", included)
 

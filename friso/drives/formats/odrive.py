@@ -218,7 +218,10 @@ def _fastest(axis: AxisParameters) -> str:
 
 
 def _entries(text: str) -> dict[str, Any]:
-    """Return the entries of a JSON document by their places. Raises InputError for a text that is no JSON."""
+    """Return the entries of a JSON document by their places.
+
+    Raises InputError for a text that is no JSON.
+    """
     try:
         document = json.loads(text)
     except RecursionError:

@@ -14,7 +14,10 @@ from friso.shown.documents import plain_json
 
 
 def bode_document(bode: Bode) -> dict[str, Any]:
-    """Return the JSON document of a linear analysis. Infinite and undefined numbers become null."""
+    """Return the JSON document of a linear analysis.
+
+    Infinite and undefined numbers become null.
+    """
     joint = bode.stage.joint
     state = "given" if joint is None else ("locked" if joint.locked else "free")
     crossover = bode.stage.controller.bandwidth_key is not None

@@ -1,4 +1,7 @@
-"""Is the loop stable, stuck or sliding, and how fast may it be: limit cases, margins, Bode plots."""
+"""Analyse whether the loop is stable, stuck or sliding, and how fast it may be.
+
+The answer holds limit cases, margins and Bode plots.
+"""
 
 from __future__ import annotations
 

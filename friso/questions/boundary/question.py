@@ -1,4 +1,4 @@
-"""Where hunting ends: over one key, or in the plane of two."""
+"""Answer where hunting ends, over one key or in the plane of two."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 
 
 class BoundaryAnswer(Answer):
-    """Where hunting ends: `result` is a `Diagram` over one key or a `Plane` of two.
+    """The values at which hunting ends, over one key or two.
 
-    `texts` holds the ranges as the user gave them.
+    `result` is a `Diagram` over one key or a `Plane` of two. `texts` holds the ranges as the user gave them.
     """
 
     stage: Stage
@@ -132,6 +132,7 @@ def boundary(
     from friso.studies.boundary import boundary as traced_boundary
 
     def begins() -> None:
+        """Report what is computed, and whether the loop is unstable, before the work starts."""
         mention_unstable_loop(chosen)
         progress(0, 0, f"following cycles over {' and '.join(ranges)}")
 

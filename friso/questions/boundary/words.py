@@ -157,10 +157,12 @@ def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
     side, other = ("below", "above") if edge.below else ("above", "below")
 
     def ends(k: int) -> str:
+        """Write the value or range of values at which hunting ends, at a place across."""
         low, high = (along.text(float(column[k]), ROUGHLY) for column in (edge.low, edge.high))
         return low if edge.low[k] == edge.high[k] else f"{low} to {high}"
 
     def at(k: int) -> str:
+        """Write the value of the other key at a place across."""
         return f"{across.key} = {across.text(float(edge.across[k]), ROUGHLY)}"
 
     answer = f"Hunting is possible {side} {along.key} = {ends(0)} at {at(0)}, and {side} {ends(-1)} at {at(-1)}"

@@ -171,6 +171,7 @@ def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
     """
 
     def end(one: MarginEnd | None) -> dict[str, Any] | None:
+        """Return one end of a margin; None if hunting does not change on that side."""
         return one and {"same_at_factor": one.same, "other_at_factor": one.other, "certain": one.certain}
 
     return {

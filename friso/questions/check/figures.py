@@ -93,7 +93,10 @@ _TIME = Axis("Time", "s")
 
 
 def _settling_figure(cases: list[ShownCase]) -> Figure:
-    """Draw the deviation after the move with its counted peaks (thesis, Fig. 5), and the settling."""
+    """Draw the deviation after the move with its counted peaks (thesis, Fig.
+
+    5), and the settling.
+    """
     start, end = _window(cases)
     lines, peaks = [], []
     for item in cases:

@@ -1,4 +1,4 @@
-"""Does the stage hunt: as given, and with its joint locked and free."""
+"""Check whether the stage hunts: as given, and with its joint locked and free."""
 
 from __future__ import annotations
 

@@ -49,6 +49,7 @@ def _of_the_cycle(text: Callable[[Cycle], str]) -> Callable[[Case], str]:
     """Turn a text about a cycle into a text about a case, empty for a case without a cycle."""
 
     def of_the_case(case: Case) -> str:
+        """Write the text about the cycle of a case, or that there is none."""
         cycle = case.judgement.cycle
         return text(cycle) if cycle else NOTHING
 
@@ -176,6 +177,7 @@ def _settled_within(band: float) -> Callable[[Case], str]:
     """Build the text of the settling time into a band [m]."""
 
     def text(case: Case) -> str:
+        """Write the settling time of a case, or why there is none."""
         time = case.settling_time.get(band)
         if time is not None:
             return with_unit(time, "s")

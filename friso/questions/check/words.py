@@ -463,6 +463,7 @@ def _distance(case: Case, edge: Margin) -> float:
     to = edge.quiet * distance
 
     def in_the_way(window: BandwidthWindow) -> bool:
+        """Tell whether a window attracts again between the edge and the bandwidth advised."""
         low, high = window.low, window.high
         if low is None or not edge.factor < low.inside <= to * (1 + ROUGH):
             return False

@@ -1,4 +1,4 @@
-"""The same stage under another friction law, and what could not be kept."""
+"""Put a stage under another friction law, and say what could not be kept."""
 
 from __future__ import annotations
 

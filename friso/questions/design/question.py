@@ -1,4 +1,7 @@
-"""What stops it: leaf springs, stroke, crossover and gains from a specification, tried in simulated moves."""
+"""Design an isolator that stops hunting, and try it in simulated moves.
+
+Leaf springs, stroke, crossover and gains follow from a specification.
+"""
 
 from __future__ import annotations
 

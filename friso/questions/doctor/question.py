@@ -1,4 +1,4 @@
-"""Does friso work on this machine."""
+"""Check whether friso works on this machine."""
 
 from __future__ import annotations
 

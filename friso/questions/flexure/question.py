@@ -1,4 +1,4 @@
-"""How good the leaf springs of a joint are: stiffness, modes, stress."""
+"""Evaluate the leaf springs of a joint: stiffness, modes and stress."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `friso identify` writes: the stage, the correlations beside it, a page that opens offline, and every figure."""
+"""Write the files of `friso identify`: stage, correlations, a page that opens offline, and figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is my machine: a stage file with uncertainties from measured logs."""
+"""Identify a machine from measured logs: a stage file with uncertainties."""
 
 from __future__ import annotations
 
@@ -226,8 +226,9 @@ def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Cha
 
 
 def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]:
-    """List the keys of tables that a stage file lacks, of a stage `made` up around a log, but
-    for those that are set.
+    """List the keys that a stage file lacks and a stage `made` up around a log supplies.
+
+    Keys that the user sets are left out.
     """
     keys_set = changes_of(changes)
     keys = [f"{name}.{key}" for name in lacking for key in made.as_written()[name]]

@@ -1,4 +1,4 @@
-"""What files of logs hold, before anything is identified."""
+"""Show what log files hold, before anything is identified."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LogFiles = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 
 
 class LogsAnswer(Answer):
-    """What files of logs hold.
+    """Contents of log files.
 
     `result` has a `LogContent` for each file that could be read. `errors` says what is wrong with the others.
     """

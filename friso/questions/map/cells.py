@@ -193,7 +193,10 @@ def plane_first(axes: Sequence[CellAxis]) -> list[CellAxis]:
 
 
 def look(runs: xr.Dataset, metric: str) -> Look:
-    """Return how a metric is coloured, be it of words or of numbers. Raises ValueError for what the runs lack."""
+    """Return how a metric of words or of numbers is coloured.
+
+    Raises ValueError for a metric that the runs do not hold.
+    """
     if metric not in coloured(runs):
         raise ValueError(f"metric: got {metric!r}, expected one of {', '.join(coloured(runs))}")
     if metric in worded():

@@ -86,9 +86,9 @@ def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
 
 
 def _flags(runs: xr.Dataset, name: str, words: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a metric has one of the words (a count: is more than 0), and where it has a result.
+    """Return where a metric has one of some words, and where it has a result.
 
-    Both have the shape of the runs; a large store is read in parts.
+    A count holds if it is more than 0. Both arrays have the shape of the runs; a large store is read in parts.
     """
     values = runs[name]
     holds, completed = np.zeros(values.shape, bool), np.zeros(values.shape, bool)

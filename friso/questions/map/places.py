@@ -31,6 +31,7 @@ def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Seque
             places.append(Markers(np.array([right]), np.array([up]), label, colour, "target"))
 
     def marked(panel: Panel) -> Panel:
+        """Add the places that lie within a panel."""
         inside = [one for one in places if _is_on(panel.x, one.x[0]) and _is_on(panel.y, one.y[0])]
         return replace(panel, markers=(*panel.markers, *inside))
 

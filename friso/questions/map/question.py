@@ -1,4 +1,7 @@
-"""Where does it hunt: keys swept over ranges, in memory or in a store that an interrupted study resumes from."""
+"""Sweep keys over ranges and map where a stage hunts.
+
+Results stay in memory, or go into a store from which an interrupted study is resumed.
+"""
 
 from __future__ import annotations
 
@@ -399,6 +402,7 @@ def _filled(
     stored = 0
 
     def counted(done: int, total: int, what: str, /) -> None:
+        """Report progress, and count the cells that are stored."""
         nonlocal stored
         stored = done
         progress(done, total, store.name)

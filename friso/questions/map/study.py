@@ -67,7 +67,10 @@ class Varied:
         latin: bool,
         log: bool,
     ) -> Varied:
-        """Collect axes from a dictionary and from texts KEY=RANGE, each key once. Raises InputError."""
+        """Collect axes from a dictionary and from texts KEY=RANGE, each key once.
+
+        Raises InputError.
+        """
         named = {"x": x, "y": y} | {f"axis {k + 1}": text for k, text in enumerate(more)}
         return cls(
             axes_of(axes, named, AXIS_EXAMPLE), pairs_of(link, "link", 'masses.cart="0.7 * mass"'), samples, latin, log

@@ -1,4 +1,4 @@
-"""A rehearsal: an experiment on the machine as built, its logs, and the truth behind them."""
+"""Rehearse an experiment on the machine as built, with its logs and the truth behind them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run does: the time response of a stage to its motion, or of a cell of a study."""
+"""Simulate one run: the response of a stage to its motion, or a cell of a study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stops it: the least change of controller or joint that settles machines like this one."""
+"""Find what stops hunting: the least change of controller or joint that settles such machines."""
 
 from __future__ import annotations
 
@@ -166,6 +166,7 @@ def _goal(
         raise InputError("keep", str(keep), f"something else than --only {only}, or nothing is left to change", "")
 
     def read(name: str, value: float | str | None, unit: str, example: str, bound: Bound = positive) -> float | None:
+        """Read an option as a number in SI; None if it is not given."""
         quantity = Quantity(unit, bound, example).on(stage.axis_kind)
         text = None if value is None else text_of(value, quantity.unit)
         try:

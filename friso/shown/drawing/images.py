@@ -41,7 +41,10 @@ ON_PAGE = Image("svg", headed=False)
 
 
 def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:
-    """Return an image of a figure, as `Image` describes it. Raises ValueError for an unknown format."""
+    """Return an image of a figure, as `Image` describes it.
+
+    Raises ValueError for an unknown format.
+    """
     if artists := _ARTISTS.get():
         drawn = artists.drawn(figure, Image(form, headed, noted))
         if drawn is not None:
@@ -52,7 +55,10 @@ def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) ->
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure to a path in the format of its suffix. Raises ValueError for an unknown format."""
+    """Write a figure to a path in the format of its suffix.
+
+    Raises ValueError for an unknown format.
+    """
     path.write_bytes(image(figure, path.suffix.removeprefix(".").lower()))
 
 

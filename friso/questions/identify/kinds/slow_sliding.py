@@ -1,4 +1,4 @@
-"""How slow sliding is shown."""
+"""Show the results of slow sliding."""
 
 from __future__ import annotations
 
@@ -36,9 +36,7 @@ def _numbers(result: SlowSliding) -> dict[str, Any]:
 
 
 def _figures(result: SlowSliding, logs: Sequence[Source], name: str) -> list[Figure]:
-    """Draw friction over velocity as it was and as the model has it, and both over time at its
-    end.
-    """
+    """Draw measured and modelled friction, over velocity and over time."""
     if not len(result.model):
         return []
     caption, panels = slow_sliding_caption(result), slow_sliding_panels(result)
