@@ -31,7 +31,10 @@ def frame(value: Any) -> bytes:
 
 
 def figure_on_page(figure: Figure) -> dict[str, Any]:
-    """Return a figure as the page draws it: name, title, caption, and plotly's data for wide and narrow pages."""
+    """Return a figure as the page draws it: name, title, caption and plotly's data.
+
+    The data serve wide and narrow pages.
+    """
     return {
         "name": figure.name,
         "title": figure.title,

@@ -19,7 +19,7 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-"""What a page may load: all from this server, scripts from their files alone. plotly.js makes style elements itself."""
+"""Sources that a page may load: this server alone, scripts only from files. plotly.js makes style elements itself."""
 
 HEADERS = {
     "Content-Security-Policy": POLICY,
@@ -29,7 +29,7 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-"""What goes with every response that says nothing else of the same."""
+"""Headers of every response that does not set them otherwise."""
 
 REFUSED = (
     "friso app answers only the browser that was opened with the address it printed: open that address. "
@@ -56,10 +56,10 @@ TOKEN = "friso-token"
 """The header that has a token."""
 
 LET_IN = "friso.let_in"
-"""Stands in the scope of a request that came with a key."""
+"""Marks the scope of a request that came with a key."""
 
 BEARER = "Bearer "
-"""What stands before a key in the header `Authorization`. Browsers add none of their own accord, as they do with
+"""Text before a key in the header `Authorization`. Browsers add none of their own accord, as they do with
 cookies, which also go to every other server of the same name, whatever its port."""
 
 

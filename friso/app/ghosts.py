@@ -1,4 +1,7 @@
-"""Add to a figure what is compared with it: the pinned machine in grey, or the edge of hunting."""
+"""Add to a figure what it is compared with.
+
+This is the pinned machine in grey, or the edge of hunting on a map.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +50,7 @@ def _ghosted(figure: Figure, other: Figure) -> Figure:
 
 
 _OWN = re.compile(r" \(as given\)|, \S+ k?Hz$")
-"""What a title says of the machine alone: which of its cases it is in, and the frequency of a mode."""
+"""Part of a title that belongs to one machine alone: its case, or the frequency of a mode."""
 
 
 def _subject(panel: Panel) -> tuple[str, str, str]:

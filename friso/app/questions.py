@@ -197,7 +197,10 @@ def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def bode(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield the Bode plots of the limit cases first, then the largest bandwidth, which takes longer."""
+    """Yield the Bode plots of the limit cases, then the largest bandwidth.
+
+    The bandwidth takes longer to compute.
+    """
     lines = _lines("bode", asked)
     for picture in loops(asked, work):
         yield {**picture, "kind": "partly"}
@@ -525,7 +528,10 @@ def report(command: str, asked: PageRequest, work: Work) -> Iterator[AnswerPart]
 def _lines(
     command: str, asked: PageRequest, options: Mapping[str, Any] | None = None, function: str = ""
 ) -> AnswerPart:
-    """Return the shell command and the line of Python that give what the page shows of the machine."""
+    """Return the shell command and the line of Python for what the page shows.
+
+    Both are about the machine shown.
+    """
     chosen = {name: value for name, value in (options or {}).items() if value is not False}
     files, options = [asked.machine.name], {**asked.machine.to_set, **chosen}
     return _both_lines(command, asked, files, options, _of(asked.machine), function)

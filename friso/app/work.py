@@ -1,4 +1,7 @@
-"""Run each question in a thread, with progress and messages, until it is answered or overtaken."""
+"""Run each question in a thread until it is answered or overtaken.
+
+Progress and messages are sent to the page meanwhile.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ from friso.engine.overtaken import ASKER, Overtaken, ended_by, go_on, going_firs
 from friso.errors import InputError
 
 Job = Callable[["Work"], Iterator[dict[str, Any]]]
-"""What answers a question: gives the parts of its answer one after the other."""
+"""A function that answers a question and yields the parts of its answer."""
 
 OFTEN = 0.1
 """Seconds between two reports of progress."""
@@ -47,7 +50,7 @@ class Work:
     notes: list[str] = field(default_factory=list)
     """Warnings so far, each once; they go with the answer."""
     meanwhile: list[str] = field(default_factory=list)
-    """What was mentioned early: most answers say it themselves."""
+    """Messages logged early; most answers repeat them."""
 
     def overtake(self) -> None:
         """End the work from another thread."""
@@ -112,7 +115,10 @@ class Messages(logging.Handler):
 
 
 def _import_libraries() -> None:
-    """Import libraries that two threads cannot import at once, since their modules import one another."""
+    """Import libraries that two threads cannot import at once.
+
+    Their modules import one another, which deadlocks or fails in two threads.
+    """
     with _IMPORTING, suppress(ImportError):  # of an extra; xarray imports it where it is installed
         import dask.array  # noqa: F401
 

@@ -56,7 +56,7 @@ TOUR = """friso: does a positioning stage on contact bearings hunt, why, and wha
   friso init my_stage.toml                  a commented stage file for your own machine
 
 friso --help lists all commands by question; friso COMMAND --help has an example of each."""
-"""What `friso` alone prints."""
+"""Text that `friso` alone prints."""
 
 
 class ByQuestion(TyperGroup):
@@ -198,7 +198,10 @@ def _failed(error: BaseException) -> int:
 
 
 def _is_of_loading(error: BaseException) -> bool:
-    """Tell whether a compiled library could not be loaded, for example because a system runtime is missing."""
+    """Tell whether a compiled library could not be loaded.
+
+    A missing runtime of the system is a typical cause.
+    """
     if isinstance(error, ImportError):
         return not isinstance(error, ModuleNotFoundError)
     return isinstance(error, OSError) and "llvmlite" in str(error)

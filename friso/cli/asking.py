@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from friso.interface.question import Question
 
 DRAWING = "drawing the page"
-"""What is being done once an answer is there."""
+"""Label of the progress bar once an answer is there."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,10 @@ class Shown:
 
 
 def ask(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown, **kept: Any) -> None:
-    """Ask a question `about` files, with the options of its command, write its files, and show the answer.
+    """Ask a question `about` files, write its files, and show the answer.
 
-    `kept` are further keywords of the function. Raises InputError, typer.Exit with the status of a failure.
+    `options` are those of its command, and `kept` are further keywords of the function. Raises InputError for wrong
+    input. Raises typer.Exit with the status of a failure.
     """
     if question.answers_interrupted:
         answers_interrupts()
@@ -138,7 +139,10 @@ def named_as_options(names: Collection[str]) -> Iterator[None]:
 
 
 def option_of(keyword: str) -> str:
-    """Return the command-line option for a Python keyword, such as "--sample-time" for "sample_time"."""
+    """Return the command-line option for a Python keyword.
+
+    "sample_time" becomes "--sample-time".
+    """
     return f"--{keyword.strip('_').replace('_', '-')}"
 
 

@@ -1,4 +1,7 @@
-"""The commands of friso: one for each question, and a few that ask none (`friso/cli/commands/`)."""
+"""Collect the commands of friso.
+
+There is one for each question, and a few ask none (`friso/cli/commands/`).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Derive commands from questions: options from the function's signature, help from its docstring."""
+"""Derive commands from questions.
+
+Options come from the function's signature, and help from its docstring.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +41,10 @@ class CommandParameter:
 
 
 def command_function(question: Question) -> Callable[..., None]:
-    """Return the function that typer calls for a question; its signature and docstring are those of the command."""
+    """Return the function that typer calls for a question.
+
+    Its signature and docstring are those of the command.
+    """
 
     def command(**values: Any) -> None:
         """Ask the question by the values of the command's options."""
@@ -52,7 +58,10 @@ def command_function(question: Question) -> Callable[..., None]:
 
 
 def ask_by_values(question: Question, values: Mapping[str, Any]) -> None:
-    """Ask a question by the values of its command's parameters; those that are None are left out."""
+    """Ask a question by the values of its command's parameters.
+
+    Values that are None are left out.
+    """
     shown = Shown(**{name: value for name, value in values.items() if name in Shown.__dataclass_fields__})
     about = [values[name] for name in question.takes]
     apart = {*question.takes, *Shown.__dataclass_fields__}
@@ -62,7 +71,10 @@ def ask_by_values(question: Question, values: Mapping[str, Any]) -> None:
 
 
 def command_help(question: Question) -> str:
-    """Return the help of a command: the docstring of the function up to its parameters, and the examples."""
+    """Return the help of a command.
+
+    It is the docstring of the function up to its parameters, followed by the examples.
+    """
     before, _, _ = (getdoc(question.function) or "").partition("\n\nParameters\n---")
     first, *more = question.example.splitlines()
     return "\n\n".join([before, f"Example: friso {first}", *more])
@@ -82,7 +94,10 @@ def _asked(question: Question) -> Iterator[Parameter]:
 
 
 def _kind_of(annotation: str) -> ArgumentKind | None:
-    """Return the kind of value that a parameter takes on the command line; None if it has no form there."""
+    """Return the kind of value that a parameter takes on the command line.
+
+    Returns None for a parameter without a form there.
+    """
     parts = [part for part in alternatives(annotation) if part not in ("None", *IN_PYTHON_ALONE)]
     several = [part for part in parts if KINDS[part].several]
     paths = [part for part in parts if KINDS[part].command_type is Path]
@@ -90,6 +105,7 @@ def _kind_of(annotation: str) -> ArgumentKind | None:
 
 
 def _argument(parameter: CommandParameter) -> Parameter:
+    """Build an argument of a command, which has a place and no name."""
     info = typer.Argument(metavar=parameter.kind.metavar or parameter.name.upper(), help=parameter.help)
     return _typed(parameter, info, Parameter.empty if parameter.default is Parameter.empty else None)
 
@@ -112,6 +128,10 @@ def _option(parameter: CommandParameter) -> Parameter:
 
 
 def _typed(parameter: CommandParameter, info: Any, default: Any) -> Parameter:
+    """Build a parameter with the type that typer expects.
+
+    A parameter that may be repeated takes a list.
+    """
     one: Any = parameter.kind.command_type
     value = list[one] if parameter.kind.several else one
     annotation = value if default is not None else value | None

@@ -93,7 +93,10 @@ def bears(task: LeafTask, by_beams: Evaluation) -> bool:
 def _in_order(
     task: LeafTask, needs: list[Requirement], candidates: Sequence[Candidate]
 ) -> Iterator[tuple[Geometry, np.ndarray]]:
-    """Yield geometries in whole sizes that meet the requirements by closed forms, the softest first."""
+    """Yield geometries in whole sizes that meet the requirements by closed forms.
+
+    The softest comes first.
+    """
     settings = DesignSettings.current()
     enough = task.spec.safety.parasitic * task.crossover
     near = [candidate.geometry for candidate in candidates if candidate.frequency >= 0.98 * enough]

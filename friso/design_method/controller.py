@@ -1,4 +1,7 @@
-"""Choose the controller of a design: its crossover, its margins, and whether joint damping helps."""
+"""Choose the controller of a design: its crossover and its margins.
+
+It is also computed whether more damping in the joint would help.
+"""
 
 from __future__ import annotations
 

@@ -20,7 +20,10 @@ from friso.leaf_springs.joint import first_interfering
 
 @dataclass(frozen=True)
 class Candidate:
-    """Leaf springs with drive stiffness [N/m] and first interfering frequency [Hz] by closed forms."""
+    """Leaf springs with their drive stiffness [N/m] and first interfering frequency [Hz].
+
+    Both numbers come from closed forms.
+    """
 
     geometry: Geometry
     stiffness: float

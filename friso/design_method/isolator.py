@@ -1,4 +1,7 @@
-"""Put a rigid stage on an isolator: split its mass, add a joint, and leave friction on the cart."""
+"""Put a rigid stage on an isolator.
+
+Its mass is split, a joint is added between the parts, and the friction stays on the cart.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Find leaf springs for a joint of given stiffness and stroke, with the highest interfering frequency."""
+"""Find leaf springs for a joint of given stiffness and stroke.
+
+Of all that fit, those with the highest interfering frequency are taken.
+"""
 
 from __future__ import annotations
 
@@ -67,7 +70,10 @@ def _moved(flat: Mapping[str, Any], geometry: Geometry) -> dict[str, str]:
 
 
 class _Search:
-    """The search over length, spacing and sheet of the leaves; the width follows from the stiffness."""
+    """The search over length, spacing and sheet of the leaves.
+
+    The width follows from the stiffness wanted.
+    """
 
     def __init__(self, task: LeafTask, stiffness: float) -> None:
         """Prepare the search for leaves of a `stiffness` [N/m].

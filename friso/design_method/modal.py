@@ -76,7 +76,10 @@ class Modal:
 
 
 def _turns(ratio: np.ndarray) -> np.ndarray:
-    """Count how often curves, (..., frequencies), run around the origin from first to last frequency."""
+    """Count how often curves, (..., frequencies), run around the origin.
+
+    They run from the first frequency to the last.
+    """
     return np.angle(ratio[..., 1:] / ratio[..., :-1]).sum(axis=-1) / (2 * np.pi)
 
 

@@ -18,7 +18,7 @@ from friso.stage.stage import numeric_keys
 STATIC, COULOMB = "friction.static", "friction.coulomb"
 
 COMMENT = "   # "
-"""What stands between a line and what is said of it."""
+"""Separator between a line and its comment."""
 
 SPREAD = ("static", "coulomb", "stribeck_velocity", "bristle_stiffness", "viscous")
 

@@ -1,4 +1,7 @@
-"""Find which single requirement to relax, and by how much, if no leaf springs meet all of them."""
+"""Find which single requirement to relax if no leaf springs meet all of them.
+
+The least change that is enough is computed for each requirement.
+"""
 
 from __future__ import annotations
 

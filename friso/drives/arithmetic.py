@@ -19,7 +19,7 @@ _PAIRS = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv}
 _SIGNS = {ast.USub: neg, ast.UAdd: pos}
 
 _OTHER = re.compile(r"\d(?!e[+-]?\d)[a-z_]|\\", re.IGNORECASE)
-"""What stands in no arithmetic, and would make Python's parser warn: letters right behind a digit, as in 0x10."""
+"""Texts that are no arithmetic and would make Python's parser warn, such as letters behind a digit in 0x10."""
 
 
 def number_in(text: str) -> float | None:

@@ -18,7 +18,7 @@ from friso.quantities import Quantity, positive
 from friso.stage.controllers import controller_of
 
 TRAVEL, MOTOR_CONSTANT = "travel_per_turn", "motor_constant"
-"""What the user may say: what a turn moves, and the torque of an ampere [N m/A], or the force [N/A] without a turn."""
+"""Answers of the user: travel of a turn, and torque of an ampere [N m/A], or force [N/A] without a turn."""
 
 TRAVELS = {LINEAR: Quantity("m", positive, "10 mm"), KINDS["rotary"]: Quantity("rad", positive, "360 deg")}
 TORQUE_PER_AMPERE, FORCE_PER_AMPERE = Quantity("N*m/A", positive, "0.5 N*m/A"), Quantity("N/A", positive, "30 N/A")
@@ -144,7 +144,10 @@ def _length(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
 
 
 def _mass(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-    """Convert an inertia [kg or kg m^2] to current and torque per acceleration, where the turn is known."""
+    """Convert an inertia [kg or kg m^2] to current per acceleration, and to the motor's side.
+
+    Units that need an unknown travel or motor constant are left out.
+    """
     current = [(value / turn.per_ampere, f"A*s^2/{kind.length}")] if turn.per_ampere else []
     at_motor = [(value * (turn.travel / (2 * pi)) ** 2, "kg*m^2 at the motor")] if turn.travel else []
     return [*current, *at_motor]
@@ -191,4 +194,4 @@ BY_UNIT: Mapping[str, Convert] = {
     "1/s": _rate,
     "Hz": _frequency,
 }
-"""What values in SI are in other units, by their unit on a linear axis."""
+"""Converters of values in SI to other units, by their unit on a linear axis."""

@@ -1,4 +1,7 @@
-"""Declare kinds of parameter files: how to recognise, read and write them, and what they leave open."""
+"""Declare kinds of parameter files.
+
+A kind says how to recognise, read and write its files, and what they leave open.
+"""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 LOGGER = logging.getLogger("friso")
 
 STORE_MAKER = "map, a store"
-"""What made a folder that is a store, not one of files."""
+"""Maker of a folder that is a store and not a folder of files."""
 
 MARKER = ".friso-output"
 """The file that records which command made a folder, and which files there are friso's."""

@@ -86,7 +86,7 @@ class Question:
     """Files that may not be in the way when the command begins."""
 
     during: str = ""
-    """What stands beside the progress bar until the work says what it does."""
+    """Label of the progress bar until the work reports its own."""
 
     answers_interrupted: bool = False
     """Whether Ctrl-C ends the work with an answer by what was done so far."""
@@ -97,7 +97,7 @@ class Question:
     """Defaults of the command that differ from those of the function."""
 
     metavars: Mapping[str, str] = field(default_factory=dict)
-    """What stands for the value of a parameter in the help, where the word of its kind says too little."""
+    """Word for the value of a parameter in the help, if the word of its kind says too little."""
 
     runner: str = ""
     """Module of the function `run` that asks on the command line, where that takes more than showing the answer."""

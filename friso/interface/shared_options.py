@@ -15,7 +15,10 @@ from typing import Any
 
 @dataclass(frozen=True)
 class SharedOption:
-    """The type and meaning of a parameter in a docstring, and its line in the help if that differs."""
+    """The type and meaning of a shared parameter in docstrings.
+
+    Its line in the help of a command is given if it differs.
+    """
 
     kind: str
     meaning: str

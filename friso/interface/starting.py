@@ -1,4 +1,7 @@
-"""Provide what users start from: a stage file to edit, the examples, and the schema for editors."""
+"""Provide what users start from.
+
+These are a stage file to edit, the examples, and the schemas by which editors complete files.
+"""
 
 from __future__ import annotations
 

@@ -1,11 +1,12 @@
-"""The leaves of one mechanism as geometrically exact beams of exudyn: forces, stiffness and mass of their nodes.
+"""Model the leaves of a mechanism as geometrically exact beams of exudyn.
 
-Only this module knows exudyn. A leaf is a chain of equal two-node elements of constant strain. Three things keep few of
-them exact. The bending an element misses because its moment is taken as constant is added to its shear flexibility
-(residual bending flexibility: h^2/(12 E I) per force). The mass its bent middle carries beyond the straight line
-between its nodes is added to its rotary inertia (rho A h^2/6). And what the leaf has as a plate (plate.py) is averaged
-over the element, such that the whole leaf has the stiffness of the plate in parallel motion, under a constant torque,
-and under the torque that a force across the deflected leaf adds.
+Forces, stiffness and mass of their nodes are computed. Only this module knows exudyn. A leaf is a chain of equal
+two-node elements of constant strain. Three things keep few of them exact. The bending an element misses because its
+moment is taken as constant is added to its shear flexibility (residual bending flexibility: h^2/(12 E I) per force).
+The mass its bent middle carries beyond the straight line between its nodes is added to its rotary inertia (rho A
+h^2/6). What the leaf has as a plate (plate.py) is averaged over the element. The whole leaf then has the stiffness
+of the plate in parallel motion, under a constant torque, and under the torque that a force across the deflected leaf
+adds.
 """
 
 from __future__ import annotations

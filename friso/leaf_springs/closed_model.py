@@ -40,7 +40,10 @@ def closed_form_model(mechanism: Mechanism, stroke: float) -> Evaluation:
 
 
 def _modes(mechanism: Mechanism) -> tuple[Mode, ...]:
-    """Return modes of the stage with all leaves in phase, and modes of the leaves with the stage at rest."""
+    """Return the modes of stage and leaves by closed forms.
+
+    The leaves bend in phase with the stage, or move with the stage at rest.
+    """
     frequencies, shapes = closed_forms.modes(mechanism)
     drive = int(closed_forms.drive_mode(frequencies, shapes))
     first = replace(_mode(mechanism, frequencies[drive], shapes[:, drive]), name="drive")

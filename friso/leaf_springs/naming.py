@@ -57,7 +57,10 @@ def _mean(values: np.ndarray) -> np.ndarray:
 
 
 def _dynamic_part(shapes: np.ndarray) -> np.ndarray:
-    """Return the shapes (leaves, points) without the part that follows a shift of the stage statically."""
+    """Return the shapes (leaves, points) without their static part.
+
+    The static part is what follows a shift of the stage.
+    """
     x = np.linspace(0, 1, shapes.shape[1])
     return shapes - np.outer(shapes[:, -1], x**2 * (3 - 2 * x))
 

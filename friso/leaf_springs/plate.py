@@ -21,9 +21,9 @@ import numpy as np
 from friso.leaf_springs.settings import LeafSpringSettings
 
 CONVERGED, PEAK = 0.878, 0.63
-"""What more functions across the width leave of the stiffening (0.866 to 0.895 at a Poisson's ratio of 0.3, 0.854 to
-0.909 from 0.05 to 0.45), and of the excess of the stress (0.60, for square leaves 0.65), of leaves from 1 to 6 times as
-long as wide (tests/ritz.py)."""
+"""Share of the stiffening that remains with more functions across the width (0.866 to 0.895 at a Poisson's ratio of
+0.3, 0.854 to 0.909 from 0.05 to 0.45), and of the excess of the stress (0.60, for square leaves 0.65), of leaves from
+1 to 6 times as long as wide (tests/ritz.py)."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,10 @@ def warping_rate(width: Any, poisson: Any) -> Any:
 
 
 def torsion_stiffness(length: Any, width: Any, thickness: Any, shear: Any, poisson: Any) -> Any:
-    """Return the torsional stiffness of a leaf between clamps [N m/rad]; `shear` is its modulus [Pa]."""
+    """Return the torsional stiffness of a leaf between clamps [N m/rad].
+
+    `shear` is its shear modulus [Pa]; lengths are in metres [m].
+    """
     u = warping_rate(width, poisson) * length / 2
     return torsion_constant(width, thickness) * shear / length / (1 - np.tanh(u) / u)
 

@@ -3,4 +3,4 @@
 from typing import Literal
 
 Changeable = Literal["controller", "joint"]
-"""What of a stage may be changed."""
+"""Parts of a stage that may be changed."""

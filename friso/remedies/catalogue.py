@@ -139,7 +139,10 @@ def _structures(stage: Stage) -> Iterator[Remedy]:
 
 
 def _restructured(stage: Stage, changes: Mapping[str, Any]) -> Stage:
-    """Return a stage with other keys of its controller: numbers [SI], texts, or None to remove a key."""
+    """Return a stage with other keys of its controller.
+
+    Changes are numbers [SI], texts, or None to remove a key.
+    """
     numbers = {key: value for key, value in changes.items() if isinstance(value, float)}
     keys = numeric_keys({key: value for key, value in {**stage.flat(), **changes}.items() if value is not None})
     texts = {key: exactly(value, keys[key].unit) if keys[key].unit else value for key, value in numbers.items()}

@@ -45,7 +45,10 @@ def change_size(before: Stage, after: Stage) -> ChangeSize:
 
 
 def _octaves(old: Mapping[str, Any], new: Mapping[str, Any], key: str) -> float:
-    """Return the logarithm of the factor by which a number changes, as a size; 0 if there was no number."""
+    """Return by how much a number changes, as the logarithm of a factor.
+
+    Upward and downward changes count alike. The result is 0 if there was no number.
+    """
     before, after = old.get(key), new.get(key)
     if isinstance(before, str) or isinstance(after, str) or not before or not after or before * after <= 0:
         return 0.0

@@ -1,4 +1,7 @@
-"""Find the least change of a controller that still meets the goal, starting from settings that do."""
+"""Find the least change of a controller that still meets the goal.
+
+The search starts from settings that meet it.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 
 LEAST = ": the least change"
-"""What is added to the name of a remedy."""
+"""Suffix of the name of a remedy with the least change."""
 
 
 STEPS = np.append(np.linspace(1.0, 1.5, 26), np.geomspace(1.6, 8.0, 14))
@@ -44,7 +47,10 @@ def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
 
 
 def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
-    """Return a key that varies between two values, and a little beyond both, as far as a stage allows."""
+    """Return a key that varies between two values.
+
+    It also goes a little beyond both, as far as a stage allows.
+    """
     settings = RemedySettings.current()
     towards, away = (
         (new * settings.factor_beyond, old / settings.factor_away)

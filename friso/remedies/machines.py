@@ -1,4 +1,7 @@
-"""Draw machines around a stage, each with a move of its own, and apply changes of the stage to them."""
+"""Draw machines around a stage, each with a move of its own.
+
+Any change of the stage can be applied to all of them.
+"""
 
 from __future__ import annotations
 

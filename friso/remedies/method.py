@@ -300,7 +300,10 @@ class _Session:
                     self.outcomes[place] = fewer
 
     def _tries_less_than(self, outcome: RemedyOutcome) -> bool:
-        """Search for the least change of the keys that a working remedy changes; tell whether it has any."""
+        """Search for the least change of the keys that a working remedy changes.
+
+        Returns whether it changes any key that can be searched.
+        """
         settings = RemedySettings.current()
         assert outcome.stage is not None
         less = least_remedy(self.stage, outcome.stage, outcome.remedy)
@@ -329,7 +332,10 @@ class _Session:
         return search
 
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
-        """Return the first of a few points that is verified, or else the first that is not sure to work."""
+        """Return the first of a few points that is verified.
+
+        If none is, the first that is not sure to work is returned.
+        """
         settings = RemedySettings.current()
         unsure: RemedyOutcome | None = None
         tries, worked = 0, 0.0

@@ -67,7 +67,10 @@ def _within(
     needed: Mapping[str, np.ndarray],
     limited: Sequence[str],
 ) -> Iterator[RelaxedGoal]:
-    """Return the cheapest relaxations of a remedy, with some parts `limited` in how far they relax."""
+    """Return the cheapest relaxations of a remedy.
+
+    Some parts are `limited` in how far they may be relaxed.
+    """
     settings = RemedySettings.current()
     needed = {name: values.copy() for name, values in needed.items()}
     count = np.sum([values > 1 for values in needed.values()], axis=0)

@@ -166,7 +166,10 @@ class Search:
             yield few[self.tried[-1].meets(self.goal)]
 
     def looked_at(self, points: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
-        """Yield points (variables,) to look at further, until the next one takes too much work (`cut`)."""
+        """Yield points (variables,) to look at further.
+
+        This ends when the next one takes too much work (`cut`).
+        """
         settings = RemedySettings.current()
         left = settings.looking_work * self._work
         while True:
@@ -429,7 +432,10 @@ class Search:
 
 
 def _order(points: TriedPoints, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
-    """Return the measure by which points are sorted, shape (n,): settling time, or what is `wanted` small."""
+    """Return the measure by which points are sorted, shape (n,).
+
+    It is the settling time, or what is `wanted` small instead.
+    """
     return points.settling if wanted is None else wanted(points.shares)
 
 

@@ -1,4 +1,7 @@
-"""Compute derivatives of cycle, edge of hunting, settling time and modulus margin to keys of the stage file."""
+"""Compute which keys of the stage file matter.
+
+These are derivatives of cycle, edge of hunting, settling time and modulus margin.
+"""
 
 from __future__ import annotations
 
@@ -169,7 +172,10 @@ def sensitivity(
 
 
 def edge_sensitivities(stage: Stage, edge: Margin | None) -> Sensitivities:
-    """Return the derivatives of the edge of hunting and of the margin to all keys of the equations."""
+    """Return the derivatives of the edge of hunting and of the margin.
+
+    They are taken to all keys that the equations contain.
+    """
     flat = {**stage.flat(), **as_tuned(stage.flat())}
     names = _keys(flat)
     values = np.array([flat[name] for name in names])

@@ -1,4 +1,7 @@
-"""Suggest an isolator for a rigid stage that hunts, as a first answer from a survey of a few joints."""
+"""Suggest an isolator for a rigid stage that hunts.
+
+A few joints are surveyed for a first answer.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Define what an optimiser may change of a stage: numbers on logarithmic scales, and their keys."""
+"""Define what an optimiser may change of a stage.
+
+These are numbers on logarithmic scales, and the keys that follow from them.
+"""
 
 from __future__ import annotations
 

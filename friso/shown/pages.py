@@ -1,4 +1,7 @@
-"""Write every page of friso from one skeleton, the answer first; a command's template may change it."""
+"""Write every page of friso from one skeleton, with the answer first.
+
+The template of a command may change parts of it.
+"""
 
 from __future__ import annotations
 
@@ -71,7 +74,10 @@ class Report:
         templates: str = OWN_TEMPLATES,
         **values: Any,
     ) -> Report:
-        """Return the page about a stage, or about none; `name` stands at the head without a stage's name."""
+        """Return the page about a stage, or about none.
+
+        `name` stands at the head if the stage has no name.
+        """
         if stage is None:
             return cls(command, name, figures, templates=templates, values=values)
         about = (stage.to_toml(), stage.source)
@@ -136,7 +142,7 @@ def _plain(svg: str) -> str:
 
 
 _UNSEEN = re.compile(r'<!--.*?-->|<metadata>.*?</metadata>|(?<=<g) id="[^"]*"', re.DOTALL)
-"""What nothing shows or refers to, names of groups among it."""
+"""Parts of an SVG that nothing shows or refers to, such as names of groups."""
 
 _PATH, _SPACED = re.compile(r'(?<= d=")[^"]*'), re.compile(r" ?([A-Za-z]) ?")
 """The lines of an element, and their commands, which need no blanks."""

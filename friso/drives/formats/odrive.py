@@ -94,7 +94,7 @@ HELD = frozenset({"kv", "kp", "velocity_integral_time", "force_limit", "integral
 """Names in [controller] that the parameters hold."""
 
 FED_FORWARD = frozenset({"velocity_feedforward", "acceleration_feedforward"})
-"""Those that they hold where the drive's own trajectories feed them forward: the velocity whole."""
+"""Names in [controller] that parameters hold if the drive's own trajectories feed them forward."""
 
 
 _LINE = re.compile(r"[ \t]*(odrv[0-9]{1,3})\.([\w.]{1,200})[ \t]*=(?!=)[ \t]*([^#]*)(?:#.*)?")
@@ -127,7 +127,7 @@ IN_TURNS_INSTEAD = (
 )
 
 GAINS_IN, TURNS, COUNTS = "gains_in", "turns", "counts"
-"""What the user may say where nothing in a file tells which firmware it is of."""
+"""Answer of the user, and its choices, if nothing in a file reveals the firmware."""
 
 _RECOGNISED = re.compile(r"^[ \t]*odrv[0-9]{1,3}\.axis[0-9]{1,3}\.[\w.]{1,180}[ \t]*=(?!=)", re.MULTILINE)
 
@@ -187,7 +187,10 @@ def _settings(text: str) -> dict[str, Any]:
 
 
 def _refuse_other_firmware(axis: AxisParameters) -> None:
-    """Raise InputError for firmware whose gains are in counts, or whose parameters have other names."""
+    """Raise InputError for firmware other than 0.5.1 to 0.5.6.
+
+    Older firmware has gains in counts, and newer firmware has other names of parameters.
+    """
     if IN_TURNS in axis.values:
         return
     if name := _sign_of(axis, NEWEST):

@@ -42,7 +42,7 @@ LEAST_PHASE = -720.0
 """Phases [deg] below this one, as of a delay at high frequencies, are left out of view."""
 
 NEAR = ((-3.0, 1.5), (-1.5, 1.5))
-"""What is seen of the complex plane about -1."""
+"""Part of the complex plane around -1 that the Nyquist plot shows."""
 
 KEPT = (0.02, 5.0)
 """Sizes of the loop that are drawn of the family in it."""
@@ -221,7 +221,7 @@ def _nyquist(bode: Bode) -> Figure:
 
 
 def _family(bode: Bode, stable: bool, name: str, shade: str) -> list[Series]:
-    """Return evenly picked members of the family that are stable, or unstable, where they are in view."""
+    """Return evenly picked stable or unstable members of the family, where they are in view."""
     numbers = np.flatnonzero(bode.scan.stable == stable) if has_family(bode) else np.empty(0, int)
     picked = numbers[np.linspace(0, len(numbers) - 1, min(DRAWN[stable], len(numbers))).round().astype(int)]
     lines = []

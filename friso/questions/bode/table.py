@@ -1,4 +1,7 @@
-"""Write the table of a linear analysis: the name of each quantity, and its text for each state."""
+"""Write the table of a linear analysis.
+
+Each row names a quantity and has its text for each state.
+"""
 
 from __future__ import annotations
 

@@ -58,13 +58,13 @@ NODES = {
 }
 
 LOST = "a change, no curve begun"
-"""What is said of places between stages that differ, where no curve could be begun."""
+"""Label of places between stages that differ, where no curve could be started."""
 
 LOST_END = "cycle not followed farther"
-"""What is said of ends of curves inside the range."""
+"""Label of ends of curves inside the range."""
 
 MEETING = "curves meet"
-"""What is said of places where two curves cross, end on each other, or begin or cease to run together."""
+"""Label of places where two curves cross, end on each other, or begin or cease to run together."""
 
 REACH = 2.5
 """Multipliers up to which they are shown."""
@@ -103,7 +103,10 @@ def _diagram(traced: Diagram, key: ShownKey) -> Figure:
 
 
 def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: ShownKey | None = None) -> Panel:
-    """Draw one measure of all branches with their special points; labels are added if there is a key."""
+    """Draw one measure of all branches with their special points.
+
+    Labels are added if there is a key.
+    """
     labels: set[str] = set()
     series = []
     for line in branches:

@@ -50,7 +50,7 @@ MEANINGS = {
     "fold": "it has merged with another cycle, and neither exists",
     "torus": "it still exists, but motions spiral away from it",
 }
-"""What has become of a cycle on the other side of a special point."""
+"""State of a cycle on the other side of a special point."""
 BASIN = "Asymmetric cycles bound the basin of the hunting cycle."
 
 

@@ -127,7 +127,10 @@ def cycle_figure(cases: list[ShownCase]) -> Figure:
 
 
 def _cycle_panels(item: ShownCase) -> list[Panel]:
-    """Return the panels of a case's cycles: position and force over time, and velocity over position."""
+    """Return the panels of a case's cycles.
+
+    They show position and force over time, and velocity over position.
+    """
     cycles = item.case.judgement.hunting.cycles
     time = Axis("Time", "s", (0.0, max(cycle.period for cycle in cycles)))
     names = ["stage"] if len(cycles) == 1 else [_WORDS[cycle.attracts] for cycle in cycles]

@@ -127,7 +127,10 @@ def _settling_figure(cases: list[ShownCase]) -> Figure:
 
 
 def _settling(cases: list[ShownCase]) -> Panel:
-    """Draw the size of the deviation over the whole run on a logarithmic scale, with settling bands."""
+    """Draw the size of the deviation over the whole run with the settling bands.
+
+    The scale is logarithmic, so that both the move and the standstill are seen.
+    """
     lines = []
     for item in cases:
         size = np.maximum(np.abs(_deviation(item)), _FLOOR)

@@ -1,4 +1,7 @@
-"""Compare the verdict across friction laws: in sentences, in the table, and in the JSON document."""
+"""Compare the verdict across friction laws.
+
+Sentences, the table and the JSON document share this comparison.
+"""
 
 from __future__ import annotations
 

@@ -63,7 +63,10 @@ def margin_ways(margin: ParameterMargin) -> list[str]:
 
 
 def thin_margins(case: Case) -> list[str]:
-    """Return what brings hunting back in a case that settles, within the distance that advice keeps."""
+    """Return what brings hunting back in a case that settles, if its reserve is small.
+
+    Small means less than the distance from an edge that advice keeps.
+    """
     distance, thin = SEARCH_LIMITS.edge_distance, []
     edge, friction = case.judgement.margin, case.static_friction
     if edge and edge.quiet * distance > 1:
@@ -81,7 +84,10 @@ def _side(side: int) -> str:
 
 
 def _way(margin: ParameterMargin, side: int, end: MarginEnd) -> str:
-    """Say below or above which multiple of a parameter hunting begins or ends, rounded to the safe side."""
+    """Say below or above which multiple of a parameter hunting begins or ends.
+
+    The multiple is rounded to the safe side.
+    """
     outward, inward = (rounded_up, rounded_down) if side > 0 else (rounded_down, rounded_up)
     if margin.attracts:
         return f"{_side(side)} {plain_factor(outward(end.other))} times yours"

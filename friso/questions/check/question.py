@@ -126,7 +126,10 @@ class CheckAnswer(Answer):
 
     @cached_property
     def joint_margins(self) -> Mapping[str, ParameterMargin]:
-        """Return the margins in the joint's stroke and stiffness by key, for the case with a free joint."""
+        """Return the margins in the joint's stroke and stiffness by key.
+
+        They belong to the case with a free joint.
+        """
         from friso.hunting import joint_margins
 
         case = self.result.get("free", self.result["given"])

@@ -36,7 +36,7 @@ _AFTERWARDS = {
     "unstable": "grows",
     "unknown": "may last, grow or die out",
 }
-"""What becomes of a swing that was observed beyond a force limit without anti-windup, by the loop at lower gains."""
+"""Later course of a swing beyond a force limit without anti-windup, by the loop's stability at lower gains."""
 
 _UNFINISHED = (
     "could not be judged: its own run was completed, but not the longer one that shows whether it ends in the hunting "
@@ -50,7 +50,7 @@ IN_SHORT: Mapping[Verdict, str] = {
     "transient": "does not hunt",
     "settles": "does not hunt",
 }
-"""What a case does, before its margin is known."""
+"""Words for the verdict on a case before its margin is known."""
 
 ONE_PLACE = 1.01
 """Factor between the ends of a window below which it is told by its middle and its width."""

@@ -1,4 +1,7 @@
-"""Describe a conversion to another friction law: what is kept, what is not, and what stays open."""
+"""Describe a conversion to another friction law in words.
+
+It is said what is kept, what is not, and what the measurements leave open.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +26,10 @@ SHOWN: Mapping[MeasuredKind, str] = {
     "damping": "damping at rest",
     "viscous": "viscous damping",
 }
-"""What measurements show."""
+"""Names of the properties of friction that measurements show."""
 
 COLUMNS = ("before", "after", "off by", "kept")
-"""Of the table of what is compared."""
+"""Columns of the table that compares both laws."""
 
 
 def sentences(conversion: LawConversion) -> list[str]:

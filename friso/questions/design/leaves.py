@@ -1,4 +1,7 @@
-"""Describe the leaf springs of a design: their numbers, what limits them, and how beams confirm them."""
+"""Describe the leaf springs of a design in words.
+
+These are their numbers, the requirements that limit them, and how the beam model confirms the closed forms.
+"""
 
 from __future__ import annotations
 

@@ -28,7 +28,10 @@ SHOWN = 5
 
 @dataclass(frozen=True)
 class DesignStep:
-    """A step of the method: its result as title, the reasons, its numbers, and its figures by name."""
+    """A step of the method, with its result as title.
+
+    It has the reasons in sentences, its numbers by name, and the names of its figures.
+    """
 
     title: str
     sentences: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Write the files of `friso export`: a page, and the parameters as the drive's file holds them."""
+"""Write the files of `friso export`: a page, and the parameter file of the drive."""
 
 from __future__ import annotations
 

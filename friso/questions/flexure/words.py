@@ -148,7 +148,10 @@ def _loaded(evaluation: Evaluation) -> list[str]:
 
 
 def _breaks_away(flexure: BothModels) -> list[str]:
-    """Warn that the cart breaks away inside the stroke, if the leaves push harder than friction holds."""
+    """Warn that the cart breaks away inside the stroke.
+
+    It does so if the leaves push harder than static friction holds.
+    """
     static, force = flexure.stage.flat().get("friction.static"), float(flexure.best.forces[-1])
     if static is None or force <= static:
         return []

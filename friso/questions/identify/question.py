@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 _HERTZ, _SECONDS = Quantity("Hz", positive, "20 Hz"), Quantity("s", positive, "5 s")
 
 MappingKeeper = Callable[[dict[Path, Mapping]], object]
-"""What keeps for the next time what was said of logs."""
+"""A function that stores what the user said of logs for the next time."""
 
 
 class IdentifyAnswer(Answer):

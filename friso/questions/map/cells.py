@@ -1,4 +1,7 @@
-"""Prepare the cells of a map for drawing: axes in order, numbers, and why some cells have none."""
+"""Prepare the cells of a map for drawing.
+
+Axes are put in order, numbers are scaled, and cells without a number get the reason.
+"""
 
 from __future__ import annotations
 
@@ -133,7 +136,10 @@ def cuts(runs: xr.Dataset) -> list[str]:
 
 
 def dims_of(runs: xr.Dataset) -> tuple[Hashable, ...]:
-    """Return the dimensions in the order of the variables, which a dataset's own list may not have."""
+    """Return the dimensions in the order of the variables.
+
+    A dataset's own list may have another order.
+    """
     return max((variable.dims for variable in runs.data_vars.values()), key=len, default=())
 
 

@@ -31,7 +31,7 @@ FORMS = (*FORMATS, "html")
 """Suffixes of the files of a map."""
 
 PRINTED = ON_PAGE._replace(noted=False)
-"""What the page shows where it is printed."""
+"""Image that the page shows when it is printed."""
 
 
 def map_files(runs: xr.Dataset, metric: str, rerun: str, draw: Callable[[], Traces | None]) -> dict[str, Content]:

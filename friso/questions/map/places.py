@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from friso.stage import Stage
 
 SHOWN = "this machine"
-"""What the machine is called that a figure is about; any other one is grey."""
+"""Label of the machine that a figure is about; any other machine is grey."""
 
 
 def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Sequence[str]) -> Figure:

@@ -330,7 +330,10 @@ def sweep(
 
 
 def _whole(store: Any) -> StoreAnswer:
-    """Check a store. Raises InputError for anything but a store, and StoreError for an unreadable one."""
+    """Check whether a store is complete and undamaged.
+
+    Raises InputError for anything but a store, and StoreError for an unreadable one.
+    """
     if not isinstance(store, str | os.PathLike) or Path(store).is_file():
         stem = Path(store).stem if isinstance(store, str | os.PathLike) else "rig"
         raise InputError("check", f"{store}, a file", "the store of a study", f"friso map {stem}_map.zarr --check")

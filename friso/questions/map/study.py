@@ -1,4 +1,7 @@
-"""Build the study that a sweep is asked for, estimate its cost, and write the files beside its store."""
+"""Build the study that a sweep asks for, and write the files beside its store.
+
+A study that is too large is refused with an estimate of its cost.
+"""
 
 from __future__ import annotations
 
@@ -172,7 +175,10 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
 
 
 def drawn_runs(study: Study, runs: xr.Dataset, progress: Progress = silent) -> Traces | None:
-    """Return the runs of all cells that were not inferred, for the page; None for more than DRAWN cells."""
+    """Return the runs of all cells that were not inferred, for the page to draw.
+
+    Returns None for more than DRAWN cells.
+    """
     from friso.studies.traces import traces
 
     if study.cells > DRAWN:

@@ -66,7 +66,10 @@ def variable(name: Hashable) -> str:
 
 
 def categories_of(name: str, inferred: bool = False) -> dict[str, Category]:
-    """Return label and colour of each word of a metric, the worst first; with `inferred`, of cells said to have it."""
+    """Return label and colour of each word of a metric, the worst first.
+
+    With `inferred`, they are those of cells whose word was inferred from neighbours.
+    """
     words = (metrics()[name] if name in metrics() else metrics()["outcome"]).words
     if inferred:
         return {word.text: Category(f"{word.text} (inferred)", word.inferred) for word in words if word.inferred}
@@ -75,12 +78,18 @@ def categories_of(name: str, inferred: bool = False) -> dict[str, Category]:
 
 
 def word_category(name: str, word: str) -> Category:
-    """Return label and colour of a word of a metric; a word that the metric does not declare is grey."""
+    """Return label and colour of a word of a metric.
+
+    A word that the metric does not declare is grey.
+    """
     return (categories_of(name) | _NO_RESULT).get(word) or Category(word, GREY)
 
 
 def no_number(name: str, reason: str | None = None) -> Category:
-    """Return what it means that a cell that was run has no such number; `reason`: the word of `Metric.reasons`."""
+    """Return the category of a cell that was run but has no number.
+
+    `reason` is the word of `Metric.reasons` for that cell.
+    """
     metric = metrics().get(name)
     reasons = categories_of(metric.reasons) if metric and metric.reasons else {}
     return reasons.get(reason or "") or Category(
@@ -94,7 +103,10 @@ def grouped(number: int) -> str:
 
 
 def in_order(categories: Iterable[Category]) -> tuple[Category, ...]:
-    """Return each category once, in the order of every legend: words, the worst first, then what has none."""
+    """Return each category once, in the order of every legend.
+
+    Words come first, the worst at the beginning, then cells without a word.
+    """
     words = [category for name in worded() for category in categories_of(name).values()]
     order = [*words, *_NO_RESULT.values(), *(one for name in worded() for one in categories_of(name, True).values())]
     places = {category: place for place, category in reversed([*enumerate(order)])}
@@ -151,7 +163,10 @@ def word_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
 
 
 def tally(runs: xr.Dataset, name: str) -> str:
-    """Count the cells with each word of a metric in a sentence: "1 swings, 3 creep"; empty without the metric."""
+    """Count the cells with each word of a metric in a sentence: "1 swings, 3 creep".
+
+    The sentence is empty without the metric.
+    """
     return ", ".join(f"{grouped(number)} {_verb(word, number)}" for word, number in word_counts(runs, name).items())
 
 

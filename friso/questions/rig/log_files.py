@@ -36,7 +36,10 @@ def log_files(log: RigLog, stage: Stage) -> dict[str, Content]:
 
 
 def _setup(machine: Stage, stage: Stage) -> dict[str, str]:
-    """Return the keys of joint and controller that a log set otherwise than the stage file, with units."""
+    """Return the keys of joint and controller that a log set otherwise than the stage file.
+
+    Values are texts with units.
+    """
     before, after = stage.as_written(), machine.as_written()
     return {
         f"{table}.{key}": text

@@ -36,7 +36,7 @@ from friso.stage.controllers import CONTROLLER
 from friso.studies.compare.options import linear_flat
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)
-"""Of the remedies that have settings, in their order; more than these begin again, dashed."""
+"""Colours of remedies that have settings, in order; further ones begin again, dashed."""
 
 SAMPLES = 4000
 """Samples of a time response."""
@@ -152,7 +152,10 @@ def _settling(tuning: Advice, lines: Lines) -> Panel:
 
 
 def _windows(tuning: Advice) -> list[Panel]:
-    """Return the panel of the window of each number of the least change, as factors of its tuned value."""
+    """Return the panel of the windows of the least change's numbers.
+
+    Windows are given as factors of the tuned numbers.
+    """
     least = tuning.least
     if least is None or not least.windows:
         return []

@@ -1,4 +1,7 @@
-"""Describe the remedies: what to change, what it brings and costs, and what cannot work and why."""
+"""Describe the remedies in words.
+
+It is said what to change, what that brings and costs, and what cannot work and why.
+"""
 
 from __future__ import annotations
 
@@ -81,7 +84,7 @@ OPTIONS = {
 ABSENT = "never"
 
 NONE_FOUND = "none was found that surely works"
-"""What is said of a remedy some of whose settings meet the goal on the machines of the search, and were not taken."""
+"""Said of a remedy whose settings meet the goal on the machines of the search, but not surely on others."""
 
 LOCKED = "joint.locked"
 
@@ -92,7 +95,7 @@ def time(seconds: float) -> str:
 
 
 def slowest_time(measured: Performance, goal: Goal) -> str:
-    """Write the settling time within which 95 % of the machines are in position, with its interval."""
+    """Write the time within which 95 % of the machines are in position, with its interval."""
     low, high = measured.slowest_interval(goal)
     alone = time(measured.slowest(goal))
     if not math.isfinite(low):
@@ -157,7 +160,10 @@ def answer(tuning: Advice) -> list[str]:
 
 
 def _least_words(tuning: Advice) -> str:
-    """Introduce the least change that works, and say if the search for a smaller one was cut short."""
+    """Introduce the least change that works.
+
+    The words say if the search for a smaller change was cut short or not reached.
+    """
     sought = [outcome for outcome in tuning.outcomes if outcome.remedy.name.endswith(LEAST)]
     if not tuning.interrupted:
         given_up = any(outcome.certainty == "given up" for outcome in sought)
@@ -241,7 +247,10 @@ UNMADE = {
 
 
 def _made_of_leaves(outcome: RemedyOutcome, tuning: Advice) -> Iterator[str]:
-    """Yield which leaf springs make the joint of a remedy and whether they work, or why there are none."""
+    """Yield which leaf springs make the joint of a remedy, and whether they work.
+
+    If there are none, the reason is given.
+    """
     made = tuning.made_of_leaves(outcome)
     if made is not None:
         flat = made.remedy.stage.flat()
@@ -260,7 +269,10 @@ def _made_of_leaves(outcome: RemedyOutcome, tuning: Advice) -> Iterator[str]:
 
 
 def _replaced(stage: Stage) -> str:
-    """Say that the leaf springs' mode replaces the parasitic mode of the stage file, if it has one."""
+    """Say that the leaf springs' mode replaces the parasitic mode of the stage file.
+
+    Nothing is said for a stage file without such a mode.
+    """
     if stage.parasitic is None or stage.flexure is not None:
         return ""
     return f", in place of the parasitic mode of the file ({with_unit(stage.flat()['parasitic.frequency'], 'Hz')})"
@@ -436,7 +448,10 @@ def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
 
 
 def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterator[str]:
-    """Yield the first constraint that rules out every setting which meets the constraints before it."""
+    """Yield the first constraint that leaves no setting.
+
+    Only settings that meet the constraints before it count.
+    """
     broken, left = points.broken(goal), np.ones(len(points.margin), bool)
     margin, best = f"a modulus margin of {goal.margin:g}", float(points.margin.max(initial=0.0))
     some = bool(broken["margin"].any())  # lack the margin: nothing is said of these

@@ -30,7 +30,10 @@ def drawable(figure: Figure) -> Figure:
 
 
 def _escaped_part(part: Any) -> Any:
-    """Return a part of a figure with its texts escaped and shortened, since they may come from a file."""
+    """Return a part of a figure with its texts escaped and shortened.
+
+    Such texts may come from a file that others wrote.
+    """
     if isinstance(part, str):
         text = escaped(part)
         return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}..."

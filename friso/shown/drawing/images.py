@@ -22,7 +22,7 @@ from friso.shown.drawing.figure import Figure
 FORMATS = ("png", "svg", "pdf")
 
 PROGRAM, MOST = "friso.shown.drawing.artist", 2
-"""What a process runs that draws, and how many do at a time."""
+"""Module that a drawing process runs, and the largest number of such processes."""
 
 
 class Image(NamedTuple):
@@ -37,7 +37,7 @@ class Image(NamedTuple):
 
 
 ON_PAGE = Image("svg", headed=False)
-"""What a page shows of most figures where it is printed, or no script runs."""
+"""Image of most figures when a page is printed, or when no script runs."""
 
 
 def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:

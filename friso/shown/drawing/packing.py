@@ -7,7 +7,7 @@ import gzip
 import json
 
 LEVEL = 6
-"""Of gzip: the tightest takes half as long again for two thousandths of the size."""
+"""Level of gzip: the tightest takes half as long again and saves two thousandths of the size."""
 
 
 def packed(text: str) -> str:

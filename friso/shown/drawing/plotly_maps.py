@@ -1,4 +1,7 @@
-"""Draw maps and clouds on a page: traces, colour bars, and the legend and note beneath a figure."""
+"""Draw maps and clouds on a page.
+
+This includes traces, colour bars, and the legend and note beneath a figure.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +46,10 @@ def bar_panels(panels: Sequence[Panel]) -> tuple[set[int], bool]:
 
 
 def coloured_traces(panel: Panel, place: dict[str, Any], bar: dict[str, Any] | None) -> list[Any]:
-    """Return the traces of a panel's maps and clouds: numbers with their bar first, then categories."""
+    """Return the traces of a panel's maps and clouds.
+
+    Numbers with their colour bar come first, then categories.
+    """
     traces: list[Any] = []
     for field in panel.coloured:
         colouring = _colouring(scale(field), bar if field.has_numbers else None, field.label)

@@ -211,7 +211,10 @@ class _Head:
         return {**kind, **place, **({"title": {**self._text, "side": "top"}} if self.lines else {})}
 
     def alone(self, left: float, top: float) -> dict[str, Any]:
-        """Return the title as plotly takes it without a legend, above axes at a place in shares of the figure."""
+        """Return the title as plotly takes it without a legend.
+
+        It stands above axes at a place in shares of the figure.
+        """
         place = {"x": left, "xref": "paper", "xanchor": "left", "y": top, "yref": "paper", "yanchor": "bottom"}
         return {**self._text, "showarrow": False, **place, "yshift": SPACE - 4, "align": "left"}
 

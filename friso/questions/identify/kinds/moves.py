@@ -23,7 +23,7 @@ from friso.shown.drawing.figure import Figure
 from friso.shown.drawing.prefixes import range_with_unit
 
 FALLING = "viscous friction below zero: friction falls as the speed rises (Stribeck effect), which this model lacks"
-"""What a negative viscous friction of the inverse model means."""
+"""Meaning of a negative viscous friction of the inverse model."""
 
 
 def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:

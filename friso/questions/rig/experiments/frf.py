@@ -1,4 +1,7 @@
-"""Show frequency responses on the rig: plants, mass lines, open loops, and the highest stable setting."""
+"""Show frequency responses on the rig.
+
+These are plants, mass lines, open loops, and the highest stable setting.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Show the results of `friso rig hunting`: Fig. 24 and 25 of the thesis, and rails with counted peaks."""
+"""Show the results of `friso rig hunting`.
+
+These are Fig. 24 and 25 of the thesis, and the share of rails with counted peaks.
+"""
 
 from __future__ import annotations
 
