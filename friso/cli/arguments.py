@@ -36,6 +36,7 @@ def with_checked_paths(function: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(function)
     def command(**options: Any) -> None:
+        """Check every path among the options, then call the function."""
         for name, value in options.items():
             for path in value if isinstance(value, list) else [value]:
                 if isinstance(path, Path) and (flaw := paths.flaw_of(path)):

@@ -71,18 +71,22 @@ class QuestionCommand:
 
     @property
     def place(self) -> float:
+        """Return the place of the command below its topic."""
         return self.question.place
 
     @property
     def topic(self) -> str:
+        """Return the topic below which the command is listed."""
         return self.question.topic
 
     @property
     def choices(self) -> Choices | None:
+        """Return the list below the help of the command, if it has one."""
         return self.question.choices
 
     @property
     def summary(self) -> str:
+        """Return the command in one line."""
         return self.question.summary
 
     @cached_property
@@ -148,7 +152,10 @@ def help_class(choices: Choices | None) -> type[TyperCommand]:
         return _Command
 
     class ListingCommand(_Command):
+        """A command whose help ends with a list of choices."""
+
         def format_epilog(self, ctx: Any, formatter: Any) -> None:
+            """Write the list of choices below the help."""
             with formatter.section(choices.title):
                 formatter.write_dl([*choices.rows()])
 
@@ -159,6 +166,7 @@ def listed(command: AnyCommand) -> Callable[[], None]:
     """Return a stand-in for a command in the list of all, which needs only a summary."""
 
     def stand_in() -> None:
+        """Stand for the command in the list, where it is never called."""
         raise RuntimeError("a command of the list is not called")
 
     stand_in.__doc__ = command.summary

@@ -113,12 +113,14 @@ def _display(to_go: Callable[[], str]) -> Display:
         """Steps per second, where they are many."""
 
         def render(self, task: Task) -> Text:
+            """Write the steps per second, if there is one or more."""
             return Text(f"{task.speed:,.0f}/s" if task.speed and task.speed >= 1 else "")
 
     class ToGo(ProgressColumn):
         """The time that the rest of the work takes."""
 
         def render(self, task: Task) -> Text:
+            """Write the time left."""
             return Text(to_go())
 
     columns = (

@@ -78,6 +78,7 @@ def spelled(text: str, encoding: str) -> str:
 
 
 def _spelled(error: UnicodeError) -> tuple[str, int]:
+    """Replace characters that an encoding lacks; this is the error handler of streams."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     return "".join(map(_spelling, error.object[error.start : error.end])), error.end

@@ -48,10 +48,10 @@ class UserAnswers:
         return key in self.texts
 
     def refuse_unwanted(self) -> None:
-        """Raise InputError for an answer that nothing asked for, such as a misspelled key.
+        """Refuse answers that nothing asked for, such as a misspelled key.
 
-        Keys of tables, which contain a dot, are left to the check of the stage. Raises nothing where every answer was
-        wanted.
+        Raises InputError for the first of them. Keys of tables, which contain a dot, are left to the check of the
+        stage.
         """
         for key in self.texts:
             if "." not in key and key not in self.wanted:
@@ -127,7 +127,10 @@ def _of_table(
 
 
 def refuse_open(questions: Iterable[OpenQuestion], origin: str) -> None:
-    """Raise InputError that lists all open questions at once. Raises nothing if none is open."""
+    """Refuse to go on while questions are open.
+
+    Raises InputError that lists all of them at once.
+    """
     asked = list(questions)
     if asked:
         values = f"{len(asked)} values are" if len(asked) > 1 else "one value is"

@@ -122,10 +122,10 @@ class OutputFolder:
 
 
 def refuse_place(option: str, path: Path) -> None:
-    """Raise InputError if nothing can be written to a path.
+    """Check that something can be written to a path.
 
-    That holds for unusable paths (`paths.unwritable`), and for paths inside a store, which takes only its own files.
-    Raises nothing for other paths.
+    Raises InputError for unusable paths (`paths.unwritable`), and for paths inside a store, which takes only its own
+    files.
     """
     from friso.studies.metadata import is_store
 
@@ -137,9 +137,10 @@ def refuse_place(option: str, path: Path) -> None:
 
 
 def check_store_folder(folder: Path) -> None:
-    """Raise InputError if a folder cannot become a store, or holds anything but a store.
+    """Check that a folder can become a store, or is one.
 
-    A store is the whole folder, so --overwrite does not put one beside other files.
+    Raises InputError if it holds anything else, or cannot be made. A store is the whole folder, so --overwrite does not
+    put one beside other files.
     """
     maker, _ = marked(folder)
     if _entries(folder):
@@ -161,10 +162,10 @@ def check_file(
     is_own: bool = False,
     example: str = "",
 ) -> None:
-    """Raise InputError if a file that the user names must not be written.
+    """Check that a file named by the user may be written.
 
-    It must not be among the `inputs`, which are read. It must be new, unless it `is_own` or may be overwritten. The
-    message suggests another name, or `example`.
+    Raises InputError if it is among the `inputs`, which are read, or exists already. An existing file is allowed if it
+    `is_own` or may be overwritten. The message suggests another name, or `example`.
     """
     refuse_place(option, path)
     another = f"{path.stem}-2{path.suffix}"

@@ -76,4 +76,5 @@ class Glossary:
 
     @staticmethod
     def _link(word: str, entry: GlossaryRow) -> Markup:
+        """Return a link from a word to its row."""
         return Markup('<a class="word" href="#{}" title="{}">{}</a>').format(entry.place, entry.meaning, word)

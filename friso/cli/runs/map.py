@@ -32,6 +32,10 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
         place = answer.store or source
 
         def written() -> list[Path]:
+            """Write figure, page and exports, and return their paths.
+
+            They go beside the store, or into another folder that was named.
+            """
             if elsewhere is not None:
                 return [*elsewhere.write(answer.files(progress), progress), *answer.exports]
             return write_beside(answer.files_beside(progress), place, shown.overwrite, progress)

@@ -92,6 +92,7 @@ class ShownKey:
         return self._with_unit(f"{low:.6g} to {high:.6g}")
 
     def _with_unit(self, numbers: str) -> str:
+        """Add the unit to numbers, if the key has one."""
         return f"{numbers} {pretty(self.unit)}".rstrip()
 
 

@@ -81,15 +81,18 @@ def _by_estimates(kind: str) -> KindView[Any]:
     """Return a view of estimates and logs, for a kind that declares no view."""
 
     def facts(result: Any) -> Facts:
+        """List the estimates with their intervals."""
         return tuple(
             (name_of(estimate.name), with_interval(estimate)) for estimate in KINDS[kind].estimates(result, None)
         )
 
     def figures(result: Any, logs: Sequence[Source], name: str) -> list[Figure]:
+        """Draw the signals that the kind needs of each log."""
         records = [log for log in logs if isinstance(log, Log)]
         return [log_figure(log, KINDS[kind].needed(log.signals), f"{name}_{i}") for i, log in enumerate(records, 1)]
 
     def warnings(result: Any) -> tuple[str, ...]:
+        """Return the warnings of a result that has some."""
         return getattr(result, "warnings", ())
 
     return KindView(kind.replace("-", " ").capitalize(), facts, lambda result: {}, figures, warnings=warnings)

@@ -144,11 +144,13 @@ def _prefix(axis: Axis, values: Array) -> tuple[float, str]:
 
 
 def _finite(values: Iterable[float] | Array) -> Array:
+    """Return all finite values as one array."""
     array = np.asarray(values, dtype=float)
     return array[np.isfinite(array)]
 
 
 def _axis(axis: Axis, factor: float, unit: str) -> Axis:
+    """Return an axis with its limits and its unit prefixed."""
     limits = None if axis.limits is None else (axis.limits[0] * factor, axis.limits[1] * factor)
     step = None if axis.step is None else axis.step * factor
     return replace(axis, unit=unit, limits=limits, step=step)
@@ -170,6 +172,7 @@ def _limit(limit: Limit, extent: tuple[float, float]) -> Series:
 
 
 def _markers(markers: Markers, x_factor: float, y_factor: float) -> Markers:
+    """Return markers with prefixed coordinates."""
     finite = np.isfinite(markers.x) & np.isfinite(markers.y)
     return replace(markers, x=markers.x[finite] * x_factor, y=markers.y[finite] * y_factor)
 

@@ -239,5 +239,6 @@ class Figure:
 
 
 def _same_length(label: str, x: Sequence[float] | Array, y: Sequence[float] | Array) -> None:
+    """Check that x and y have one length. Raises ValueError."""
     if np.ndim(x) != 1 or np.shape(x) != np.shape(y):
         raise ValueError(f"{label}: x has the shape {np.shape(x)}, y {np.shape(y)}; expected one length")

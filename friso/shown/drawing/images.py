@@ -146,6 +146,7 @@ class Artists:
 
 
 def _artist() -> HelperProcess:
+    """Start a process that draws."""
     return HelperProcess(PROGRAM, paths=sys.path)
 
 

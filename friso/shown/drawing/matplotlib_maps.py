@@ -75,6 +75,7 @@ def _bar(canvas: Canvas, axes: list[Axes], colour_scale: ColourScale, label: str
 
 
 def _colour_map(colour_scale: ColourScale) -> Colormap:
+    """Return the colours of a scale as matplotlib takes them."""
     if colour_scale.steps:
         return ListedColormap(list(colour_scale.colours))
     return LinearSegmentedColormap.from_list("friso", list(colour_scale.colours))

@@ -90,6 +90,7 @@ def _cells(centres: Array, axis: Axis) -> Array:
 
 
 def _hover(name: str, axis: Axis) -> str:
+    """Return the text of a coordinate while the mouse is over a cell."""
     return f"%{{{name}}}" if axis.words else f"%{{{name}:.5~g}} {html.escape(axis.unit)}"
 
 

@@ -82,6 +82,7 @@ def parts_of_both(figure: Figure) -> dict[str, Any]:
 
 
 def _on_both(wide: dict[str, Any], narrow: dict[str, Any]) -> dict[str, Any]:
+    """Return the wide figure with what differs on a narrow screen."""
     return {**wide, "narrow": narrow["layout"], "bars": [_bar(trace) for trace in narrow["data"]]}
 
 
@@ -220,6 +221,7 @@ class _Head:
 
     @property
     def _text(self) -> dict[str, Any]:
+        """Return the title in bold as plotly takes it."""
         return {"text": f"<b>{'<br>'.join(map(html.escape, self.lines))}</b>", "font": {"size": 13}}
 
 
@@ -328,18 +330,21 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
 
 
 def _area(band: Band, place: dict[str, Any]) -> dict[str, Any]:
+    """Return the trace of a filled band."""
     x, y = band.outline
     style = {"mode": "lines", "line": {"width": 0}, "fill": "toself", "fillcolor": band.colour, "hoverinfo": "skip"}
     return {"type": "scatter", "x": x, "y": y, "name": html.escape(band.label), **style, **place}
 
 
 def _line(line: Series, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
+    """Return the trace of a line."""
     style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash], "simplify": False}
     drawn = {"type": "scatter", "x": line.x, "y": line.y, "mode": "lines", "line": style, "connectgaps": False}
     return {**drawn, **_text(line.label, panel), **place}
 
 
 def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
+    """Return the trace of single points."""
     style = {"color": marker.colour, **SYMBOLS[marker.symbol]}
     drawn = {"type": "scatter", "x": marker.x, "y": marker.y, "mode": "markers", "marker": style}
     return {**drawn, **_text(marker.label, panel), **place}

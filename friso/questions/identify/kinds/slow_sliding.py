@@ -60,6 +60,7 @@ def slow_sliding_panels(result: SlowSliding) -> tuple[Panel, ...]:
     thinned = slice(None, None, max(len(result.time) // POINTS, 1))
 
     def both(x: np.ndarray) -> tuple[Series, ...]:
+        """Draw measured and modelled friction over a signal."""
         return (
             Series(x[thinned], result.friction[thinned], "force less inertia", INK, width=1.4),
             Series(x[thinned], result.model[thinned], "LuGre's bristles", ORANGE, "dashed", 1.0),
