@@ -81,8 +81,9 @@ def init(
     axis: str | None = None,
     set: Changes = None,
 ) -> Path:
-    """Write a stage file to start from: a commented one, or that of an axis in a drive's parameter file; or a
-    specification for the design of a stage.
+    """Write a stage file to start from, or a specification for the design of a stage.
+
+    The stage file is a commented one, or that of an axis in a drive's parameter file.
 
     Parameters
     ----------

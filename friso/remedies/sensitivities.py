@@ -94,8 +94,10 @@ class MarginDerivatives:
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """Derivatives of a stage to some keys, whose `values` are SI: of its cycle, edge of hunting, margin and settling
-    time; None where there is no such thing, none that is smooth, or, of settling, where it was not asked for.
+    """Derivatives of cycle, edge of hunting, margin and settling time to keys of a stage.
+
+    `values` of the keys are in SI. A part is None if the stage has no such quantity, or none that is smooth. The settling
+    time is also None if it was not asked for.
 
     Examples
     --------
@@ -124,16 +126,20 @@ class Sensitivities:
 def sensitivity(
     stage: Stage, keys: Sequence[str] | None = None, edge: Margin | None = None, within: float | None = None
 ) -> Sensitivities:
-    """Derivatives of cycle, edge of hunting and modulus margin to keys; all that the equations contain if none are
-    named. The `edge` is located unless it is given (that of a check). Those of the settling time, too, if it is said
-    what deviation counts as in position, `within` [m].
+    """Return derivatives of cycle, edge of hunting and modulus margin to `keys` of a `stage`.
 
-    The cycle's and the settling time's are exact: from variational equations along the keys, with saltation at kinks
-    (of the settling time, but for the share of a start that depends on keys, which is by central differences).
-    The edge's follow from the multipliers, exact derivatives of the flow, whose own change is taken by central
-    differences; they are those of a flip. The margin's are central differences of the loop at one frequency. Raises
-    InputError for an unknown key, for a deviation that is not positive, and, of the settling time, for keys of the
-    motion: the reference is taken as it is. Where a release begins may be asked for.
+    Without `keys`, all that the equations contain are taken. The `edge` is located, unless that of a check is given. With
+    `within` [m], the deviation that counts as in position, the settling time is derived, too.
+
+    Derivatives of the cycle and of the settling time are exact. They follow from variational equations along the keys,
+    with saltation at kinks. Only the part by which keys move the start of a move is by central differences.
+
+    The edge is that of a flip. Its derivatives follow from the multipliers, which are exact derivatives of the flow;
+    their own change is taken by central differences. Derivatives of the margin are central differences of the loop at one
+    frequency.
+
+    Raises InputError for an unknown key, and for a deviation that is not positive. For the settling time, it is also
+    raised for keys of the motion, since the reference is taken as it is. The start of a release is allowed.
 
     Examples
     --------

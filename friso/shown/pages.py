@@ -40,9 +40,12 @@ OWN_TEMPLATES = "friso.shown"
 CONTENTS: Mapping[str, Any] = MappingProxyType(
     {"verdicts": (), "sentences": (), "notes": (), "columns": (), "rows": (), "computed": ""}
 )
-"""What every page shows of its values, where it has them: sentences with a colour, and others; notes below them; a
-table, whose columns are texts or have a label and a colour, and whose rows are a text and a list of texts; and how it
-was `computed`, after the version of friso, without the full stop."""
+"""Values that every page shows if it has them.
+
+Verdicts are sentences with a colour, and sentences have none; notes stand below them. Columns of the table are texts, or
+have a label and a colour. Its rows are a text and a list of texts. `computed` says how the result was computed: it follows
+the version of friso, without a full stop.
+"""
 
 
 @dataclass(frozen=True)
