@@ -96,8 +96,8 @@ class MarginDerivatives:
 class Sensitivities:
     """Derivatives of cycle, edge of hunting, margin and settling time to keys of a stage.
 
-    `values` of the keys are in SI. A part is None if the stage has no such quantity, or none that is smooth. The settling
-    time is also None if it was not asked for.
+    `values` of the keys are in SI. A part is None if the stage has no such quantity, or none that is smooth. The
+    settling time is also None if it was not asked for.
 
     Examples
     --------
@@ -128,15 +128,15 @@ def sensitivity(
 ) -> Sensitivities:
     """Return derivatives of cycle, edge of hunting and modulus margin to `keys` of a `stage`.
 
-    Without `keys`, all that the equations contain are taken. The `edge` is located, unless that of a check is given. With
-    `within` [m], the deviation that counts as in position, the settling time is derived, too.
+    Without `keys`, all that the equations contain are taken. The `edge` is located, unless that of a check is given.
+    With `within` [m], the deviation that counts as in position, the settling time is derived, too.
 
     Derivatives of the cycle and of the settling time are exact. They follow from variational equations along the keys,
     with saltation at kinks. Only the part by which keys move the start of a move is by central differences.
 
     The edge is that of a flip. Its derivatives follow from the multipliers, which are exact derivatives of the flow;
-    their own change is taken by central differences. Derivatives of the margin are central differences of the loop at one
-    frequency.
+    their own change is taken by central differences. Derivatives of the margin are central differences of the loop at
+    one frequency.
 
     Raises InputError for an unknown key, and for a deviation that is not positive. For the settling time, it is also
     raised for keys of the motion, since the reference is taken as it is. The start of a release is allowed.
