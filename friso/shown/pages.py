@@ -42,9 +42,9 @@ CONTENTS: Mapping[str, Any] = MappingProxyType(
 )
 """Values that every page shows if it has them.
 
-`verdicts` have a colour and `sentences` have none; `notes` stand below them. `columns` of the table are texts, or have a
-label and a colour. Its `rows` are a text and a list of texts. `computed` says how the result was computed; it follows
-the version of friso and has no full stop.
+`verdicts` have a colour and `sentences` have none; `notes` stand below them. `columns` of the table are texts, or have
+a label and a colour. Its `rows` are a text and a list of texts. `computed` says how the result was computed; it
+follows the version of friso and has no full stop.
 """
 
 
