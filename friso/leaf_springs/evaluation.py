@@ -41,15 +41,18 @@ class Mode:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """A mechanism at deflections of its stage along the motion [m], from 0 to the stroke, shape (n,).
+    """A mechanism at deflections of its stage along the motion.
 
-    `forces` [N] hold it there; `drive` is the stiffness along the motion [N/m] with the stage free to shift and turn
-    otherwise, `support_x` along the leaves and `support_y` along their width [N/m] with all else held, each of shape
-    (n,). `stiffness` (2, 6, 6) is that of the stage at its reference point, the middle of the leaf ends, at deflection
-    0 and at full stroke: forces [N] and moments [N m] along and about x, y, z per displacement [m] and rotation.
-    `modes` are those at deflection 0, the drive mode first, the others by frequency. At full stroke: `stress`, the
-    largest bending stress [Pa], without and with the concentration at the `clamp`, and the `shortening` of the leaves
-    [m]. `buckling` is the load [N] along the leaves, borne by all of them, at which the stage sways.
+    `deflections` [m] run from 0 to the stroke, shape (n,). `forces` [N] hold the stage there. `drive` is the stiffness
+    along the motion [N/m], with the stage otherwise free to shift and turn. `support_x` along the leaves and
+    `support_y` along their width [N/m] hold with all else fixed. All have shape (n,).
+
+    `stiffness` (2, 6, 6) is that of the stage at its reference point, the middle of the leaf ends, at deflection 0 and
+    at full stroke. It relates forces [N] and moments [N m] along and about x, y, z to displacements [m] and rotations.
+    `modes` are those at deflection 0, the drive mode first, then by frequency.
+
+    At full stroke, `stress` is the largest bending stress [Pa] without the concentration at the clamp, and `shortening`
+    how much the leaves shorten [m]. `buckling` is the load [N] along all leaves together at which the stage sways.
     """
 
     model: str

@@ -1,10 +1,12 @@
 """LinuxCNC INI file
 
-The gains of a joint go to the HAL component `pid`: output = P e + I sum(e) T + D e' + FF0 r + FF1 r' + FF2 r'' + BIAS,
-e behind MAX_ERROR and DEADBAND, the output within MAX_OUTPUT, where the integral rests while it would drive it further.
-e' is r' - y', as in versions with the pins command-deriv and feedback-deriv; older ones differentiate the error behind
-its deadband. In torque mode the output is a force; in velocity mode it is a velocity, which the drive's own loop
-follows, in whatever unit the drive is scaled to: FF1 = 1 where that is machine units per second.
+The gains of a joint go to the HAL component `pid`: output = P e + I sum(e) T + D e' + FF0 r + FF1 r' + FF2 r'' + BIAS.
+The error e is taken after MAX_ERROR and DEADBAND, and the output is limited to MAX_OUTPUT. At that limit the integral
+rests while it would drive the output further. e' is r' - y', as in versions with the pins command-deriv and
+feedback-deriv. Older versions differentiate the error after its deadband.
+
+In torque mode the output is a force. In velocity mode it is a velocity, which the drive's own loop follows, in the unit
+that the drive is scaled to. FF1 = 1 if that unit is machine units per second.
 """
 
 from __future__ import annotations

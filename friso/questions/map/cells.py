@@ -231,7 +231,7 @@ def _range(name: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, 
     """Return the limits of a colour scale, whether it is logarithmic, and the colours of counts.
 
     A count of 0 has the colour of rest. Positive numbers over more than three decades get a logarithmic scale of at
-    most six decades, because the motion of a stage at rest is solver noise.
+    most six decades. Below that, the motion of a stage at rest is only solver noise.
     """
     finite, metric = numbers[np.isfinite(numbers)], metrics().get(name)
     if not finite.size:
