@@ -1,4 +1,4 @@
-"""What a command would write, in one archive: nothing is written anywhere else."""
+"""Pack what a command would write into one archive, and write nothing else."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
 
 def archive(answer: Answer, more: Mapping[str, str]) -> bytes:
-    """A ZIP file of the files of an answer, its figures in all forms, its document as JSON, and more texts by name."""
+    """Return a ZIP file with everything that an answer's command would write.
+
+    It holds the files, the figures in all formats, and the answer as JSON. `more` adds texts by name.
+    """
     held = io.BytesIO()
     packing = zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED)
     with temporary_folder("friso-app-") as folder, packing as file:

@@ -1,4 +1,7 @@
-"""Who may hold a connection, and for how long: nobody without a key keeps others from the server."""
+"""Limit who holds a connection, and for how long.
+
+Nobody without a key can keep others from the server.
+"""
 
 from __future__ import annotations
 
@@ -29,11 +32,14 @@ OUT_OF_FILES = (
 
 
 class Connection(H11Protocol):
-    """A connection that is cut off where it rests or is held by somebody without a key for too long, or where a new
-    one needs its place. One at work for somebody with a key stays."""
+    """A connection that is cut off when it rests too long, or is held too long without a key.
+
+    If all places are taken, the connection that has rested longest makes way for a new one. A connection that answers
+    somebody with a key is never cut.
+    """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a place, if need be that of the connection that has rested longest."""
+        """Take a place; abort the connection that has rested longest if all are taken."""
         super().connection_made(transport)
         self._since, self._timer = self.loop.time(), self.loop.call_later(HEADERS, self._look)
         held = [one for one in self.connections if isinstance(one, Connection) and not one.transport.is_closing()]
@@ -42,18 +48,18 @@ class Connection(H11Protocol):
             min(resting, key=lambda one: one._since).transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Give the place back."""
+        """Stop the timer and give the place back."""
         self._timer.cancel()
         super().connection_lost(exc)
 
     def on_response_complete(self) -> None:
-        """Wait for another request."""
+        """Start to measure the rest before the next request."""
         self._since = self.loop.time()
         super().on_response_complete()
 
     @property
     def is_at_work(self) -> bool:
-        """Whether somebody with a key is being answered."""
+        """Tell whether the connection answers somebody with a key."""
         return self._is_answering and LET_IN in self.scope
 
     @property
@@ -61,7 +67,7 @@ class Connection(H11Protocol):
         return self.cycle is not None and not self.cycle.response_complete
 
     def _look(self) -> None:
-        """Cut the connection off, or look again when its time is over."""
+        """Cut the connection off if its time is over; otherwise look again when it will be."""
         allowed = SENDING if self._is_answering else HEADERS
         left = HEADERS if self.is_at_work else self._since + allowed - self.loop.time()
         if left <= 0:
@@ -71,14 +77,17 @@ class Connection(H11Protocol):
 
 
 class Once(logging.Filter):
-    """Lets each message through once, with its error: whoever can reach the server can repeat what makes it."""
+    """A filter that lets each message and its error through only once.
+
+    Anybody who reaches the server can repeat a request that fails, and would otherwise fill the log.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self._said: set[tuple[str, str]] = set()
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Whether the message is new."""
+        """Tell whether the message has not been let through before."""
         said = str(record.msg), repr(record.exc_info[1]) if record.exc_info else ""
         new = said not in self._said
         self._said.add(said)
@@ -86,7 +95,10 @@ class Once(logging.Filter):
 
 
 def failed(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """Say what failed in the loop of the server; that no connection can be taken, in a sentence."""
+    """Log an error of the server's event loop.
+
+    Too many open connections are reported in one sentence, without a traceback.
+    """
     error = context.get("exception")
     if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM):
         LOGGER.warning(OUT_OF_FILES)

@@ -1,7 +1,8 @@
-"""What travels to the page: frames of a JSON text and of the numbers that it refers to, in binary.
+"""Pack answers for the page: frames of a JSON text and of its numbers in binary.
 
-A frame is two whole numbers of four bytes, least significant first, the lengths of the text and of the numbers, and
-then both. In the text, an array is an object: {"array": place of its first byte, "shape": [...]}, of float32.
+A frame begins with two whole numbers of four bytes, least significant byte first. They are the lengths of the text and
+of the numbers, which follow. In the text, an array is an object {"array": place of its first byte, "shape": [...]}.
+Arrays are float32.
 """
 
 from __future__ import annotations
@@ -18,8 +19,11 @@ from friso.shown.drawing.figure import Figure
 
 
 def frame(value: Any) -> bytes:
-    """A value of dictionaries, lists, texts, numbers and NumPy arrays, as a frame. What is not finite is null; in
-    arrays, NaN."""
+    """Return a value as a frame.
+
+    The value may hold dictionaries, lists, texts, numbers and NumPy arrays. Numbers that are not finite become null; in
+    arrays they become NaN.
+    """
     arrays = _Arrays()
     text = json.dumps(_plain(value, arrays), separators=(",", ":"), allow_nan=False).encode()
     numbers = b"".join(arrays.parts)
@@ -27,8 +31,10 @@ def frame(value: Any) -> bytes:
 
 
 def figure_on_page(figure: Figure) -> dict[str, Any]:
-    """A figure as a page draws it: name, title, caption, and what plotly takes, where there is room and on a narrow
-    page."""
+    """Return a figure as the page draws it: name, title, caption and plotly's data.
+
+    The data serve wide and narrow pages.
+    """
     return {
         "name": figure.name,
         "title": figure.title,
@@ -38,20 +44,24 @@ def figure_on_page(figure: Figure) -> dict[str, Any]:
 
 
 class _Arrays:
-    """The numbers of a frame, array by array."""
+    """The arrays of a frame, one behind the other."""
 
     def __init__(self) -> None:
         self.parts: list[bytes] = []
         self.size = 0
 
     def add(self, numbers: bytes) -> int:
-        """Add an array; the place of its first byte."""
+        """Add an array and return the place of its first byte."""
         place, self.size = self.size, self.size + len(numbers)
         self.parts.append(numbers)
         return place
 
 
 def _plain(value: Any, arrays: _Arrays) -> Any:
+    """Replace arrays by references and numbers by what JSON can hold.
+
+    Arrays are added to `arrays` as float32. Numbers that are not finite become None.
+    """
     if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size:
         place = arrays.add(np.ascontiguousarray(value, "<f4").tobytes())
         return {"array": place, "shape": [*value.shape]}

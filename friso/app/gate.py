@@ -1,4 +1,7 @@
-"""Who is let in: the browser that opened the address with the token, which has a key since, and nobody else."""
+"""Let in the browser that opened the address with the token, and nobody else.
+
+The browser exchanges the token for a key, which it sends with every later request.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-"""What a page may load: all from this server, scripts from their files alone. plotly.js makes style elements itself."""
+"""Sources that a page may load: this server alone, scripts only from files. plotly.js makes style elements itself."""
 
 HEADERS = {
     "Content-Security-Policy": POLICY,
@@ -26,7 +29,7 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-"""What goes with every response that says nothing else of the same."""
+"""Headers of every response that does not set them otherwise."""
 
 REFUSED = (
     "friso app answers only the browser that was opened with the address it printed: open that address. "
@@ -53,16 +56,19 @@ TOKEN = "friso-token"
 """The header that has a token."""
 
 LET_IN = "friso.let_in"
-"""Stands in the scope of a request that came with a key."""
+"""Marks the scope of a request that came with a key."""
 
 BEARER = "Bearer "
-"""What stands before a key in the header `Authorization`. Browsers add none of their own accord, as they do with
+"""Text before a key in the header `Authorization`. Browsers add none of their own accord, as they do with
 cookies, which also go to every other server of the same name, whatever its port."""
 
 
 @dataclass(frozen=True)
 class Access:
-    """The names by which the server may be addressed, with the port, and the secrets of its token and its session."""
+    """The names under which the server answers, and the secrets that let a browser in.
+
+    `hosts` holds names with the port. `token` begins the long session, and `session` is its key.
+    """
 
     hosts: frozenset[str]
     token: str = field(default_factory=lambda: secrets.token_urlsafe(32))
@@ -74,29 +80,41 @@ class Access:
 
     @classmethod
     def at(cls, host: str, port: int) -> Access:
-        """The access to a server at this host and port; one on all addresses of the machine has any name."""
+        """Return the access to a server at a host and port.
+
+        Names of this machine alone stand for each other, such as localhost and 127.0.0.1.
+        """
         named = (f"[{host}]" if ":" in host else host).lower()
         names = {named, "localhost", "127.0.0.1", "[::1]"} if host in LOOPBACK else {named}
         hosts = {f"{name}:{port}" for name in names} | (names if port == HTTP else set())
         return cls(frozenset(hosts))
 
     def token_for_once(self) -> str:
-        """A token that is taken once: commands that are running, and the addresses in them, can be seen by others."""
+        """Return a token that is valid once.
+
+        Other users can see running commands, and with them the address that friso opens in a browser.
+        """
         token = secrets.token_urlsafe(32)
         self.once[token] = time.monotonic(), ""
         return token
 
     def is_host(self, host: str) -> bool:
-        """Whether the server goes by this name: another one was made to lead here. Names are the same in capitals."""
+        """Tell whether the server goes by this name, in small or capital letters.
+
+        A foreign name would mean that another site made its name lead to this server.
+        """
         return host.lower() in self.hosts
 
     def is_origin(self, origin: str | None) -> bool:
-        """Whether a request comes from a page of this server, or from no page at all."""
+        """Tell whether a request comes from a page of this server, or from no page."""
         return origin is None or (origin.startswith("http://") and self.is_host(origin.removeprefix("http://")))
 
     def session_of(self, token: str, key: str = "") -> str:
-        """The session that a token begins, "" for a wrong one. A token that is taken once and comes again from another
-        browser than the one that has the session which it began as its key, was seen by two: that session is over."""
+        """Return the key of the session that a token begins; empty for a wrong token.
+
+        A token that is valid once may return from the browser that used it, with the session's key. If it returns
+        without that key, two people have seen it, and its session ends.
+        """
         for own, (made, session) in self.once.items():
             if not _same(token, own):
                 continue
@@ -110,7 +128,7 @@ class Access:
         return self.session if _same(token, self.token) else ""
 
     def has(self, key: str) -> bool:
-        """Whether a key is that of a session which goes on."""
+        """Tell whether a key belongs to a session that has not ended."""
         begun = {session for _, session in self.once.values() if session}
         return any(_same(key, session) for session in {self.session, *begun} - self.ended)
 
@@ -123,14 +141,16 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 class Gate:
-    """Lets requests through to an application that have a key, and those for what it hands to anybody, `public` by
-    path: the page itself, which holds nothing of the user's. All others are refused with 403."""
+    """Pass requests with a key on to the application, and refuse all others with status 403.
+
+    Paths in `public` need no key: they are the page itself, which holds nothing of the user's.
+    """
 
     def __init__(self, application: ASGIApp, access: Access, public: Set[str]) -> None:
         self.application, self.access, self.public = application, access, public
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request: let it in, hand it a key for its token, or refuse it."""
+        """Answer a request: let it in, exchange its token for a key, or refuse it."""
         if scope["type"] == "lifespan":
             await self.application(scope, receive, send)
             return
@@ -146,7 +166,10 @@ class Gate:
         await (own or self.application)(scope, receive, guarded)
 
     def _own(self, scope: Scope) -> Response | None:
-        """The answer of the gate's own, None for what is let in."""
+        """Return the gate's own answer, or None for a request that is let in.
+
+        Requests under foreign names and from foreign pages are refused first.
+        """
         headers, access, path = Headers(scope=scope), self.access, scope["path"]
         if not access.is_host(headers.get("host", "")) or not access.is_origin(headers.get("origin")):
             return _refused()

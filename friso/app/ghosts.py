@@ -1,4 +1,7 @@
-"""What stands in a figure beside its own: the pinned machine in grey; on maps, the edge of hunting."""
+"""Add to a figure what it is compared with.
+
+This is the pinned machine in grey, or the edge of hunting on a map.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,10 @@ GHOST = "#a9a9a9"
 
 
 def ghosts_of(pinned: Answer | None) -> Callable[[Figure], Figure]:
-    """What puts the lines of a pinned machine's answer behind those of a figure of the same name."""
+    """Return a function that draws the pinned machine's lines behind those of a figure.
+
+    Figures are matched by name. Without a pinned answer, figures stay as they are.
+    """
     if pinned is None:
         return lambda figure: figure
     others = {figure.name: figure for figure in pinned.figures()}
@@ -25,10 +31,14 @@ def ghosts_of(pinned: Answer | None) -> Callable[[Figure], Figure]:
 
 
 def _ghosted(figure: Figure, other: Figure) -> Figure:
-    """The figure with the lines of another one's panels behind its own: of those that show the same."""
+    """Draw the lines of another figure in grey behind those of this one.
+
+    Panels are matched by title and axis labels.
+    """
     ghosts = {_subject(panel): panel for panel in other.panels}
 
     def both(panel: Panel) -> Panel:
+        """Draw the other figure's lines in grey behind those of a panel."""
         ghost = ghosts.get(_subject(panel))
         if ghost is None or not ghost.series:
             return panel
@@ -40,15 +50,16 @@ def _ghosted(figure: Figure, other: Figure) -> Figure:
 
 
 _OWN = re.compile(r" \(as given\)|, \S+ k?Hz$")
-"""What a title says of the machine alone: which of its cases it is in, and the frequency of a mode."""
+"""Part of a title that belongs to one machine alone: its case, or the frequency of a mode."""
 
 
 def _subject(panel: Panel) -> tuple[str, str, str]:
+    """Return title and axis labels of a panel, without what the title says of one machine alone."""
     return _OWN.sub("", panel.title), panel.x.label, panel.y.label
 
 
 def with_edge(figure: Figure, edge: Answer | None) -> Figure:
-    """A map over two keys with the curves on which hunting ends over the same two."""
+    """Add to a map over two keys the curves on which hunting ends."""
     if edge is None:
         return figure
     curves = edge.figures()[0].panels[0].series

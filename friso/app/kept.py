@@ -1,5 +1,7 @@
-"""Answers that are kept for whoever comes back to a machine: a tab is opened again, a change is undone, a machine is
-pinned, the files of what is shown are handed out."""
+"""Keep answers for later, since the same machine is often asked about again.
+
+A tab is opened again, a change is undone, a machine is pinned, or the files of an answer are downloaded.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,10 @@ MOST = 4
 
 
 class KeptAnswers:
-    """The answers of functions of friso about machines, with what was noted about each."""
+    """Answers of friso's functions about machines, with the notes on each.
+
+    Only the answers asked for last are kept. Several threads may use the object.
+    """
 
     def __init__(self) -> None:
         self._kept: dict[Callable[..., Answer], OrderedDict[tuple[Machine, str], tuple[Answer, list[str]]]] = {}
@@ -28,8 +33,10 @@ class KeptAnswers:
     def answer(
         self, function: Callable[..., Answer], machine: Machine, work: Work, options: Mapping[str, Any] | None = None
     ) -> Any:
-        """The answer of a function about a machine: the one that is kept, whose notes the work has then, too, or a new
-        one. Raises whatever the function raises."""
+        """Return a function's answer about a machine, computed now or kept from before.
+
+        The notes on a kept answer are added to the work again. Raises whatever the function raises.
+        """
         place = _place(machine, options)
         with self._turn:
             kept = self._kept.setdefault(function, OrderedDict())
@@ -48,7 +55,7 @@ class KeptAnswers:
     def holds(
         self, function: Callable[..., Answer], machine: Machine, options: Mapping[str, Any] | None = None
     ) -> bool:
-        """Whether the answer of a function about a machine is kept."""
+        """Tell whether a function's answer about a machine is kept."""
         with self._turn:
             return _place(machine, options) in self._kept.get(function, ())
 

@@ -1,4 +1,4 @@
-"""The command and the line of Python that give what the page shows."""
+"""Write the shell command and the line of Python that repeat what the page shows."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from friso.quantities import as_toml
 
 
 def command_line(command: str, files: Sequence[str], options: Mapping[str, Any]) -> str:
-    """A command with files and options by their names in Python, as the shell of this system takes it."""
+    """Return a friso command with its files and options, quoted for this system's shell.
+
+    `options` holds the options by their names in Python.
+    """
     words = ["friso", command, *files]
     for name, value in _each(options):
         option = f"--{name.strip('_').replace('_', '-')}"
@@ -19,13 +22,13 @@ def command_line(command: str, files: Sequence[str], options: Mapping[str, Any])
 
 
 def python_line(function: str, files: Sequence[str], options: Mapping[str, Any]) -> str:
-    """The same in Python."""
+    """Return the call of a friso function with its files and options as a line of Python."""
     first = repr(files[0] if len(files) == 1 else [*files])
     return f"friso.{function}({', '.join([first, *(f'{name}={value!r}' for name, value in options.items())])})"
 
 
 def _each(options: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """The options of a command; of one that is given for several keys, each."""
+    """Yield every option with its value; an option for several keys comes once per key."""
     for name, value in options.items():
         if isinstance(value, Mapping):
             yield from ((name, f"{key}={_bare(item)}") for key, item in value.items())
@@ -34,5 +37,5 @@ def _each(options: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _bare(value: Any) -> str:
-    """A value behind KEY=: texts without quotes, as the command line reads them."""
+    """Write a value behind KEY= as the command line reads it, texts without quotes."""
     return value if isinstance(value, str) else as_toml(value)

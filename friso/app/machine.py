@@ -1,4 +1,4 @@
-"""The machine of a page: a stage file as it was opened, the keys changed since, and what the page shows of them."""
+"""Hold the machine that a page shows: a stage file, and the keys changed since it was opened."""
 
 from __future__ import annotations
 
@@ -21,8 +21,11 @@ REACH = 10.0
 
 @dataclass(frozen=True)
 class Machine:
-    """A stage file by its `text` and its `name`, and the keys `changed`, as JSON; null removes one. `made` on the page:
-    no file has this text."""
+    """A stage file by its text and name, and the keys changed on the page.
+
+    `changed` holds the changes as JSON, in which null removes a key. `made` says that the machine was made on the page,
+    so that no file has its text.
+    """
 
     text: str
     name: str
@@ -31,7 +34,7 @@ class Machine:
 
     @classmethod
     def of(cls, data: Any) -> Machine:
-        """The machine that a page sends. Raises InputError for anything else."""
+        """Return the machine that a page sent. Raises InputError for data of any other form."""
         if not isinstance(data, Mapping) or not isinstance(data.get("text"), str):
             raise InputError("machine", type(data).__name__, "the text of a stage file, and the keys changed")
         changes = data.get("changes") or {}
@@ -42,22 +45,28 @@ class Machine:
 
     @property
     def changes(self) -> dict[str, Any]:
-        """The keys changed."""
+        """Return the changed keys and their values."""
         return json.loads(self.changed)
 
     @property
     def is_of_page(self) -> bool:
-        """Whether only the stage file that the page saves is this machine: no command says to take a key away."""
+        """Tell whether only a stage file saved by the page describes this machine.
+
+        A machine made on the page has no other file. No option of a command can remove a key, either.
+        """
         return self.made or None in self.changes.values()
 
     @property
     def to_set(self) -> dict[str, Any]:
-        """The keys to be set in its file, as an option: none in the stage file that the page saves, which has them."""
+        """Return the changed keys as the option `set` of a command.
+
+        Returns nothing if the stage file that the page saves holds the changes already.
+        """
         return {"set": self.changes} if self.changes and not self.is_of_page else {}
 
     @property
     def stage(self) -> Stage:
-        """The stage. Raises StageError."""
+        """Build the stage, with all changes. Raises StageError."""
         return _stage(self)
 
 
@@ -71,6 +80,10 @@ questions are about the same one."""
 
 @lru_cache(MOST_KEPT)
 def _stage(machine: Machine) -> Stage:
+    """Build the stage of a machine, or return it from the cache.
+
+    Changes that remove a key which the file does not have are ignored.
+    """
     base = loads(machine.text, machine.name)
     written = base.as_written()
     changes = {key: value for key, value in machine.changes.items() if value is not None or _has(written, key)}
@@ -78,13 +91,13 @@ def _stage(machine: Machine) -> Stage:
 
 
 def _has(tables: Mapping[str, Any], key: str) -> bool:
-    """Whether a dotted key of nested tables is there: one that was added on the page and taken away again is not."""
+    """Tell whether a dotted key is there in nested tables."""
     table, _, name = key.partition(".")
     return name in tables[table] if table in tables and name else table in tables
 
 
 def machine_on_page(machine: Machine) -> dict[str, Any]:
-    """What a page shows of a machine: its tables with their keys, in the order of the stage file."""
+    """Return what the page shows of a machine: its tables and keys in the order of the stage file."""
     stage = machine.stage
     flat, written, uncertain = stage.flat(), stage.as_written(), stage.uncertain()
     fields, tables = numeric_keys(flat), []
@@ -111,9 +124,13 @@ def machine_on_page(machine: Machine) -> dict[str, Any]:
 
 
 def _variant(node: Mapping[str, Any], present: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The form of a table that is written: the one whose words are these, and which has all its keys."""
+    """Return the form of a table that the stage file uses.
+
+    The form has all keys that are present, and allows the kind or model that is written.
+    """
 
     def fits(form: Mapping[str, Any]) -> bool:
+        """Tell whether a form of the table allows all that is written."""
         keys = form["properties"]
         words = (present.get(key) in item["enum"] for key, item in keys.items() if key in ("kind", "model"))
         return all(words) and all(key in keys for key in present)
@@ -130,8 +147,10 @@ def _key(
     fields: Mapping[str, Quantity | Number],
     uncertain: Container[str],
 ) -> dict[str, Any]:
-    """A key as the page shows it: its value as written, whether that is `plain` (certain), what it takes, and the range
-    of its slider in SI."""
+    """Describe a key for the page: its value, kind, unit and example.
+
+    `plain` marks a certain value. A number also gets its value in SI and the range of its slider.
+    """
     key = path.partition(".")[2]
     value, field = present.get(key), fields.get(path)
     about = {"path": path, "value": value, "description": node.get("description", ""), "kind": _kind(node)}
@@ -145,14 +164,17 @@ def _key(
 
 
 def _kind(node: Mapping[str, Any]) -> str:
+    """Return how the page edits a key: by choice of a word, switch, array or value."""
     if "enum" in node:
         return "word"
     return {"boolean": "switch", "array": "array", "object": "array"}.get(str(node.get("type")), "value")
 
 
 def _range(field: Quantity | Number, value: float) -> dict[str, Any]:
-    """From where to where a slider goes [SI], and whether by ratio: ten times as small and as large, as far as the key
-    takes such values."""
+    """Return the range of a slider [SI], and whether it moves by ratio.
+
+    The slider reaches from a tenth of the value to ten times the value, within the bounds of the key.
+    """
     if value == 0:
         most = abs(float(field.read(field.example))) * REACH if isinstance(field, Quantity) else 1.0
         return {"low": 0.0, "high": most, "log": False}
@@ -165,8 +187,11 @@ def _range(field: Quantity | Number, value: float) -> dict[str, Any]:
 
 
 def _schema() -> dict[str, Any]:
-    """The schema of the stage file: read once, and by one thread, for Python 3.11 cannot parse in several at a time
-    ("AST constructor recursion depth mismatch", github.com/python/cpython/issues/106905)."""
+    """Return the schema of the stage file, which is read once and by one thread.
+
+    Python 3.11 cannot parse in several threads at a time ("AST constructor recursion depth mismatch",
+    github.com/python/cpython/issues/106905).
+    """
     with _reading:
         return _read_schema()
 

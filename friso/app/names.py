@@ -1,4 +1,4 @@
-"""Names that a page gives to files, as this machine takes them."""
+"""Make file names sent by a page safe for this machine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ LONGEST = 150
 
 
 def plain_name(name: str, otherwise: str) -> str:
-    """The last part of a name without what leads elsewhere, hides a file, or reads as an option of a command."""
+    """Return the last part of a path as a safe file name, or `otherwise` if nothing is left.
+
+    The name cannot lead to another folder, hide the file, or read as an option of a command.
+    """
     last = _OUTSIDE.sub("_", name.replace("\\", "/").rpartition("/")[2])
     plain = last.encode()[-LONGEST:].decode(errors="ignore").lstrip(".- ").rstrip(". ") or otherwise
     return f"_{plain}" if name_refused(Path(plain)) else plain

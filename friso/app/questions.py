@@ -1,4 +1,4 @@
-"""The questions that a page asks: each is answered by the function of friso of that name."""
+"""Answer the questions of a page, each by the friso function of that name."""
 
 from __future__ import annotations
 
@@ -46,8 +46,10 @@ KEPT = KeptAnswers()
 
 @dataclass(frozen=True)
 class PageRequest:
-    """What a page asks about: the machine shown, the one that is `pinned` beside it or None, and the options; and the
-    files that were dropped on it."""
+    """A question of the page: the machine shown, the pinned one, options, and dropped files.
+
+    `pinned` is None if no machine is pinned.
+    """
 
     machine: Machine
     pinned: Machine | None
@@ -56,7 +58,10 @@ class PageRequest:
 
     @classmethod
     def of(cls, data: Mapping[str, Any], uploads: Uploads) -> PageRequest:
-        """What a request holds. Raises InputError."""
+        """Read a request from the JSON that a page sent.
+
+        Raises InputError for data of any other form.
+        """
         options = data.get("options") or {}
         if not isinstance(options, Mapping):
             raise InputError("options", type(options).__name__, "options by name")
@@ -65,7 +70,10 @@ class PageRequest:
         return cls(*both, options, uploads)
 
     def chosen(self, *names: str) -> dict[str, Any]:
-        """The options of these names that are given: texts, numbers, true or false. Raises InputError for others."""
+        """Return the options of these names that are set.
+
+        Raises InputError for other names or values.
+        """
         for name, value in self.options.items():
             if name not in names or not isinstance(value, str | int | float | bool | None):
                 raise InputError("options", name, f"one of {', '.join(names) or 'none'}, a text or a number")
@@ -73,21 +81,24 @@ class PageRequest:
 
 
 def parts_of(answer: Answer, beside: Callable[[Figure], Figure] = lambda figure: figure, **more: Any) -> AnswerPart:
-    """An answer as a page shows it, each figure with what is shown `beside`."""
+    """Return an answer as the page shows it.
+
+    `beside` adds to each figure what it is compared with. `more` adds further entries.
+    """
     return {**figures_of(answer, beside), **words_of(answer), **more}
 
 
 def figures_of(
     answer: Answer, beside: Callable[[Figure], Figure], some: Callable[[], Sequence[Figure]] | None = None
 ) -> AnswerPart:
-    """The figures of an answer, or `some` of them, without words."""
+    """Return the figures of an answer without its words; `some` selects a few of them."""
     with speaking_of(answer.axis_kind):
         figures = [figure_on_page(beside(figure)) for figure in (some or answer.figures)()]
     return {"kind": "answer", "sentences": [], "tables": [], "details": [], "failure": "", "figures": figures}
 
 
 def words_of(answer: Answer) -> AnswerPart:
-    """The words of an answer, without figures: those that are shown stay."""
+    """Return the words of an answer without figures, so that the figures shown stay."""
     return {
         "kind": "answer",
         "sentences": [*answer.sentences()],
@@ -102,7 +113,7 @@ def words_of(answer: Answer) -> AnswerPart:
 
 
 def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """The keys of the machine."""
+    """Yield the keys of the machine, the metrics of maps, and the questions of installed packages."""
     asked.chosen()
     others = [{"id": name, "label": name.replace("-", " ").capitalize()} for name in others_of_stages()]
     in_order = sorted(metrics().items(), key=lambda item: not item[1].words)  # those in words first
@@ -111,12 +122,18 @@ def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def others_of_stages() -> list[str]:
-    """The questions of installed packages that are asked about a stage alone; a page shows each as a picture."""
+    """Return the questions of installed packages that need a stage alone.
+
+    The page shows each of them as a picture.
+    """
     return [name for name in DECLARED.others if name not in {*QUESTIONS, *COMMANDS} and _takes_a_stage_alone(name)]
 
 
 def _takes_a_stage_alone(name: str) -> bool:
-    """Whether a question can be asked about a stage without any option; not where its package is of no use."""
+    """Tell whether a question needs a stage and no option.
+
+    Returns False for a package that cannot be loaded; `friso --help` reports it.
+    """
     try:
         declared = DECLARED[name]
         options = (item for key, item in declared.parameters.items() if key != "stage")
@@ -126,7 +143,7 @@ def _takes_a_stage_alone(name: str) -> bool:
 
 
 def other(name: str, asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """What an installed package answers about the machine shown."""
+    """Yield the answer of an installed package about the machine shown."""
     asked.chosen()
     yield parts_of(_other(name, asked, work), **_lines(name, asked))
 
@@ -136,7 +153,7 @@ def _other(name: str, asked: PageRequest, work: Work) -> Answer:
 
 
 def run(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """What the run does: the figure, and then the sentence, for which it is measured."""
+    """Yield the run: first its figures, then its sentences, which need measurements of the run."""
     asked.chosen()
     ghosts = _ghosts(asked, work, friso.simulate)
     answer, lines = friso.simulate(asked.machine.stage), _lines("simulate", asked)
@@ -145,7 +162,7 @@ def run(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """What the run of a cell of a map does: its error alone."""
+    """Yield the error of the run that a cell of a map stands for."""
     asked.chosen()
     ghosts = _ghosts(asked, work, friso.simulate)
     answer = friso.simulate(asked.machine.stage)
@@ -156,8 +173,10 @@ def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """The verdict by the cycles that attract, in a word for each case: a map of a single cell, or one over the joint
-    locked and free."""
+    """Yield the verdict of each case in one word, judged by the attracting cycles.
+
+    The verdict is computed as a map of one cell, or of two cells for the joint locked and free.
+    """
     stage = asked.machine.stage
     key, cases = _cases(stage)
     runs = friso.sweep(stage, {key: list(cases.values())}, metric="verdict", progress=work.progress)
@@ -167,7 +186,7 @@ def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Does it hunt: every case, with its margin."""
+    """Yield whether the stage hunts, for every case, with its margin."""
     options = asked.chosen(*OPTIONS["check"])
     ghosts = _ghosts(asked, work, friso.check)
     answer = KEPT.answer(friso.check, asked.machine, work, options)
@@ -178,7 +197,10 @@ def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def bode(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """The loop in the limit cases: the figures, and then how fast the controller may be, which takes longer."""
+    """Yield the Bode plots of the limit cases, then the largest bandwidth.
+
+    The bandwidth takes longer to compute.
+    """
     lines = _lines("bode", asked)
     for picture in loops(asked, work):
         yield {**picture, "kind": "partly"}
@@ -186,7 +208,10 @@ def bode(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def loops(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """The same while a slider moves: the figures alone, first those that need no family of states."""
+    """Yield the Bode plots while a slider moves.
+
+    Figures that need no family of friction states come first.
+    """
     asked.chosen()
     ghosts, lines = _ghosts(asked, work, friso.bode), _lines("bode", asked)
     answer = KEPT.answer(friso.bode, asked.machine, work)
@@ -198,7 +223,7 @@ def loops(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def flexure(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """The leaf springs."""
+    """Yield the leaf springs of the machine, beside those of the pinned one."""
     asked.chosen()
     pinned = asked.pinned if asked.pinned and asked.pinned.stage.flexure else None
     ghost = KEPT.answer(friso.flexure, pinned, work) if pinned else None
@@ -222,20 +247,26 @@ COARSE_TO_FINE = (6, 21, 41)
 
 
 def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """A map over two keys, coarse to fine, and last, if it is asked for, the edge of hunting over it; where the machine
-    stands in it, and the pinned one."""
+    """Yield a map over two keys from coarse to fine, with the places of the machines in it.
+
+    If asked for, the edge of hunting is added last. A stage that cannot hunt gets a sentence instead.
+    """
     options = asked.chosen(*OPTIONS["map"])
     axes = {name: str(options.get(name, "")) for name in ("x", "y")}
     keys = {name: text.partition("=")[0].strip() for name, text in axes.items()}
     shown = {"metric": options.get("metric", "outcome"), "log": options.get("log", False)}
 
     def ranges(count: int) -> dict[str, Any]:
+        """Return the ranges of both axes with so many points."""
         return {name: f"{text}:{count}" for name, text in axes.items()}
 
     def swept(count: int) -> SweepAnswer:
+        """Return the map with so many points along each axis."""
         return KEPT.answer(friso.sweep, asked.machine, work, {**ranges(count), **shown})
 
     def part(answer: SweepAnswer, count: int, edge: Answer | None = None) -> AnswerPart:
+        """Return a map as the page shows it, with the machines and the edge of hunting on it."""
+
         def drawn(figure: Figure) -> Figure:
             return with_edge(_on_map(figure, asked, [*keys.values()]), edge)
 
@@ -260,14 +291,19 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def _on_map(figure: Figure, asked: PageRequest, keys: Sequence[str]) -> Figure:
-    """The figure of a map over two keys as the page shows it: with the places of the machines, and without its note,
-    for the sentences below it say the same."""
+    """Mark the machines on a map over two keys.
+
+    The note of the figure is removed, because the sentences below say the same.
+    """
     return with_places(replace(figure, note=""), _stands(asked), keys)
 
 
 def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Where hunting ends, over one key or in the plane of two; there a coarse map of verdicts comes first, for to
-    follow the edge may take minutes, and stays where there is none."""
+    """Yield where hunting ends, over one key or in the plane of two keys.
+
+    Following the edge may take minutes, so a coarse map of verdicts comes first in a plane. It stays if there is no
+    edge.
+    """
     options = asked.chosen(*OPTIONS["boundary"])
     keys = [str(options[name]).partition("=")[0].strip() for name in ("x", "y") if name in options]
     lines, rough = _lines("boundary", asked, options), None
@@ -286,6 +322,8 @@ def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         return
 
     def part(ghosts: Callable[[Figure], Figure]) -> AnswerPart:
+        """Return the boundary as the page shows it, with ghosts and machines."""
+
         def drawn(figure: Figure) -> Figure:
             return with_places(ghosts(figure), _stands(asked), keys) if len(keys) == 2 else ghosts(figure)
 
@@ -307,7 +345,7 @@ def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def tune(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """What stops it: the ways, and the stage of each that works."""
+    """Yield the remedies that stop hunting, and the stage of each that works."""
     options = asked.chosen(*OPTIONS["tune"])
     answer = KEPT.answer(friso.tune, asked.machine, work, options)
     ways = [
@@ -318,7 +356,7 @@ def tune(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def design(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """What stops it: an isolator with its leaf springs."""
+    """Yield a design that stops hunting: an isolator with its leaf springs."""
     asked.chosen()
     answer = KEPT.answer(friso.design, asked.machine, work)
     work.notes += work.meanwhile
@@ -327,7 +365,7 @@ def design(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def logs(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """What dropped files hold, and which channels there are to choose from."""
+    """Yield what dropped files hold, and which channels can be chosen."""
     answer = _looked_into(asked, work)
     held = [channel for item in answer.result for channel in item.channels]
     channels = list(dict.fromkeys(channel.name for channel in held))
@@ -337,13 +375,17 @@ def logs(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def _looked_into(asked: PageRequest, work: Work) -> LogsAnswer:
+    """Read the dropped files with what the user said of their channels."""
     files, assigned = _dropped(asked)
     with _named_as_dropped():
         return friso.logs(files, **assigned, progress=work.progress)
 
 
 def identify(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """The machine that dropped logs show, with its uncertainties; with `assumed`, the one shown is what is known."""
+    """Yield the machine identified from dropped logs, with its uncertainties.
+
+    With the option `assumed`, the machine shown counts as prior knowledge.
+    """
     answer = _identified(asked, work)
     stages = [] if answer.stage is None else [{"name": "identified", "toml": answer.stage.to_toml()}]
     if stages and answer.result.correlations.keys:
@@ -352,6 +394,10 @@ def identify(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def _identified(asked: PageRequest, work: Work) -> IdentifyAnswer:
+    """Identify a machine from the dropped logs.
+
+    The logs' own folder is searched for further files, not the folder in which friso was started.
+    """
     files, assigned = _dropped(asked)
     stage = asked.machine.stage if asked.options.get("assumed") is True else None
     beside = files[0].parent  # else a file of that name in the folder where friso was started would have its say
@@ -361,7 +407,7 @@ def _identified(asked: PageRequest, work: Work) -> IdentifyAnswer:
 
 @contextmanager
 def _named_as_dropped() -> Iterator[None]:
-    """What is wrong with a log is said of it by its name: where the server keeps it, is of no use to anybody."""
+    """Let errors in a log name the file as it was dropped, without the server's folder."""
     try:
         yield
     except InputError as error:
@@ -375,7 +421,10 @@ CORRELATED = (
 
 
 def _dropped(asked: PageRequest) -> tuple[list[Path], dict[str, Any]]:
-    """The files of a question about logs, and what is said of their channels. Raises InputError."""
+    """Return the files of a question about logs, and what the user said of their channels.
+
+    Raises InputError if no file was dropped, or for options that are no texts.
+    """
     names, options = asked.options.get("files"), {}
     if not isinstance(names, list) or not names:
         raise InputError("files", "none", "files that were dropped on the page")
@@ -415,9 +464,10 @@ PICTURES = frozenset({"run", "cell", "loops", "bode", "flexure", "map"})
 
 
 def _answered(function: Callable[..., Answer], command: str) -> Callable[[PageRequest, Work], Answer]:
-    """What answers a command about the machine shown."""
+    """Return a function that answers a command about the machine shown."""
 
     def answer(asked: PageRequest, work: Work) -> Answer:
+        """Answer the command with the options that the page gave."""
         options = asked.chosen(*OPTIONS.get(command, ()))
         return KEPT.answer(function, asked.machine, work, options)
 
@@ -425,7 +475,10 @@ def _answered(function: Callable[..., Answer], command: str) -> Callable[[PageRe
 
 
 def _mapped(asked: PageRequest, work: Work) -> Answer:
-    """The finest map; its edge is a boundary's."""
+    """Return the finest map.
+
+    The edge of hunting belongs to the command boundary and is left out.
+    """
     options = asked.chosen(*OPTIONS["map"])
     options.pop("edge", None)
     options |= {name: f"{options[name]}:{COARSE_TO_FINE[-1]}" for name in ("x", "y") if name in options}
@@ -448,7 +501,10 @@ COMMANDS: Mapping[str, Callable[[PageRequest, Work], Answer]] = {
 
 
 def job_of(name: str) -> Callable[[PageRequest, Work], Iterator[AnswerPart]] | None:
-    """What answers a page that asks under a name, with ".zip" for the files of a command; None for an unknown name."""
+    """Return the function that answers a question of the page; None for an unknown name.
+
+    A name that ends in ".zip" asks for the files of a command.
+    """
     command = name.removesuffix(".zip")
     if name in QUESTIONS:
         return QUESTIONS[name]
@@ -460,7 +516,7 @@ def job_of(name: str) -> Callable[[PageRequest, Work], Iterator[AnswerPart]] | N
 
 
 def report(command: str, asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """The files of the answer of a command."""
+    """Yield the files of a command's answer as one archive in base64."""
     answer = COMMANDS[command](asked, work) if command in COMMANDS else _other(command, asked, work)
     work.progress(0, 0, "drawing the figures")
     of_logs = command in ("logs", "identify")  # a stage file that is identified is among what is written
@@ -472,13 +528,20 @@ def report(command: str, asked: PageRequest, work: Work) -> Iterator[AnswerPart]
 def _lines(
     command: str, asked: PageRequest, options: Mapping[str, Any] | None = None, function: str = ""
 ) -> AnswerPart:
+    """Return the shell command and the line of Python for what the page shows.
+
+    Both are about the machine shown.
+    """
     chosen = {name: value for name, value in (options or {}).items() if value is not False}
     files, options = [asked.machine.name], {**asked.machine.to_set, **chosen}
     return _both_lines(command, asked, files, options, _of(asked.machine), function)
 
 
 def _lines_of_logs(command: str, asked: PageRequest) -> AnswerPart:
-    """The lines of a question about logs; of the machine shown where it is what is known."""
+    """Return the shell command and the line of Python for a question about logs.
+
+    They name the machine shown if it counts as prior knowledge.
+    """
     paths, assigned = _dropped(asked)
     options, of = {name: item for name, item in assigned.items() if item}, "the files dropped here"
     if asked.options.get("assumed") is True and command == "identify":
@@ -490,7 +553,7 @@ def _lines_of_logs(command: str, asked: PageRequest) -> AnswerPart:
 def _both_lines(
     command: str, asked: PageRequest, files: list[str], options: Mapping[str, Any], of: str, function: str = ""
 ) -> AnswerPart:
-    """A command and its line of Python, what they are `of`, and what was asked, for its files."""
+    """Return a command, its line of Python, what they are about, and the question asked."""
     lines = {
         "command": command_line(command, files, options),
         "python": python_line(function or command, files, options),
@@ -499,11 +562,12 @@ def _both_lines(
 
 
 def _of(machine: Machine) -> str:
+    """Name the file that the lines are about."""
     return "the stage file saved here" if machine.is_of_page else f"{machine.name} as it was opened"
 
 
 def _ghosts(asked: PageRequest, work: Work, function: Callable[..., Answer]) -> Callable[[Figure], Figure]:
-    """What puts the lines of the answer about the pinned machine behind those of a figure."""
+    """Return a function that draws the pinned machine's answer behind a figure's lines."""
     if asked.pinned is None:
         return ghosts_of(None)
     pinned = KEPT.answer(function, asked.pinned, work)
@@ -512,23 +576,26 @@ def _ghosts(asked: PageRequest, work: Work, function: Callable[..., Answer]) -> 
 
 
 def _stands(asked: PageRequest) -> list[tuple[str, Stage]]:
-    """The machines whose places a map shows."""
+    """Return the machines that a map marks, with their labels."""
     pinned = [("pinned", asked.pinned.stage)] if asked.pinned else []
     return [(SHOWN, asked.machine.stage), *pinned]
 
 
 def _given(stage: Stage) -> str:
-    """Which of the cases is the stage as it is given."""
+    """Return the name of the case that the stage file describes."""
     return "given" if stage.joint is None else "locked" if stage.joint.locked else "free"
 
 
 def _labelled(stage: Stage, verdicts: Mapping[str, str]) -> list[dict[str, str]]:
-    """The cases that differ, by their labels in sentences, with the verdicts."""
+    """Return the cases that differ, with their labels and verdicts."""
     return [{"label": label, "verdict": verdicts[name]} for name, label in case_labels(stage).items()]
 
 
 def _cases(stage: Stage) -> tuple[str, dict[str, Any]]:
-    """A key, and the value of it in each case."""
+    """Return a key and the value that it has in each case.
+
+    The key locks or frees the joint. A stage without a joint has one case, set by its mass as given.
+    """
     if stage.joint is not None:
         values = {"locked": True, "free": False}
         cases = {name: values[name] for name in stage.variants() if name in values}

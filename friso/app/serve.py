@@ -1,4 +1,4 @@
-"""Starts the server and opens the browser."""
+"""Start the server of the page and open the browser."""
 
 from __future__ import annotations
 
@@ -40,8 +40,11 @@ TRIES = 20
 
 
 def serve(stage: Path | None, host: str, port: int | None, insecure: bool, browser: bool) -> None:
-    """Serve the page until it is interrupted, and print its address. Raises InputError for a stage file that cannot be
-    read, a host that others can reach without `insecure`, and where no port is free."""
+    """Print the address of the page and serve it until interrupted.
+
+    Raises InputError for a stage file that cannot be read, or if no port is free. A host that others can reach is
+    refused unless `insecure` is set.
+    """
     file = example("thesis_rig") if stage is None else stage
     load(file)
     begin = {"name": file.name, "text": text_of(file, "a stage file"), "asked": stage is not None}
@@ -67,10 +70,14 @@ def serve(stage: Path | None, host: str, port: int | None, insecure: bool, brows
 
 
 class Server(uvicorn.Server):
-    """Ends the questions at work before it waits for their answers, and itself in good order for any signal, which is
-    the command's own once the server has ended."""
+    """A server that ends in good order on any signal.
+
+    Questions at work are ended before the server waits for their answers. Afterwards the signal takes its usual
+    effect.
+    """
 
     def __init__(self, app: ASGIApp, workshop: Workshop, grace: int = GRACE) -> None:
+        """Configure the server; `grace` [s] is the longest wait for answers at the end."""
         config = uvicorn.Config(
             app,
             log_level="warning",
@@ -88,7 +95,7 @@ class Server(uvicorn.Server):
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Take the signals, but those that are ignored (nohup), while the server runs."""
+        """Take the signals while the server runs, except ignored ones, as under nohup."""
         taken = {number: handler for number in SIGNALS if (handler := signal.getsignal(number)) is not signal.SIG_IGN}
         for number in taken:
             signal.signal(number, self.handle_exit)
@@ -99,19 +106,22 @@ class Server(uvicorn.Server):
                 signal.signal(number, handler)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Note that the server is to end."""
+        """Note that the server is to end, and by which signal."""
         self.ended_by = self.ended_by or sig
         self.should_exit = True
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Begin, and from here on say once what goes wrong again and again."""
+        """Start the server; from here on, repeated errors are logged once."""
         asyncio.get_running_loop().set_exception_handler(failed)
         for name in LOGS:
             logging.getLogger(name).addFilter(self.once)
         await super().startup(sockets)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """End what is asked, and then the connections; a log that is still coming is cut off, which is no error."""
+        """End the questions, then the connections.
+
+        An upload that is still coming is cut off, which is no error.
+        """
         self.workshop.overtake()
         errors = logging.getLogger("uvicorn.error")
         usual = errors.level
@@ -127,8 +137,11 @@ class Server(uvicorn.Server):
 
 
 def listening(host: str, port: int | None) -> socket.socket:
-    """A socket that listens at a port that is free: the one asked for, or the next from the usual one on. Raises
-    InputError."""
+    """Return a socket that listens at a free port.
+
+    It is the port asked for; without one, the first free port from the usual one on. Raises InputError if none is
+    free.
+    """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     wanted = [port] if port is not None else [*range(PORT, PORT + TRIES)]
     problem = ""

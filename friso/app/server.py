@@ -1,4 +1,4 @@
-"""The server of the page: its files, its questions, its uploads, and what it hands out."""
+"""Serve the page: its files, its questions, its uploads, and its downloads."""
 
 from __future__ import annotations
 
@@ -34,11 +34,15 @@ PLOTLY = "/plotly.js"
 
 
 def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> ASGIApp:
-    """The server for those who have an access; `begin`: name and text of the stage file that it starts with, and
-    whether it was `asked` for. The workshop is closed at its end."""
+    """Build the server's application behind its gate.
+
+    `begin` holds name and text of the first stage file, and whether the user `asked` for it. The workshop is closed
+    when the server ends.
+    """
     uploads = Uploads()
 
     async def ask(request: Request) -> Response:
+        """Answer a question of the page in frames, or refuse it with the reason."""
         name = request.path_params["question"]
         job = job_of(name)
         if job is None:
@@ -58,6 +62,7 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
         return JSONResponse(begin)
 
     async def upload(request: Request) -> Response:
+        """Keep a dropped file, or say why it cannot be kept."""
         try:
             return JSONResponse({"file": await uploads.keep(request.path_params["name"], request.stream())})
         except InputError as error:
@@ -94,12 +99,12 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
 
 
 async def _gone(request: Request, error: Exception) -> Response:
-    """For a browser that has left in the middle of its request: nobody reads it."""
+    """Answer a browser that left in the middle of its request, although nobody reads it."""
     return Response(status_code=400)
 
 
 def _page_files() -> dict[str, Traversable]:
-    """The files of the page by their plain names."""
+    """Return the files of the page by name."""
     held = files("friso.app").joinpath("page").iterdir()
     return {item.name: item for item in held if item.is_file() and _suffix(item.name) in KINDS}
 
@@ -109,7 +114,7 @@ def _suffix(name: str) -> str:
 
 
 async def _page(request: Request) -> Response:
-    """A file of the page, by its plain name."""
+    """Send a file of the page."""
     name, held = request.path_params.get("file", "index.html"), _page_files()
     if name not in held:
         return _refused("there is no such page", 404)
@@ -117,7 +122,7 @@ async def _page(request: Request) -> Response:
 
 
 async def _plotly(request: Request) -> Response:
-    """plotly.js as the package plotly has it."""
+    """Send plotly.js from the installed package plotly."""
     return _file(request, _plotly_js(), KINDS[".js"])
 
 
@@ -131,7 +136,7 @@ CHUNK = 65536
 
 
 def _file(request: Request, content: bytes, kind: str) -> Response:
-    """A file of the page, in chunks, or only that the browser has this very content already."""
+    """Send a file in chunks, or only confirm that the browser has this content already."""
     mark = f'"{sha256(content).hexdigest()}"'
     headers = {"ETag": mark, "Cache-Control": "no-cache"}  # which is to ask whether it is still the same
     if mark in request.headers.get("if-none-match", ""):
@@ -146,7 +151,10 @@ def _file(request: Request, content: bytes, kind: str) -> Response:
 
 
 async def _json(request: Request) -> dict[str, Any]:
-    """The JSON object in the body of a request. Raises InputError."""
+    """Return the JSON object in the body of a request.
+
+    Raises InputError for another content type, a body that is too large, or anything but a JSON object.
+    """
     if request.headers.get("content-type", "").partition(";")[0] != "application/json":
         raise InputError("Content-Type", request.headers.get("content-type", "nothing")[:60], "application/json")
     body = bytearray()

@@ -1,4 +1,4 @@
-"""Files that were dropped on the page: kept in a folder of this server's own, for as long as it runs."""
+"""Keep files that were dropped on the page in a folder of the server, while it runs."""
 
 from __future__ import annotations
 
@@ -24,8 +24,11 @@ PREFIX = "friso-uploads-"
 
 
 class Uploads:
-    """The files by the names under which the page knows them. The page names no other file, and no name means another
-    file to a later server: a page may have been left open. What a killed server left is deleted by the next."""
+    """Dropped files by the names under which the page knows them.
+
+    The page can name no other file. Names are random, so a page left open cannot reach files of a later server. The
+    next server deletes what a killed one left.
+    """
 
     def __init__(self) -> None:
         self.held = ExitStack()
@@ -33,8 +36,10 @@ class Uploads:
         self.files: dict[str, Path] = {}
 
     async def keep(self, name: str, chunks: AsyncIterable[bytes]) -> str:
-        """Keep a file as it comes; the name by which it is asked for. Raises InputError for one that is too large, and
-        OSError for one that cannot be written."""
+        """Store a file as it arrives, and return the name under which it is asked for.
+
+        Raises InputError for a file that is too large, or one file too many. Raises OSError if it cannot be written.
+        """
         place = self.folder / secrets.token_hex(8)  # several may come at the same time
         if sum(1 for entry in self.folder.iterdir() if entry.is_dir()) >= MOST_FILES:
             most = f"at most {MOST_FILES}: Other files lets those go that are shown"
@@ -58,18 +63,18 @@ class Uploads:
         return label
 
     def path(self, name: object) -> Path:
-        """The file of a name. Raises InputError for any other."""
+        """Return where a dropped file is stored. Raises InputError for an unknown name."""
         path = self.files.get(name) if isinstance(name, str) else None
         if path is None:
             raise InputError("file", str(name)[:60], "a file that was dropped on the page while this server ran")
         return path
 
     def let_go(self, name: str) -> None:
-        """Delete one of them. Raises InputError for any other name."""
+        """Delete a dropped file. Raises InputError for an unknown name."""
         place = self.path(name).parent
         del self.files[name]
         remove_folder(place)
 
     def remove(self) -> None:
-        """Delete all of them."""
+        """Delete all dropped files and their folder."""
         self.held.close()

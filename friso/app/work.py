@@ -1,4 +1,7 @@
-"""A question at work: in a thread of its own, with progress and messages, until it is answered or overtaken."""
+"""Run each question in a thread until it is answered or overtaken.
+
+Progress and messages are sent to the page meanwhile.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ from friso.engine.overtaken import ASKER, Overtaken, ended_by, go_on, going_firs
 from friso.errors import InputError
 
 Job = Callable[["Work"], Iterator[dict[str, Any]]]
-"""What answers a question: gives the parts of its answer one after the other."""
+"""A function that answers a question and yields the parts of its answer."""
 
 OFTEN = 0.1
 """Seconds between two reports of progress."""
@@ -32,7 +35,11 @@ THREADS = 16
 
 @dataclass(eq=False)
 class Work:
-    """A question at work, the page's `number`th. `flag` ends it: another thread sets it."""
+    """A question at work.
+
+    `put` sends a part of its answer to the page. `number` orders the questions of a page. Another thread sets `flag` to
+    end the work.
+    """
 
     put: Callable[[dict[str, Any] | None], object]
     number: int = 0
@@ -43,14 +50,14 @@ class Work:
     notes: list[str] = field(default_factory=list)
     """Warnings so far, each once; they go with the answer."""
     meanwhile: list[str] = field(default_factory=list)
-    """What was mentioned early: most answers say it themselves."""
+    """Messages logged early; most answers repeat them."""
 
     def overtake(self) -> None:
-        """End it, from another thread."""
+        """End the work from another thread."""
         self.flag[0] = 1
 
     def progress(self, done: int, total: int, label: str, /) -> None:
-        """Report progress. Raises Overtaken once nobody waits any more."""
+        """Report progress. Raises Overtaken once nobody waits for the answer."""
         go_on()
         now = time.monotonic()
         if now - self.last > OFTEN:
@@ -61,7 +68,10 @@ class Work:
         self.put({**part, "notes": [*dict.fromkeys(self.notes)]})
 
     def run(self, job: Job) -> None:
-        """Do the job, in this thread, and put what comes of it; None is put last."""
+        """Do the job in this thread and send each part of its answer.
+
+        Errors become parts, too: a page is answered whatever happens. None is sent last.
+        """
         token = ASKER.set(self)
         try:
             with ended_by(self.flag):
@@ -88,11 +98,13 @@ class Work:
 
 
 class Messages(logging.Handler):
-    """Hands what friso logs to the question that asked for it, and to no other one: it stands below the answer; what is
-    said of kernels that are compiled is passing."""
+    """A log handler that sends each message to the question that caused it.
+
+    Messages stay below the answer, except those on the compilation of kernels.
+    """
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Hand a message on."""
+        """Send a message to the question in whose context it was logged."""
         work, text = ASKER.get(), record.getMessage()
         if not isinstance(work, Work):
             return
@@ -103,7 +115,10 @@ class Messages(logging.Handler):
 
 
 def _import_libraries() -> None:
-    """Import what cannot be imported by two threads at once: its modules import one another."""
+    """Import libraries that two threads cannot import at once.
+
+    Their modules import one another, which deadlocks or fails in two threads.
+    """
     with _IMPORTING, suppress(ImportError):  # of an extra; xarray imports it where it is installed
         import dask.array  # noqa: F401
 
@@ -112,8 +127,11 @@ _IMPORTING = Lock()
 
 
 class Workshop:
-    """The questions at work, one on every lane of a page: a newer one, which has a larger number, overtakes the one
-    before it, in whatever order they arrive."""
+    """The questions at work, one on every lane of a page.
+
+    A newer question, which has a larger number, overtakes the older one on its lane. The order of arrival does not
+    matter.
+    """
 
     def __init__(self) -> None:
         self.pool = ThreadPoolExecutor(THREADS, thread_name_prefix="friso-app", initializer=_import_libraries)
@@ -123,8 +141,11 @@ class Workshop:
     async def answer(
         self, page: str, lane: str, number: int, job: Job, quick: bool = False, first: bool = False
     ) -> AsyncIterator[bytes]:
-        """The frames of an answer, as they come. Whoever stops reading ends the work. A `quick` question computes
-        nothing, and does not wait for those that do; these wait for the first part of one that goes `first`."""
+        """Yield the frames of an answer as they come. The work ends when the reader stops.
+
+        A `quick` question computes nothing and does not wait for others. All others wait for the first part of a
+        question that goes `first`.
+        """
         loop, parts = asyncio.get_running_loop(), asyncio.Queue[dict[str, Any] | None]()
 
         def put(part: dict[str, Any] | None) -> None:
@@ -150,7 +171,7 @@ class Workshop:
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Hand what friso logs to the questions that it is about."""
+        """Send what friso logs to the questions that it concerns."""
         log, messages = logging.getLogger("friso"), Messages(logging.INFO)
         log.addHandler(messages)
         level = log.level
@@ -162,14 +183,14 @@ class Workshop:
             log.removeHandler(messages)
 
     def overtake(self) -> None:
-        """End all that is asked, and every answer at once: what computes may notice only later."""
+        """End all questions, and answer each at once, because computations may notice later."""
         for work in [*self.lanes.values()]:
             work.overtake()
             for part in ({"kind": "overtaken"}, None):
                 work.put(part)
 
     def close(self) -> None:
-        """End everything."""
+        """End all questions and take no more."""
         self.overtake()
         for pool in (self.pool, self.quick):
             pool.shutdown(wait=False, cancel_futures=True)

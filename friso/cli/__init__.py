@@ -1,4 +1,4 @@
-"""The command line."""
+"""The command line of friso."""
 
 from friso.cli.app import main
 

@@ -1,4 +1,4 @@
-"""The command line: `friso COMMAND STAGE.toml`. Reads what the analyses return and prints or draws it.
+"""Run the command line: `friso COMMAND STAGE.toml`.
 
 Exit status: 0 done, 1 the computation could not be completed, 2 the input is wrong, 130 interrupted.
 """
@@ -29,6 +29,7 @@ from friso.version import VERSION
 
 
 def _version(requested: bool) -> None:
+    """Print the version and leave, if `--version` is given."""
     if requested:
         print(f"friso {VERSION}")
         raise typer.Exit
@@ -55,13 +56,14 @@ TOUR = """friso: does a positioning stage on contact bearings hunt, why, and wha
   friso init my_stage.toml                  a commented stage file for your own machine
 
 friso --help lists all commands by question; friso COMMAND --help has an example of each."""
-"""What `friso` alone prints."""
+"""Text that `friso` alone prints."""
 
 
 class ByQuestion(TyperGroup):
-    """The list of commands, by the question that they answer."""
+    """The list of commands in `friso --help`, grouped by the question that they answer."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write each topic with the names and summaries of its commands."""
         for topic in TOPICS:
             commands = [(name, COMMANDS[name]) for name in self.list_commands(ctx) if name in COMMANDS]
             if rows := [(name, command.summary) for name, command in commands if command.topic == topic]:
@@ -71,8 +73,11 @@ class ByQuestion(TyperGroup):
 
 
 def command_line(*names: str, for_list: bool = False) -> typer.Typer:
-    """The commands of these names, by default all that there are, in the order of their places; those `for_list` have
-    no options, for which their functions would have to be imported."""
+    """Build the command line with the named commands, or with all of them.
+
+    Commands stand in the order of their places. With `for_list` they have no options, so that their functions need not
+    be imported.
+    """
     app = typer.Typer(
         cls=ByQuestion,
         rich_markup_mode=None,
@@ -92,7 +97,10 @@ GARBAGE = 20_000, 20, 10
 
 
 def main() -> NoReturn:
-    """Run the command line; wrong input ends in one message and status 2, never in a traceback."""
+    """Run the command line and end the process with its status.
+
+    Wrong input ends in one message and status 2, never in a traceback.
+    """
     gc.set_threshold(*GARBAGE)
     sys.stdout, sys.stderr = sys.stdout or _nowhere(), sys.stderr or _nowhere()  # None where the caller closed them
     for stream in (sys.stdout, sys.stderr):
@@ -103,12 +111,15 @@ def main() -> NoReturn:
 
 
 def _nowhere() -> TextIO:
-    """A stream that keeps nothing."""
+    """Return a stream that discards what is written to it."""
     return open(os.devnull, "w", encoding="utf-8")
 
 
 def _status() -> int:
-    """Run the command; the status with which the process ends."""
+    """Run the command and return the status of the process.
+
+    Interrupts give 130 or 128 plus the signal.
+    """
     signal = 0
     try:
         with interrupts.raising():
@@ -132,7 +143,10 @@ def _status() -> int:
 
 
 def _run() -> int:
-    """Run the command; its status."""
+    """Run the command and return its status.
+
+    Only the named command is loaded, because the options of all commands take seconds to build.
+    """
     messages, log = logging.StreamHandler(sys.stderr), logging.getLogger("friso")
     messages.setFormatter(logging.Formatter("friso: %(message)s"))
     log.addHandler(messages)
@@ -152,7 +166,10 @@ def _run() -> int:
 
 
 def _failed(error: BaseException) -> int:
-    """Say what went wrong; the status with which the process ends. Raises what nobody should meet."""
+    """Report an error in one message and return the exit status.
+
+    Raises errors that only a fault of friso can cause.
+    """
     if isinstance(error, typer.Exit):
         return error.exit_code
     exits = isinstance(error, SystemExit)  # which typer makes of it
@@ -181,14 +198,17 @@ def _failed(error: BaseException) -> int:
 
 
 def _is_of_loading(error: BaseException) -> bool:
-    """Whether a compiled library could not be loaded, as where the system lacks a runtime."""
+    """Tell whether a compiled library could not be loaded.
+
+    A missing runtime of the system is a typical cause.
+    """
     if isinstance(error, ImportError):
         return not isinstance(error, ModuleNotFoundError)
     return isinstance(error, OSError) and "llvmlite" in str(error)
 
 
 def _plug_ins() -> str:
-    """Controllers and friction laws of installed packages, for the help."""
+    """Return a line for the help that names controllers and friction laws of installed packages."""
     if not any(map(installed_modules, ("friso.controllers", "friso.friction"))):
         return ""
     from friso.stage.foreign import installed

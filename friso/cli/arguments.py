@@ -1,4 +1,4 @@
-"""What is checked of the arguments of every command, before it begins."""
+"""Check the arguments of every command before it runs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from friso.platform.system import shell_word
 
 
 def refuse_empty(arguments: Iterable[str]) -> None:
-    """Raises InputError for an empty argument: what a shell makes of a variable that is not set."""
+    """Raise InputError for an empty argument, as a shell passes for a variable that is not set."""
     option = ""
     for argument in arguments:
         name, _, value = argument.partition("=")
@@ -32,10 +32,11 @@ def refuse_empty(arguments: Iterable[str]) -> None:
 
 
 def with_checked_paths(function: Callable[..., None]) -> Callable[..., None]:
-    """The function of a command, which raises InputError for a path that is none."""
+    """Wrap a command so that it refuses malformed paths with InputError."""
 
     @wraps(function)
     def command(**options: Any) -> None:
+        """Check every path among the options, then call the function."""
         for name, value in options.items():
             for path in value if isinstance(value, list) else [value]:
                 if isinstance(path, Path) and (flaw := paths.flaw_of(path)):
@@ -47,7 +48,7 @@ def with_checked_paths(function: Callable[..., None]) -> Callable[..., None]:
 
 
 def _named(function: Callable[..., None], name: str) -> tuple[str, str]:
-    """What a path is called on the command line, and an example of it."""
+    """Return the name of a path on the command line, and an example of its use."""
     (info,) = get_type_hints(function, include_extras=True)[name].__metadata__
     if isinstance(info, ArgumentInfo):
         return str(info.metavar), "rig.toml"
@@ -59,8 +60,10 @@ _NUMBERS = {int: "a whole number", float: "a number"}
 
 
 def number_refused(error: BaseException, arguments: Sequence[str]) -> InputError | None:
-    """Of an option that wants a number and was given none, or one beyond its ends, the same error as friso tells every
-    other one; None for any other error."""
+    """Return friso's error for an option with a missing number, or one out of range.
+
+    Returns None for any other error.
+    """
     parameter, context = (getattr(error, name, None) for name in ("param", "ctx"))
     command = getattr(context, "info_name", None) or ""
     if not isinstance(error, BadParameter) or parameter is None or command not in COMMANDS:
@@ -80,7 +83,7 @@ def number_refused(error: BaseException, arguments: Sequence[str]) -> InputError
 
 
 def _value_of(option: str, arguments: Sequence[str]) -> str:
-    """What follows an option on the command line, the last time that it is there."""
+    """Return the last value of an option on the command line, in quotes."""
     values = [value for before, value in pairwise(arguments) if before == option]
     values += [argument.partition("=")[2] for argument in arguments if argument.startswith(f"{option}=")]
     from friso.quantities import quoted  # its libraries are not needed where nothing is refused
@@ -89,7 +92,10 @@ def _value_of(option: str, arguments: Sequence[str]) -> str:
 
 
 def parted_path(words: Sequence[str]) -> str:
-    """What to say where words that follow one another are the path of a file with blanks, which lacks its quotes."""
+    """Return a hint if several words together are the path of an existing file.
+
+    Such a path contains blanks and lacks its quotes. Otherwise the hint is empty.
+    """
     paths = (" ".join(words[first : first + count]) for first in range(len(words) - 1) for count in range(2, 7))
     path = next((path for path in paths if os.path.isfile(path)), "")
     return f"\n  a path with blanks needs quotes: {shell_word(path)}" if path else ""

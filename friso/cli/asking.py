@@ -1,5 +1,7 @@
-"""How every command answers: it asks the function of friso of the same name, and shows the answer: the conclusion
-first, small tables, what to do next, and details if they are wanted."""
+"""Answer every command: ask the friso function of its name and show the answer.
+
+The conclusion comes first, then small tables and what to do next. Details follow if they are asked for.
+"""
 
 from __future__ import annotations
 
@@ -26,12 +28,15 @@ if TYPE_CHECKING:
     from friso.interface.question import Question
 
 DRAWING = "drawing the page"
-"""What is being done once an answer is there."""
+"""Label of the progress bar once an answer is there."""
 
 
 @dataclass(frozen=True)
 class Shown:
-    """Where a command's answer goes: a folder for its files, what may be replaced there, and what is printed."""
+    """Options that say where an answer goes: the folder for its files, and what is printed.
+
+    `overwrite` allows the command to replace files in the folder.
+    """
 
     out: Path | None = None
     overwrite: bool = False
@@ -40,9 +45,10 @@ class Shown:
 
 
 def ask(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown, **kept: Any) -> None:
-    """Ask a question `about` files, with the options of its command, write its files, and show the answer.
+    """Ask a question `about` files, write its files, and show the answer.
 
-    `kept` are further keywords of the function. Raises InputError, typer.Exit with the status of a failure.
+    `options` are those of its command, and `kept` are further keywords of the function. Raises InputError for wrong
+    input. Raises typer.Exit with the status of a failure.
     """
     if question.answers_interrupted:
         answers_interrupts()
@@ -66,8 +72,10 @@ def ask(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
 
 
 def tried(write: Callable[[], list[Path]], nothing: str = "no file was written") -> tuple[list[Path], str]:
-    """The files that `write` writes, and why it could not, "" where it could: what was computed is shown all the
-    same. `nothing` says what is missing then."""
+    """Write files and return them, or return none and the reason why writing failed.
+
+    What was computed is shown all the same. `nothing` says what is missing then.
+    """
     try:
         return write(), ""
     except OSError as error:
@@ -79,8 +87,10 @@ def tried(write: Callable[[], list[Path]], nothing: str = "no file was written")
 def show(
     answer: Answer, files: Iterable[Path], as_json: bool = False, details: bool = False, unwritten: str = ""
 ) -> None:
-    """Print the answer with the `files` written, or why they are `unwritten`. Raises typer.Exit with the status of a
-    failure, KeyboardInterrupt after an answer that was interrupted."""
+    """Print an answer with its `files`, or with the reason why they are `unwritten`.
+
+    Raises typer.Exit with the status of a failure. Raises KeyboardInterrupt after an answer that was interrupted.
+    """
     written = [*files]
     if as_json:
         print_document(answer.to_dict(details), written)
@@ -113,7 +123,7 @@ def show(
 
 @contextmanager
 def named_as_options(names: Collection[str]) -> Iterator[None]:
-    """An InputError about a keyword speaks of the option of the same name."""
+    """Let an InputError about a keyword name the command-line option instead."""
     try:
         yield
     except InputError as error:
@@ -129,12 +139,15 @@ def named_as_options(names: Collection[str]) -> Iterator[None]:
 
 
 def option_of(keyword: str) -> str:
-    """The option on the command line for a keyword of Python: "--sample-time" for "sample_time"."""
+    """Return the command-line option for a Python keyword.
+
+    "sample_time" becomes "--sample-time".
+    """
     return f"--{keyword.strip('_').replace('_', '-')}"
 
 
 def _paths(about: Iterable[Any]) -> Iterator[Path]:
-    """The files among what is asked about."""
+    """Yield the files among the arguments, also from nested lists."""
     for item in about:
         if isinstance(item, list | tuple):
             yield from _paths(item)

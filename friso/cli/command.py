@@ -1,4 +1,7 @@
-"""The commands of friso: one for each question, and a few that ask none (`friso/cli/commands/`)."""
+"""Collect the commands of friso.
+
+There is one for each question, and a few ask none (`friso/cli/commands/`).
+"""
 
 from __future__ import annotations
 
@@ -17,9 +20,10 @@ from friso.registry import Registry
 
 
 class _Command(TyperCommand):
-    """A command whose help shows arguments as the usage does, without the type that Python has them in."""
+    """A command whose help names arguments as the usage line does, without their Python types."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the options and arguments without the types of arguments."""
         for parameter in self.params:
             if isinstance(parameter, TyperArgument):
                 parameter.display_type_rich = lambda ctx: None
@@ -28,11 +32,12 @@ class _Command(TyperCommand):
 
 @dataclass(frozen=True)
 class Command:
-    """A command that asks no question: the function that typer calls, whose docstring is the help; its `place` below
-    its `topic` in `friso --help`.
+    """A command that asks no question.
 
-    Raises ValueError for a topic that is not one of TOPICS, TypeError or NameError for a function whose options typer
-    could not read.
+    The docstring of `function` is its help. `place` orders commands below their `topic` in `friso --help`.
+
+    Raises ValueError for a topic that is not one of TOPICS. Raises TypeError or NameError for a function whose options
+    typer could not read.
     """
 
     function: Callable[..., None]
@@ -41,41 +46,55 @@ class Command:
     choices: Choices | None = None
 
     def __post_init__(self) -> None:
+        """Check that typer can read the function's options, and that the topic exists.
+
+        Raises ValueError.
+        """
         signature(self.function, eval_str=True)
         if self.topic not in TOPICS:
             raise ValueError(f"topic {self.topic!r} is none of {', '.join(TOPICS)}")
 
     @property
     def summary(self) -> str:
-        """The command in one line."""
+        """Return the command in one line, the first of its function's docstring."""
         return (self.function.__doc__ or "").partition("\n")[0].strip().rstrip(".")
 
 
 @dataclass(frozen=True)
 class QuestionCommand:
-    """The command of a question; its options are read from the question's function when they are needed."""
+    """The command of a question.
+
+    Its options are read from the question's function when needed.
+    """
 
     question: Question
 
     @property
     def place(self) -> float:
+        """Return the place of the command below its topic."""
         return self.question.place
 
     @property
     def topic(self) -> str:
+        """Return the topic below which the command is listed."""
         return self.question.topic
 
     @property
     def choices(self) -> Choices | None:
+        """Return the list below the help of the command, if it has one."""
         return self.question.choices
 
     @property
     def summary(self) -> str:
+        """Return the command in one line."""
         return self.question.summary
 
     @cached_property
     def function(self) -> Callable[..., None]:
-        """The function that typer calls."""
+        """Return the function that typer calls.
+
+        Raises InputError for a question of another package that cannot be read.
+        """
         from friso.cli.derived import command_function
 
         try:
@@ -111,7 +130,10 @@ class _Commands(Mapping[str, AnyCommand]):
         return WITHOUT_QUESTION[name] if name in WITHOUT_QUESTION else QuestionCommand(QUESTIONS[name])
 
     def usable(self) -> Iterator[tuple[str, AnyCommand]]:
-        """The commands by name; what another package's module does not declare is told, and left out."""
+        """Yield the commands by name.
+
+        A command of another package that cannot be used is reported and left out.
+        """
         for name in self:
             try:
                 command = self[name]
@@ -125,12 +147,15 @@ COMMANDS = _Commands()
 
 
 def help_class(choices: Choices | None) -> type[TyperCommand]:
-    """The class of typer that shows the help of a command, with its choices below."""
+    """Return the typer class that shows a command's help, with its choices below."""
     if choices is None:
         return _Command
 
     class ListingCommand(_Command):
+        """A command whose help ends with a list of choices."""
+
         def format_epilog(self, ctx: Any, formatter: Any) -> None:
+            """Write the list of choices below the help."""
             with formatter.section(choices.title):
                 formatter.write_dl([*choices.rows()])
 
@@ -138,9 +163,10 @@ def help_class(choices: Choices | None) -> type[TyperCommand]:
 
 
 def listed(command: AnyCommand) -> Callable[[], None]:
-    """A stand-in for a command in the list of all, which needs its summary alone."""
+    """Return a stand-in for a command in the list of all, which needs only a summary."""
 
     def stand_in() -> None:
+        """Stand for the command in the list, where it is never called."""
         raise RuntimeError("a command of the list is not called")
 
     stand_in.__doc__ = command.summary

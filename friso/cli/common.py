@@ -1,4 +1,4 @@
-"""How sentences and tables are printed, and the option that commands without a question share."""
+"""Print sentences and tables, and declare the option that commands without a question share."""
 
 from __future__ import annotations
 
@@ -21,11 +21,15 @@ Overrides = Annotated[
 
 
 def say(message: str) -> None:
+    """Print a message of friso on standard error."""
     print(f"friso: {message}", file=sys.stderr)
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, list[str]]]) -> None:
-    """A table whose rows have names; columns that do not fit beside each other go into further tables below."""
+    """Print a table with named rows.
+
+    Columns that do not fit side by side go into further tables below.
+    """
     from rich.table import Table
 
     screen = console(sys.stdout, highlight=False, markup=False)
@@ -57,14 +61,17 @@ _LEAST = 8
 
 
 def _narrow(texts: Sequence[str]) -> int:
-    """The least width in which each of the texts takes two lines at most, and no word is cut."""
+    """Return the least width in which every text takes at most two lines and no word is cut."""
     words = max((len(word) for text in texts for word in text.split()), default=1)
     widths = range(words, max(map(len, texts)) + 1)
     return next((width for width in widths if all(len(textwrap.wrap(text, width)) <= 2 for text in texts)), words)
 
 
 def _side_by_side(narrow: Sequence[int], room: int) -> list[list[int]]:
-    """Which columns stand in a table together: the first in each, and at least one beside it."""
+    """Return which columns stand together in each table.
+
+    The first column, which names the rows, stands in every table with at least one other.
+    """
     parts = [[0]]
     for k in range(1, len(narrow)):
         if len(parts[-1]) > 1 and sum(narrow[j] + _BORDER for j in [*parts[-1], k]) > room:
@@ -74,7 +81,7 @@ def _side_by_side(narrow: Sequence[int], room: int) -> list[list[int]]:
 
 
 def print_wrapped(sentence: str, indent: str = "") -> None:
-    """A sentence on the terminal, in lines as wide as that."""
+    """Print a sentence in lines as wide as the terminal."""
     width = shutil.get_terminal_size().columns
     lines = textwrap.wrap(sentence, max(40, width - len(indent)), break_long_words=False, break_on_hyphens=False)
     print(textwrap.indent("\n".join(lines), indent))

@@ -1,4 +1,7 @@
-"""Commands made of questions: options from the signature of a function, their help from its docstring."""
+"""Derive commands from questions.
+
+Options come from the function's signature, and help from its docstring.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,7 @@ IN_PYTHON_ALONE = (
 
 @dataclass(frozen=True)
 class CommandParameter:
-    """A parameter of a function as its command has it."""
+    """A parameter of a question's function as its command shows it."""
 
     name: str
     kind: ArgumentKind
@@ -38,9 +41,13 @@ class CommandParameter:
 
 
 def command_function(question: Question) -> Callable[..., None]:
-    """Return the function that typer calls for a question; its signature and docstring are those of the command."""
+    """Return the function that typer calls for a question.
+
+    Its signature and docstring are those of the command.
+    """
 
     def command(**values: Any) -> None:
+        """Ask the question by the values of the command's options."""
         ask_by_values(question, values)
 
     parameters = [*_asked(question), *_of_the_shell(question)]
@@ -51,7 +58,10 @@ def command_function(question: Question) -> Callable[..., None]:
 
 
 def ask_by_values(question: Question, values: Mapping[str, Any]) -> None:
-    """Ask a question by the values of its command's parameters; those that are None are left out."""
+    """Ask a question by the values of its command's parameters.
+
+    Values that are None are left out.
+    """
     shown = Shown(**{name: value for name, value in values.items() if name in Shown.__dataclass_fields__})
     about = [values[name] for name in question.takes]
     apart = {*question.takes, *Shown.__dataclass_fields__}
@@ -61,14 +71,17 @@ def ask_by_values(question: Question, values: Mapping[str, Any]) -> None:
 
 
 def command_help(question: Question) -> str:
-    """Return the help of a command: the docstring of the function up to its parameters, and the examples."""
+    """Return the help of a command.
+
+    It is the docstring of the function up to its parameters, followed by the examples.
+    """
     before, _, _ = (getdoc(question.function) or "").partition("\n\nParameters\n---")
     first, *more = question.example.splitlines()
     return "\n\n".join([before, f"Example: friso {first}", *more])
 
 
 def _asked(question: Question) -> Iterator[Parameter]:
-    """The parameters that are asked about: arguments in the order of `takes`, then options."""
+    """Yield the parameters of a question: arguments in the order of `takes`, then options."""
     parameters = question.parameters
     for name in (*question.takes, *(name for name in parameters if name not in question.takes)):
         parameter = parameters[name]
@@ -81,7 +94,10 @@ def _asked(question: Question) -> Iterator[Parameter]:
 
 
 def _kind_of(annotation: str) -> ArgumentKind | None:
-    """The kind that a command line gives a parameter; None for one that it has no form for."""
+    """Return the kind of value that a parameter takes on the command line.
+
+    Returns None for a parameter without a form there.
+    """
     parts = [part for part in alternatives(annotation) if part not in ("None", *IN_PYTHON_ALONE)]
     several = [part for part in parts if KINDS[part].several]
     paths = [part for part in parts if KINDS[part].command_type is Path]
@@ -89,11 +105,16 @@ def _kind_of(annotation: str) -> ArgumentKind | None:
 
 
 def _argument(parameter: CommandParameter) -> Parameter:
+    """Build an argument of a command, which has a place and no name."""
     info = typer.Argument(metavar=parameter.kind.metavar or parameter.name.upper(), help=parameter.help)
     return _typed(parameter, info, Parameter.empty if parameter.default is Parameter.empty else None)
 
 
 def _option(parameter: CommandParameter) -> Parameter:
+    """Build an option of a command, with its name, default and help.
+
+    A boolean becomes a flag. Defaults are shown as short numbers.
+    """
     kind, default = parameter.kind, parameter.default
     names = [option_of(parameter.name)]
     needed = default is Parameter.empty
@@ -107,6 +128,10 @@ def _option(parameter: CommandParameter) -> Parameter:
 
 
 def _typed(parameter: CommandParameter, info: Any, default: Any) -> Parameter:
+    """Build a parameter with the type that typer expects.
+
+    A parameter that may be repeated takes a list.
+    """
     one: Any = parameter.kind.command_type
     value = list[one] if parameter.kind.several else one
     annotation = value if default is not None else value | None
@@ -114,9 +139,10 @@ def _typed(parameter: CommandParameter, info: Any, default: Any) -> Parameter:
 
 
 def _of_the_shell(question: Question) -> Iterator[Parameter]:
-    """The options that say where the answer goes."""
+    """Yield the options that say where the answer goes: --out, --overwrite, --json and --details."""
 
     def option(name: str, default: Any, annotation: Any, declared: str, help: str, **more: Any) -> Parameter:
+        """Build an option with its default, type and help."""
         info = typer.Option(declared, help=help, **more)
         return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[annotation, info])
 

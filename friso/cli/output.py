@@ -1,4 +1,4 @@
-"""Where the answers of all commands go: files, all of them or none, and one JSON document."""
+"""Print the answers of all commands: the names of files written, and the JSON document."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Replace = Annotated[bool, typer.Option("--overwrite", help="Replace the file if 
 
 
 def print_document(document: Mapping[str, Any], files: Iterable[Path] = ()) -> None:
-    """The JSON document of a command, with the files that it has written and the plug-ins that are loaded."""
+    """Print the JSON document of a command, with the files written and the plug-ins loaded."""
     from friso.stage.foreign import foreign
 
     written = {"files": [str(file) for file in files], "plug_ins": foreign()}
@@ -23,7 +23,7 @@ def print_document(document: Mapping[str, Any], files: Iterable[Path] = ()) -> N
 
 
 def print_written(files: Iterable[Path]) -> None:
-    """Every file on a line of its own; many pictures on one."""
+    """Print every file written on a line of its own; many pictures share one line."""
     every = [*files]
     pictures = [file for file in every if file.suffix in _PICTURES]
     listed = every if len(pictures) <= _FEW else [file for file in every if file not in pictures]

@@ -1,4 +1,4 @@
-"""The progress bar on the terminal."""
+"""Show the progress of a computation on the terminal."""
 
 from __future__ import annotations
 
@@ -25,14 +25,16 @@ SHARE, STEPS = 0.05, 100
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):
-    """A bar on standard error for as long as the `with` block lasts; where that is no terminal, a line every `LINES`
-    seconds.
+    """A progress bar on standard error for as long as the `with` block lasts.
 
-    It is a `friso.progress.Progress`; before its first call, and without a total, it shows `what` and only moves.
-    Where fewer steps are done than before, or the total is another, other work has begun: its time counts from there.
+    Where standard error is no terminal, a line is printed every `LINES` seconds.
+
+    The bar is a `friso.progress.Progress`. Without a total it shows `label` and only moves. If fewer steps are done
+    than before, or the total changes, new work has begun, and its time counts from there.
     """
 
     def __init__(self, label: str = "") -> None:
+        """Prepare a bar with a label; nothing is shown before the `with` block begins."""
         self.label = label
         self.begun = WORK_CLOCK.now()
         self.done = self.total = self.before = 0
@@ -44,6 +46,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         self._level = self._log.level
 
     def __enter__(self) -> Self:
+        """Start the bar, or the thread that prints lines where there is no terminal."""
         if sys.stderr.isatty():
             self.display = _display(self._to_go)
             self.task = self.display.add_task(one_line(self.label), total=None)
@@ -55,6 +58,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         return self
 
     def __exit__(self, *error: object) -> None:
+        """Stop the bar or the thread, and restore the level of the log."""
         self.ended.set()
         if self.clock is not None:
             self.clock.join()
@@ -64,6 +68,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             self._log.setLevel(self._level)
 
     def __call__(self, done: int, total: int, label: str, /) -> None:
+        """Report that `done` of `total` steps are finished; a `total` of 0 means unknown."""
         with self._turn:
             if done < self.done or total != self.total:
                 self.begun, self.before = WORK_CLOCK.now(), done
@@ -72,12 +77,13 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             self.display.update(self.task, completed=done, total=total or None, description=one_line(label))
 
     def line(self) -> str:
-        """What is done, of how much, and how long the rest takes if it goes on as so far."""
+        """Return the share done, what is being done, and the time left at the pace so far."""
         with self._turn:
             share = f"{100 * self.done // self.total} %" if self.total else ""
             return ", ".join(part for part in (share, one_line(self.label) or "working", self._to_go()) if part)
 
     def _to_go(self) -> str:
+        """Return the time left in words; empty until enough is done to estimate it."""
         done = self.done - self.before
         if not self.total or done < min(SHARE * (self.total - self.before), STEPS) or not done:
             return ""
@@ -85,13 +91,14 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         return f"{seconds / 60:.0f} min to go" if seconds >= 100 else f"{seconds:.0f} s to go"
 
     def _tell(self, stream: TextIO) -> None:
-        """Write a line now and then, until the block ends, or nobody takes it any more."""
+        """Print a line of progress now and then, until the block ends or the stream is closed."""
         with suppress(OSError, ValueError):
             while not self.ended.wait(LINES):
                 print(f"friso: {self.line()}", file=stream, flush=True)
 
 
 def _display(to_go: Callable[[], str]) -> Display:
+    """Build the display of the library rich: description, bar, counts, rate and time left."""
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -106,12 +113,14 @@ def _display(to_go: Callable[[], str]) -> Display:
         """Steps per second, where they are many."""
 
         def render(self, task: Task) -> Text:
+            """Write the steps per second, if there is one or more."""
             return Text(f"{task.speed:,.0f}/s" if task.speed and task.speed >= 1 else "")
 
     class ToGo(ProgressColumn):
-        """How long the rest takes."""
+        """The time that the rest of the work takes."""
 
         def render(self, task: Task) -> Text:
+            """Write the time left."""
             return Text(to_go())
 
     columns = (

@@ -1,5 +1,8 @@
-"""The terminal: what stands in files may not steer it (`friso.escapes`), friso's own tables and bars may, and it need
-not know all letters."""
+"""Write to the terminal safely.
+
+Texts from files cannot steer the terminal (`friso.escapes`); friso's own tables and bars can. Characters that the
+terminal's encoding lacks are spelled out.
+"""
 
 from __future__ import annotations
 
@@ -48,15 +51,17 @@ class Escaping(Piped):
 
 @contextmanager
 def escaping() -> Iterator[None]:
-    """What is printed and logged within is escaped."""
+    """Escape everything that is printed or logged in the `with` block."""
     out, err = cast(TextIO, Escaping(sys.stdout)), cast(TextIO, Escaping(sys.stderr))
     with redirect_stdout(out), redirect_stderr(err):
         yield
 
 
 def console(stream: TextIO, **options: Any) -> Console:
-    """What draws on a stream with escape sequences of its own: texts have to be escaped before they come here. It makes
-    no pictures of names such as ":x:"."""
+    """Return rich's console for a stream.
+
+    Its own escape sequences reach the stream, so texts have to be escaped beforehand. Names such as ":x:" stay text.
+    """
     from rich.console import Console
 
     plain = cast("TextIO", Piped(stream.stream)) if isinstance(stream, Escaping) else stream
@@ -68,18 +73,22 @@ SPELLED = "friso.spelled"
 
 
 def spelled(text: str, encoding: str) -> str:
-    """The text as a stream with an encoding shows it."""
+    """Return a text with the characters that an encoding lacks spelled out."""
     return text.encode(encoding, SPELLED).decode(encoding)
 
 
 def _spelled(error: UnicodeError) -> tuple[str, int]:
+    """Replace characters that an encoding lacks; this is the error handler of streams."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     return "".join(map(_spelling, error.object[error.start : error.end])), error.end
 
 
 def _spelling(character: str) -> str:
-    """A character in ASCII: as in `_SPELLINGS`, an exponent after "^", a Greek letter by its name, others "?"."""
+    """Spell a character in ASCII.
+
+    Exponents follow "^", Greek letters become their names, and unknown characters become "?".
+    """
     if character.isascii() or character in _SPELLINGS:
         return _SPELLINGS.get(character, character)
     if unicodedata.decomposition(character).startswith("<super>"):

@@ -1,4 +1,7 @@
-"""The leaf springs chosen from the front: softest that do, in sizes that can be made, confirmed by the beam model."""
+"""Choose from the front the softest leaf springs that meet all requirements.
+
+Sizes are rounded so that the leaves can be made, and the beam model confirms the choice.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +21,10 @@ from friso.leaf_springs.joint import first_interfering
 
 @dataclass(frozen=True)
 class Confirmed:
-    """A candidate by the beam model: its drive stiffness [N/m] and first interfering frequency [Hz], NaN with the
-    reason in `failure` where that could not be evaluated."""
+    """A candidate by the beam model: drive stiffness [N/m] and first interfering frequency [Hz].
+
+    Both are NaN if the model could not be evaluated; `failure` gives the reason.
+    """
 
     candidate: Candidate
     stiffness: float
@@ -29,8 +34,11 @@ class Confirmed:
 
 @dataclass(frozen=True)
 class ChosenLeaves:
-    """The geometry chosen, by the beam model; its requirements, and by what factor it breaks each by closed forms (at
-    most 1); and of the geometries that were passed over, what beams found or why they failed."""
+    """The geometry chosen, evaluated by the beam model, with its requirements.
+
+    `excess` is the factor by which it breaks each requirement by closed forms, at most 1. `passed_over` says why softer
+    geometries were not taken.
+    """
 
     geometry: Geometry
     beams: Evaluation
@@ -40,13 +48,19 @@ class ChosenLeaves:
 
     @property
     def frequency(self) -> float:
-        """First interfering frequency [Hz], the lower one of both models: in one two modes may hide each other."""
+        """Return the first interfering frequency [Hz], the lower one of both models.
+
+        In one model, two modes may hide each other.
+        """
         mode = self.beams.interfering
         return min(mode.frequency if mode else np.inf, float(first_interfering(self.beams.mechanism)))
 
 
 def chosen(task: LeafTask, candidates: Sequence[Candidate]) -> ChosenLeaves | None:
-    """The softest geometry that meets all requirements, by closed forms and by beams; None if there is none."""
+    """Return the softest geometry that meets all requirements by closed forms and by beams.
+
+    Returns None if there is none.
+    """
     needs, passed = requirements(task), []
     for geometry, excess in _in_order(task, needs, candidates):
         try:
@@ -63,13 +77,13 @@ def chosen(task: LeafTask, candidates: Sequence[Candidate]) -> ChosenLeaves | No
 
 
 def stays(task: LeafTask, by_beams: Evaluation) -> bool:
-    """Whether by beams, too, the cart does not break away inside the stroke."""
+    """Tell whether the cart also stays stuck inside the stroke by the beam model."""
     safety = task.spec.safety
     return bool(safety.breakaway * (1 + safety.stiffness_tolerance) * by_beams.forces[-1] <= task.friction)
 
 
 def bears(task: LeafTask, by_beams: Evaluation) -> bool:
-    """Whether by beams, too, the leaves bear bending and load."""
+    """Tell whether the leaves also bear bending and load by the beam model."""
     safety = task.spec.safety
     swing = 0.0 if np.isnan(by_beams.fatigue_margin) else 1 / by_beams.fatigue_margin
     lasts = safety.fatigue * (swing + load_stress(by_beams.mechanism, task) / by_beams.mechanism.yield_strength) <= 1
@@ -79,7 +93,10 @@ def bears(task: LeafTask, by_beams: Evaluation) -> bool:
 def _in_order(
     task: LeafTask, needs: list[Requirement], candidates: Sequence[Candidate]
 ) -> Iterator[tuple[Geometry, np.ndarray]]:
-    """Geometries in whole sizes that meet the requirements by closed forms, the softest first."""
+    """Yield geometries in whole sizes that meet the requirements by closed forms.
+
+    The softest comes first.
+    """
     settings = DesignSettings.current()
     enough = task.spec.safety.parasitic * task.crossover
     near = [candidate.geometry for candidate in candidates if candidate.frequency >= 0.98 * enough]
@@ -95,12 +112,15 @@ def _in_order(
 
 
 def evaluated(task: LeafTask, geometry: Geometry) -> Evaluation:
-    """A geometry by the beam model. Raises BeamFailure."""
+    """Evaluate a geometry by the beam model. Raises BeamFailure."""
     return beams(mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).member(0), task.stroke)
 
 
 def confirmed(task: LeafTask, candidates: Sequence[Candidate]) -> Iterable[Confirmed]:
-    """Some of the front, evenly, by the beam model; where that fails, why."""
+    """Evaluate evenly picked candidates of the front by the beam model.
+
+    A candidate that the model cannot evaluate keeps the reason.
+    """
     settings = DesignSettings.current()
     for k in np.unique(np.linspace(0, len(candidates) - 1, settings.confirmed_candidates).astype(int)):
         candidate = candidates[k]

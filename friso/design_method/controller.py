@@ -1,4 +1,7 @@
-"""The controller of a design: how fast it may be, with which margins, and what joint damping would add."""
+"""Choose the controller of a design: its crossover and its margins.
+
+It is also computed whether more damping in the joint would help.
+"""
 
 from __future__ import annotations
 
@@ -23,22 +26,31 @@ RATIOS = np.geomspace(0.02, 0.7, 9)
 
 @dataclass(frozen=True)
 class Damping:
-    """Joint dampings [N s/m] tried, the stage's own first, and the least modulus margin with each (0: not stable)."""
+    """Joint dampings tried [N s/m], with the least modulus margin of each (0: unstable).
+
+    The stage's own damping comes first.
+    """
 
     tried: np.ndarray
     margins: np.ndarray
 
     @property
     def worth(self) -> int:
-        """The number of the least damping that does nearly all that damping can do; 0 where the stage's own does."""
+        """Return the number of the least damping that brings nearly all of the possible gain.
+
+        It is 0 if the stage's own damping already does.
+        """
         settings = DesignSettings.current()
         return int(np.flatnonzero(self.margins >= settings.enough_margin * self.margins.max())[0])
 
 
 @dataclass(frozen=True)
 class DesignedController:
-    """Gains by van Dijk's rules at the `crossover` [Hz] chosen; the least modulus margin of the settled states, in the
-    stage of the design and in each corner (n,); and what joint damping adds."""
+    """Gains by van Dijk's rules at the chosen `crossover` [Hz].
+
+    `margin` is the least modulus margin of the settled states as designed, and `corners` that of each corner, shape
+    (n,). `damping` tells what joint damping would add.
+    """
 
     crossover: float
     gains: Tuning
@@ -48,14 +60,16 @@ class DesignedController:
 
 
 def comfortable_below(ranges: Sequence[Range], highest: float) -> float | None:
-    """The highest crossover [Hz] of the ranges that is not above `highest`."""
+    """Return the highest crossover [Hz] in the ranges that is not above `highest`."""
     below = [min(high, highest) for low, high in ranges if low < highest]
     return max(below) if below else None
 
 
 def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tuple[Range, ...]:
-    """The crossovers [Hz] with a modulus margin of 0.5 in all settled states, with the masses of the stage and with all
-    those of the population."""
+    """Return the crossovers [Hz] with a modulus margin of 0.5 in all settled states.
+
+    They hold for the masses of the stage and for those of the whole population.
+    """
     flat = stage.flat()
     ranges = Modal.of(flat, leaves).comfortable
     masses = {
@@ -69,7 +83,7 @@ def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tup
 
 
 def choose_controller(stage: Stage, leaves: Evaluation, population: Population) -> DesignedController:
-    """The controller of a stage with leaf springs, its crossover chosen."""
+    """Design the controller of a stage with leaf springs at its chosen crossover."""
     flat = stage.flat()
     gains = tuning(*(flat[key] for key in (CROSSOVER, ALPHA, BETA, TUNED_MASS)))
     corners = np.array([_margin({**flat, **population.of(k)}, leaves) for k in range(population.count)])
@@ -83,7 +97,7 @@ def _margin(flat: Mapping[str, Any], leaves: Evaluation) -> float:
 
 
 def dampings(flat: Mapping[str, Any]) -> np.ndarray:
-    """Dampings of the joint [N s/m] to be tried: the stage's own and larger ones."""
+    """Return the joint dampings to try [N s/m]: the stage's own and larger ones."""
     critical = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])
     given_damping = flat["joint.damping"]
     return np.array([given_damping, *(damping for damping in RATIOS * critical if damping > given_damping)])

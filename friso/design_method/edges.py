@@ -1,6 +1,7 @@
-"""The edge of hunting over the corners of a specification: the highest crossover at which anything attracts.
+"""Find the edge of hunting over the corners of a specification.
 
-Coarse: a design asks for 1 or 2 % in seconds, and simulates all its moves afterwards.
+The edge is the highest crossover at which anything attracts. It is found to within 1 or 2 % in seconds, since a design
+simulates all its moves afterwards.
 """
 
 from __future__ import annotations
@@ -20,10 +21,13 @@ from friso.progress import Progress, silent
 
 @dataclass(frozen=True)
 class Corners:
-    """The corners of a specification with the highest crossover [Hz] at which anything attracts in each, shape (n,): 0
-    where nothing does from `searched[0]` on, infinite where something does at `searched[1]`. In `unknown` of them the
-    simulations below the edge failed or had not settled when they were stopped, which counts as hunting, or something
-    may attract above it that no simulation starts from."""
+    """The corners of a specification with the edge of hunting of each.
+
+    `edges` [Hz], shape (n,), is the highest crossover at which anything attracts. It is 0 if nothing attracts from
+    `searched[0]` on, and infinite if something still attracts at `searched[1]`. In `unknown` corners the edge is not
+    certain: simulations below it failed or had not settled, which counts as hunting. There may also be attractors above
+    it that no simulation starts from.
+    """
 
     population: Population
     edges: np.ndarray
@@ -32,17 +36,20 @@ class Corners:
 
     @property
     def worst(self) -> int:
-        """The number of the corner that hunts up to the highest crossover."""
+        """Return the number of the corner that hunts up to the highest crossover."""
         return int(self.edges.argmax())
 
     @property
     def highest(self) -> float:
-        """The highest crossover [Hz] at which anything attracts in any of them; at least where the search begins."""
+        """Return the highest crossover [Hz] at which anything attracts in any corner.
+
+        It is never below the beginning of the search.
+        """
         return float(max(self.searched[0], self.edges.max()))
 
     @property
     def hunts(self) -> bool:
-        """Whether anything attracts anywhere in the range that was searched."""
+        """Tell whether anything attracts anywhere in the range searched."""
         return bool(np.any(self.edges > 0))
 
 
@@ -55,9 +62,11 @@ def edges_over(
     progress: Progress = silent,
     label: str = "",
 ) -> Corners:
-    """The edges of the stage `flat` in all corners, tuned by van Dijk's rules: on a grid of so many `steps` from `high`
-    down to `low` [Hz], as far as to the first point at which anything attracts, and between that and the one above.
-    `label` names the search to the progress."""
+    """Find the edges of the stage `flat` in all corners, tuned by van Dijk's rules.
+
+    The search goes down from `high` to `low` [Hz] on a grid of `steps`, until something attracts. Then it refines
+    between that point and the one above. `label` names the search to the progress.
+    """
     settings = DesignSettings.current()
     corners = population.over({**flat, CROSSOVER: np.nan, "motion.kind": "release"})  # whatever the stage's motion
     grid, count = np.log(np.geomspace(low, high, steps)), population.count
@@ -81,7 +90,10 @@ def edges_over(
 
 
 def worst_edges(by_law: Mapping[str, Corners]) -> Corners:
-    """In each corner the highest of the edges under several laws, searched over the same corners and range."""
+    """Return in each corner the highest edge of hunting under several friction laws.
+
+    All laws must have been searched over the same corners and range.
+    """
     several = [*by_law.values()]
     edges = np.max([corners.edges for corners in several], axis=0)
     return replace(several[0], edges=edges, unknown=sum(corners.unknown for corners in several))
@@ -89,22 +101,27 @@ def worst_edges(by_law: Mapping[str, Corners]) -> Corners:
 
 @dataclass(frozen=True)
 class OtherLaws:
-    """Flat keys of the friction of stages under other laws by name, arrays of shape (stages,) where they differ; and
-    the laws that are `lost`, with the numbers of the stages in which they do not keep what is measured."""
+    """Friction of stages under other laws, as flat keys by the name of the law.
+
+    Keys that differ between stages are arrays of shape (stages,). `lost` names the laws that do not keep what is
+    measured, with the numbers of those stages.
+    """
 
     frictions: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     lost: Mapping[str, Sequence[int]] = field(default_factory=dict)
 
 
 def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str, Any]:
-    """The stage with the flat keys of another law's friction."""
+    """Return the stage with the friction keys of another law."""
     return {**{key: value for key, value in flat.items() if not key.startswith("friction.")}, **friction}
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Whether anything attracts, or may for all that simulations show, in corners at logarithms of crossovers; and
-    whether that is certain."""
+    """Tell whether anything attracts, or may attract, in corners at logarithms of crossovers.
+
+    The second array tells whether that is certain.
+    """
     settings = DesignSettings.current()
     some = {key: value[which] if np.ndim(value) else value for key, value in corners.items()}
     attracted = find_attractors({**some, CROSSOVER: np.exp(crossover)}, len(which), settings.orbit_rtol)
@@ -112,5 +129,8 @@ def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarra
 
 
 def rigid(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """The stage without isolator: cart and stage as one mass, which a joint locked by its fixtures makes of them."""
+    """Return the stage without isolator.
+
+    Cart and stage become one mass, as when fixtures lock the joint.
+    """
     return {key: value for key, value in flat.items() if not key.startswith(("joint.", "flexure.", "parasitic."))}

@@ -1,4 +1,7 @@
-"""The Pareto front of leaf springs: drive stiffness against first interfering frequency, within all requirements."""
+"""Find the Pareto front of drive stiffness and first interfering frequency of leaf springs.
+
+All leaf springs on it meet the requirements.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,10 @@ from friso.leaf_springs.joint import first_interfering
 
 @dataclass(frozen=True)
 class Candidate:
-    """Leaf springs with their drive stiffness [N/m] and first interfering frequency [Hz] by closed forms."""
+    """Leaf springs with their drive stiffness [N/m] and first interfering frequency [Hz].
+
+    Both numbers come from closed forms.
+    """
 
     geometry: Geometry
     stiffness: float
@@ -25,8 +31,10 @@ class Candidate:
 
 
 def front(task: LeafTask) -> list[Candidate]:
-    """The front, by rising stiffness (NSGA-II, doi:10.1109/4235.996017); empty where no geometry meets the requirements
-    except the one on the frequency, which is an objective here."""
+    """Return the Pareto front by rising stiffness (NSGA-II, doi:10.1109/4235.996017).
+
+    It is empty if no geometry meets the requirements. The requirement on the frequency is an objective here.
+    """
     settings = DesignSettings.current()
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.operators.crossover.sbx import SBX
@@ -64,13 +72,16 @@ def front(task: LeafTask) -> list[Candidate]:
 
 
 def _ends(task: LeafTask) -> tuple[np.ndarray, np.ndarray]:
-    """The least and the largest variables, each (4,): logarithms of the sizes, and the number of the sheet."""
+    """Return the least and the largest variables, each of shape (4,).
+
+    They are the logarithms of the sizes, and the number of the sheet.
+    """
     low, high = box(task.spec)
     return np.append(np.log(low), 0.0), np.append(np.log(high), len(sheets(task.spec)) - 1e-9)
 
 
 def _problem(task: LeafTask, needs: list[Requirement]) -> Any:
-    """The two objectives and the requirements, as pymoo takes them."""
+    """Return the two objectives and the requirements in the form that pymoo takes."""
     from pymoo.core.problem import Problem
 
     low, high = _ends(task)
@@ -86,8 +97,11 @@ def _problem(task: LeafTask, needs: list[Requirement]) -> Any:
 
 
 def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
-    """A geometry, as the logarithms of its sizes and the number of its sheet (4,), that meets the requirements with the
-    most to spare, by differential evolution; None if none meets them."""
+    """Return a geometry that meets the requirements with the most to spare; None if none does.
+
+    It is found by differential evolution, and given as logarithms of its sizes with the number of its sheet, shape
+    (4,).
+    """
     settings = DesignSettings.current()
     bought = sheets(task.spec)
 
@@ -111,8 +125,11 @@ def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
 
 @dataclass(frozen=True)
 class GeometryScores:
-    """Geometries: their drive stiffness [N/m] and first interfering frequency [Hz], shape (count,), and by what factor
-    each requirement is broken, (count, requirements)."""
+    """Scores of geometries: drive stiffness [N/m] and first interfering frequency [Hz].
+
+    Both have shape (count,). `excess` is the factor by which each requirement is broken, shape (count,
+    requirements).
+    """
 
     stiffness: np.ndarray
     frequency: np.ndarray
@@ -122,7 +139,7 @@ class GeometryScores:
 def evaluate_geometries(
     task: LeafTask, needs: list[Requirement], sizes: np.ndarray, bought: list[Sheet]
 ) -> GeometryScores:
-    """Geometries by closed forms."""
+    """Evaluate geometries by closed forms."""
     many = mechanisms(task.flat, sizes, bought)
     excess = [np.broadcast_to(requirement.excess(many), (len(sizes),)) for requirement in needs]
     return GeometryScores(closed_forms.drive_stiffness(many), first_interfering(many), np.stack(excess, axis=1))

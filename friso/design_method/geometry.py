@@ -1,4 +1,4 @@
-"""The leaf springs that may be built: geometries as numbers to choose from, and as mechanisms."""
+"""Define the leaf springs that can be built, as numbers to choose from and as mechanisms."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SIZES = ("length", "width", "spacing")
 
 @dataclass(frozen=True)
 class Sheet:
-    """What is bought: how many leaves, of which sheet [m] and material."""
+    """A purchase for leaf springs: number of leaves, thickness of the sheet [m], and material."""
 
     leaves: float
     thickness: float
@@ -26,7 +26,7 @@ class Sheet:
 
 
 def sheets(spec: Spec) -> list[Sheet]:
-    """All that may be bought."""
+    """Return all sheets that a specification allows."""
     section = spec.leaves
     return [
         Sheet(*sheet) for sheet in product(section.leaves, sorted(map(float, section.thickness)), section.materials)
@@ -44,18 +44,18 @@ class Geometry:
 
     @classmethod
     def of(cls, sizes: np.ndarray, sheet: Sheet) -> Geometry:
-        """Of length, width and spacing [m], shape (3,)."""
+        """Build a geometry from length, width and spacing [m], shape (3,), and a sheet."""
         length, width, spacing = sizes.tolist()
         return cls(length, width, spacing, sheet)
 
     @classmethod
     def of_stage(cls, flat: Mapping[str, Any]) -> Geometry:
-        """That of a stage with [flexure], given as its flat keys [SI]."""
+        """Read the geometry of a stage with [flexure], given as its flat keys [SI]."""
         bought = (flat[f"flexure.{name}"] for name in ("leaves", "thickness", "material"))
         return cls.of(np.array([flat[f"flexure.{name}"] for name in SIZES]), Sheet(*bought))
 
     def keys(self) -> dict[str, Any]:
-        """The keys of [flexure], as text with units."""
+        """Return the keys of [flexure] as texts with units."""
         sizes = {f"flexure.{name}": f"{getattr(self, name) * 1e3:.6g} mm" for name in SIZES}
         bought = {
             "flexure.leaves": int(self.sheet.leaves),
@@ -66,7 +66,10 @@ class Geometry:
 
 
 def mechanisms(flat: Mapping[str, Any], sizes: np.ndarray, bought: list[Sheet]) -> Mechanism:
-    """Geometries of lengths, widths and spacings [m], shape (count, 3), each of its sheet, in the stage `flat`."""
+    """Build mechanisms from lengths, widths and spacings [m], shape (count, 3), and sheets.
+
+    They stand in the stage `flat`.
+    """
     sheet_materials = [materials()[sheet.material] for sheet in bought]
     columns = {
         "leaves": [sheet.leaves for sheet in bought],
@@ -83,24 +86,27 @@ def mechanisms(flat: Mapping[str, Any], sizes: np.ndarray, bought: list[Sheet]) 
 
 
 def moved_along(flat: Mapping[str, Any], length: Any) -> dict[str, Any]:
-    """The points of the stage that are given: as the length [m] changes, they stay as far from the leaf ends."""
+    """Move the given points of the stage with the leaf ends when the length [m] changes."""
     points = [f"flexure.{name}_x" for name in ("centre", "actuation", "sensor")]
     return {key: flat[key] + length - flat["flexure.length"] for key in points if key in flat}
 
 
 def box(spec: Spec) -> tuple[np.ndarray, np.ndarray]:
-    """The least and the largest length, width and spacing [m], each (3,)."""
+    """Return the least and the largest length, width and spacing [m], each of shape (3,)."""
     ends = np.array([spec.leaves.space(name) for name in SIZES])
     return ends[:, 0], ends[:, 1]
 
 
 def sizes_of(geometries: Sequence[Geometry]) -> np.ndarray:
-    """Their lengths, widths and spacings [m], shape (count, 3)."""
+    """Return the lengths, widths and spacings of geometries [m], shape (count, 3)."""
     return np.array([[getattr(geometry, name) for name in SIZES] for geometry in geometries])
 
 
 def round_geometries(spec: Spec, geometry: Geometry, step: float) -> list[Geometry]:
-    """The geometries with whole multiples of a step [m] next to one, as far as there is space for them."""
+    """Return the geometries next to one whose sizes are whole multiples of a step [m].
+
+    Geometries beyond the space allowed are left out.
+    """
     low, high = box(spec)
     near = [{float(np.round(size / step + side, 0) * step) for side in (-0.5, 0.5)} for size in sizes_of([geometry])[0]]
     corners = [np.array(corner) for corner in product(*map(sorted, near))]

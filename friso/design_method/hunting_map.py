@@ -1,4 +1,4 @@
-"""Where moves come to rest over crossover and stroke about a design, over the corners of its specification."""
+"""Map over crossover and stroke where moves come to rest, in the corners of a specification."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class HuntingMap:
-    """Crossovers [Hz] (n,) and strokes [m] (m,), and the share of the corners, (m, n), in which the stage is not in
-    position a quarter of a minute after a typical move; NaN where a run failed."""
+    """The share of corners that are not in position, over crossover and stroke.
+
+    Crossovers [Hz] have shape (n,), strokes [m] (m,), and shares (m, n). A corner counts if the stage is not in
+    position a quarter of a minute after a typical move. The share is NaN where a run failed.
+    """
 
     crossovers: np.ndarray
     strokes: np.ndarray
@@ -25,7 +28,7 @@ class HuntingMap:
 
 
 def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
-    """The map about a design, at its own drive stiffness."""
+    """Compute the map around a design, at its own drive stiffness."""
     settings = DesignSettings.current()
     flat = stage.flat()
     crossovers, strokes = (

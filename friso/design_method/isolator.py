@@ -1,4 +1,7 @@
-"""A rigid stage on an isolator: its mass split, a joint between the parts, friction on the cart."""
+"""Put a rigid stage on an isolator.
+
+Its mass is split, a joint is added between the parts, and the friction stays on the cart.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ STEEL = 190e9
 
 
 def split(flat: Mapping[str, Any]) -> dict[str, float]:
-    """Masses of cart and stage [kg]: those of the file, or shares of the only one."""
+    """Return the masses of cart and stage [kg]: those of the file, or shares of the only mass."""
     settings = DesignSettings.current()
     masses = {key: flat[key] for key in ("masses.cart", "masses.stage") if key in flat}
     if len(masses) == 2:
@@ -28,8 +31,10 @@ def split(flat: Mapping[str, Any]) -> dict[str, float]:
 
 
 def isolated(stage: Stage, stroke: float = STROKE, young: float = STEEL) -> Stage:
-    """The stage with a free joint: its own, or one to begin a search with, of a stroke [m] and leaves with a Young's
-    modulus `young` [Pa]; its controller as tuned for the whole mass. Raises StageError where the result is no stage.
+    """Return the stage with a free joint: its own, or one to begin a search with.
+
+    The new joint has a stroke [m] and leaves with a Young's modulus `young` [Pa]. The controller stays tuned for the
+    whole mass. Raises StageError if the result is not a valid stage.
     """
     settings = DesignSettings.current()
     free = stage.variants().get("free")

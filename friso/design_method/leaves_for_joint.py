@@ -1,4 +1,7 @@
-"""The leaf springs that make a joint of a given stiffness and stroke: those with the highest interfering frequency."""
+"""Find leaf springs for a joint of given stiffness and stroke.
+
+Of all that fit, those with the highest interfering frequency are taken.
+"""
 
 from __future__ import annotations
 
@@ -30,11 +33,13 @@ OF_LEAVES = (*SIZES, "leaves", "thickness", "material", "young", "poisson", "den
 
 
 def leaves_for_joint(stage: Stage, present: Stage) -> Stage | None:
-    """The stage with leaf springs in place of the numbers of its joint and of the parasitic mode: those of the same
-    stiffness that interfere at the highest frequency, of the sizes, sheets, loads and factors of safety that `friso
-    init --spec` begins with; None where none bear stroke and load. What they guide and carry is as in [flexure] of the
-    stage as it is at `present`, if it has that: its points stay where they are from the leaf ends. Raises InputError
-    for a stage whose joint leaf springs cannot be.
+    """Return the stage with leaf springs in place of its joint's numbers and its parasitic mode.
+
+    The leaf springs have the same stiffness and interfere at the highest possible frequency. Sizes, sheets, loads and
+    factors of safety are those that `friso init --spec` begins with. Returns None if no leaves bear stroke and load.
+
+    If the stage `present` has [flexure], its points keep their distance from the leaf ends. Raises InputError for a
+    joint that leaf springs cannot make.
     """
     spec = read_spec(outline(stage))
     low, high = box(spec)
@@ -60,14 +65,22 @@ def leaves_for_joint(stage: Stage, present: Stage) -> Stage | None:
 
 
 def _moved(flat: Mapping[str, Any], geometry: Geometry) -> dict[str, str]:
-    """The points of a stage given as its flat keys as far from the ends of other leaves as they are from its own."""
+    """Move the points of a stage so that they keep their distance from the ends of other leaves."""
     return {key: exactly(place, "m") for key, place in moved_along(flat, geometry.length).items()}
 
 
 class _Search:
-    """The search over length and spacing of the leaves and what they are of; the width follows from the stiffness."""
+    """The search over length, spacing and sheet of the leaves.
+
+    The width follows from the stiffness wanted.
+    """
 
     def __init__(self, task: LeafTask, stiffness: float) -> None:
+        """Prepare the search for leaves of a `stiffness` [N/m].
+
+        Two requirements are left to a later check on the whole stage: that the cart stays, and that no mode
+        interferes.
+        """
         self.task, self.stiffness = task, stiffness
         self.bought = sheets(task.spec)
         self.low, self.high = box(task.spec)
@@ -75,7 +88,7 @@ class _Search:
         self.needs = [need for need in requirements(task) if need.name not in (BREAKAWAY, PARASITIC)]
 
     def best(self) -> np.ndarray:
-        """Logarithms of length and spacing [m], and the number of the sheet (3,)."""
+        """Return logarithms of the best length and spacing [m], and the number of the sheet, (3,)."""
         settings = DesignSettings.current()
         ends = [*np.log([self.low[[0, 2]], self.high[[0, 2]]]).T, (0.0, len(self.bought) - 1e-9)]
         bounds = [(low, high + 1e-12 * (high == low)) for low, high in ends]
@@ -92,8 +105,11 @@ class _Search:
         return np.asarray(minimum.x)
 
     def cost(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:
-        """What is minimised over lengths and spacings [m], (count, 2): how far leaves break a requirement, or else the
-        frequency at which they interfere, the other way round."""
+        """Return what is minimised over lengths and spacings [m], (count, 2).
+
+        It is how far leaves break a requirement. For leaves that break none, it falls as their interfering frequency
+        rises.
+        """
         settings = DesignSettings.current()
         sizes = self.with_width(spans, bought)
         worst = self.broken(sizes, bought)
@@ -101,7 +117,7 @@ class _Search:
         return np.where(worst > 0, settings.worst_cost + worst, -np.log(frequency))
 
     def with_width(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:
-        """Lengths, widths and spacings [m], (count, 3), of the stiffness wanted."""
+        """Return lengths, widths and spacings [m], (count, 3), of leaves with the stiffness wanted."""
         settings = DesignSettings.current()
         sizes = np.insert(spans, 1, self.high[1], axis=1)
         for _ in range(settings.width_steps):
@@ -110,8 +126,10 @@ class _Search:
         return sizes
 
     def broken(self, sizes: np.ndarray, bought: list[Sheet]) -> np.ndarray:
-        """The logarithm of the factor by which leaves break a requirement, the space for their width being one: 0 or
-        less where they break none."""
+        """Return the logarithm of the factor by which leaves break a requirement.
+
+        The space for their width is one requirement. The result is 0 or less for leaves that break none.
+        """
         settings = DesignSettings.current()
         scores = evaluate_geometries(self.task, self.needs, sizes, bought)
         space = np.stack([self.low[1] / sizes[:, 1], sizes[:, 1] / self.high[1]], axis=1)
@@ -119,8 +137,11 @@ class _Search:
         return np.where(np.isfinite(worst), worst, settings.worst_cost)
 
     def whole_sizes(self, best: np.ndarray) -> list[Geometry]:
-        """The geometries in sizes that can be made next to one, (3,), that break no requirement and have the
-        stiffness, those that interfere at the highest frequency first."""
+        """Return the geometries in sizes that can be made, next to one of shape (3,).
+
+        They have the stiffness wanted and break no requirement. Those that interfere at the highest frequency come
+        first.
+        """
         settings = DesignSettings.current()
         sheet = self.bought[int(best[2])]
         near = [

@@ -1,4 +1,7 @@
-"""The design method (thesis, Sec. 3.4): from a specification to leaf springs, stroke, crossover and gains."""
+"""Design an isolator from a specification: leaf springs, stroke, crossover and gains.
+
+The method is that of the thesis, Sec. 3.4.
+"""
 
 from __future__ import annotations
 
@@ -41,41 +44,48 @@ Frictions = Callable[[Sequence[Stage]], OtherLaws]
 
 
 def own_law(stages: Sequence[Stage]) -> OtherLaws:
-    """No laws beside that of the stages."""
+    """Return no friction laws besides the stages' own."""
     return OtherLaws()
 
 
 @dataclass(frozen=True)
 class Need:
-    """What tells whether a machine needs an isolator: the edges of hunting `without` one over the corners of a
-    specification."""
+    """The result that decides whether a machine needs an isolator.
+
+    `without` holds the edges of hunting without an isolator over the corners of the specification.
+    """
 
     without: Corners
     spec: Spec
 
     @property
     def isolator(self) -> bool:
-        """Whether the machine hunts without isolator at all crossovers that it allows."""
+        """Tell whether the machine hunts without isolator at all crossovers that it allows."""
         return self.spec.safety.hunting * self.without.highest > self.spec.limit
 
 
 class NoDesign(Exception):
-    """No design meets the specification: why, and what to relax by how much; and what tells whether an isolator is
-    needed at all, `need` (None: that was not looked at)."""
+    """Raised if no design meets the specification, with the reason and what to relax.
+
+    `need` tells whether an isolator is needed at all; None means that this was not examined.
+    """
 
     def __init__(self, reason: str, relaxed: tuple[Relaxation, ...] = (), need: Need | None = None) -> None:
         super().__init__(reason)
         self.reason, self.relaxed, self.need = reason, relaxed, need
 
     def of(self, need: Need) -> NoDesign:
-        """The same, once it is known whether an isolator is needed."""
+        """Return the error with the result on whether an isolator is needed."""
         return NoDesign(self.reason, self.relaxed, need)
 
 
 @dataclass(frozen=True)
 class LeavesAndCrossover:
-    """Leaves and crossover that go together: the task the leaves were chosen for, the choice, the stage with both, and
-    the ranges of crossovers [Hz] that are `comfortable` with these leaves."""
+    """Leaf springs and a crossover that fit each other.
+
+    It holds the task for which the leaves were chosen, the choice, and the stage with both. `comfortable` are the
+    ranges of crossovers [Hz] with a good modulus margin.
+    """
 
     task: LeafTask
     choice: ChosenLeaves
@@ -87,12 +97,14 @@ class LeavesAndCrossover:
 class Design:
     """A design with the numbers of each step.
 
-    `without`: the edges of hunting over the `corners` of the specification without isolator, `edges` with it.
-    `candidates`: the Pareto front, some of it `confirmed` by beams; `fitted`: what was chosen. `controller`: margins.
-    `map`: hunting over crossover and stroke. `verification`: the moves simulated. `stage`: the design as a stage.
-    `damped`: the joint damping with which the crossover could be `faster` [Hz], where margins hold it down.
-    `by_law`: the edges without isolator and with it under each friction law; `without` and `edges` are the worst.
-    `lost`: the laws that were not tried, with the numbers of the corners in which they do not keep what is measured.
+    `without` and `edges` are the edges of hunting over the `corners` without and with isolator. `candidates` is the
+    Pareto front, and `confirmed` a part of it by the beam model. `fitted` holds the leaf springs and crossover chosen.
+    `controller` has the margins, `map` shows hunting over crossover and stroke, and `verification` the simulated moves.
+    `stage` is the design as a stage.
+
+    `damped` is the joint damping with which the crossover could be `faster` [Hz], if margins limit it. `by_law` holds
+    the edges without and with isolator under each friction law; `without` and `edges` are the worst. `lost` names laws
+    that were not tried, with the numbers of the corners in which they do not keep what is measured.
     """
 
     spec: Spec
@@ -112,12 +124,16 @@ class Design:
 
     @property
     def stage(self) -> Stage:
+        """Return the design as a stage."""
         return self.fitted.stage
 
     @property
     def unmet(self) -> tuple[Relaxation, ...]:
-        """What the verification found not to be met: the settling time, with that which would be; moves that do not
-        come to rest are reported by the verification itself."""
+        """Return what to relax if moves settle too late: the settling time, with the time needed.
+
+        More joint damping is named before it, if that allows a higher crossover. Moves that do not come to rest are
+        reported by the verification itself.
+        """
         settings = DesignSettings.current()
         limit, settling = self.spec.position.settling_time, self.verification.free.slower_than(settings.slow_share)
         if limit is None or settling <= limit or not np.isfinite(settling):
@@ -128,25 +144,28 @@ class Design:
 
     @property
     def meets(self) -> bool:
-        """Whether all moves come to rest, and settle in the time specified."""
+        """Tell whether all moves come to rest, and settle in the time specified."""
         settings = DesignSettings.current()
         limit, free = self.spec.position.settling_time, self.verification.free
         return not free.missed and (limit is None or free.slower_than(settings.slow_share) <= limit)
 
     @property
     def need(self) -> Need:
-        """What tells whether an isolator is needed."""
+        """Return the result that decides whether an isolator is needed."""
         return Need(self.without, self.spec)
 
     @property
     def needed(self) -> bool:
-        """Whether the machine hunts without isolator at all crossovers that it allows."""
+        """Tell whether the machine hunts without isolator at all crossovers that it allows."""
         return self.need.isolator
 
 
 def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Frictions = own_law) -> Design:
-    """Carry the method out; edges of hunting are the worst over the stage's own friction and other `laws`. Raises
-    InputError for input that cannot be used, NoDesign if nothing meets the specification."""
+    """Design leaf springs, stroke and controller of an isolator.
+
+    Edges of hunting are the worst over the stage's own friction and other `laws`. Raises InputError for unusable input,
+    and NoDesign if nothing meets the specification.
+    """
     settings = DesignSettings.current()
     base = prepared(stage, spec)
     flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit
@@ -196,7 +215,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
 
 
 def _friction_of(population: Population, number: int) -> dict[str, float]:
-    """What differs in the friction of one of the machines."""
+    """Return the friction keys of one of the machines that differ from the stage's."""
     return {key: value for key, value in population.of(number).items() if key.startswith("friction.")}
 
 
@@ -209,7 +228,7 @@ def _by_law(
     population: Population,
     progress: Progress,
 ) -> dict[str, Corners]:
-    """The edges of a stage over the corners under each law, between crossovers [Hz]."""
+    """Return the edges of a stage over the corners under each law, between crossovers [Hz]."""
     settings = DesignSettings.current()
     edges = {}
     for law, friction in laws.items():
@@ -221,8 +240,11 @@ def _by_law(
 
 
 def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
-    """The least joint damping of those tried with which the crossover could be what leaves and machine allow, and that
-    crossover [Hz]; none where it is already, or where damping does not help."""
+    """Return the least joint damping that no longer limits the crossover.
+
+    The crossover [Hz] that leaves and machine then allow is returned with it. Returns nothing if the crossover is that
+    high already, or if no damping tried helps.
+    """
     settings = DesignSettings.current()
     flat, spec = fit.stage.flat(), fit.task.spec
     target = min(spec.limit, fit.choice.frequency / spec.safety.parasitic)
@@ -238,8 +260,11 @@ def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
 
 
 def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTask, list[Candidate]]:
-    """The front for the largest stroke that allows the machine's limit; else that which allows the highest crossover.
-    Raises NoDesign where no leaf springs meet the requirements."""
+    """Return the front for the largest stroke that allows the machine's limit.
+
+    Otherwise it is the front that allows the highest crossover. Raises NoDesign if no leaf springs meet the
+    requirements.
+    """
     settings = DesignSettings.current()
     stroke, choices = spec.leaves.stroke, []
     several = stroke.high > stroke.low
@@ -259,12 +284,18 @@ def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTa
 
 
 def allowed_crossover(task: LeafTask, candidates: list[Candidate]) -> float:
-    """The highest crossover [Hz] whose multiple is still below a first interfering frequency of the front."""
+    """Return the highest crossover [Hz] that a front allows.
+
+    Its multiple is still below a first interfering frequency of the front.
+    """
     return max(candidate.frequency for candidate in candidates) / task.spec.safety.parasitic
 
 
 def fit_leaves(base: Stage, task: LeafTask, candidates: list[Candidate], population: Population) -> LeavesAndCrossover:
-    """Leaves as soft as the crossover allows, that as high as leaves and margins allow. Raises NoDesign."""
+    """Choose the softest leaves for the highest crossover that leaves and margins allow.
+
+    Raises NoDesign.
+    """
     settings = DesignSettings.current()
     target = min(task.spec.limit, allowed_crossover(task, candidates))
     for _ in range(settings.design_rounds):
@@ -288,13 +319,16 @@ def fit_leaves(base: Stage, task: LeafTask, candidates: list[Candidate], populat
 
 
 def _down(crossover: float) -> float:
-    """Rounded down to three digits."""
+    """Round a crossover down to three digits."""
     step = 10 ** (np.floor(np.log10(crossover)) - 2)
     return float(np.floor(crossover / step * (1 + 1e-9)) * step)
 
 
 def _does_not_hunt(fit: LeavesAndCrossover, edges: Corners, need: Need) -> None:
-    """Raises NoDesign where the crossover does not keep its distance from the edge of hunting."""
+    """Check the distance of the crossover from the edge of hunting.
+
+    Raises NoDesign if it is too close.
+    """
     spec, crossover = fit.task.spec, fit.stage.flat()[CROSSOVER]
     needed = spec.safety.hunting * edges.highest
     if not edges.hunts or needed <= crossover:
@@ -310,7 +344,7 @@ def _does_not_hunt(fit: LeavesAndCrossover, edges: Corners, need: Need) -> None:
 
 
 def _ways_out(fit: LeavesAndCrossover, edge: float, needed: float, crossover: float) -> Iterator[Relaxation]:
-    """What would let the crossover keep its distance from the edge [Hz]."""
+    """Return what would let the crossover keep its distance from the edge [Hz]."""
     spec, name = fit.task.spec, "crossover above the edge of hunting"
     above = [max(low, needed) for low, high in fit.comfortable if high > needed]
     allowed_ = fit.choice.frequency / spec.safety.parasitic

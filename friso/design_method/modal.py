@@ -1,4 +1,7 @@
-"""The loop with all modes of the leaf springs that actuator and sensor see, of which the equations have one only."""
+"""Analyse the loop with all modes of the leaf springs that actuator and sensor see.
+
+The equations of motion contain only one of these modes.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +26,11 @@ AROUND = np.sinh(np.linspace(-7.0, 7.0, 71))
 
 @dataclass(frozen=True)
 class Modal:
-    """Settled states of a stage (members,) with their plants without parasitic mode, `bare`, and with those of the leaf
-    springs, `with_modes`, both of shape (members, frequencies) [m/N], the drive included, over `omega` [rad/s].
+    """Settled states of a stage (members,), with their plants over `omega` [rad/s].
 
-    Modes add to the motion of the stage as a rigid mass, whatever the cart does far below them.
+    `bare` are the plants without parasitic mode, and `with_modes` those with the modes of the leaf springs. Both have
+    shape (members, frequencies) [m/N] and include the drive. Modes add to the motion of the stage as a rigid mass,
+    whatever the cart does far below them.
     """
 
     flat: Mapping[str, Any]
@@ -37,7 +41,7 @@ class Modal:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], leaves: Evaluation) -> Modal:
-        """A stage given as flat keys with the modes of its leaf springs."""
+        """Build the states of a stage, given as flat keys, with the modes of its leaf springs."""
         rigid = {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
         members, drive = settled_members(rigid), DriveTiming.of(rigid)
         omega = _frequencies(rigid, leaves, drive)
@@ -45,7 +49,10 @@ class Modal:
         return cls(rigid, members, omega, bare, bare + compliance(leaves, omega) * drive.transfer(omega))
 
     def margin(self, crossover: np.ndarray) -> np.ndarray:
-        """The least modulus margin of all states at each crossover [Hz], shape (n,); 0 where one is unstable."""
+        """Return the least modulus margin of all states at each crossover [Hz], shape (n,).
+
+        It is 0 if a state is unstable.
+        """
         factors = np.atleast_1d(crossover) / bandwidth(self.flat)
         keys = faster(self.flat, np.repeat(factors, len(self.members)))
         settled = stability_by_poles(keys, self.members.repeated(len(factors))).abscissa.reshape(len(factors), -1) < 0
@@ -53,7 +60,7 @@ class Modal:
         return np.array([self._margin(factors[k]) if stable[k] else 0.0 for k in range(len(factors))])
 
     def _margin(self, factor: np.ndarray) -> float:
-        """That of states which are stable without the modes, at a factor of the bandwidth."""
+        """Return the least margin at a factor of the bandwidth, for states stable without the modes."""
         shape = controller_response(faster(self.flat, factor), self.omega)
         bare, loop = self.bare * shape, self.with_modes * shape
         stable = np.abs(_turns((1 + loop) / (1 + bare))) < 0.5
@@ -61,7 +68,7 @@ class Modal:
 
     @property
     def comfortable(self) -> tuple[Range, ...]:
-        """The crossovers [Hz] with a modulus margin of 0.5."""
+        """Return the crossovers [Hz] with a modulus margin of 0.5."""
         settings = FrequencySettings.current()
         return ranges_below(
             np.geomspace(*searched_crossovers(self.flat), settings.crossover_steps), lambda at: WANTED - self.margin(at)
@@ -69,12 +76,18 @@ class Modal:
 
 
 def _turns(ratio: np.ndarray) -> np.ndarray:
-    """How often the curves, (..., frequencies), run around the origin from the first frequency to the last."""
+    """Count how often curves, (..., frequencies), run around the origin.
+
+    They run from the first frequency to the last.
+    """
     return np.angle(ratio[..., 1:] / ratio[..., :-1]).sum(axis=-1) / (2 * np.pi)
 
 
 def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
-    """What the modes other than the drive mode add to the plant [m/N] at frequencies [rad/s], shape (frequencies,)."""
+    """Return what all modes but the drive mode add to the plant [m/N].
+
+    `omega` are frequencies [rad/s]; the result has shape (frequencies,).
+    """
     zeta = float(leaves.mechanism.damping_ratio)
     parts = [
         mode.actuator
@@ -86,7 +99,7 @@ def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
 
 
 def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: DriveTiming) -> np.ndarray:
-    """Angular frequencies that show the loop at all crossovers, and every mode."""
+    """Return angular frequencies that show the loop at all crossovers, and every mode."""
     settings = FrequencySettings.current()
     ends = [
         frequency_grid(faster(flat, np.array(end / bandwidth(flat))), settings.search_density)

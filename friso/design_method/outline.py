@@ -1,4 +1,7 @@
-"""A specification to begin with, written from a stage file: ranges about its own numbers, leaves as sold."""
+"""Write a specification to begin with from a stage file.
+
+Ranges lie around the stage's own numbers, and leaves have sizes that are sold.
+"""
 
 from __future__ import annotations
 
@@ -15,15 +18,18 @@ from friso.stage.stage import numeric_keys
 STATIC, COULOMB = "friction.static", "friction.coulomb"
 
 COMMENT = "   # "
-"""What stands between a line and what is said of it."""
+"""Separator between a line and its comment."""
 
 SPREAD = ("static", "coulomb", "stribeck_velocity", "bristle_stiffness", "viscous")
 
 
 def outline(stage: Stage) -> str:
-    """The text of a specification with comments: the present crossover as the machine's limit, ranges from what is
-    uncertain in the stage file (else assumed ones), moves up to its travel, and spring steel in usual gauges. Raises
-    InputError for a stage that `friso design` cannot design for."""
+    """Return the text of a specification with comments.
+
+    The present crossover becomes the machine's limit. Ranges follow from uncertain keys of the stage file, or are
+    assumed. Moves go up to the travel, and sheets are spring steel in usual gauges. Raises InputError for a stage that
+    `friso design` cannot design for.
+    """
     settings = DesignSettings.current()
     check_designable(stage)
     flat = stage.flat()
@@ -79,14 +85,17 @@ def outline(stage: Stage) -> str:
 
 
 def _aligned(lines: Sequence[str]) -> str:
-    """Lines with their comments below each other."""
+    """Align the comments of lines below each other."""
     parts = [line.partition(COMMENT) for line in lines]
     widest = max(len(line) for line, _, comment in parts if comment)
     return "\n".join(f"{line:{widest}}{COMMENT}{comment}" if comment else line for line, _, comment in parts)
 
 
 def _line(stage: Stage, key: str, share: float) -> str:
-    """A range of a key: its own, or a share about its value; Coulomb friction at most up to the static friction."""
+    """Return the range of a key: its own, or a share around its value.
+
+    Coulomb friction does not exceed the static friction.
+    """
     flat, own = stage.flat(), stage.uncertain().get(key)
     name, unit = key.split(".")[1], numeric_keys(flat)[key].unit
     low, high = (own.low, own.high) if own else ((1 - share) * flat[key], (1 + share) * flat[key])
@@ -100,7 +109,7 @@ def _line(stage: Stage, key: str, share: float) -> str:
 
 
 def _move(stage: Stage) -> tuple[float, float]:
-    """Travel [m] and acceleration [m/s^2] of the stage file's motion, or 10 mm at 10 m/s^2."""
+    """Return travel [m] and acceleration [m/s^2] of the stage's motion, or 10 mm at 10 m/s^2."""
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"]:
         return 1e-2, 10.0

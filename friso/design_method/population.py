@@ -1,4 +1,4 @@
-"""The machines that a specification allows: its corners, and machines and moves drawn at random from it."""
+"""Build the machines that a specification allows: its corners, and machines drawn at random."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from friso.intervals import Interval
 
 @dataclass(frozen=True)
 class Population:
-    """Machines: flat keys to SI arrays (count,) that differ from those of the stage."""
+    """Machines as flat keys with SI arrays (count,), for the keys that differ from the stage."""
 
     keys: Mapping[str, np.ndarray]
     count: int
 
     def over(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """The flat keys of the stage with its numbers replaced by those of these machines; its controller is kept."""
+        """Return the stage's flat keys with the numbers of these machines; the controller stays."""
         return {**flat, **self.keys}
 
     def of(self, number: int) -> dict[str, float]:
-        """What differs in one of the machines."""
+        """Return the keys of one machine that differ from the stage."""
         return {key: float(values[number]) for key, values in self.keys.items()}
 
 
 def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
-    """The ends of all ranges of friction and masses, and the middle of those of static friction and gap.
+    """Return the corners of a specification: the ends of all ranges of friction and masses.
 
-    Static friction and gap are combined with each other and with masses that are all light or all heavy; the rest of
-    the friction goes together, viscous friction against it, since it is what damps. Raises InputError where friction
-    never falls.
+    For static friction and gap, the middles are included. Static friction and gap are combined with each other, and
+    with masses that are all light or all heavy. The rest of the friction goes together, except that viscous friction
+    goes against it because it damps. Raises InputError if friction never falls.
     """
     settings = DesignSettings.current()
     friction, masses = _friction(spec, flat), _masses(spec)
@@ -59,7 +59,10 @@ def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
 
 
 def _falls(population: Population, flat: Mapping[str, Any]) -> None:
-    """Raises InputError where sliding friction is nowhere below the static one although there are both."""
+    """Raise InputError if sliding friction is nowhere below static friction.
+
+    Nothing is checked for a law without both kinds of friction.
+    """
     static, coulomb = (population.keys.get(f"friction.{name}") for name in ("static", "coulomb"))
     if static is not None and coulomb is not None and np.all(coulomb >= static):
         text = f"static friction up to {static.max():g} N with Coulomb friction from {coulomb.min():g} N on"
@@ -68,8 +71,11 @@ def _falls(population: Population, flat: Mapping[str, Any]) -> None:
 
 
 def random_machines(spec: Spec, flat: Mapping[str, Any], count: int, softening: float) -> Population:
-    """Machines and moves drawn evenly from all ranges: friction, masses, stiffness (its tolerance either way, and down
-    by the share of it that the load may take, `softening`), travel and acceleration (evenly in the logarithm)."""
+    """Draw machines and moves evenly from all ranges.
+
+    Friction, masses, stiffness, travel and acceleration vary; travel and acceleration evenly in the logarithm.
+    Stiffness varies by its tolerance, and falls by up to the share `softening` that the load may take.
+    """
     settings = DesignSettings.current()
     ranges = _friction(spec, flat) | _masses(spec)
     names = [*ranges, "stiffness", "travel", "acceleration"]
@@ -84,13 +90,13 @@ def random_machines(spec: Spec, flat: Mapping[str, Any], count: int, softening: 
 
 
 def typical_move(spec: Spec) -> dict[str, Any]:
-    """The keys of a move in the middle of the ranges of travel and acceleration."""
+    """Return the keys of a move in the middle of the ranges of travel and acceleration."""
     keys = _moves(spec, np.array(0.5), np.array(0.5))
     return {"motion.kind": "there_and_back", **{key: float(value) for key, value in keys.items()}}
 
 
 def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str, np.ndarray]:
-    """There and back, at shares of the ranges."""
+    """Return moves there and back at shares of the ranges of travel and acceleration."""
     settings = DesignSettings.current()
     distance, rate = (
         interval.low * (interval.high / interval.low) ** share
@@ -106,7 +112,10 @@ def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str
 
 
 def _friction(spec: Spec, flat: Mapping[str, Any]) -> dict[str, Interval]:
-    """The ranges of friction by key. Raises InputError for one that the stage's friction law does not have."""
+    """Return the ranges of friction by key.
+
+    Raises InputError for a key that the friction law lacks.
+    """
     values = {name: getattr(spec.friction, name) for name in type(spec.friction).model_fields}
     ranges = {name: interval for name, interval in values.items() if interval is not None}
     for name in ranges:
@@ -126,8 +135,10 @@ def _masses(spec: Spec) -> dict[str, Interval]:
 def _population(
     ranges: Mapping[str, Interval], shares: Mapping[str, np.ndarray], flat: Mapping[str, Any], count: int
 ) -> Population:
-    """Machines at shares of the ranges; those whose sliding friction is no smaller than the static one are given almost
-    as much: they cannot hunt, but exist."""
+    """Return machines at shares of the ranges.
+
+    Sliding friction is held at or below the static friction. Machines where both are equal cannot hunt, but exist.
+    """
     values = {name: interval.at(shares[name]) for name, interval in ranges.items()}
     keys = {f"masses.{name}": values.pop(name) for name in ("cart", "stage") if name in values}
     if "friction.static" not in flat:

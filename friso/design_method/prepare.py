@@ -1,4 +1,4 @@
-"""The stage that a design starts from, and the stage with leaf springs."""
+"""Prepare the stage that a design starts from, and give it leaf springs."""
 
 from __future__ import annotations
 
@@ -20,9 +20,12 @@ LIMITS = ("force_limit", "anti_windup", "anti_windup_time")
 
 
 def prepared(stage: Stage, spec: Spec) -> Stage:
-    """The stage with a free joint of leaf springs, the largest that the specification allows, to be replaced; masses in
-    the middle of their ranges, which the controller is tuned for. Points of the stage stay where they are from the leaf
-    ends; a load is the specification's. Raises InputError for a stage that cannot be given an isolator."""
+    """Return the stage with a free joint of the largest leaf springs allowed.
+
+    The leaf springs are a start, to be replaced. Masses, for which the controller is tuned, lie in the middle of their
+    ranges. Points of the stage keep their distance from the leaf ends, and the load is the specification's. Raises
+    InputError for a stage that cannot have an isolator.
+    """
     check_designable(stage)
     stage = complete_joint(by_rules(stage), spec)
     section = spec.leaves
@@ -54,8 +57,11 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
 
 
 def by_rules(stage: Stage) -> Stage:
-    """The stage with a controller by van Dijk's rules, whose crossover follows from the design: its own, or else one of
-    the same bandwidth of the mass as a whole and the same force limit."""
+    """Return the stage with a controller by van Dijk's rules.
+
+    Its own is kept if it follows these rules. Otherwise the new one has the same bandwidth for the whole mass, and the
+    same force limit.
+    """
     if CROSSOVER in stage.flat():
         return stage
     written = stage.as_written()
@@ -64,7 +70,10 @@ def by_rules(stage: Stage) -> Stage:
 
 
 def complete_joint(stage: Stage, spec: Spec) -> Stage:
-    """The stage with masses of cart and stage, and a joint with damping and limiter: its own, or assumed ones."""
+    """Return the stage with masses of cart and stage and a whole joint.
+
+    What the stage file lacks, such as damping and limiter of the joint, is assumed.
+    """
     if stage.joint is not None:
         return stage
     material = spec.leaves.materials[0]
@@ -72,7 +81,7 @@ def complete_joint(stage: Stage, spec: Spec) -> Stage:
 
 
 def assumed(stage: Stage, spec: Spec) -> dict[str, float]:
-    """The masses and keys of the joint that are assumed for a stage without one, by key [SI]."""
+    """Return the masses and joint keys assumed for a stage without a joint, by key [SI]."""
     if stage.joint is not None:
         return {}
     before, after = stage.flat(), complete_joint(stage, spec).flat()
@@ -81,14 +90,17 @@ def assumed(stage: Stage, spec: Spec) -> dict[str, float]:
 
 
 def with_leaves(base: Stage, geometry: Geometry, stroke: float) -> Stage:
-    """A prepared stage with leaf springs of a geometry and a stroke [m]."""
+    """Return a prepared stage with leaf springs of a geometry and a stroke [m]."""
     name = f"{base.name}, with friction isolator" if base.name else "With friction isolator"
     moved = {key: f"{place * 1e3:.6g} mm" for key, place in moved_along(base.flat(), geometry.length).items()}
     return base.replace({"name": name, "joint.stroke": f"{stroke * 1e3:.6g} mm", **geometry.keys(), **moved})
 
 
 def check_designable(stage: Stage) -> None:
-    """Raises InputError for a stage that `friso design` cannot design a friction isolator for."""
+    """Check that `friso design` can design an isolator for a stage.
+
+    Raises InputError otherwise.
+    """
     if stage.axis_kind != LINEAR:
         expected = '"linear": leaf springs guide along a line (friso tune gives any axis a joint)'
         raise InputError("axis.kind", as_toml(stage.axis_kind.name), expected, '[axis] kind = "linear"')

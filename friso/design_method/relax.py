@@ -1,4 +1,7 @@
-"""When no leaf springs meet a specification: which requirement to relax, and by how much it has to be."""
+"""Find which single requirement to relax if no leaf springs meet all of them.
+
+The least change that is enough is computed for each requirement.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +20,11 @@ from friso.leaf_springs.mechanism import Mechanism
 
 @dataclass(frozen=True)
 class Relaxation:
-    """A `key` of the specification that, changed alone from `value` to `needed` [unit], lets the requirement be met: in
-    leaf springs, by those of a `geometry` (None for what is not about them)."""
+    """A `key` of the specification that must change from `value` to `needed` [unit].
+
+    Changed alone, it lets the requirement be met, by leaf springs of a `geometry`. The geometry is None for
+    requirements on other parts.
+    """
 
     requirement: str
     key: str
@@ -29,20 +35,22 @@ class Relaxation:
 
 
 def relaxed_requirements(task: LeafTask) -> tuple[Relaxation, ...]:
-    """For each requirement, by how much it has to be relaxed if all others stand; those that can be, the least change
-    first. Empty where no single one is enough."""
+    """Return for each requirement by how much it must be relaxed if all others stand.
+
+    The least change comes first. The result is empty if no single relaxation is enough.
+    """
     needs = [*requirements(task), *_space(task)]
     all_relaxations = [relaxation for k in range(len(needs)) for relaxation in _alone(task, needs, k)]
     return tuple(sorted(all_relaxations, key=_change))
 
 
 def _change(relaxation: Relaxation) -> float:
-    """How large a change is, as a factor's logarithm."""
+    """Return how large a change is, as the logarithm of a factor."""
     return float(abs(np.log(relaxation.needed / relaxation.value))) if relaxation.needed > 0 else np.inf
 
 
 def _space(task: LeafTask) -> list[Requirement]:
-    """The limits of space and sheets as requirements."""
+    """Return the limits of space and sheets as requirements."""
     low, high = box(task.spec)
     gauges = sorted(map(float, task.spec.leaves.thickness))
     limits = []
@@ -56,6 +64,8 @@ def _space(task: LeafTask) -> list[Requirement]:
 
 
 def _over(name: str, limit: float, low: bool) -> Callable[[Mechanism], Any]:
+    """Build the function that tells by which factor a mechanism exceeds a limit of size."""
+
     def excess(mechanism: Mechanism) -> Any:
         return limit / getattr(mechanism, name) if low else getattr(mechanism, name) / limit
 
@@ -64,24 +74,29 @@ def _over(name: str, limit: float, low: bool) -> Callable[[Mechanism], Any]:
 
 @dataclass(frozen=True)
 class _Trials:
-    """Geometries in more space than is allowed, as variables: logarithms of length, width, spacing and thickness, and
-    the number of the kind. The thickness is `free`, or that of the next available sheet."""
+    """Geometries in more space than allowed, as variables.
+
+    The variables are logarithms of length, width, spacing and thickness, and the number of the kind. The thickness is
+    `free`, or is rounded to the next available sheet.
+    """
 
     task: LeafTask
     free: bool
 
     @property
     def kinds(self) -> list[tuple[float, str]]:
-        """Numbers of leaves with materials."""
+        """Return the combinations of number of leaves and material."""
         section = self.task.spec.leaves
         return [(count, material) for count in section.leaves for material in section.materials]
 
     @property
     def gauges(self) -> np.ndarray:
+        """Return the available thicknesses [m], ascending."""
         return np.sort(np.array(self.task.spec.leaves.thickness, dtype=float))
 
     @property
     def bounds(self) -> list[tuple[float, float]]:
+        """Return the bounds of each variable, somewhat beyond the space allowed."""
         settings = DesignSettings.current()
         low, high = box(self.task.spec)
         ends = np.log([[*low, self.gauges[0]], [*high, self.gauges[-1]]]).T + np.log(
@@ -90,7 +105,7 @@ class _Trials:
         return [*map(tuple, ends), (0, len(self.kinds) - 1e-9)]
 
     def built(self, x: np.ndarray) -> tuple[np.ndarray, list[Sheet]]:
-        """Sizes (count, 3) and sheets of the variables, (5, count)."""
+        """Return sizes (count, 3) and sheets for variables of shape (5, count)."""
         sizes, gauges, kinds = np.exp(x[:4]).T, self.gauges, self.kinds
         nearest = gauges[np.abs(np.log(gauges) - x[3][:, None]).argmin(axis=1)]
         thickness = sizes[:, 3] if self.free else nearest
@@ -99,7 +114,7 @@ class _Trials:
 
 
 def _alone(task: LeafTask, needs: list[Requirement], k: int) -> Iterator[Relaxation]:
-    """The least relaxation of requirement `k` with which the others can be met."""
+    """Return the least relaxation of requirement `k` with which the others can be met."""
     settings = DesignSettings.current()
     of_sheets = np.array([requirement.keys[0].key == "leaves.thickness" for requirement in needs])
     trials = _Trials(task, free=bool(of_sheets[k]))

@@ -1,4 +1,7 @@
-"""What a specification requires of leaf springs, each as a ratio: of many geometries at once, by closed forms."""
+"""Define what a specification requires of leaf springs, each requirement as a ratio.
+
+Closed forms evaluate many geometries at once.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +20,11 @@ from friso.leaf_springs.mechanism import GRAVITY, Mechanism
 
 @dataclass(frozen=True)
 class LeafTask:
-    """What leaf springs are designed for: the specification, a stroke [m], the crossover [Hz] whose multiple the first
-    interfering frequency has to be, the least static friction [N], and the flat keys of the stage without its joint's
-    leaves."""
+    """The task that leaf springs are designed for.
+
+    It holds the specification, a stroke [m], the crossover [Hz], the least static friction [N], and the stage's flat
+    keys without leaves. A multiple of the crossover must lie below the first interfering frequency.
+    """
 
     spec: Spec
     stroke: float
@@ -29,8 +34,11 @@ class LeafTask:
 
     @property
     def load(self) -> float:
-        """Force along the leaves [N]: what the specification says and the weight of the heaviest stage, or the load of
-        the stage file if that is more."""
+        """Return the force along the leaves [N].
+
+        It is the specification's load plus the weight of the heaviest stage, or the stage file's load if that is
+        larger.
+        """
         masses = self.spec.masses.stage
         heaviest = masses.high if masses else float(self.flat["masses.stage"])
         return max(float(self.spec.load.force_x) + GRAVITY * heaviest, self.flat.get("flexure.load", 0.0))
@@ -38,8 +46,11 @@ class LeafTask:
 
 @dataclass(frozen=True)
 class RelaxableKey:
-    """What relaxes a requirement: the `key` of the specification, its `value` there and `unit`, and to what it has to
-    be changed for a geometry that breaks the requirement by a factor (None: no change of it is enough)."""
+    """A key of the specification that relaxes a requirement.
+
+    It holds the `key`, its `value` and `unit`, and a function from the factor by which a geometry breaks the
+    requirement to the value needed. That value is None if no change of the key is enough.
+    """
 
     key: str
     value: float
@@ -49,7 +60,10 @@ class RelaxableKey:
 
 @dataclass(frozen=True)
 class Requirement:
-    """A requirement in words, the keys that relax it, and by what factor geometries break it: 1 where they just do."""
+    """A requirement in words, with the keys that relax it.
+
+    Its `excess` is the factor by which geometries break it: 1 if they just meet it.
+    """
 
     name: str
     keys: tuple[RelaxableKey, ...]
@@ -57,17 +71,17 @@ class Requirement:
 
 
 def more(key: str, value: float, unit: str) -> RelaxableKey:
-    """To be relaxed by making it larger."""
+    """Return a key that relaxes a requirement when it becomes larger."""
     return RelaxableKey(key, value, unit, lambda excess: value * excess)
 
 
 def less(key: str, value: float, unit: str) -> RelaxableKey:
-    """To be relaxed by making it smaller."""
+    """Return a key that relaxes a requirement when it becomes smaller."""
     return RelaxableKey(key, value, unit, lambda excess: value / excess)
 
 
 def safety_factor(key: str, value: float) -> RelaxableKey:
-    """A factor of safety, which cannot be smaller than 1."""
+    """Return a factor of safety as a key that relaxes a requirement; it cannot be smaller than 1."""
     return RelaxableKey(key, value, "", lambda excess: value / excess if value >= excess else None)
 
 
@@ -75,7 +89,7 @@ BREAKAWAY, PARASITIC = "the cart must not break away inside the stroke", "first 
 
 
 def requirements(task: LeafTask) -> list[Requirement]:
-    """All requirements except those on space and sheets."""
+    """Return all requirements except those on space and sheets."""
     settings = DesignSettings.current()
     spec, safety, stroke = task.spec, task.spec.safety, task.stroke
     shorter = less("leaves.stroke", stroke, "m")
@@ -123,7 +137,7 @@ def requirements(task: LeafTask) -> list[Requirement]:
 
 
 def _lighter(task: LeafTask) -> tuple[RelaxableKey, ...]:
-    """A smaller load along the leaves, if that is all there is; the weight of the stage stays."""
+    """Return a smaller load along the leaves, if that alone is enough; the stage's weight stays."""
     load = task.spec.load
     force = float(load.force_x)
     if not force or load.force_y or load.moment_y:
@@ -137,7 +151,7 @@ def _lighter(task: LeafTask) -> tuple[RelaxableKey, ...]:
 
 
 def _support(spec: Spec, stroke: float) -> list[Requirement]:
-    """The stiffness wanted at full stroke."""
+    """Return the requirements on support stiffness at full stroke."""
     forms = {
         "support_x": ("along the leaves", closed_forms.support_x),
         "support_y": ("across them", closed_forms.support_y),
@@ -154,28 +168,40 @@ def _support(spec: Spec, stroke: float) -> list[Requirement]:
 
 
 def buckling_share(mechanism: Mechanism, task: LeafTask, buckling: Any) -> Any:
-    """How much of what makes the leaves give way is there: the largest force along a leaf, as if it pressed on all,
-    over the `buckling` load [N], and the force across them over that at which they give way sideways."""
+    """Return the load on the leaves as a share of what makes them give way.
+
+    It adds two shares: the largest force along a leaf, as if it pressed on all, over the `buckling` load [N]; and the
+    force across the leaves over that at which they give way sideways.
+    """
     across = float(task.spec.load.force_y) / closed_forms.lateral_load(mechanism)
     return leaf_load(mechanism, task) * mechanism.leaves / buckling + across
 
 
 def leaf_load(mechanism: Mechanism, task: LeafTask) -> Any:
-    """The largest force along a leaf [N]: its share of the load, and what a moment about the width adds."""
+    """Return the largest force along a leaf [N]: its share of the load, plus a moment's part.
+
+    The moment acts about the width of the leaves.
+    """
     outermost = mechanism.depth / 2 / mechanism.offset_squares
     return task.load / mechanism.leaves + float(task.spec.load.moment_y) * outermost
 
 
 def static_stress(mechanism: Mechanism, task: LeafTask) -> Any:
-    """Largest stress at the clamps [Pa] at full stroke under all loads at once, with the concentration there."""
+    """Return the largest stress at the clamps [Pa] at full stroke under all loads at once.
+
+    The concentration of stress at the clamps is included.
+    """
     return mechanism.stress_concentration * closed_forms.max_stress(mechanism, task.stroke) + load_stress(
         mechanism, task
     )
 
 
 def load_stress(mechanism: Mechanism, task: LeafTask) -> Any:
-    """The part of that stress which the loads make [Pa]: a force across the leaf ends bends them in their plane as
-    cantilevers, since nothing else holds the stage about z; a moment about x as leaves whose ends stay parallel."""
+    """Return the stress at the clamps that the loads make [Pa].
+
+    A force across the leaf ends bends leaves in their plane as cantilevers, since nothing else holds the stage about z.
+    A moment about x bends them as leaves whose ends stay parallel.
+    """
     load, middle = task.spec.load, mechanism.width / 2 / mechanism.edgewise
     about_x = float(load.moment_x) * mechanism.depth / 2 / mechanism.offset_squares * mechanism.length / 2
     edgewise = (float(load.force_y) * mechanism.length + float(load.moment_z)) / mechanism.leaves + about_x

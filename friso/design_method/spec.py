@@ -38,22 +38,23 @@ class OneOrMany:
 
     @property
     def expected(self) -> str:
-        """What the key takes, in words."""
+        """Return what the key takes, in words."""
         return f"a list, each {self.of.expected}" if self.of else f"a list of some of {', '.join(materials())}"
 
     @property
     def written_example(self) -> str:
-        """The example as it stands in a file."""
+        """Return the example as it stands in a file."""
         return self.example
 
     def read(self, entry: Any) -> tuple[Any, ...]:
-        """The items. Raises SpecError."""
+        """Read one item or a list. Raises SpecError."""
         items = entry if isinstance(entry, list | tuple) else [entry]
         if not items:
             raise SpecError("", "an empty list", self.expected, self.example)
         return tuple(self._item(item) for item in items)
 
     def _item(self, value: Any) -> Any:
+        """Read one item, or a material by name. Raises SpecError."""
         if self.of:
             try:
                 return self.of.read(value)
@@ -76,7 +77,7 @@ class Gauges(OneOrMany):
     """A list of thicknesses, or a range that stands for the usual gauges in it."""
 
     def read(self, entry: Any) -> tuple[Any, ...]:
-        """The thicknesses. Raises SpecError."""
+        """Read the thicknesses. Raises SpecError."""
         if not (isinstance(entry, str) and ".." in entry):
             return super().read(entry)
         assert isinstance(self.of, Quantity)
@@ -113,7 +114,7 @@ class SpecMachine(Section):
     @model_validator(mode="before")
     @classmethod
     def _by_its_former_name(cls, table: Any) -> Any:
-        """Earlier specifications call the crossover limit `bandwidth_limit`."""
+        """Accept `bandwidth_limit`, the name of the crossover limit in earlier specifications."""
         if isinstance(table, dict) and FORMER_LIMIT in table and "crossover_limit" not in table:
             others = {key: value for key, value in table.items() if key != FORMER_LIMIT}
             return {**others, "crossover_limit": table[FORMER_LIMIT]}
@@ -121,6 +122,7 @@ class SpecMachine(Section):
 
     @model_validator(mode="after")
     def _has_one(self) -> Self:
+        """Check that either crossover limit or parasitic frequencies are given. Raises SpecError."""
         if (self.crossover_limit is None) == (self.parasitic_frequencies is None):
             text = "both" if self.crossover_limit else "neither"
             example = 'crossover_limit = "48 Hz" or parasitic_frequencies = ["480 Hz"]'
@@ -145,6 +147,7 @@ class SpecFriction(Section):
 
     @model_validator(mode="after")
     def _is_not_contradictory(self) -> Self:
+        """Check that Coulomb friction, static friction and gap agree. Raises SpecError."""
         if self.coulomb and self.gap:
             raise SpecError("", "coulomb together with gap", "one of the two", 'gap = "0.3 .. 0.85"')
         if self.static and self.coulomb and self.coulomb.high > self.static.high:
@@ -202,12 +205,13 @@ class SpecLeaves(Section):
     stroke: Annotated[Interval, Span(_LENGTH, "0.3 mm .. 1 mm")]
 
     def space(self, name: str) -> tuple[float, float]:
-        """The least and the largest length, width or spacing [m]; a fixed one is a range from itself to itself."""
+        """Return the least and the largest length, width or spacing [m]; a fixed one is both."""
         allowed: Interval = getattr(self, name)
         return (allowed.high / 10 if allowed.single else allowed.low), allowed.high
 
     @model_validator(mode="after")
     def _can_be_built(self) -> Self:
+        """Check that stroke, sizes and thicknesses fit each other. Raises SpecError."""
         thickest = max(self.thickness)
         if 2 * self.stroke.low > self.length.high:
             text = f"stroke = {quoted(self.stroke.text)}, length = {quoted(self.length.text)}"
@@ -270,7 +274,7 @@ class Spec(Section):
 
     @property
     def limit(self) -> float:
-        """The highest crossover [Hz] that the machine allows."""
+        """Return the highest crossover [Hz] that the machine allows."""
         if self.machine.crossover_limit is not None:
             return float(self.machine.crossover_limit)
         frequencies: Sequence[float] = self.machine.parasitic_frequencies or ()
@@ -282,7 +286,7 @@ EXPECTED = "a specification; examples/specs/thesis.toml is one"
 
 
 def read_spec(text: str) -> Spec:
-    """The specification of a TOML text. Raises SpecError."""
+    """Read a specification from a TOML text. Raises SpecError."""
     try:
         return Spec(**parsed(text, EXPECTED, EXAMPLE))
     except InputError as error:
@@ -290,7 +294,7 @@ def read_spec(text: str) -> Spec:
 
 
 def load_spec(path: str | os.PathLike[str]) -> Spec:
-    """The specification in a TOML file. Raises SpecError."""
+    """Read a specification from a TOML file. Raises SpecError."""
     try:
         tables = parsed(text_of(Path(path), EXPECTED, EXAMPLE), EXPECTED, EXAMPLE)
         if "machine" not in tables and {"controller", "motion"} <= tables.keys():

@@ -1,4 +1,7 @@
-"""The design tried: moves of machines drawn from the specification, its joint free, and locked for comparison."""
+"""Try the design in simulated moves of machines drawn from the specification.
+
+The joint is free, and locked for comparison.
+"""
 
 from __future__ import annotations
 
@@ -33,11 +36,13 @@ THERE_AND_BACK = {
 
 @dataclass(frozen=True)
 class MachineOutcomes:
-    """What became of the machines, arrays of shape (count,): what the run did at its end (`words`, of
-    `friso.hunting.criteria.run_outcome`, the band being the position window; a run rests that has been in it for the
-    last quarter; of those that do not, the words are of a run ten times as long), the time [s] after the last corner of
-    the reference from which on it stays in the window (NaN: it does not rest), and its swing, peak to peak, in the last
-    quarter [m]."""
+    """Outcomes of machines after their moves, as arrays of shape (count,).
+
+    `words` say what the run does at its end (`friso.hunting.criteria.run_outcome`), with the position window as band. A
+    machine rests if it stays in the window for the last quarter of the run. For other machines, the words are those of
+    a run ten times as long. `settling` [s] is the time after the reference's last corner from which the stage stays in
+    the window; NaN if it does not rest. `swing` [m] is the peak-to-peak motion in the last quarter.
+    """
 
     words: np.ndarray
     settling: np.ndarray
@@ -45,56 +50,64 @@ class MachineOutcomes:
 
     @property
     def completed(self) -> np.ndarray:
-        """Which runs were completed, shape (count,)."""
+        """Tell which runs were completed, shape (count,)."""
         return self.words != FAILED
 
     @property
     def restless(self) -> np.ndarray:
-        """Which machines swing or creep at the end, shape (count,)."""
+        """Tell which machines swing or creep at the end, shape (count,)."""
         return np.isin(self.words, (SWINGS, CREEPS))
 
     @property
     def tried(self) -> int:
-        """Moves that were simulated to their end."""
+        """Return the number of moves simulated to their end."""
         return int(self.completed.sum())
 
     @property
     def missed(self) -> int:
-        """Moves after which the stage does not come to rest in the window."""
+        """Return the number of moves after which the stage does not come to rest in the window."""
         return int(self.restless.sum())
 
     @property
     def swinging(self) -> int:
-        """Those of them after which it swings."""
+        """Return the number of moves after which the stage keeps swinging."""
         return int(np.count_nonzero(self.words == SWINGS))
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The range that holds the probability of not coming to rest with 95 % (Clopper and Pearson)."""
+        """Return the 95 % interval of the probability of not coming to rest (Clopper and Pearson)."""
         return share_interval(self.missed, self.tried)
 
     def slower_than(self, share: float) -> float:
-        """The settling time [s] that is exceeded by a share of the moves; infinite where more of them do not settle."""
+        """Return the settling time [s] that a share of the moves exceeds.
+
+        It is infinite if more moves than that do not settle.
+        """
         times = np.where(np.isnan(self.settling), np.inf, self.settling)[self.completed]
         return float(np.quantile(times, 1 - share, method="higher")) if times.size else np.inf
 
     def followed(self, number: int) -> float:
-        """For how long [s] a machine was followed after its move."""
+        """Return for how long [s] a machine was followed after its move."""
         settings = DesignSettings.current()
         soon = self.settling[number] <= (1 - settings.last_share) * settings.followed_time
         return settings.followed_time if soon else settings.longer_factor * settings.followed_time
 
     @property
     def worst(self) -> int:
-        """The number of the move that does not come to rest and has the largest swing, or else rests last."""
+        """Return the number of the worst move.
+
+        It is the restless move with the largest swing, or else the move that settles last.
+        """
         rank = np.where(self.restless, self.swing + 1e9, np.nan_to_num(self.settling, nan=-1.0))
         return int(np.where(self.completed, rank, -np.inf).argmax())
 
 
 @dataclass(frozen=True)
 class Verification:
-    """The machines and moves drawn, what became of them with the joint `free` and `locked`, and the `worst` of the free
-    ones as a stage."""
+    """The machines and moves drawn, with their outcomes for the joint `free` and `locked`.
+
+    `worst` is the worst machine with a free joint, as a stage.
+    """
 
     population: Population
     free: MachineOutcomes
@@ -103,8 +116,10 @@ class Verification:
 
 
 def verification(stage: Stage, spec: Spec, softening: float, progress: Progress) -> Verification:
-    """Try the design in all that the specification allows; its load takes a share of the drive stiffness, `softening`,
-    or none of it."""
+    """Try the design in machines and moves drawn from the specification.
+
+    The load takes up to the share `softening` of the drive stiffness.
+    """
     settings = DesignSettings.current()
     flat = stage.flat()
     machines = random_machines(spec, flat, settings.verified_moves, softening)
@@ -125,8 +140,11 @@ def move_machines(
     label: str = "moves",
     patient: bool = True,
 ) -> MachineOutcomes:
-    """The moves of stages given as flat keys, arrays of shape (count,); if `patient`, those that are not in position
-    again, for longer."""
+    """Simulate the moves of stages given as flat keys, arrays of shape (count,).
+
+    If `patient`, machines that are not in position are simulated again for longer. `window` is the position window
+    [m].
+    """
     settings = DesignSettings.current()
     first = _followed_moves(flat, count, window, settings.followed_time, progress, label)
     again = np.flatnonzero(first.restless & patient)
@@ -149,7 +167,7 @@ def move_machines(
 def _followed_moves(
     flat: dict[str, Any], count: int, window: float, time: float, progress: Progress, label: str
 ) -> MachineOutcomes:
-    """The moves, each followed for a time [s] after its last corner."""
+    """Simulate moves, each followed for a time [s] after its last corner."""
     settings = DesignSettings.current()
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
     keys = {**flat, "motion.duration": corner + time}
@@ -176,8 +194,10 @@ def _followed_moves(
 
 
 def _worst_stage(stage: Stage, keys: dict[str, float], time: float) -> Stage:
-    """One of the machines with its move as a stage, followed for a time [s] after the move. Its joint is given by its
-    numbers: of which size of the leaves its stiffness is off is not told apart."""
+    """Return one of the machines with its move as a stage, for a time [s] after the move.
+
+    Its joint has plain numbers, since the deviation of its stiffness belongs to no single size of the leaves.
+    """
     flat = stage.flat()
     follow = ("joint.stiffness", "parasitic.frequency", "parasitic.mass", "parasitic.damping_ratio")
     joint = {key: float(flat[key]) for key in (*follow, TUNED_MASS)}

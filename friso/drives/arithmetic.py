@@ -1,4 +1,4 @@
-"""Numbers as scripts for drives have them: written out, or as arithmetic of numbers."""
+"""Read numbers as drive scripts write them: as digits, or as arithmetic of numbers."""
 
 from __future__ import annotations
 
@@ -19,11 +19,14 @@ _PAIRS = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv}
 _SIGNS = {ast.USub: neg, ast.UAdd: pos}
 
 _OTHER = re.compile(r"\d(?!e[+-]?\d)[a-z_]|\\", re.IGNORECASE)
-"""What stands in no arithmetic, and would make Python's parser warn: letters right behind a digit, as in 0x10."""
+"""Texts that are no arithmetic and would make Python's parser warn, such as letters behind a digit in 0x10."""
 
 
 def number_in(text: str) -> float | None:
-    """The number that a text is, or that its arithmetic makes (+, -, *, /, brackets, pi, inf); None for any other."""
+    """Return the number that a text stands for, or None if it is no number.
+
+    Arithmetic with +, -, *, /, brackets, pi and inf is worked out. Python code is never executed.
+    """
     if len(text) > LONGEST or _OTHER.search(text):
         return None
     try:
@@ -33,7 +36,10 @@ def number_in(text: str) -> float | None:
 
 
 def _worked_out(node: ast.expr) -> float:
-    """The number that an expression makes. Raises ValueError for what is no arithmetic of numbers."""
+    """Return the value of an arithmetic expression.
+
+    Raises ValueError for anything but arithmetic of numbers.
+    """
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             return float(value)

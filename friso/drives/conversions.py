@@ -1,7 +1,7 @@
-"""The gains of a stage in the units that drives use.
+"""Convert the gains of a stage to the units that drives use.
 
-A turn of the motor moves the load by a travel L [m], or L [rad] on a rotary axis: a force F is a torque F L/(2 pi), a
-velocity v is v/L turns per second, and a torque is a current times the motor's constant.
+One turn of the motor moves the load by a travel L, in m, or in rad on a rotary axis. A force F then equals a torque F
+L/(2 pi). A velocity v equals v/L turns per second. A torque equals a current times the motor's constant.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from friso.quantities import Quantity, positive
 from friso.stage.controllers import controller_of
 
 TRAVEL, MOTOR_CONSTANT = "travel_per_turn", "motor_constant"
-"""What the user may say: what a turn moves, and the torque of an ampere [N m/A], or the force [N/A] without a turn."""
+"""Answers of the user: travel of a turn, and torque of an ampere [N m/A], or force [N/A] without a turn."""
 
 TRAVELS = {LINEAR: Quantity("m", positive, "10 mm"), KINDS["rotary"]: Quantity("rad", positive, "360 deg")}
 TORQUE_PER_AMPERE, FORCE_PER_AMPERE = Quantity("N*m/A", positive, "0.5 N*m/A"), Quantity("N/A", positive, "30 N/A")
@@ -30,7 +30,10 @@ Other = tuple[float, str]
 
 @dataclass(frozen=True)
 class Conversion:
-    """A gain: what it is, its symbol, and its values in units, the first of which is SI."""
+    """One gain of a controller: its name, its symbol, and its value in several units.
+
+    The first of the values is in SI. Each value stands beside its unit.
+    """
 
     name: str
     symbol: str
@@ -38,12 +41,15 @@ class Conversion:
 
     @property
     def finite(self) -> bool:
-        """Whether all its values are finite numbers."""
+        """Tell whether all values of the gain are finite numbers."""
         return all(isfinite(value) for value, _ in self.values)
 
 
 def travel_of(flat: Mapping[str, Any]) -> float | None:
-    """What one turn of the motor moves [m or rad], as the transmission tells; None without one."""
+    """Return how far one turn of the motor moves the load [m or rad].
+
+    The transmission's ratio or lead gives it. Returns None for a stage without a transmission.
+    """
     if "transmission.ratio" in flat:
         return 2 * pi / flat["transmission.ratio"]
     return flat.get("transmission.lead")
@@ -51,15 +57,22 @@ def travel_of(flat: Mapping[str, Any]) -> float | None:
 
 @dataclass(frozen=True)
 class Turn:
-    """What a turn moves [m or rad] and what an ampere exerts at the load [N or N m]; None where unknown."""
+    """Travel of a turn and force of an ampere, by which units of motor and load are converted.
+
+    `travel` is how far one turn moves the load [m or rad]. `per_ampere` is the force or torque at the load per ampere
+    [N/A or N m/A]. Either is None where it is unknown.
+    """
 
     travel: float | None
     per_ampere: float | None
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], answers: UserAnswers, per_ampere: float | None = None) -> Turn:
-        """As the transmission, the actuator (`per_ampere`) or the user says. Raises InputError for an answer in another
-        unit, or other than that of the stage."""
+        """Collect travel and force per ampere from the stage file and the user's answers.
+
+        The transmission gives the travel, the actuator gives `per_ampere` [N/A or N m/A]; the user may add what is
+        missing. Raises InputError for an answer in a wrong unit, or one that contradicts the stage.
+        """
         kind, travel = axis_of(flat), travel_of(flat)
         if TRAVEL in answers:
             answer = answers.value(TRAVEL, TRAVELS[kind])
@@ -88,7 +101,11 @@ Convert = Callable[[float, Turn, AxisKind], list[Other]]
 def conversions(
     flat: Mapping[str, Any], answers: UserAnswers, per_ampere: float | None = None
 ) -> tuple[Conversion, ...]:
-    """The gains of a stage given as flat keys, by what is known of motor and screw. Raises InputError."""
+    """Return every gain of a stage in SI and in the units that drives use.
+
+    `flat` holds the stage by flat keys. Units that need an unknown travel or motor constant are left out. Raises
+    InputError for gains too large or too small to convert, and for answers that contradict the stage.
+    """
     turn = Turn.of(flat, answers, per_ampere)
     try:
         return tuple(row for row in _rows(flat, turn) if row.finite)
@@ -98,7 +115,7 @@ def conversions(
 
 
 def _rows(flat: Mapping[str, Any], turn: Turn) -> Iterator[Conversion]:
-    """The gains that a controller declares, each by its unit."""
+    """Yield each gain that the controller declares, in SI and in other units."""
     kind = axis_of(flat)
     for gain in controller_of(flat).gains(flat):
         convert = BY_UNIT.get(gain.unit)
@@ -107,37 +124,49 @@ def _rows(flat: Mapping[str, Any], turn: Turn) -> Iterator[Conversion]:
 
 
 def _rate(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+    """Convert a rate [1/s] to metres per minute for each millimetre of error."""
     return [(value * 0.06, "(m/min)/mm")]
 
 
 def _time(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+    """Convert a time [s] to milliseconds and to its corner frequency [Hz]."""
     return [(value * 1e3, "ms"), (1 / (2 * pi * value), "Hz (corner)")]
 
 
 def _frequency(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+    """Convert a frequency [Hz] to radians per second."""
     return [(value * 2 * pi, "rad/s")]
 
 
 def _length(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+    """Convert a length [m] to turns of the motor, where the travel is known."""
     return [(value / turn.travel, "turn")] if turn.travel else []
 
 
 def _mass(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+    """Convert an inertia [kg or kg m^2] to current per acceleration, and to the motor's side.
+
+    Units that need an unknown travel or motor constant are left out.
+    """
     current = [(value / turn.per_ampere, f"A*s^2/{kind.length}")] if turn.per_ampere else []
     at_motor = [(value * (turn.travel / (2 * pi)) ** 2, "kg*m^2 at the motor")] if turn.travel else []
     return [*current, *at_motor]
 
 
 def _force(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+    """Convert a force [N or N m] to current and motor torque, where the turn is known."""
     at_motor = [(value * turn.travel / (2 * pi), "N*m at the motor")] if turn.travel else []
     return [*at_motor, *([(value / turn.per_ampere, "A")] if turn.per_ampere else [])]
 
 
 def _per(unit: str, *per: tuple[str, float]) -> Convert:
-    """A force for a motion, also per angle of the motor, as a torque and as a current: with the angle as it is written
-    behind the force, and how many of the first there are in it."""
+    """Build a converter for gains that are a force per motion, such as N/m or N s/m.
+
+    The converter also gives the gain per turn of the motor, as torque and as current.
+    """
 
     def others(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+        """Return the gain per ampere and per turn of the motor, as far as these are known."""
         values = []
         if turn.per_ampere:
             shown = kind.unit(unit).replace("N*m", "A", 1) if kind != LINEAR else unit.replace("N", "A", 1)
@@ -165,4 +194,4 @@ BY_UNIT: Mapping[str, Convert] = {
     "1/s": _rate,
     "Hz": _frequency,
 }
-"""What values in SI are in other units, by their unit on a linear axis."""
+"""Converters of values in SI to other units, by their unit on a linear axis."""

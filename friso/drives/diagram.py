@@ -1,4 +1,4 @@
-"""The loop of a controller, drawn in characters, so that nobody has to guess which structure its gains are of."""
+"""Draw the loop of a controller in characters, to show which structure its gains belong to."""
 
 from __future__ import annotations
 
@@ -17,9 +17,16 @@ ASIDE = 6
 
 
 class Canvas:
-    """A drawing from the error to the force, to which boxes and sums are added from left to right."""
+    """A drawing of the loop from the error to the force.
+
+    Boxes and sums are added from left to right. Feedback and feedforward enter on lines above and below.
+    """
 
     def __init__(self, flat: Mapping[str, Any]) -> None:
+        """Start the drawing with the reference, the first sum and the fed-back position.
+
+        `flat` is the stage by flat keys; it tells which filters and limits to draw.
+        """
         self.paths = {flat[f"{place}.path"] for place in row_keys(flat, FILTERS_KEY)}
         self.limited = FORCE_LIMIT in flat
         self.lines = [""] * 5
@@ -29,17 +36,19 @@ class Canvas:
 
     @property
     def filtered(self) -> bool:
-        """Whether what is fed back is filtered."""
+        """Tell whether a filter acts on the fed-back position."""
         return FEEDBACK in self.paths
 
     def box(self, text: str) -> None:
-        """What the signal goes through next."""
+        """Add a box with a text that the signal passes through next."""
         line = self.lines[MAIN]
         self.lines[MAIN] = f"{line}{'' if line.endswith('-') else '--'}[ {text} ]"
 
     def sum(self, above: str = "", below: str = "", minus: bool = True, deep: bool = False) -> None:
-        """A sum with what comes from above, and what from below, subtracted or (`minus` False) added; `deep`, one line
-        further down."""
+        """Add a sum of the signal and of what enters from above or below.
+
+        What enters from below is subtracted, or added if `minus` is False. It is drawn one line lower if `deep`.
+        """
         self.lines[MAIN] += "--(+)"
         place = len(self.lines[MAIN]) - 2
         if above:
@@ -51,7 +60,7 @@ class Canvas:
             self._put(LOWEST if deep else LAST, place if minus else place - ASIDE, below)
 
     def text(self) -> str:
-        """The drawing, the force behind filters and limit."""
+        """Finish the drawing with output filters and force limit, and return its lines as text."""
         boxes = [*(["filters"] if FORWARD in self.paths else []), *(["limit"] if self.limited else [])]
         for name in boxes:
             self.box(name)
@@ -59,12 +68,12 @@ class Canvas:
         return "\n".join(line.rstrip() for line in self.lines if line.strip())
 
     def _put(self, line: int, place: int, text: str) -> None:
-        """Write at a place of a line, behind what stands there."""
+        """Write a text at a column of a line, padding the line with spaces up to there."""
         self.lines[line] = f"{self.lines[line]:<{place}}{text}"
 
 
 def loop_diagram(flat: Mapping[str, Any]) -> str:
-    """The loop of a stage given as flat keys, with the terms that it has, as its controller draws it."""
+    """Draw the loop of a stage with the terms that its controller has."""
     canvas = Canvas(flat)
     controller_of(flat).draw(canvas, flat)
     return canvas.text()

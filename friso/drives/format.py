@@ -1,4 +1,7 @@
-"""What a kind of parameter file declares: how it is recognised and read, what it leaves open, and the way back."""
+"""Declare kinds of parameter files.
+
+A kind says how to recognise, read and write its files, and what they leave open.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +26,11 @@ folder or below it."""
 
 @dataclass(frozen=True)
 class AxisParameters:
-    """The parameters of one axis in a file: its `name` there, texts or numbers by name, those of the whole machine
-    that matter, and the `letter` that the machine's users call it by."""
+    """The parameters of one axis, as a parameter file holds them.
+
+    `name` is the axis's name in the file, and `letter` is what users of the machine call it. `values` holds texts or
+    numbers by name. `machine` holds the settings of the whole machine that matter for the axis.
+    """
 
     name: str
     values: Mapping[str, Any]
@@ -35,8 +41,11 @@ class AxisParameters:
         object.__setattr__(self, "name", one_line(self.name))
 
     def number(self, name: str, default: float | None = None, symbols: Mapping[str, float] | None = None) -> float:
-        """A finite number, or what one of the `symbols` stands for. Raises InputError where it is something else, or
-        absent without a `default`."""
+        """Return a parameter as a finite number.
+
+        A text may be one of the `symbols`, which stand for numbers. Raises InputError if the parameter is no number, or
+        if it is absent and has no `default`.
+        """
         entry = self.values.get(name, self.machine.get(name, default))
         if entry is None:
             raise InputError(name, "nothing", "a number", f"{name} = 1.0")
@@ -57,14 +66,17 @@ class AxisParameters:
         return value
 
     def flag(self, name: str, default: bool = False) -> bool:
-        """Whether a switch is on. Raises InputError where it is neither true nor false, 0 nor 1."""
+        """Tell whether a switch is on.
+
+        Raises InputError if its value is neither true nor false, 0 nor 1.
+        """
         entry = self.values.get(name, default)
         if not isinstance(entry, bool) and entry not in (0, 1):
             raise InputError(name, quoted(str(entry)), "true or false", f"{name} = true")
         return bool(entry)
 
     def is_set(self, name: str) -> bool:
-        """Whether there is such a parameter, and it is neither 0 nor infinite."""
+        """Tell whether a parameter exists and is neither 0 nor infinite."""
         entry = self.values.get(name)
         return entry is not None and str(entry).strip().lower() not in ENDLESS and self.number(name) != 0
 
@@ -82,7 +94,10 @@ ENDLESS = ("", "inf", "+inf", "infinity")
 
 @dataclass(frozen=True)
 class AsStage:
-    """Tables of a stage file that follow from an axis's parameters, and what they cannot say of it, in sentences."""
+    """The stage that an axis's parameters describe, as tables of a stage file.
+
+    `left_out` says in sentences which settings of the drive a stage cannot describe.
+    """
 
     tables: Mapping[str, Mapping[str, Any]]
     left_out: tuple[str, ...] = ()
@@ -98,13 +113,19 @@ class Parameters:
 
 @dataclass(frozen=True)
 class ParameterFormat:
-    """A kind of parameter file.
+    """One kind of parameter file, with the functions that read and write it.
 
-    Its `title`; the `firmware` whose formulas are used; the `source` of these; whether a file is of this kind by its
-    name and text; its axes (raises InputError); what it leaves open of an axis (raises InputError for an axis that
-    friso cannot describe); the stage of an axis with the answers to that (raises InputError for numbers that it cannot
-    be made of, which are refused before anything is asked); what the parameters of a stage need to know, these
-    parameters, how a file holds them; and its text with other files of its folder taken in (by `Beside`).
+    `title` names the kind. `firmware` and `source` say whose formulas are used, and where they are published.
+    `recognises` tells from name and text whether a file is of this kind. `axes` reads the axes of a text and raises
+    InputError for a text that it cannot read.
+
+    `questions` lists what an axis leaves open; it raises InputError for an axis that friso cannot describe. `stage`
+    turns the axis and the answers into a stage. It raises InputError for unusable numbers, before the user is asked
+    anything.
+
+    `questions_back`, `parameters` and `text` lead from a stage back to the drive. They list what is still unknown,
+    compute the parameters, and write them as a file. `whole` takes in other files of the same folder through
+    `Beside`.
     """
 
     title: str
@@ -128,10 +149,10 @@ FORMATS: Registry[ParameterFormat] = Registry("friso.drives.formats", "FORMAT")
 
 
 def si(value: float, unit: str) -> str:
-    """A number in SI as it stands in a stage file."""
+    """Write a number in SI as it stands in a stage file, with its unit."""
     return f"{value:.15g} {unit}"
 
 
 def lacks(what: str, expected: str, example: str = "") -> InputError:
-    """The refusal of a controller whose numbers a format cannot hold."""
+    """Build the refusal of a controller that a parameter format cannot hold."""
     return InputError("controller", what, expected, example)

@@ -1,4 +1,4 @@
-"""The gains of a stage for whoever types them into a drive."""
+"""Give the gains of a stage as they are typed into a drive."""
 
 from __future__ import annotations
 
@@ -18,8 +18,11 @@ from friso.stage.controllers import CONTROLLER
 
 @dataclass(frozen=True)
 class Gains:
-    """The gains of a stage: its loop drawn, its gains in the units of drives, and, for a kind of drive (None: for
-    none), its parameters by name, and the keys of the stage that these have no place for."""
+    """The gains of a stage, with its loop drawn and its gains in the units of drives.
+
+    For a `kind` of drive, `parameters` holds its parameters by name. `not_held` lists the keys of the stage that these
+    parameters cannot hold.
+    """
 
     stage: Stage
     diagram: str
@@ -30,13 +33,16 @@ class Gains:
 
     @property
     def text(self) -> str:
-        """The parameters as a file holds them."""
+        """Return the parameters as a file for the drive holds them; empty without a kind of drive."""
         return self.kind.text(self.parameters) if self.kind and self.parameters else ""
 
 
 def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None) -> Gains:
-    """The gains of a stage, also as the parameters of the kind of drive `to`. Raises InputError for a controller that
-    the drive does not have, and for all that is still to be said, together."""
+    """Return the gains of a stage, and the parameters of the drive `to` if one is named.
+
+    Raises InputError for a controller that the drive does not have. Values that are still missing are refused
+    together.
+    """
     flat = stage.flat()
     answers = UserAnswers({**_told(stage, flat), **user_values})
     kind = None if to is None else FORMATS[FORMATS.checked(to, "--to", "--to {}")]
@@ -55,7 +61,10 @@ def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None
 
 
 def _told(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """What the stage file keeps of what friso init --from was told; the centre of what is uncertain."""
+    """Return the answers that `friso init --from` kept in the stage file.
+
+    An uncertain answer counts by the centre of its range.
+    """
     fields = stage.numeric_keys()
     kept = {name: flat[key] for name in TOLD if (key := f"drive.{name}") in flat}
     return {
@@ -65,7 +74,10 @@ def _told(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _not_held(flat: Mapping[str, Any], held: frozenset[str]) -> tuple[str, ...]:
-    """Keys of [controller] that parameters have no place for: a filter once, and nothing that is 0 or a mere choice."""
+    """Return the keys of [controller] that the parameters cannot hold.
+
+    A filter counts once. Values of 0 and mere choices are left out.
+    """
     before = f"{CONTROLLER}."
     names = [key.removeprefix(before) for key, value in flat.items() if key.startswith(before) and value]
     numbers = [name for name in names if name not in held and not isinstance(flat[before + name], str)]

@@ -1,4 +1,4 @@
-"""What a parameter file does not tell, asked for all at once, and the answers."""
+"""Ask at once for everything that a parameter file does not tell, and read the answers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from friso.stage.tables import FRICTION, Masses, ThereAndBack, friction_law
 
 @dataclass(frozen=True)
 class OpenQuestion:
-    """What is asked for: its key, what it is, and an example of an answer as --set takes it."""
+    """A value that the user must give: its key, its meaning, and an example for --set."""
 
     key: str
     meaning: str
@@ -23,28 +23,36 @@ class OpenQuestion:
 
     @property
     def option(self) -> str:
-        """The option that answers it."""
+        """Return the command-line option that answers the question."""
         return f"--set {self.key}={self.example}"
 
 
 class UserAnswers:
-    """What the user says besides a file: texts by key, as --set reads them."""
+    """The values that the user gives beside a file: texts by key, as --set reads them.
+
+    The object remembers which keys were asked for, so that misspelled ones can be refused.
+    """
 
     def __init__(self, texts: Mapping[str, Any]) -> None:
+        """Keep the texts that the user gave. No key has been asked for yet."""
         self.texts = dict(texts)
         self.wanted: set[str] = set()
 
     def with_examples(self, questions: Iterable[OpenQuestion]) -> UserAnswers:
-        """These answers, and to the questions that are open the examples."""
+        """Return a copy in which the example answers each question that is still open."""
         return UserAnswers({**{question.key: question.example.strip('"') for question in questions}, **self.texts})
 
     def __contains__(self, key: object) -> bool:
+        """Tell whether the user answered a key, and remember that it was asked for."""
         self.wanted.add(str(key))
         return key in self.texts
 
     def refuse_unwanted(self) -> None:
-        """Raises InputError for an answer to what nothing asked, such as a misspelled one; keys of tables are checked
-        with the stage."""
+        """Refuse answers that nothing asked for, such as a misspelled key.
+
+        Raises InputError for the first of them. Keys of tables, which contain a dot, are left to the check of the
+        stage.
+        """
         for key in self.texts:
             if "." not in key and key not in self.wanted:
                 wanted = sorted(name for name in self.wanted if "." not in name)
@@ -53,20 +61,26 @@ class UserAnswers:
                 raise InputError("--set", quoted(key), expected, f"--set {near}=...")
 
     def value(self, key: str, field: Quantity | Number) -> float:
-        """A number in SI. Raises InputError for another answer."""
+        """Return an answer as a number in SI.
+
+        Raises InputError for an answer that does not fit the field.
+        """
         try:
             return float(field.read(self.texts[key]))
         except InputError as error:
             raise error.under(key) from None
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
-        """One of some texts. Raises InputError for another answer."""
+        """Return an answer that must be one of some texts. Raises InputError for any other."""
         if (text := str(self.texts[key])) not in choices:
             raise InputError(key, quoted(text), f"one of {', '.join(choices)}", f"--set {key}={choices[0]}")
         return text
 
     def kind_of(self, key: str, fields: Mapping[AxisKind, Quantity]) -> tuple[AxisKind, float]:
-        """The kind of axis whose unit an answer has, and its value in SI. Raises InputError for another answer."""
+        """Return the kind of axis that an answer's unit implies, and the answer in SI.
+
+        Raises InputError if the unit fits no kind of axis.
+        """
         for kind, field in fields.items():
             try:
                 return kind, float(field.read(self.texts[key]))
@@ -78,8 +92,11 @@ class UserAnswers:
 
 
 def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = False) -> tuple[OpenQuestion, ...]:
-    """What no drive knows of its machine and nobody has said yet: what moves, its friction, and, unless a file says how
-    it is `moved`, a move to try. Raises InputError for a friction law that there is not."""
+    """List what no drive knows of its machine and the user has not said yet.
+
+    Moving mass and friction are asked for. A move to try is asked for unless the file gives one (`moved`). Raises
+    InputError for an unknown friction law.
+    """
     asked: list[OpenQuestion] = []
     if not {"masses.cart", "masses.stage"} & answers.texts.keys():
         asked += _of_table("masses", Masses, ("stage",), {"stage": "what moves"}, kind)
@@ -101,12 +118,19 @@ def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = 
 def _of_table(
     table: str, section: type[Section], names: Iterable[str], meaning: Mapping[str, str], kind: AxisKind
 ) -> list[OpenQuestion]:
+    """Build one open question for each named key of a table of the stage file.
+
+    Unit and example follow from the kind of axis, linear or rotary.
+    """
     fields = {name: field.on(kind) for name, field in numeric_fields(section).items()}
     return [OpenQuestion(f"{table}.{name}", meaning[name], fields[name].written_example) for name in names]
 
 
 def refuse_open(questions: Iterable[OpenQuestion], origin: str) -> None:
-    """Raises InputError with all that is open, in one list."""
+    """Refuse to go on while questions are open.
+
+    Raises InputError that lists all of them at once.
+    """
     asked = list(questions)
     if asked:
         values = f"{len(asked)} values are" if len(asked) > 1 else "one value is"

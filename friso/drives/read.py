@@ -1,4 +1,7 @@
-"""From a parameter file to a stage file. What is read was written by others: it is bounded, and never trusted."""
+"""Turn a parameter file into a stage file.
+
+The text was written by others, so its size is limited and no value is trusted unchecked.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,10 @@ from friso.stage.files import text_of
 
 @dataclass(frozen=True)
 class StageOfAxis:
-    """A stage from a parameter file: the file, its kind, the name of the axis in it, and what the stage leaves out."""
+    """A stage read from a parameter file, with where it came from.
+
+    It holds the file's path and kind, the name of the axis, and sentences on what the stage leaves out.
+    """
 
     stage: Stage
     path: Path
@@ -29,15 +35,17 @@ class StageOfAxis:
     left_out: tuple[str, ...]
 
     def text(self) -> str:
-        """The stage file, at its head what it leaves out."""
+        """Return the stage file, which begins with comments on what was left out."""
         sentences = [f"From {self.path.name}, {self.axis}, by friso init --from."]
         sentences += [f"Left out: {sentence}" for sentence in self.left_out]
         return "\n".join([*(f"# {one_line(sentence)}" for sentence in sentences), self.stage.to_toml()])
 
 
 def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) -> StageOfAxis:
-    """The stage of an axis in a parameter file, with what the user says of all that is not in it. Raises InputError for
-    what cannot be read, and for all that is still open together."""
+    """Read one axis of a parameter file as a stage, completed by the user's answers.
+
+    Raises InputError for a file that cannot be read. Values that are still missing are refused together.
+    """
     kind, axes = read(path)
     chosen = _chosen(axes, axis, path)
     try:
@@ -53,7 +61,10 @@ def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) ->
 
 
 def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
-    """The kind of a parameter file, and its axes that have gains. Raises InputError."""
+    """Return the kind of a parameter file, and its axes that have gains.
+
+    Raises InputError for a file of no known kind, or one that its kind cannot read.
+    """
     titles = ", ".join(FORMATS[name].title for name in FORMATS)
     expected = f"a parameter file: {titles}"
     text = text_of(path, expected, "friso init stage.toml --from machine.ini", latin=True)
@@ -68,8 +79,10 @@ def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
 
 
 def _beside(path: Path, name: str) -> str | None:
-    """The text of a file in the folder of another one, or below it; None for a name of nothing there. Raises
-    InputError."""
+    """Return the text of a file in the folder of another file, or below it.
+
+    Returns None if the name leads outside that folder or to nothing. Raises InputError for a file that is no text.
+    """
     place = None if flaw_of(name) else Path(os.path.realpath(path.parent / name))
     if place is None or not place.is_relative_to(os.path.realpath(path.parent)) or not os.path.lexists(place):
         return None
@@ -77,7 +90,10 @@ def _beside(path: Path, name: str) -> str | None:
 
 
 def _chosen(axes: tuple[AxisParameters, ...], name: str | None, path: Path) -> AxisParameters:
-    """The axis of that name; without one, the only one there is. Raises InputError."""
+    """Return the axis with a name or letter; without a name, the only axis.
+
+    Raises InputError if no axis, or more than one, fits.
+    """
     names = ", ".join(f"{axis.name} ({axis.letter})" if axis.letter else axis.name for axis in axes)
     if name is None and len(axes) == 1:
         return axes[0]
@@ -91,7 +107,10 @@ def _chosen(axes: tuple[AxisParameters, ...], name: str | None, path: Path) -> A
 def _with_answers(
     of_axis: AsStage, kind: ParameterFormat, axis: AxisParameters, path: Path, user_answers: Mapping[str, Any]
 ) -> Stage:
-    """The stage of the tables with the answers laid over them: those with a dot are keys of the stage."""
+    """Build the stage from the tables of an axis with the user's answers laid over them.
+
+    Answers whose key has a dot are keys of the stage file. Friction model and motion get defaults.
+    """
     source = (
         f"Controller: {one_line(path.name)}, {axis.name}, by the formulas of {kind.firmware} ({kind.source}); "
         "machine: as given to friso init"

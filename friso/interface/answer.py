@@ -1,4 +1,7 @@
-"""What every function of friso that has a command returns: one `Answer`, read by people, pages and programs alike."""
+"""Define `Answer`, which every function of friso with a command returns.
+
+People, pages and programs read one and the same answer.
+"""
 
 from __future__ import annotations
 
@@ -31,8 +34,11 @@ Returned = TypeVar("Returned")
 
 
 def question(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
-    """Make a function of friso of a question's function: its arguments are checked, shared parameters are described in
-    its docstring, and the kind of axis that it speaks of stays its own."""
+    """Turn the function of a question into a function of friso.
+
+    Its arguments are checked, shared parameters are added to its docstring, and the kind of axis that it speaks of
+    stays its own.
+    """
     function.__doc__ = described(function)
     answer = check_arguments(function)
 
@@ -45,8 +51,10 @@ def question(function: Callable[Arguments, Returned]) -> Callable[Arguments, Ret
 
 @dataclass(frozen=True)
 class AnswerTable:
-    """A small table: columns with a label each, and rows that have names. One that stands `behind` the answer is shown
-    with its details alone."""
+    """A small table: labelled columns, and rows that have names.
+
+    A table `behind` the answer is shown only with its details.
+    """
 
     title: str
     columns: Sequence[str]
@@ -69,7 +77,7 @@ _SHOWN = {
 
 
 def _in_its_units(method: Callable[Concatenate[Answer, Arguments], Returned]) -> Callable[..., Returned]:
-    """The method of an answer, in the units of the answer's axis."""
+    """Wrap a method of an answer so that it speaks in the units of the answer's axis."""
 
     @wraps(method)
     def shown(answer: Answer, *arguments: Arguments.args, **options: Arguments.kwargs) -> Returned:
@@ -106,13 +114,16 @@ class Answer:
     """The exit status of the command where the answer is a failure."""
 
     def __init__(self, result: Any, **parts: Any) -> None:
-        """Keep the result, and other `parts` as attributes; the axis is that of the stage unless it is one of these."""
+        """Keep the result, and other `parts` as attributes.
+
+        The axis is that of the stage, unless it is one of the parts.
+        """
         stage = parts.get("stage") or getattr(result, "stage", None)
         self.result, self.axis_kind = result, LINEAR if stage is None else stage.axis_kind
         vars(self).update(parts)
 
     def __init_subclass__(cls) -> None:
-        """Whatever an answer shows is in the units of its axis, whoever asks."""
+        """Make all that an answer shows use the units of its axis."""
         cls.package = cls.__module__.rpartition(".")[0]
         for name in _SHOWN & vars(cls).keys():
             setattr(cls, name, _in_its_units(getattr(cls, name)))
@@ -122,76 +133,82 @@ class Answer:
 
     @property
     def command(self) -> str:
-        """The command that gives this answer."""
+        """Return the command that gives this answer."""
         return self._name.replace("_", "-")
 
     @property
     def _name(self) -> str:
-        """The name of the question in Python, with which its functions begin."""
+        """Return the name of the question in Python, with which its functions begin."""
         return self.package.rpartition(".")[2]
 
     @property
     def subject(self) -> Any:
-        """What the functions that show the answer take: the result, or the answer itself where it is more than that."""
+        """Return what the functions that show the answer take.
+
+        It is the result, or the answer itself if that holds more.
+        """
         return self.result
 
     @property
     def failure(self) -> str:
-        """What could not be completed, or is not met; "" where all went well."""
+        """Say what could not be completed or is not met; empty if all went well."""
         return ""
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C ended what it rests on: it says what was found so far."""
+        """Tell whether Ctrl-C ended the work, so that the answer says what was found so far."""
         return False
 
     def _shown_by(self, module: str, function: str, otherwise: Any, *more: Any) -> Any:
-        """What a function of the question's folder makes of the answer; `otherwise` where there is none."""
+        """Return what a function of the question's folder makes of the answer.
+
+        Returns `otherwise` if the folder has no such function.
+        """
         name = f"{self.package}.{module}"
         shown = getattr(import_module(name), function, None) if self.package and find_spec(name) else None
         return otherwise if shown is None else shown(self.subject, *more)
 
     def sentences(self) -> Sequence[str]:
-        """The answer in words, the conclusion first."""
+        """Return the answer in words, the conclusion first."""
         return self._shown_by("words", "sentences", ())
 
     def blocks(self) -> Sequence[str]:
-        """Drawings and files in characters of one width."""
+        """Return drawings and files in characters of one width."""
         return self._shown_by("words", "blocks", ())
 
     def tables(self) -> Sequence[AnswerTable]:
-        """The numbers that the answer rests on, as texts."""
+        """Return the numbers that the answer rests on, as texts."""
         return self._shown_by("words", "tables", ())
 
     def details(self) -> Sequence[str]:
-        """What else there is to say, a paragraph each."""
+        """Return what else there is to say, one paragraph each."""
         return self._shown_by("words", "details", ())
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """Commands that follow from the answer, the `files` of which were written."""
+        """Return commands that follow from the answer, given the `files` written."""
         return self._shown_by("words", "next_steps", (), files)
 
     def figures(self) -> Sequence[Figure]:
-        """The figures, the most telling first."""
+        """Return the figures, the most telling first."""
         return self._shown_by("figures", f"{self._name}_figures", ())
 
     def document(self) -> dict[str, Any]:
-        """The JSON document of the command."""
+        """Return the JSON document of the command."""
         return self._shown_by("document", f"{self._name}_document", {})
 
     def files(self) -> Files:
-        """What the command writes, by name."""
+        """Return what the command writes, by name."""
         return self._shown_by("page", f"{self._name}_files", {})
 
     @property
     def data(self) -> xr.Dataset:
-        """The numbers of the answer with their units, as an xarray.Dataset."""
+        """Return the numbers of the answer with their units, as an xarray.Dataset."""
         from friso.interface.data import dataset_of
 
         return dataset_of(self.to_dict())
 
     def document_of_details(self) -> dict[str, Any]:
-        """What `--details` adds to the JSON document: numbers that take further work."""
+        """Return what `--details` adds to the JSON document: numbers that take further work."""
         return {}
 
     def to_dict(self, details: bool = False) -> dict[str, Any]:
@@ -273,6 +290,7 @@ class Answer:
         return [place]
 
     def _page(self, place: Path) -> str:
+        """Return the page among the files. Raises InputError for a command without a page."""
         page = next((content for name, content in self.files().items() if name.endswith("html")), None)
         if not isinstance(page, str):
             raise InputError("path", str(place), f"a folder: friso {self.command} has no page", 'report("folder")')
@@ -285,7 +303,7 @@ class Answer:
         return escaped("\n".join(self.sentences()))
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the answer and the small tables, no arrays."""
+        """Return what a notebook shows: the sentences and the small tables, but no arrays."""
         first, *rest = [escape(sentence) for sentence in self.sentences()] or ["no answer"]
         blocks = "".join(f"<pre>{escape(block)}</pre>" for block in self.blocks())
         tables = blocks + "".join(_html_table(table) for table in self.tables() if not table.behind)
@@ -325,6 +343,7 @@ for _name in _SHOWN:
 
 
 def _html_table(table: AnswerTable) -> str:
+    """Write a small table as HTML, with all texts escaped."""
     head = "".join(f"<th>{escape(column)}</th>" for column in ("", *table.columns))
     rows = "".join(
         f"<tr><th>{escape(label)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"

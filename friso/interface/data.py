@@ -1,4 +1,7 @@
-"""The numbers of a JSON document as an xarray.Dataset: units from the ends of keys, dimensions from tables alike."""
+"""Turn the numbers of a JSON document into an xarray.Dataset.
+
+Units come from the ends of keys, and dimensions from tables of equal form.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +19,11 @@ _LEAF = (bool, int, float, str, type(None))
 
 
 def dataset_of(document: Mapping[str, Any]) -> xr.Dataset:
-    """What a document holds: its first table of alike tables, "cases" or "models" by name or one after the other, gives
-    a dimension of that name; each of its numbers is a variable along it, and the document's own numbers and texts are
-    variables and attributes."""
+    """Return what a document holds as a Dataset.
+
+    The first table of tables, such as "cases" or "models", gives a dimension of its name, and each of its numbers a
+    variable along it. The document's own numbers become variables, and its texts attributes.
+    """
     import xarray as xr
 
     name = next((key for key, value in document.items() if _records(value)), None)
@@ -40,7 +45,7 @@ def dataset_of(document: Mapping[str, Any]) -> xr.Dataset:
 
 
 def _records(value: Any) -> Mapping[str, Mapping[str, Any]]:
-    """Tables by name, or by number where they are a list; none for anything else."""
+    """Return tables by name, or by number if they are a list; empty for anything else."""
     if isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
         return {_label(item, number): item for number, item in enumerate(value)}
     if isinstance(value, dict) and len(value) and all(isinstance(item, dict) for item in value.values()):
@@ -49,11 +54,12 @@ def _records(value: Any) -> Mapping[str, Mapping[str, Any]]:
 
 
 def _label(record: Mapping[str, Any], number: int) -> str:
+    """Return the label of a table in a list: its name, or else its number."""
     return str(next((record[key] for key in ("name", "key", "id", "letter", "label") if key in record), number))
 
 
 def _leaves(record: Mapping[str, Any], before: str = "") -> Any:
-    """Numbers and texts of a table and those below it, by their keys, one after the other."""
+    """Yield the numbers and texts of a table and of those below it, with their keys."""
     for key, value in record.items():
         if isinstance(value, dict):
             yield from _leaves(value, f"{before}{key}_")
@@ -62,13 +68,13 @@ def _leaves(record: Mapping[str, Any], before: str = "") -> Any:
 
 
 def _name_and_units(key: str) -> tuple[str, dict[str, str]]:
-    """A key without its unit, and the unit as an attribute."""
+    """Split a key into its name and its unit as an attribute."""
     name, unit = unit_of_key(key)
     return name, {"units": unit} if unit else {}
 
 
 def _column(values: list[Any]) -> np.ndarray:
-    """Numbers with NaN where there is none; texts and yes or no as they are."""
+    """Return numbers with NaN where one is missing; texts and booleans stay as they are."""
     if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
         return np.array([np.nan if value is None else value for value in values], dtype=float)
     return np.array(values, dtype=object)

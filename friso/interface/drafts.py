@@ -1,4 +1,7 @@
-"""Files that appear under their names together, or not at all: drafts first, which are renamed in the end."""
+"""Write files that appear under their names together, or not at all.
+
+Drafts are written first and renamed in the end.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,10 @@ _LEVELS = 4
 
 
 class Drafts:
-    """Drafts of files on the disk where they are to be, gone at the end of the `with` block unless put in place."""
+    """Drafts of files, on the disk where the files are to be.
+
+    They are deleted at the end of the `with` block unless they were put in place.
+    """
 
     def __init__(self) -> None:
         self.folders: dict[Path, Path] = {}
@@ -46,7 +52,7 @@ class Drafts:
             self.made.close()
 
     def add(self, path: Path, content: Content) -> None:
-        """The draft of a file; None: an earlier one is deleted in the end."""
+        """Write the draft of a file; for the content None, an earlier file is deleted in the end."""
         if path.is_dir():
             raise IsADirectoryError(f"{path} is a folder")
         self._tidy(path)
@@ -61,9 +67,12 @@ class Drafts:
         self.drafts.append((draft, path))
 
     def put_in_place(self, may_replace: Collection[Path] = ()) -> None:
-        """Give all drafts their names; only files of those paths that `may_replace` names give way. An error on the
-        way, and all is as it was before; Ctrl-C waits until the drafts are gone. A name always has a file, the earlier
-        one or the new. Raises FileExistsError where anything else is in the way by now, another OSError."""
+        """Give all drafts their names; only files that `may_replace` names are replaced.
+
+        After an error, all is as it was before. Ctrl-C waits until the drafts are gone. At any moment, a name has
+        either the earlier file or the new one. Raises FileExistsError if any other file is in the way by now, or
+        another OSError.
+        """
         undo: list[Callable[[], object]] = []
         raise_what_waits()
         self.held.enter_context(hold_interrupts())
@@ -90,14 +99,17 @@ class Drafts:
             raise
 
     def _tidy(self, path: Path) -> None:
-        """Remove what killed processes left of drafts, near `path`: where there was no folder yet, further up."""
+        """Remove drafts near `path` that killed processes left behind.
+
+        Folders further up are searched as well, since the folder of the file may not have existed.
+        """
         for folder in {*path.absolute().parents[:_LEVELS]} - self.tidied:
             self.tidied.add(folder)
             if folder.is_dir():
                 remove_leftovers(folder, DRAFTS, _LOCK)
 
     def _spare(self, path: Path) -> Path:
-        """A path that is free, on the disk of `path`, with its suffix."""
+        """Return a free path on the disk of `path`, with its suffix."""
         parents = path.absolute().parents
         root = next((folder for folder in parents if folder.exists()), parents[-1])  # a drive that is not there
         if root not in self.folders:
@@ -107,7 +119,7 @@ class Drafts:
 
 
 def _duplicate(path: Path, spare: Path) -> None:
-    """Keep a file under another name too, a symbolic link as such."""
+    """Keep a file under another name as well; a symbolic link stays one."""
     try:
         os.link(path, spare, follow_symlinks=False)
     except (OSError, NotImplementedError):  # a disk without links
@@ -115,8 +127,10 @@ def _duplicate(path: Path, spare: Path) -> None:
 
 
 def made(folder: Path) -> list[Path]:
-    """Make a folder and those above it that are missing; those made, outermost first. Raises OSError, with none of
-    them left."""
+    """Make a folder and the missing ones above it; return those made, the outermost first.
+
+    Raises OSError, and then leaves none of them behind.
+    """
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     done: list[Path] = []
     try:

@@ -1,4 +1,4 @@
-"""What the questions are asked about, read in all the forms in which people give it: stages, numbers with units."""
+"""Read stages and numbers with units in all the forms in which people give them."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ LOGGER = logging.getLogger("friso")
 
 
 def stage_of(source: StageLike, changes: Changes = None) -> Stage:
-    """The stage that is meant, with keys overridden. Raises InputError."""
+    """Return a stage with keys overridden, from any form. Raises InputError."""
     wanted = changes_of(changes)
     if isinstance(source, Stage | Mapping):
         stage = source if isinstance(source, Stage) else Stage(**source)
@@ -83,14 +83,14 @@ def stage_of(source: StageLike, changes: Changes = None) -> Stage:
 
 
 def tables_of(source: StageLike) -> dict[str, Any]:
-    """The tables of a stage as they are written, whether they make a whole one or not. Raises InputError."""
+    """Return the tables of a stage as written, complete or not. Raises InputError."""
     if isinstance(source, Stage):
         return source.as_written()
     return dict(source) if isinstance(source, Mapping) else load_tables(source)
 
 
 def changes_of(changes: Changes) -> dict[str, Any]:
-    """Keys to their new values, from a dictionary or texts KEY=VALUE. Raises InputError."""
+    """Return new values by key, from a dictionary or texts KEY=VALUE. Raises InputError."""
     if changes is None:
         return {}
     keys: list[Any] = [*changes] if isinstance(changes, Iterable) and not isinstance(changes, str | bytes) else [None]
@@ -103,9 +103,11 @@ def changes_of(changes: Changes) -> dict[str, Any]:
 def read_stage(
     source: StageLike, changes: Changes = None, leaves_out: Sequence[str] = AS_BUILT, uncertain_too: bool = False
 ) -> Stage:
-    """The stage that is meant, with keys overridden. It is mentioned (to the logger "friso") what is doubtful about it,
-    that the centres of uncertain keys are used, unless these are wanted too (`uncertain_too`), and which of its tables
-    the analysis leaves out. Raises InputError."""
+    """Return a stage with keys overridden, and log what is doubtful about it.
+
+    The logger "friso" says if centres of uncertain keys are used, unless `uncertain_too`. It also names the tables that
+    the analysis `leaves_out`. Raises InputError.
+    """
     stage = stage_of(source, changes)
     for doubt in (*implausible_values(stage), *idle_encoder(stage)):
         LOGGER.warning(doubt)
@@ -128,8 +130,10 @@ def read_stage(
 
 
 def mention_unstable_loop(stage: Stage) -> None:
-    """Mention (to the logger "friso") that the loop of a stage is unstable, if it is: before the work whose answer
-    rests on that, which may take minutes."""
+    """Log that the loop of a stage is unstable, if it is.
+
+    The logger "friso" says so before work that may take minutes and whose answer depends on it.
+    """
     from friso.hunting import unstable
     from friso.shown.loop_words import unstable_loop
 
@@ -138,7 +142,10 @@ def mention_unstable_loop(stage: Stage) -> None:
 
 
 def correlations_of(source: StageLike, stage: Stage) -> Correlations:
-    """How the uncertain keys of a stage hang together, as a file beside its stage file says. Raises InputError."""
+    """Return the correlations of uncertain keys, from a file beside the stage file.
+
+    Raises InputError.
+    """
     correlations = Correlations()
     if not isinstance(source, Stage | Mapping) and correlations_file(Path(source)).exists():
         correlations = read_correlations(correlations_file(Path(source)), load(source))
@@ -150,15 +157,17 @@ _LONGEST_STEM = 150
 
 
 def stem_of(source: StageLike, usual: str = "stage") -> str:
-    """What files about a stage are called: the name of its file without the suffix, "_" for bytes that are no text; the
-    beginning of a long one, with room for what follows it."""
+    """Return the stem of names of files about a stage: the name of its file without suffix.
+
+    Bytes that are no text become "_". A long name is cut, so that suffixes still fit.
+    """
     if isinstance(source, Stage | Mapping):
         return usual
     return re.sub("[\ud800-\udfff]", "_", Path(source).stem).encode()[:_LONGEST_STEM].decode(errors="ignore")
 
 
 def tolerance_of(value: str | float) -> float:
-    """A relative tolerance of the solver. Raises InputError."""
+    """Read a relative tolerance of the solver. Raises InputError."""
     from friso.engine.tolerance import checked_rtol
 
     try:
@@ -168,12 +177,12 @@ def tolerance_of(value: str | float) -> float:
 
 
 def text_of(value: str | float, unit: str) -> str:
-    """A quantity as a file would have it: a text as it is, a number with its unit."""
+    """Write a quantity as a file would have it: a text as it is, a number with its unit."""
     return value if isinstance(value, str) else exactly(value, unit)
 
 
 def quantity_of(value: str | float, name: str, quantity: Quantity, example: str = "") -> float:
-    """The SI value of a text with a unit, or of a number, which is in SI already. Raises InputError."""
+    """Return a text with a unit, or a number in SI, as an SI value. Raises InputError."""
     try:
         return float(quantity.read(text_of(value, quantity.unit)))
     except InputError as error:
@@ -181,12 +190,12 @@ def quantity_of(value: str | float, name: str, quantity: Quantity, example: str 
 
 
 def seconds_of(value: str | float, name: str, example: str = "1 ms") -> float:
-    """A time [s]. Raises InputError."""
+    """Read a time [s]. Raises InputError."""
     return quantity_of(value, name, Quantity("s", positive, example))
 
 
 def whole_number(value: int, name: str, least: int, most: int, example: str) -> int:
-    """A whole number within limits. Raises InputError."""
+    """Read a whole number within limits. Raises InputError."""
     whole = isinstance(value, Integral) and not isinstance(value, bool)
     if not whole or not least <= value <= most:
         long = whole and abs(value) >= 10**18
@@ -196,7 +205,7 @@ def whole_number(value: int, name: str, least: int, most: int, example: str) -> 
 
 
 def choice(value: str, name: str, choices: Sequence[str], example: str) -> str:
-    """One of some texts. Raises InputError for anything else."""
+    """Read one of some texts. Raises InputError for anything else."""
     if not (isinstance(value, str) and value in choices):
         raise InputError(
             name, quoted(value), choices[0] if len(choices) == 1 else f"one of {', '.join(choices)}", example
@@ -205,7 +214,7 @@ def choice(value: str, name: str, choices: Sequence[str], example: str) -> str:
 
 
 def pairs_of(values: Changes, name: str, example: str) -> dict[str, str]:
-    """Keys to texts from a dictionary, or from texts KEY=VALUE. Raises InputError."""
+    """Return texts by key, from a dictionary or texts KEY=VALUE. Raises InputError."""
     if isinstance(values, Mapping):
         for key, value in values.items():
             if not isinstance(value, str):
@@ -227,7 +236,10 @@ def pairs_of(values: Changes, name: str, example: str) -> dict[str, str]:
 
 
 def axes_of(axes: Mapping[str, Any], texts: Mapping[str, str | None], example: str) -> dict[str, Any]:
-    """The axes of a dictionary and those of texts KEY=RANGE by the option's name, each key once. Raises InputError."""
+    """Collect axes from a dictionary and from texts KEY=RANGE, each key once.
+
+    Raises InputError.
+    """
     every = dict(axes)
     for name, text in texts.items():
         ranges = {} if text is None else pairs_of([text], name, example)
@@ -239,5 +251,5 @@ def axes_of(axes: Mapping[str, Any], texts: Mapping[str, str | None], example: s
 
 
 def wrong(name: str, actual: str, expected: str, example: str) -> InputError:
-    """The error for an option, by the name of its keyword: the command line says "--name" for it."""
+    """Build the error for an option, named by its keyword; the command line says "--name" for it."""
     return InputError(name, actual, expected, f"{name}={example}")

@@ -1,6 +1,9 @@
-"""Files that a command writes: all of them or none, into a folder that is new, empty, or its own from an earlier run,
-which a small file in it marks, or which is a store of friso map; else it refuses and names --overwrite. A file that the
-user names has to be new, too. Never does a command replace a file that it reads."""
+"""Write the files of a command, all of them or none.
+
+The folder must be new, empty, a store of friso map, or the command's own from an earlier run, which a small marker file
+shows. Otherwise the command refuses and names --overwrite. A file that the user names must be new, too. No command ever
+replaces a file that it reads.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ if TYPE_CHECKING:
 LOGGER = logging.getLogger("friso")
 
 STORE_MAKER = "map, a store"
-"""What made a folder that is a store, not one of files."""
+"""Maker of a folder that is a store and not a folder of files."""
 
 MARKER = ".friso-output"
 """The file that records which command made a folder, and which files there are friso's."""
@@ -43,7 +46,7 @@ class OutputFolder:
     """The folder that a command writes into; `inputs` are the files that it reads."""
 
     def __init__(self, command: str, folder: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> None:
-        """Raises InputError where the command must not write there, or cannot."""
+        """Check the folder. Raises InputError if the command must not write there, or cannot."""
         self.command, self.folder, self.overwrite, self.inputs = command, folder, overwrite, tuple(inputs)
         refuse_place("--out", folder)
         if self.unfinished.is_symlink():
@@ -64,11 +67,11 @@ class OutputFolder:
 
     @property
     def unfinished(self) -> Path:
-        """A folder for what is done of long work, from which the next run goes on."""
+        """Return a folder for finished parts of long work, from which the next run goes on."""
         return self.folder / UNFINISHED
 
     def check(self, names: Iterable[str]) -> None:
-        """Raises InputError where a file of such a name may not be written."""
+        """Check names of files. Raises InputError if one of them must not be written."""
         existing = [name for name in names if os.path.lexists(self.folder / name)]
         for name in existing:
             if any(_are_one(self.folder / name, file) for file in self.inputs):
@@ -80,7 +83,7 @@ class OutputFolder:
             raise InputError("--out", actual, f"another folder, or {OVERWRITE}", _beside(self.folder))
 
     def _check_free(self, name: str) -> None:
-        """Raises InputError where a file cannot be replaced, since another program holds it open."""
+        """Raise InputError for a file that cannot be replaced because another program holds it open."""
         try:
             if (self.folder / name).exists():
                 check_free(self.folder / name)
@@ -91,9 +94,9 @@ class OutputFolder:
     def write(
         self, files: Files, progress: Progress = silent, beside: Mapping[Path, Content] | None = None
     ) -> list[Path]:
-        """Write the files, and some `beside` the inputs, all of them or none; the paths of those in the folder.
+        """Write the files, and some `beside` the inputs, all of them or none.
 
-        Raises InputError where one may not be written, OSError where one cannot.
+        Returns the paths in the folder. Raises InputError if one must not be written, and OSError if one cannot.
         """
         self.check(files)
         others = [name for name in files if name not in self.files and os.path.lexists(self.folder / name)]
@@ -114,13 +117,16 @@ class OutputFolder:
         return written(contents)
 
     def _marker(self, names: Iterable[str]) -> dict[Path, Content]:
-        """The marker with names of files, if the folder is the command's own."""
+        """Return the marker with names of files, if the folder is the command's own."""
         return {self.folder / MARKER: marker(self.command, names)} if self.is_own else {}
 
 
 def refuse_place(option: str, path: Path) -> None:
-    """Raises InputError where nothing can be written to a path, whatever is there (`paths.unwritable`), or nothing but
-    a store's own files, being within it."""
+    """Check that something can be written to a path.
+
+    Raises InputError for unusable paths (`paths.unwritable`), and for paths inside a store, which takes only its own
+    files.
+    """
     from friso.studies.metadata import is_store
 
     example = f"{option} report" if option.startswith("--") else ""
@@ -131,8 +137,11 @@ def refuse_place(option: str, path: Path) -> None:
 
 
 def check_store_folder(folder: Path) -> None:
-    """Raises InputError where a folder that is to be a store holds anything but a store of friso map: a store is the
-    whole folder, so that --overwrite does not put one beside files of others. Or where a new one cannot be made."""
+    """Check that a folder can become a store, or is one.
+
+    Raises InputError if it holds anything else, or cannot be made. A store is the whole folder, so --overwrite does not
+    put one beside other files.
+    """
     maker, _ = marked(folder)
     if _entries(folder):
         if maker != STORE_MAKER:
@@ -153,8 +162,11 @@ def check_file(
     is_own: bool = False,
     example: str = "",
 ) -> None:
-    """Raises InputError where a file that the user names must not be written: it is among the `inputs`, which are read,
-    or there already, unless it `is_own` or may be overwritten; with another name as the example, unless one is told."""
+    """Check that a file named by the user may be written.
+
+    Raises InputError if it is among the `inputs`, which are read, or exists already. An existing file is allowed if it
+    `is_own` or may be overwritten. The message suggests another name, or `example`.
+    """
     refuse_place(option, path)
     another = f"{path.stem}-2{path.suffix}"
     example = example or (f"{option} {another}" if option.startswith("--") else another)
@@ -172,7 +184,10 @@ def check_file(
 
 
 def write_file(option: str, path: Path, content: Content, overwrite: bool) -> None:
-    """Write a file that the user names, whole or not at all. Raises InputError where that must not be, or cannot."""
+    """Write a file that the user names, whole or not at all.
+
+    Raises InputError if it must not be written, or cannot.
+    """
     check_file(option, path, overwrite)
     place = Path(os.path.realpath(path))  # a link stays one
     try:
@@ -190,13 +205,19 @@ def _unwritable(option: str, path: Path, error: OSError, example: str) -> InputE
 def output_folder(
     command: str, folder: Path | None, overwrite: bool, inputs: Sequence[Path] = ()
 ) -> OutputFolder | None:
-    """The folder that a command writes into, if it is to write. Raises InputError as `OutputFolder`."""
+    """Return the folder that a command writes into, if any.
+
+    Raises InputError as `OutputFolder`.
+    """
     return None if folder is None else OutputFolder(command, folder, overwrite, inputs)
 
 
 def write(files: Mapping[Path, Content], may_replace: Collection[Path], progress: Progress = silent) -> list[Path]:
-    """Write files, all of them or none, at any moment; their paths. Those that `may_replace` does not name have to be
-    new. Raises FileExistsError where one is not, another OSError where it cannot be written."""
+    """Write files, all of them or none at any moment, and return their paths.
+
+    Files that `may_replace` does not name have to be new. Raises FileExistsError if one is not, and another OSError if
+    it cannot be written.
+    """
     with drafts_of(files, progress) as drafts:
         drafts.put_in_place(may_replace)
     return written(files)
@@ -204,7 +225,7 @@ def write(files: Mapping[Path, Content], may_replace: Collection[Path], progress
 
 @contextmanager
 def drafts_of(files: Mapping[Path, Content], progress: Progress = silent) -> Iterator[Drafts]:
-    """The drafts of some files. Raises OSError."""
+    """Provide the drafts of some files. Raises OSError."""
     with Drafts() as drafts:
         for number, (path, content) in enumerate(files.items()):
             progress(number, len(files), "files")
@@ -213,23 +234,26 @@ def drafts_of(files: Mapping[Path, Content], progress: Progress = silent) -> Ite
 
 
 def written(files: Mapping[Path, Content]) -> list[Path]:
-    """The files that are there once some are written: one without content is deleted."""
+    """Return the files that exist after writing; a file without content is deleted."""
     return [path for path, content in files.items() if content is not None]
 
 
 def _are_one(path: Path, other: Path) -> bool:
-    """Whether two paths lead to the same file."""
+    """Tell whether two paths lead to the same file."""
     return path.exists() and other.exists() and path.samefile(other)
 
 
 def marker(command: str, names: Iterable[str]) -> str:
-    """What the marker says of a command and the files that are its own."""
+    """Return the text of the marker: the command, and the files that are its own."""
     lines = [f'command = "{command}"', f'version = "{VERSION}"', "files = [", *(f"  {as_toml(n)}," for n in names), "]"]
     return "\n".join(["# Made by friso, which replaces these files when the command is run again.", *lines, ""])
 
 
 def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
-    """The command that made a folder and the files that it wrote there; empty where no command of friso did."""
+    """Return the command that made a folder, and the files that it wrote there.
+
+    Both are empty for a folder that no command of friso made.
+    """
     try:
         document = parsed(text_of(folder / MARKER, "a marker"), "a marker")
     except InputError:
@@ -243,25 +267,28 @@ def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
 
 
 def _of_others(folder: Path, maker: str, expected: str) -> InputError:
-    """That a folder is not new, empty or the command's own; `expected` is what else it may be."""
+    """Build the refusal of a folder that is not new, empty or the command's own.
+
+    `expected` says what else the folder may be.
+    """
     made = f"made by friso {maker}" if maker else f"with {_first_names(_entries(folder))} in it"
     holds = "a store of friso map" if maker == STORE_MAKER else made
     return InputError("--out", f"{folder}, {holds}", f"a new or empty folder, {expected}", _beside(folder))
 
 
 def _beside(folder: Path) -> str:
-    """The option for another folder."""
+    """Return the option that names another folder."""
     return f"--out {shell_word(f'{folder}-2' if folder.name.strip('.') else 'report')}"
 
 
 def _entries(folder: Path) -> list[str]:
-    """What is in a folder, but for what friso keeps there of runs that have not ended."""
+    """Return what is in a folder, except friso's own files of unfinished runs."""
     names = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
     return [name for name in names if name != UNFINISHED and not name.startswith(DRAFTS)]
 
 
 def _first_names(names: Sequence[str]) -> str:
-    """The first of some names, and how many there are more."""
+    """Write the first of some names, and how many more there are."""
     more = len(names) - _LISTED
     return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
 
@@ -270,7 +297,7 @@ _LISTED = 8
 
 
 def _check_writable(folder: Path) -> None:
-    """Raises InputError where no file can be written into the folder, or it cannot be made."""
+    """Raise InputError if no file can be written into the folder, or it cannot be made."""
     try:
         with hold_interrupts():
             for path in reversed(made(folder)):
@@ -282,6 +309,9 @@ def _check_writable(folder: Path) -> None:
 
 
 def _try_draft(path: Path) -> None:
-    """Raises OSError where no draft of a file can be made: on Windows and on network shares nothing else tells."""
+    """Raise OSError if no draft of a file can be made.
+
+    On Windows and on network shares, nothing else tells whether a file can be written.
+    """
     with Drafts() as drafts:
         drafts.add(path, "")

@@ -1,8 +1,8 @@
-"""The kind of a question: what a folder of `friso/questions/` declares, and what is made of it.
+"""Define what a folder of `friso/questions/` declares, and what is derived from it.
 
-A question is a function of friso with a command of the same name. Its folder declares a `QUESTION`; from that, from the
-signature of the function and from its docstring come the command with its options and help, and the entry in
-`friso --help`. Nothing heavy is imported here: the list of commands is printed before arrays and units are.
+A question is a function of friso with a command of the same name. Its folder declares a `QUESTION`. From that, from the
+function's signature and its docstring come the command, its options and help, and the entry in `friso --help`. Nothing
+heavy is imported here, because the list of commands is printed before arrays and units are loaded.
 """
 
 from __future__ import annotations
@@ -37,7 +37,10 @@ TOPICS = (HUNTS, WHERE, WHY, STOPS, MACHINE, HELP)
 
 @dataclass(frozen=True)
 class Choices:
-    """A list below the help of a command, read only when the help is asked for: (name, what it is in one line)."""
+    """A list below the help of a command: names, each with one line on it.
+
+    It is read only when the help is asked for.
+    """
 
     title: str
     rows: Callable[[], Iterable[tuple[str, str]]]
@@ -83,7 +86,7 @@ class Question:
     """Files that may not be in the way when the command begins."""
 
     during: str = ""
-    """What stands beside the progress bar until the work says what it does."""
+    """Label of the progress bar until the work reports its own."""
 
     answers_interrupted: bool = False
     """Whether Ctrl-C ends the work with an answer by what was done so far."""
@@ -94,12 +97,13 @@ class Question:
     """Defaults of the command that differ from those of the function."""
 
     metavars: Mapping[str, str] = field(default_factory=dict)
-    """What stands for the value of a parameter in the help, where the word of its kind says too little."""
+    """Word for the value of a parameter in the help, if the word of its kind says too little."""
 
     runner: str = ""
     """Module of the function `run` that asks on the command line, where that takes more than showing the answer."""
 
     def __post_init__(self) -> None:
+        """Check topic and place. Raises ValueError or TypeError."""
         if self.topic not in TOPICS:
             raise ValueError(f"topic {self.topic!r} is none of {', '.join(TOPICS)}")
         if not isinstance(self.place, int | float):
@@ -107,22 +111,25 @@ class Question:
 
     @property
     def name(self) -> str:
-        """The name of the command: that of the package, with dashes."""
+        """Return the name of the command: that of the package, with dashes."""
         return self.package.rpartition(".")[2].replace("_", "-")
 
     @property
     def module(self) -> str:
-        """The module that holds the function."""
+        """Return the name of the module that holds the function."""
         return f"{self.package}.question"
 
     @property
     def in_python(self) -> str:
-        """The name of the function in Python: friso.NAME."""
+        """Return the name of the function in Python: friso.NAME."""
         return self.function_name or self.package.rpartition(".")[2]
 
     @cached_property
     def function(self) -> Callable[..., Any]:
-        """The function; imports what it needs. Raises InputError where another package's module has none."""
+        """Return the function, and import what it needs.
+
+        Raises InputError if the module of another package has none.
+        """
         if self.package.startswith("friso."):
             return getattr(import_module(self.module), self.in_python)
         _ = self.summary  # which refuses a function without docstring
@@ -130,18 +137,20 @@ class Question:
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
-        """The parameters of the function."""
+        """Return the parameters of the function."""
         return signature(self.function).parameters
 
     @property
     def options(self) -> list[str]:
-        """The parameters that are options of the command, also those that no kind of the command line stands for."""
+        """Return the parameters that are options, even those that the command line cannot express."""
         return [name for name in self.parameters if name not in self.takes and name not in OF_THE_CALLER]
 
     @cached_property
     def summary(self) -> str:
-        """The first line of the function's docstring without its full stop, read without importing the module. Raises
-        InputError where there is no such function, or it has no docstring."""
+        """Return the first line of the function's docstring without its full stop.
+
+        The module is not imported. Raises InputError if there is no such function, or it has no docstring.
+        """
         text = ""
         try:
             spec = find_spec(self.module)
@@ -165,8 +174,10 @@ QUESTIONS = Registry[Question]("friso.questions", "QUESTION", GROUP, Question)
 
 
 def function_of(name: str) -> Callable[..., Any]:
-    """Return the function friso.NAME of a question. Raises KeyError where none has that name, InputError where another
-    package's module has none."""
+    """Return the function friso.NAME of a question.
+
+    Raises KeyError for an unknown name, and InputError if another package's module has no such function.
+    """
     own = name.replace("_", "-")
     if own in QUESTIONS and QUESTIONS[own].in_python == name:
         return QUESTIONS[own].function

@@ -1,5 +1,7 @@
-"""JSON Schemas of the stage file and of the specification of a design, from what their tables declare: editors complete
-and check files by them, and the reference pages are made of them."""
+"""Derive JSON Schemas of the stage file and of a specification from their tables.
+
+Editors complete and check files by them, and the reference pages are made from them.
+"""
 
 from __future__ import annotations
 
@@ -30,12 +32,12 @@ Node = dict[str, Any]
 
 
 def stage_schema() -> Node:
-    """The schema of the stage file."""
+    """Return the schema of the stage file."""
     return _document(Stage, "A stage file of friso", _template())
 
 
 def specification_schema() -> Node:
-    """The schema of the specification of a design."""
+    """Return the schema of a design's specification."""
     return _document(Spec, "A specification of friso design", {})
 
 
@@ -48,7 +50,7 @@ def _document(cls: type[Section], title: str, described: Mapping[str, str]) -> N
 
 
 def _table(cls: type[Section], place: str, described: Mapping[str, str]) -> Node:
-    """The schema of a table; `described` are comments on keys by their names with dots."""
+    """Return the schema of a table; `described` holds comments on keys by dotted names."""
     documented = _attributes(cls)
     properties = {}
     for key, field in cls.model_fields.items():
@@ -65,7 +67,7 @@ def _table(cls: type[Section], place: str, described: Mapping[str, str]) -> Node
 
 
 def _key(annotation: Any, metadata: Iterable[Any], path: str, described: Mapping[str, str]) -> Node:
-    """The schema of what a key takes."""
+    """Return the schema of what a key takes."""
     for item in metadata:
         if isinstance(item, Table):
             return _one_of(item.pick, path, described)
@@ -81,7 +83,7 @@ def _key(annotation: Any, metadata: Iterable[Any], path: str, described: Mapping
 
 
 def _numeric(item: Quantity | Number | Several | Span | OneOrMany) -> Node:
-    """The schema of numbers: texts with a unit, bare numbers, arrays of them."""
+    """Return the schema of numbers: texts with a unit, bare numbers, or arrays of them."""
     if isinstance(item, Several):
         return {
             "type": "array",
@@ -105,7 +107,7 @@ def _numeric(item: Quantity | Number | Several | Span | OneOrMany) -> Node:
 
 
 def _one_of(pick: Any, path: str, described: Mapping[str, str]) -> Node:
-    """The schema of a table of one of several classes."""
+    """Return the schema of a table that is one of several classes."""
     tables = [_table(cls, path, described) for cls in _classes(pick)]
     if len(tables) == 1:
         return {**tables[0], "description": _sentence(described.get(path, "")) or tables[0].get("description", "")}
@@ -113,7 +115,7 @@ def _one_of(pick: Any, path: str, described: Mapping[str, str]) -> Node:
 
 
 def _classes(pick: Any) -> list[type[Section]]:
-    """The classes that a table may be of."""
+    """Return the classes that a table may be of."""
     variants = getattr(pick, "__self__", None)
     if isinstance(variants, Controllers):
         return [form for forms in variants.forms.values() for form in forms]
@@ -122,7 +124,7 @@ def _classes(pick: Any) -> list[type[Section]]:
 
 @cache
 def _attributes(cls: type[Section]) -> dict[str, str]:
-    """The texts below the keys of a class in its source, its bases' too."""
+    """Return the texts below the keys in the source of a class and of its bases."""
     texts: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         if not issubclass(base, Section):
@@ -146,7 +148,7 @@ _ENTRY = re.compile(r"^(?:# )?(?:\[(?P<table>\w+)\]|(?P<key>\w+) = .*?)(?:\s{2,}
 
 @cache
 def _template() -> dict[str, str]:
-    """What the comments of the file that `friso init` writes say of tables and keys."""
+    """Return the comments on tables and keys in the file that `friso init` writes."""
     texts, table = {}, ""
     for line in files("friso").joinpath("templates/stage.toml").read_text(encoding="utf-8").splitlines():
         match = _ENTRY.match(line)
@@ -160,6 +162,6 @@ def _template() -> dict[str, str]:
 
 
 def _sentence(text: str) -> str:
-    """A text that begins with a capital and ends in a full stop."""
+    """Return a text with a capital first letter and a full stop."""
     text = text.strip().rstrip(":.;")
     return f"{text[0].upper()}{text[1:]}." if text else ""

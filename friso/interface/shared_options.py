@@ -1,6 +1,7 @@
-"""Parameters that several questions share, declared once: how the docstring and the help of the command describe them.
+"""Declare once the parameters that several questions share.
 
-A function names such a parameter in its signature and leaves it out of its docstring; `described` completes that.
+They appear in docstrings and in the help of commands. A function names such a parameter in its signature and leaves it
+out of its docstring; `described` adds it.
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ from typing import Any
 
 @dataclass(frozen=True)
 class SharedOption:
-    """The type and meaning of a parameter as a docstring has them, and its line in the help of a command, where that
-    differs."""
+    """The type and meaning of a shared parameter in docstrings.
+
+    Its line in the help of a command is given if it differs.
+    """
 
     kind: str
     meaning: str
@@ -56,7 +59,7 @@ SHARED: Mapping[str, SharedOption] = {
 
 
 def described(function: Callable[..., Any]) -> str:
-    """Return the docstring of a function with an entry for every parameter, in the order of its signature.
+    """Return the docstring of a function with an entry for every parameter in order.
 
     Raises TypeError for a parameter that is neither in the docstring nor shared.
     """
@@ -75,8 +78,11 @@ def described(function: Callable[..., Any]) -> str:
 
 
 def meaning(function: Callable[..., Any], name: str) -> str:
-    """Return what the help of a command says of a parameter of its function: the first paragraph of its description,
-    without numbers in SI, for texts have units."""
+    """Return what a command's help says of a parameter.
+
+    It is the first paragraph of the parameter's description. Numbers in SI are left out, since a command line takes
+    texts with units.
+    """
     own = {parameter: block for names, block in _parts(function.__doc__ or "")[1] for parameter in names}
     shared = SHARED.get(name)
     if shared is not None and shared.help and own[name].endswith(shared.meaning):
@@ -87,7 +93,7 @@ def meaning(function: Callable[..., Any], name: str) -> str:
 
 
 def _parts(text: str) -> tuple[str, list[tuple[list[str], str]], str]:
-    """Split a docstring into what stands before its parameters, each entry with its names, and what stands behind."""
+    """Split a docstring into the part before its parameters, their entries, and the part behind."""
     match = re.search(r"^Parameters\n-+\n", text, re.MULTILINE)
     following = re.search(r"^\w+\n-+\n", text[match.end() if match else 0 :], re.MULTILINE)
     start = match.start() if match else (following.start() if following else len(text))
@@ -97,7 +103,7 @@ def _parts(text: str) -> tuple[str, list[tuple[list[str], str]], str]:
 
 
 def _entries(text: str) -> Iterator[tuple[list[str], str]]:
-    """The entries of a section of parameters: their names, "only, keep", and their lines."""
+    """Yield the entries of a section of parameters: their names, "only, keep", and their lines."""
     for block in re.split(r"\n(?=\w)", text.strip("\n")):
         if block:
             yield [name.strip() for name in block.partition(":")[0].split(",")], block.rstrip()

@@ -1,4 +1,7 @@
-"""Where to start: a stage file to edit, the examples that come with friso, and the schema by which editors complete."""
+"""Provide what users start from.
+
+These are a stage file to edit, the examples, and the schemas by which editors complete files.
+"""
 
 from __future__ import annotations
 
@@ -18,19 +21,21 @@ EXAMPLES = "examples"
 
 
 def examples_folder() -> Path:
-    """The folder of the examples: in the package where it is installed, beside it in its repository."""
+    """Return the folder of the examples: in the installed package, or beside it in the repository."""
     package = Path(str(files("friso")))
     return next(folder for folder in (package / EXAMPLES, package.parent / EXAMPLES) if folder.is_dir())
 
 
 def example_names() -> list[str]:
-    """The names of the examples that come with friso: stage files, specifications after "specs/", and, with their
-    endings, parameter files of drives after "drives/"."""
+    """Return the names of the examples that come with friso.
+
+    Specifications stand after "specs/". Parameter files of drives stand after "drives/", with their endings.
+    """
     return sorted(_examples())
 
 
 def _examples() -> dict[str, Path]:
-    """The examples by their names."""
+    """Return the paths of the examples by name."""
     folder = examples_folder()
     named = {path.relative_to(folder): path for path in folder.rglob("*.*") if path.suffix in (".toml", ".ini")}
     return {(name.with_suffix("") if name.suffix == ".toml" else name).as_posix(): path for name, path in named.items()}
@@ -76,8 +81,9 @@ def init(
     axis: str | None = None,
     set: Changes = None,
 ) -> Path:
-    """Write a stage file to start from: a commented one, or that of an axis in a drive's parameter file; or a
-    specification for the design of a stage.
+    """Write a stage file to start from, or a specification for the design of a stage.
+
+    The stage file is a commented one, or that of an axis in a drive's parameter file.
 
     Parameters
     ----------
@@ -126,8 +132,10 @@ def _start(
     axis: str | None,
     values: Mapping[str, Any],
 ) -> str:
-    """What is written: a specification, the stage of an axis in a parameter file, or the commented stage file. Raises
-    InputError."""
+    """Return the text of a file to start from.
+
+    It is a specification, the stage of an axis in a parameter file, or the commented stage file. Raises InputError.
+    """
     if spec is not None and source is not None:
         raise InputError("spec", "together with --from", "one of the two", "friso init --from machine.ini")
     if spec is not None:

@@ -1,8 +1,8 @@
-"""Modes and buckling load of undeflected leaves and their stage, from the stiffness and mass of one leaf.
+"""Compute modes and buckling load of straight leaves and their stage.
 
-A leaf between held ends moves along x, y and z and twists independently of each other. Its lowest modes of each kind,
-together with the shapes that it takes statically when the stage moves, describe it completely (Craig & Bampton 1968,
-doi:10.2514/3.4741).
+Stiffness and mass of one leaf suffice. A leaf between held ends moves along x, y and z and twists, each independently
+of the others. Its lowest modes of each kind describe it completely, together with the shapes that it takes statically
+when the stage moves (Craig & Bampton 1968, doi:10.2514/3.4741).
 """
 
 from __future__ import annotations
@@ -27,9 +27,12 @@ bending, bending in its plane, torsion, stretching."""
 
 @dataclass(frozen=True)
 class Reduced:
-    """A straight leaf: `static` (nodes, 6, 6) and `inner` (nodes, 6, modes) its shapes for unit motions of its stage
-    end and in its own modes between held ends at unit modal mass, `squares` (modes,) their circular frequencies squared
-    [1/s^2]; `stiffness` and `mass` (6, 6) at the stage end, `coupling` (modes, 6) the mass between the two kinds."""
+    """A straight leaf reduced to the motion of its stage end and a few modes of its own.
+
+    `static` (nodes, 6, 6) holds its shapes for unit motions of the stage end. `inner` (nodes, 6, modes) holds its modes
+    between held ends at unit modal mass, and `squares` (modes,) their circular frequencies squared [1/s^2]. `stiffness`
+    and `mass` (6, 6) are those at the stage end. `coupling` (modes, 6) is the mass between both kinds of motion.
+    """
 
     static: np.ndarray
     inner: np.ndarray
@@ -40,8 +43,10 @@ class Reduced:
 
     @classmethod
     def of(cls, mechanism: Mechanism, stiffness: np.ndarray, mass: np.ndarray) -> Reduced:
-        """Of the stiffness [N/m, N, N m] and mass [kg, kg m, kg m^2] of the nodes of a leaf, but for its torsion, which
-        is that of a plate."""
+        """Reduce the stiffness [N/m, N, N m] and mass [kg, kg m, kg m^2] of the nodes of a leaf.
+
+        Torsion is replaced by that of a plate.
+        """
         size = len(stiffness)
         stiffness, mass = stiffness.copy(), mass.copy()
         stiffness[3::COORDINATES, 3::COORDINATES], mass[3::COORDINATES, 3::COORDINATES] = _torsion(
@@ -70,8 +75,11 @@ class Reduced:
 
 
 def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Torsional stiffness and mass of the nodes of a leaf that cannot warp at its ends: of cubic elements whose rates
-    of twist at the inner nodes follow statically. Beams lack warping, of which modes have more than statics."""
+    """Return torsional stiffness and mass of the nodes of a leaf that cannot warp at its ends.
+
+    Elements are cubic, and rates of twist at inner nodes follow statically. Beams lack warping, which matters more for
+    modes than for statics.
+    """
     h = float(mechanism.length) / (nodes - 1)
     rigidity = float(mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness))
     warping = rigidity / float(plate.warping_rate(mechanism.width, mechanism.poisson)) ** 2
@@ -93,7 +101,7 @@ def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
-    """The lowest modes and all of the stage, the drive mode first, the others by frequency."""
+    """Return the lowest modes and all modes of the stage: the drive mode first, then by frequency."""
     settings = LeafSpringSettings.current()
     ends, rows = end_motions(mechanism.offsets), _rows(mechanism.offsets)
     count = len(leaf.squares)
@@ -124,7 +132,10 @@ def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
 
 
 def _mode(mechanism: Mechanism, frequency: float, stage: np.ndarray, leaves: np.ndarray) -> Mode:
-    """The mode that moves stage and leaves so, its sign such that the largest displacement of a leaf is positive."""
+    """Build a mode from the motion of stage and leaves.
+
+    Its sign makes the largest displacement of a leaf positive.
+    """
     actuator, sensor = (
         float(along_motion(mechanism, point, stage[:, None])[0]) for point in (mechanism.actuation, mechanism.sensor)
     )
@@ -143,26 +154,31 @@ def _mode(mechanism: Mechanism, frequency: float, stage: np.ndarray, leaves: np.
 
 
 def end_motions(offsets: np.ndarray) -> np.ndarray:
-    """Motion of the leaves' stage ends per small motion of the stage, shape (leaves, 6, 6)."""
+    """Return the motion of the leaves' stage ends per small motion of the stage, (leaves, 6, 6)."""
     ends = np.tile(np.eye(COORDINATES), (len(offsets), 1, 1))
     ends[:, 0, 4], ends[:, 1, 3] = offsets, -offsets
     return ends
 
 
 def _gathered(ends: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """What the stage feels of this matrix at all stage ends."""
+    """Return what the stage feels of a matrix that acts at all stage ends."""
     return np.einsum("lea,ef,lfb->ab", ends, matrix, ends)
 
 
 def _rows(offsets: np.ndarray) -> np.ndarray:
-    """Orthonormal patterns of the leaves, one per row: uniform, linear in the position of the leaf, and the rest."""
+    """Return orthonormal patterns of the leaves, one in each row.
+
+    The first is uniform, the second linear in the position of the leaf, and the rest complete the set.
+    """
     powers = np.vander(np.arange(len(offsets)) - (len(offsets) - 1) / 2, increasing=True)
     return np.linalg.qr(powers)[0].T
 
 
 def buckling_load(mechanism: Mechanism, leaves: LeafBeams, straight: np.ndarray, load: float) -> float:
-    """Least load [N] along the leaves, shared by them, at which the stage sways, `straight` being the stiffness of a
-    leaf without load and `load` a guess [N], at which it is linearised."""
+    """Return the least load [N] along the leaves, shared by them, at which the stage sways.
+
+    `straight` is the stiffness of a leaf without load. `load` [N] is a guess, at which the problem is linearised.
+    """
     state = np.zeros((1, leaves.nodes, COORDINATES))
     strain = load / float(mechanism.leaves * axial(mechanism))
     state[:, :, 0] = -strain * np.linspace(0, float(mechanism.length), leaves.nodes)

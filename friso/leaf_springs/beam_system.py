@@ -1,11 +1,12 @@
-"""The leaves of one mechanism as geometrically exact beams of exudyn: forces, stiffness and mass of their nodes.
+"""Model the leaves of a mechanism as geometrically exact beams of exudyn.
 
-Only this module knows exudyn. A leaf is a chain of equal two-node elements of constant strain. Three things keep few of
-them exact. The bending an element misses because its moment is taken as constant is added to its shear flexibility
-(residual bending flexibility: h^2/(12 E I) per force). The mass its bent middle carries beyond the straight line
-between its nodes is added to its rotary inertia (rho A h^2/6). And what the leaf has as a plate (plate.py) is averaged
-over the element, such that the whole leaf has the stiffness of the plate in parallel motion, under a constant torque,
-and under the torque that a force across the deflected leaf adds.
+Forces, stiffness and mass of their nodes are computed. Only this module knows exudyn. A leaf is a chain of equal
+two-node elements of constant strain. Three things keep few of them exact. The bending an element misses because its
+moment is taken as constant is added to its shear flexibility (residual bending flexibility: h^2/(12 E I) per force).
+The mass its bent middle carries beyond the straight line between its nodes is added to its rotary inertia (rho A
+h^2/6). What the leaf has as a plate (plate.py) is averaged over the element. The whole leaf then has the stiffness
+of the plate in parallel motion, under a constant torque, and under the torque that a force across the deflected leaf
+adds.
 """
 
 from __future__ import annotations
@@ -31,10 +32,14 @@ class BeamFailure(RuntimeError):
 
 
 class LeafBeams:
-    """The leaves, all identical and with free ends: exudyn holds one leaf and evaluates each state in turn.
-    States and forces are of shape (leaves, nodes, 6), the cart end first."""
+    """The identical leaves of a mechanism with free ends, as beams in exudyn.
+
+    exudyn holds one leaf and evaluates each leaf in turn. States and forces have shape (leaves, nodes, 6), with the
+    cart end first.
+    """
 
     def __init__(self, mechanism: Mechanism, elements: int = ELEMENTS) -> None:
+        """Build one leaf of so many elements in exudyn."""
         self.count, self.nodes = int(mechanism.leaves), elements + 1
         import exudyn  # of an extra
 
@@ -83,23 +88,26 @@ class LeafBeams:
 
 @dataclass(frozen=True)
 class Configuration:
-    """A configuration in the plane of motion: displacements of the `inner` nodes (leaves, nodes between the ends, 3)
-    and of the `stage` (x, z, about y)."""
+    """A configuration in the plane of motion.
+
+    `inner` holds the displacements of the nodes between the ends (leaves, nodes between the ends, 3). `stage` holds
+    those of the stage (x, z, about y).
+    """
 
     inner: np.ndarray
     stage: np.ndarray
 
     @classmethod
     def rest(cls, leaves: LeafBeams) -> Configuration:
-        """The configuration without deflection."""
+        """Return the configuration without deflection."""
         return cls(np.zeros((leaves.count, leaves.nodes - 2, 3)), np.zeros(3))
 
     def plus(self, rate: Configuration, factor: float = 1.0) -> Configuration:
-        """The configuration moved along a rate, a factor times."""
+        """Return the configuration moved along a rate by a factor."""
         return Configuration(self.inner + factor * rate.inner, self.stage + factor * rate.stage)
 
     def state(self, offsets: np.ndarray) -> np.ndarray:
-        """That of all nodes, shape (leaves, nodes, 6)."""
+        """Return the state of all nodes, shape (leaves, nodes, 6)."""
         x, z, turn = self.stage
         leaves, inner, _ = self.inner.shape
         state = np.zeros((leaves, inner + 2, COORDINATES))
@@ -112,9 +120,11 @@ class Configuration:
 
 @dataclass(frozen=True)
 class Condensed:
-    """Coordinates of the leaves' nodes, eliminated: the inner nodes `follow` the stage (leaves, inner coordinates, 3)
-    and `settle` (leaves, inner coordinates) under forces that are out of balance; `force` (3,) and `stiffness` (3, 3)
-    are the remainder at the stage."""
+    """The leaves condensed onto the stage: their inner nodes are eliminated.
+
+    Inner nodes `follow` the stage (leaves, inner coordinates, 3), and `settle` (leaves, inner coordinates) under forces
+    that are out of balance. `force` (3,) and `stiffness` (3, 3) are what remains at the stage.
+    """
 
     follow: np.ndarray
     settle: np.ndarray
@@ -125,9 +135,12 @@ class Condensed:
     def of(
         cls, stiffness: np.ndarray, forces: np.ndarray, which: int, ends: np.ndarray, bend: tuple[int, float]
     ) -> Condensed:
-        """Of the stiffness of the leaves and forces on their nodes, the coordinates which, which + 2 and which + 4 of
-        each node; `ends` (leaves, 3, 3) says how those of the leaf ends follow the stage, `bend` at which coordinate
-        their path is curved, and what the forces do there [N m]."""
+        """Condense the stiffness of the leaves and the forces on their nodes.
+
+        Of each node, the coordinates which, which + 2 and which + 4 are used. `ends` (leaves, 3, 3) tells how the leaf
+        ends follow the stage. `bend` tells at which coordinate their path is curved, and which moment [N m] the forces
+        exert there.
+        """
         matrices = stiffness[:, COORDINATES + which :: 2, COORDINATES + which :: 2]
         out = forces[:, 1:, which::2].reshape(len(forces), -1)
         inside, border = slice(None, -3), slice(-3, None)
@@ -143,7 +156,7 @@ class Condensed:
 
 
 def _add_leaf(system: Any, mechanism: Mechanism, elements: int) -> None:
-    """The nodes and elements of a leaf."""
+    """Add the nodes and elements of a leaf."""
     h = float(mechanism.length) / elements
     middles = h * (np.arange(elements // 2) + 0.5)
     half = [
@@ -167,7 +180,10 @@ def _add_leaf(system: Any, mechanism: Mechanism, elements: int) -> None:
 
 
 def _section(mechanism: Mechanism, h: float, curl: float, twist: float) -> Any:
-    """The section of an element of length h, its compliance in bending and torsion over that of a plain beam given."""
+    """Return the section of an element of length h [m].
+
+    Its compliance in bending and torsion over that of a plain beam is given.
+    """
     weak, strong = mechanism.young * mechanism.bending / curl, mechanism.young * mechanism.edgewise
     shears = (edgewise_shear(mechanism), strong), (SHEAR * mechanism.shear * mechanism.area, weak)
     torsion = mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness) / twist
@@ -187,12 +203,15 @@ _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 def _inside(h: float, middles: np.ndarray) -> np.ndarray:
-    """Points for integrals over elements, shape (elements, 4)."""
+    """Return points for integrals over elements, shape (elements, 4)."""
     return middles[:, None] + _POINTS * h / 2
 
 
 def _curl(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
-    """Compliance in bending of elements, weighted by the square of the moment in parallel motion."""
+    """Return the compliance in bending of elements.
+
+    It is weighted by the square of the moment in parallel motion.
+    """
     s = _inside(h, middles)
     return (
         (plate.compliance_profile(s, mechanism.length, mechanism.width, mechanism.poisson) * s**2)
@@ -202,10 +221,12 @@ def _curl(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
 
 
 def _twist(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
-    """Compliance in torsion of elements: as `plate.free_twist`, so that a constant torque meets the stiffness of the
-    plate, but tilted, so that the torque of a force across the deflected leaf, s^3, does so too.
+    """Return the compliance in torsion of elements.
 
-    That torque in an element is s^3 + s h^2/2 at its middle: its strain being constant, it sees the curved leaf as arcs
+    It follows `plate.free_twist`, so that a constant torque meets the stiffness of the plate. It is tilted so that the
+    torque of a force across the deflected leaf, s^3, does so too.
+
+    In an element this torque is s^3 + s h^2/2 at its middle: its strain being constant, it sees the curved leaf as arcs
     (found by comparison; 1/n^2 errors of the stiffness along y vanish).
     """
     s, end = 2 * _inside(h, middles) / mechanism.length, 2 * middles / mechanism.length

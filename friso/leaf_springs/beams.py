@@ -1,8 +1,8 @@
-"""The mechanism as geometrically exact beams (exudyn), nonlinear over the stroke.
+"""Model the mechanism as geometrically exact beams (exudyn), nonlinear over the stroke.
 
-The stage is pushed along z; the leaves then bend in their x-z plane alone, and so does the stage move, while the
-stiffness of the deflected mechanism has all six coordinates: those in the plane (x, z, about y) and those across it
-(y, about x, about z) stay independent. Nodes between cart and stage are eliminated leaf by leaf.
+The stage is pushed along z. Leaves and stage then move in the x-z plane alone. The stiffness of the deflected mechanism
+has all six coordinates: those in the plane (x, z, about y) and those across it (y, about x, about z) stay independent.
+Nodes between cart and stage are eliminated leaf by leaf.
 """
 
 from __future__ import annotations
@@ -24,8 +24,10 @@ PLANE, ACROSS = slice(0, None, 2), slice(1, None, 2)
 
 @dataclass(frozen=True)
 class HeldEquilibrium:
-    """Equilibrium with the stage held at z: the place and its rate per z, the force along z and the tangent stiffness
-    (6, 6) of the stage."""
+    """The equilibrium with the stage held at z.
+
+    It holds the place and its rate per z, the force along z, and the tangent stiffness (6, 6) of the stage.
+    """
 
     place: Configuration
     rate: Configuration
@@ -34,7 +36,10 @@ class HeldEquilibrium:
 
 
 def beams(mechanism: Mechanism, stroke: float, elements: int = ELEMENTS) -> Evaluation:
-    """The mechanism evaluated at 5 deflections up to the stroke [m]. Raises BeamFailure where it has no solution."""
+    """Evaluate the mechanism at 5 deflections up to the stroke [m].
+
+    Raises BeamFailure where it has no solution.
+    """
     _check(mechanism, stroke)
     try:
         with np.errstate(all="ignore"):  # what comes out as no number is found by Leaves
@@ -47,7 +52,7 @@ def beams(mechanism: Mechanism, stroke: float, elements: int = ELEMENTS) -> Eval
 
 
 def _check(mechanism: Mechanism, stroke: float) -> None:
-    """Raises BeamFailure for numbers that make no mechanism."""
+    """Raise BeamFailure for numbers that make no mechanism."""
     dimensions = {name: getattr(mechanism, name) for name in ("length", "width", "thickness", "young", "density")}
     dimensions |= {"leaves": mechanism.leaves, "mass of the stage": mechanism.body.mass, "stroke": stroke}
     for name, value in dimensions.items():
@@ -56,6 +61,7 @@ def _check(mechanism: Mechanism, stroke: float) -> None:
 
 
 def _evaluate(mechanism: Mechanism, stroke: float, leaves: LeafBeams) -> Evaluation:
+    """Evaluate the mechanism from its straight state to the stroke [m], and collect the results."""
     settings = LeafSpringSettings.current()
     deflections = np.linspace(0, stroke, settings.beam_deflections)
     rest = Configuration.rest(leaves)
@@ -84,7 +90,7 @@ def _evaluate(mechanism: Mechanism, stroke: float, leaves: LeafBeams) -> Evaluat
 
 
 def _pushed(mechanism: Mechanism, leaves: LeafBeams, held: list[HeldEquilibrium], z: float) -> HeldEquilibrium:
-    """The next equilibrium, in as few steps as it can be reached."""
+    """Return the next equilibrium, reached in as few steps as possible."""
     settings = LeafSpringSettings.current()
     nearest = held[-2:]
     start = nearest[-1].place.stage[1]
@@ -102,7 +108,10 @@ def _pushed(mechanism: Mechanism, leaves: LeafBeams, held: list[HeldEquilibrium]
 
 
 def _predicted(reached: list[HeldEquilibrium], z: float) -> Configuration:
-    """Extrapolation to z through the last two equilibria and their rates, or along the rate of the only one."""
+    """Extrapolate to z from the last two equilibria and their rates.
+
+    With a single equilibrium, its rate is used.
+    """
     last = reached[-1]
     if len(reached) == 1:
         return last.place.plus(last.rate, z - last.place.stage[1])
@@ -118,7 +127,7 @@ def _predicted(reached: list[HeldEquilibrium], z: float) -> Configuration:
 
 
 def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) -> HeldEquilibrium:
-    """The equilibrium at the z of this place by Newton's method."""
+    """Find the equilibrium at the z of a place by Newton's method."""
     settings = LeafSpringSettings.current()
     z = place.stage[1]
     close = (
@@ -141,7 +150,10 @@ def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) 
 
 @dataclass(frozen=True)
 class LinearisedLeaves:
-    """A configuration linearised in the plane: the change that leads to equilibrium at the same z, and its energy."""
+    """A configuration linearised in the plane.
+
+    It holds the change that leads to equilibrium at the same z, and the energy of that change.
+    """
 
     plane: Condensed
     change: Configuration
@@ -152,7 +164,7 @@ class LinearisedLeaves:
 def _condensed(
     mechanism: Mechanism, place: Configuration, stiffness: np.ndarray, forces: np.ndarray
 ) -> LinearisedLeaves:
-    """The stiffness of the leaves and the forces on their nodes, condensed onto the stage."""
+    """Condense stiffness of the leaves and forces on their nodes onto the stage."""
     offsets, turn = mechanism.offsets, place.stage[2]
     ends = np.tile(np.eye(3), (len(offsets), 1, 1))
     ends[:, 0, 2], ends[:, 1, 2] = np.cos(turn) * offsets, -np.sin(turn) * offsets
@@ -170,7 +182,7 @@ def _condensed(
 def _held(
     mechanism: Mechanism, place: Configuration, solved: LinearisedLeaves, stiffness: np.ndarray, forces: np.ndarray
 ) -> HeldEquilibrium:
-    """The equilibrium next to this place."""
+    """Return the equilibrium next to a place."""
     plane = solved.plane
     rate = np.array([0.0, 1.0, 0.0])
     rate[::2] = -np.linalg.solve(plane.stiffness[::2, ::2], plane.stiffness[::2, 1])
@@ -186,7 +198,7 @@ def _held(
 
 
 def _across(mechanism: Mechanism, turn: float, stiffness: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Stiffness of the stage along y and about x and z, itself turned about y."""
+    """Return the stiffness of the stage along y and about x and z, with the stage turned about y."""
     offsets, tilt = mechanism.offsets, np.cos(turn)
     ends = np.tile(np.eye(3), (len(offsets), 1, 1))
     ends[:, 0, 1] = -tilt * offsets

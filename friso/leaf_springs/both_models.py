@@ -1,4 +1,4 @@
-"""A mechanism by both models, at one stroke."""
+"""Evaluate leaf springs by both models at one stroke."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ BEAMS, CLOSED = "Beams", "Closed forms"
 
 @dataclass(frozen=True)
 class BothModels:
-    """The leaf springs of a stage at a stroke by closed forms and by beams; None, with the reason in `failure`, where
-    the beam model has no solution."""
+    """The leaf springs of a stage at a stroke, by closed forms and by beams.
+
+    `beams` is None where the beam model has no solution; `failure` gives the reason.
+    """
 
     stage: Stage
     closed: Evaluation
@@ -26,22 +28,23 @@ class BothModels:
 
     @property
     def best(self) -> Evaluation:
-        """The more exact one: the beams, where they have a solution."""
+        """Return the more exact evaluation: beams, if they have a solution."""
         return self.beams or self.closed
 
     @property
     def models(self) -> dict[str, Evaluation]:
-        """The evaluations by the name of the model."""
+        """Return the evaluations by the name of the model."""
         models = {} if self.beams is None else {BEAMS: self.beams}
         return {**models, CLOSED: self.closed}
 
     @property
     def mechanism(self) -> Mechanism:
+        """Return the mechanism that was evaluated."""
         return self.closed.mechanism
 
 
 def both_models(stage: Stage, mechanism: Mechanism, stroke: float) -> BothModels:
-    """The leaf springs of a stage at a stroke [m]; a failure of the beams is kept as such."""
+    """Evaluate the leaf springs of a stage at a stroke [m]; a failure of the beams is kept."""
     simple = closed_form_model(mechanism, stroke)
     try:
         return BothModels(stage, simple, beams(mechanism, stroke))

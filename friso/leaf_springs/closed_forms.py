@@ -30,23 +30,29 @@ theta'' = -p^2 m (m theta - mean of m theta), m = 1 - x/L, theta = 0 at both cla
 
 
 def drive_stiffness(mechanism: Mechanism) -> Any:
-    """Stiffness along the motion, the stage kept parallel: n 12 E I/L^3, stiffened as a plate."""
+    """Return the stiffness along the motion with the stage kept parallel.
+
+    It is n 12 E I/L^3, stiffened as a plate.
+    """
     beam = 12 * mechanism.young * mechanism.bending / mechanism.length**3
     return mechanism.leaves * beam * plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
 
 
 def loaded_drive_stiffness(mechanism: Mechanism) -> Any:
-    """The stiffness along the motion under the load along the leaves: gone at the buckling load."""
+    """Return the stiffness along the motion under the load along the leaves.
+
+    It vanishes at the buckling load.
+    """
     return drive_stiffness(mechanism) * (1 - mechanism.load / buckling_load(mechanism))
 
 
 def axial(mechanism: Mechanism) -> Any:
-    """E A of a leaf [N], as stiff as its clamps make it."""
+    """Return E A of a leaf [N], as stiff as its clamps make it."""
     return mechanism.young * mechanism.area * plate.stretching(mechanism.length, mechanism.width, mechanism.poisson)
 
 
 def edgewise_shear(mechanism: Mechanism) -> Any:
-    """5/6 G A of a leaf in its plane [N], as stiff as its clamps make it."""
+    """Return 5/6 G A of a leaf in its plane [N], as stiff as its clamps make it."""
     return (
         SHEAR
         * mechanism.shear
@@ -56,15 +62,20 @@ def edgewise_shear(mechanism: Mechanism) -> Any:
 
 
 def support_x(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
-    """Stiffness along the leaves with all else held: falls as the deflected leaves, which are plates, bend under it."""
+    """Return the stiffness along the leaves with all else held.
+
+    It falls as the leaves deflect, because deflected leaves bend under the force. Leaves count as plates.
+    """
     straight = mechanism.leaves * axial(mechanism) / mechanism.length
     stiffened = plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
     return straight / (1 + 12 / 700 * (deflection / mechanism.thickness) ** 2 / stiffened)
 
 
 def support_y(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
-    """Stiffness along the width with all else held: bending and shear in the plane of the leaves, and the twist
-    4 delta (s/L)^3 that a force across a deflected leaf adds, s from its middle, without the warping its clamps forbid.
+    """Return the stiffness along the width with all else held.
+
+    It contains bending and shear in the plane of the leaves. A force across a deflected leaf also twists it by 4 delta
+    (s/L)^3, with s from its middle, without the warping that its clamps forbid.
     """
     flat = mechanism.length**3 / (12 * mechanism.young * mechanism.edgewise) + mechanism.length / edgewise_shear(
         mechanism
@@ -75,7 +86,7 @@ def support_y(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
 
 
 def _cubic_twist(mechanism: Mechanism) -> Any:
-    """Compliance of a leaf under a torque that goes with s^3, over that of one free to warp.
+    """Return the torsional compliance relative to free warping, for a torque that goes with s^3.
 
     The rate of twist p solves p - p''/rate^2 = s^3, with p = 0 at the clamps: p = s^3 + 6 s/rate^2 - A sinh(rate s).
     """
@@ -87,18 +98,21 @@ def _cubic_twist(mechanism: Mechanism) -> Any:
 
 
 def max_stress(mechanism: Mechanism, deflection: Any) -> Any:
-    """Largest bending stress [Pa] at the clamps, 3 E t delta/L^2 for a beam."""
+    """Return the largest bending stress [Pa] at the clamps; for a beam, 3 E t delta/L^2."""
     beam = 3 * mechanism.young * mechanism.thickness * deflection / mechanism.length**2
     return beam * plate.stress_factors(mechanism.length, mechanism.width, mechanism.poisson)[1]
 
 
 def shortening(mechanism: Mechanism, deflection: Any) -> Any:
-    """By how much the stage comes nearer to the cart: 3 delta^2/(5 L)."""
+    """Return by how much the stage comes nearer to the cart: 3 delta^2/(5 L)."""
     return 3 * deflection**2 / (5 * mechanism.length)
 
 
 def buckling_load(mechanism: Mechanism) -> Any:
-    """Load along the leaves, borne by all of them, at which the stage sways: n pi^2 E I/L^2, stiffened as a plate."""
+    """Return the load along all leaves together at which the stage sways.
+
+    It is n pi^2 E I/L^2, stiffened as a plate.
+    """
     return (
         mechanism.leaves
         * np.pi**2
@@ -110,7 +124,10 @@ def buckling_load(mechanism: Mechanism) -> Any:
 
 
 def leaf_bending(mechanism: Mechanism) -> Any:
-    """Frequency of the first bending mode of a leaf between its clamps: 1.028 t/L^2 sqrt(E/rho), stiffened."""
+    """Return the frequency of the first bending mode of a leaf between its clamps.
+
+    It is 1.028 t/L^2 sqrt(E/rho), stiffened.
+    """
     beam = (
         CLAMPED**2
         / (2 * np.pi * mechanism.length**2)
@@ -120,14 +137,18 @@ def leaf_bending(mechanism: Mechanism) -> Any:
 
 
 def _mode_stiffening(mechanism: Mechanism) -> Any:
-    """Stiffening for moments that change their sign along the leaf as in a mode: as in parallel motion, on which the
-    even share of the moments, which are far from the clamps, has little influence."""
+    """Return the stiffening for moments that change sign along the leaf, as in a mode.
+
+    It is that of parallel motion. The even share of the moments lies far from the clamps and has little influence.
+    """
     return plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
 
 
 def leaf_torsion(mechanism: Mechanism) -> Any:
-    """Frequency of the first torsional mode of a leaf between its clamps, by Rayleigh's quotient of the twist that an
-    even torque along it makes."""
+    """Return the frequency of the first torsional mode of a leaf between its clamps.
+
+    It is Rayleigh's quotient of the twist that an even torque along the leaf makes.
+    """
     rate = plate.warping_rate(mechanism.width, mechanism.poisson)
     nodes, weights = np.polynomial.legendre.leggauss(24)
     half = np.asarray(rate * mechanism.length / 2)[..., None]
@@ -139,13 +160,16 @@ def leaf_torsion(mechanism: Mechanism) -> Any:
 
 
 def lateral_load(mechanism: Mechanism) -> Any:
-    """Force across the leaves, along their width at the leaf ends and borne by all of them, at which they give way."""
+    """Return the force along the leaves' width at which they give way sideways.
+
+    The force acts at the leaf ends, on all leaves together.
+    """
     twist = mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness)
     return mechanism.leaves * LATERAL * np.sqrt(mechanism.young * mechanism.bending * twist) / mechanism.length**2
 
 
 def stage_stiffness(mechanism: Mechanism) -> np.ndarray:
-    """Stiffness of the stage at its reference point, undeflected, shape (..., 6, 6)."""
+    """Return the stiffness of the undeflected stage at its reference point, shape (..., 6, 6)."""
     odd, even = (
         plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson, parity) for parity in (True, False)
     )
@@ -174,7 +198,10 @@ def stage_stiffness(mechanism: Mechanism) -> np.ndarray:
 
 
 def stage_mass(mechanism: Mechanism) -> np.ndarray:
-    """Mass of stage and leaves, the latter following as they do statically, at the reference point, (..., 6, 6)."""
+    """Return the mass of stage and leaves at the reference point, shape (..., 6, 6).
+
+    The leaves follow the stage statically.
+    """
     leaf, length, spread = mechanism.leaf_mass, mechanism.length, mechanism.offset_squares
     leaves = _symmetric(
         mechanism,
@@ -193,7 +220,7 @@ def stage_mass(mechanism: Mechanism) -> np.ndarray:
 
 
 def body_mass(mechanism: Mechanism) -> np.ndarray:
-    """Mass of the rigid stage alone at its reference point, shape (..., 6, 6)."""
+    """Return the mass of the rigid stage alone at its reference point, shape (..., 6, 6)."""
     mass = mechanism.body.mass
     x, y, z = mechanism.body.centre[0] - mechanism.length, mechanism.body.centre[1], mechanism.body.centre[2]
     inertia = mechanism.body.inertia
@@ -220,7 +247,7 @@ def body_mass(mechanism: Mechanism) -> np.ndarray:
 
 
 def _symmetric(mechanism: Mechanism, entries: dict[tuple[int, int], Any]) -> np.ndarray:
-    """The matrices, shape (..., 6, 6), with these entries on and above the diagonal."""
+    """Build symmetric matrices, shape (..., 6, 6), from entries on and above the diagonal."""
     shape = np.broadcast_shapes(*(np.shape(entry) for entry in entries.values()), np.shape(mechanism.length))
     matrices = np.zeros((*shape, 6, 6))
     for (i, k), entry in entries.items():
@@ -229,10 +256,12 @@ def _symmetric(mechanism: Mechanism, entries: dict[tuple[int, int], Any]) -> np.
 
 
 def modes(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies, shape (..., 7), ascending, and shapes, (..., 7, 7), one per column at unit modal mass, of the stage
-    (six coordinates) and the leaves that all bend in phase in their first mode (the seventh, at its unit modal mass),
-    the leaves following the stage statically besides (Craig & Bampton 1968, doi:10.2514/3.4741); NaN where the numbers
-    make no mechanism."""
+    """Return frequencies (..., 7), ascending, and mode shapes (..., 7, 7) of stage and leaves.
+
+    Shapes stand in columns at unit modal mass. Six coordinates are the stage's. The seventh is the first bending mode
+    of all leaves in phase, at its unit modal mass. Besides, the leaves follow the stage statically (Craig & Bampton
+    1968, doi:10.2514/3.4741). Numbers that make no mechanism give NaN.
+    """
     mass, stiffness = stage_mass(mechanism), stage_stiffness(mechanism)
     mass, stiffness = (np.pad(matrix, [(0, 0)] * (matrix.ndim - 2) + [(0, 1), (0, 1)]) for matrix in (mass, stiffness))
     together = np.sqrt(mechanism.leaves * mechanism.leaf_mass)
@@ -250,7 +279,9 @@ def modes(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
 
 
 def drive_mode(frequencies: np.ndarray, shapes: np.ndarray) -> np.ndarray:
-    """Which of the modes, frequencies [Hz] (..., modes) and shapes (..., 7, modes), is the drive mode: that which
-    yields most to a steady force along the motion."""
+    """Return the number of the drive mode, which yields most to a steady force along the motion.
+
+    `frequencies` [Hz] have shape (..., modes), and shapes (..., 7, modes).
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.argmax(np.nan_to_num((shapes[..., 2, :] / frequencies) ** 2, posinf=np.inf), axis=-1)

@@ -1,4 +1,4 @@
-"""The closed forms as a model of one mechanism at a stroke."""
+"""Evaluate one mechanism at a stroke by closed forms."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from friso.leaf_springs.settings import LeafSpringSettings
 
 
 def closed_form_model(mechanism: Mechanism, stroke: float) -> Evaluation:
-    """The mechanism by closed forms over its stroke [m]: its drive stiffness is the same at any deflection."""
+    """Evaluate the mechanism by closed forms over its stroke [m].
+
+    Its drive stiffness is equal at all deflections.
+    """
     settings = LeafSpringSettings.current()
     deflections = np.linspace(0.0, stroke, settings.closed_deflections)
     drive = closed_forms.drive_stiffness(mechanism) * np.ones(settings.closed_deflections)
@@ -37,7 +40,10 @@ def closed_form_model(mechanism: Mechanism, stroke: float) -> Evaluation:
 
 
 def _modes(mechanism: Mechanism) -> tuple[Mode, ...]:
-    """Modes of the stage with all leaves bending in phase, and modes of the leaves with the stage at rest."""
+    """Return the modes of stage and leaves by closed forms.
+
+    The leaves bend in phase with the stage, or move with the stage at rest.
+    """
     frequencies, shapes = closed_forms.modes(mechanism)
     drive = int(closed_forms.drive_mode(frequencies, shapes))
     first = replace(_mode(mechanism, frequencies[drive], shapes[:, drive]), name="drive")
@@ -46,7 +52,7 @@ def _modes(mechanism: Mechanism) -> tuple[Mode, ...]:
 
 
 def _mode(mechanism: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
-    """A mode of the stage's six coordinates and the bending of the leaves."""
+    """Build a mode from the stage's six coordinates and the bending of the leaves."""
     stage, leaves = shape[:6], following(mechanism, shape[:6])
     leaves[:, :, 2] += shape[6] / np.sqrt(mechanism.leaves * mechanism.leaf_mass) * _clamped_shape()
     actuator, sensor = (
@@ -58,7 +64,10 @@ def _mode(mechanism: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
 
 
 def following(mechanism: Mechanism, stage: np.ndarray) -> np.ndarray:
-    """How the middle lines of the leaves move with the stage (6,), statically, shape (leaves, POINTS, 3)."""
+    """Return how the leaves' middle lines follow a motion of the stage, (leaves, POINTS, 3).
+
+    The motion has shape (6,), and the leaves follow statically.
+    """
     settings = LeafSpringSettings.current()
     s = np.linspace(0.0, 1.0, settings.mode_shape_points)
     by_place, by_slope = 3 * s**2 - 2 * s**3, mechanism.length * (s**3 - s**2)
@@ -79,7 +88,7 @@ def following(mechanism: Mechanism, stage: np.ndarray) -> np.ndarray:
 
 
 def _unlike(mechanism: Mechanism) -> list[Mode]:
-    """The first bending mode of the leaves against each other, the stage at rest."""
+    """Return the first bending mode of the leaves against each other, with the stage at rest."""
     settings = LeafSpringSettings.current()
     count, leaf_mass = int(mechanism.leaves), float(mechanism.leaf_mass)
     modes = []
@@ -93,7 +102,7 @@ def _unlike(mechanism: Mechanism) -> list[Mode]:
 
 
 def _clamped_shape() -> np.ndarray:
-    """First bending mode of a beam between clamps at even places, its mean square 1."""
+    """Return the first bending mode of a clamped beam at even places, with mean square 1."""
     settings = LeafSpringSettings.current()
     x = CLAMPED * np.linspace(0.0, 1.0, settings.mode_shape_points)
     ratio = (np.cosh(CLAMPED) - np.cos(CLAMPED)) / (np.sinh(CLAMPED) - np.sin(CLAMPED))
@@ -101,7 +110,7 @@ def _clamped_shape() -> np.ndarray:
 
 
 def _torsion_mode(mechanism: Mechanism) -> Mode:
-    """The first torsion of the leaves, whose middle lines stay at rest."""
+    """Return the first torsional mode of the leaves, whose middle lines stay at rest."""
     settings = LeafSpringSettings.current()
     leaves = np.zeros((int(mechanism.leaves), settings.mode_shape_points, 3))
     return Mode("leaf torsion", float(closed_forms.leaf_torsion(mechanism)), 0.0, 0.0, 0.0, np.zeros(6), leaves)

@@ -1,4 +1,7 @@
-"""A deflected leaf as a curved beam: its 6 x 6 stiffness from the energy of unit loads at its end (Castigliano)."""
+"""Model a deflected leaf as a curved beam.
+
+Its 6 x 6 stiffness follows from the energy of unit loads at its end (Castigliano).
+"""
 
 from __future__ import annotations
 
@@ -11,10 +14,10 @@ from friso.leaf_springs.settings import LeafSpringSettings
 
 
 def stage_stiffness_at(mechanism: Mechanism, deflection: float) -> np.ndarray:
-    """Stiffness of the stage of one mechanism at its reference point, deflected [m] and kept parallel, (6, 6).
+    """Return the stiffness of the deflected stage [m] at its reference point, (6, 6).
 
-    Elasticity is linear about the deflected shape; the forces that hold it there are too small to matter as long as
-    they are small against the buckling load.
+    The stage is kept parallel. Elasticity is linear about the deflected shape. The forces that hold the shape are too
+    small to matter as long as they are small against the buckling load.
     """
     leaf = leaf_stiffness(mechanism, deflection)
     stiffness = np.zeros((6, 6))
@@ -26,7 +29,7 @@ def stage_stiffness_at(mechanism: Mechanism, deflection: float) -> np.ndarray:
 
 
 def leaf_stiffness(mechanism: Mechanism, deflection: float) -> np.ndarray:
-    """Stiffness of one leaf at its end, deflected [m] to 3 s^2 - 2 s^3, (6, 6)."""
+    """Return the stiffness of one leaf at its end, deflected [m] to 3 s^2 - 2 s^3, (6, 6)."""
     settings = LeafSpringSettings.current()
     nodes, weights = np.polynomial.legendre.leggauss(settings.gauss_points)
     x, weight = (nodes + 1) / 2 * mechanism.length, weights / 2 * mechanism.length
@@ -38,7 +41,7 @@ def leaf_stiffness(mechanism: Mechanism, deflection: float) -> np.ndarray:
 
 
 def _per(mechanism: Mechanism, x: np.ndarray, weight: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Compliance of the section for each resultant, (points, 6), and the length of arc per point, (points,)."""
+    """Return compliance of the section for each resultant, (points, 6), and arc length, (points,)."""
     s = x - mechanism.length / 2
     sheared = 1 / (SHEAR * mechanism.shear * mechanism.area)
     shape, ends = (mechanism.length, mechanism.width, mechanism.poisson), 2 * s / mechanism.length
@@ -62,8 +65,10 @@ def _per(mechanism: Mechanism, x: np.ndarray, weight: np.ndarray, slope: np.ndar
 def _resultants(
     mechanism: Mechanism, deflection: float, x: np.ndarray, height: np.ndarray, slope: np.ndarray
 ) -> np.ndarray:
-    """Forces and moments along and about tangent, width and normal at the points, per unit load at the end:
-    shape (points, 6, 6)."""
+    """Return forces and moments at the points per unit load at the end, shape (points, 6, 6).
+
+    They act along and about tangent, width and normal.
+    """
     cosine, sine = 1 / np.sqrt(1 + slope**2), slope / np.sqrt(1 + slope**2)
     turn = np.zeros((len(x), 3, 3))
     turn[:, 0, 0], turn[:, 0, 2], turn[:, 1, 1], turn[:, 2, 0], turn[:, 2, 2] = cosine, sine, 1.0, -sine, cosine

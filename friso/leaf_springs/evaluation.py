@@ -1,4 +1,4 @@
-"""What is known of a mechanism at a stroke, by whichever model."""
+"""Collect the results on a mechanism at a stroke, by any model."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ from friso.leaf_springs.settings import LeafSpringSettings
 
 @dataclass(frozen=True)
 class Mode:
-    """A mode: its name, frequency [Hz], and displacement as (count, 3) triples at unit modal mass [1/sqrt(kg)]: of the
-    leaves, shape (leaves, points, 3), at even places from cart to stage, and the stage's motion (6,): translation of
-    the reference point (the middle of the leaf ends) and rotation [1/m] about it.
+    """A mode of the mechanism: its name, its frequency [Hz], and its displacements.
 
-    `actuator` and `sensor` [1/sqrt(kg)] tell how far the mode moves where the actuator pushes and where the sensor
-    looks, along the motion; `peak` how far its resonance rises over the line of the stage's mass.
+    Displacements are (count, 3) triples at unit modal mass [1/sqrt(kg)]. Those of the leaves have shape (leaves,
+    points, 3), at even places from cart to stage. The stage's motion (6,) is a translation of its reference point, the
+    middle of the leaf ends, and a rotation [1/m] about it.
+
+    `actuator` and `sensor` [1/sqrt(kg)] tell how far the mode moves along the motion, where the actuator pushes and
+    where the sensor measures. `peak` tells how far its resonance rises over the line of the stage's mass.
     """
 
     name: str
@@ -32,22 +34,25 @@ class Mode:
 
     @property
     def interferes(self) -> bool:
-        """Whether actuator and sensor both see it well enough to disturb control."""
+        """Tell whether actuator and sensor both see the mode well enough to disturb control."""
         settings = LeafSpringSettings.current()
         return self.peak > settings.visible_peak
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """A mechanism at deflections of its stage along the motion [m], from 0 to the stroke, shape (n,).
+    """A mechanism at deflections of its stage along the motion.
 
-    `forces` [N] hold it there; `drive` is the stiffness along the motion [N/m] with the stage free to shift and turn
-    otherwise, `support_x` along the leaves and `support_y` along their width [N/m] with all else held, each of shape
-    (n,). `stiffness` (2, 6, 6) is that of the stage at its reference point, the middle of the leaf ends, at deflection
-    0 and at full stroke: forces [N] and moments [N m] along and about x, y, z per displacement [m] and rotation.
-    `modes` are those at deflection 0, the drive mode first, the others by frequency. At full stroke: `stress`, the
-    largest bending stress [Pa], without and with the concentration at the `clamp`, and the `shortening` of the leaves
-    [m]. `buckling` is the load [N] along the leaves, borne by all of them, at which the stage sways.
+    `deflections` [m] run from 0 to the stroke, shape (n,). `forces` [N] hold the stage there. `drive` is the stiffness
+    along the motion [N/m], with the stage otherwise free to shift and turn. `support_x` along the leaves and
+    `support_y` along their width [N/m] hold with all else fixed. All have shape (n,).
+
+    `stiffness` (2, 6, 6) is that of the stage at its reference point, the middle of the leaf ends, at deflection 0 and
+    at full stroke. It relates forces [N] and moments [N m] along and about x, y, z to displacements [m] and rotations.
+    `modes` are those at deflection 0, the drive mode first, then by frequency.
+
+    At full stroke, `stress` is the largest bending stress [Pa] without the concentration at the clamp, and `shortening`
+    how much the leaves shorten [m]. `buckling` is the load [N] along all leaves together at which the stage sways.
     """
 
     model: str
@@ -65,53 +70,59 @@ class Evaluation:
 
     @property
     def stroke(self) -> float:
+        """Return the largest deflection [m]."""
         return float(self.deflections[-1])
 
     @property
     def loaded_drive(self) -> float:
-        """The drive stiffness [N/m] at deflection 0 under the load along the leaves: gone at the buckling load."""
+        """Return the drive stiffness [N/m] at deflection 0 under the load along the leaves.
+
+        It vanishes at the buckling load.
+        """
         return float(self.drive[0] * (1 - self.mechanism.load / self.buckling))
 
     @property
     def buckling_margin(self) -> float:
-        """Buckling load over the load along the leaves, or over the weight of the stage where there is none; infinite
-        where the load pulls."""
+        """Return the buckling load over the load along the leaves.
+
+        Without a load, the weight of the stage counts. The margin is infinite if the load pulls.
+        """
         load = self.mechanism.load if self.mechanism.load else self.mechanism.weight
         return float(self.buckling / load) if load > 0 else np.inf
 
     @property
     def clamp_stress(self) -> float:
-        """The stress [Pa] at full stroke times the factor for the clamp."""
+        """Return the stress [Pa] at full stroke times the concentration factor of the clamp."""
         return self.stress * self.mechanism.stress_concentration
 
     @property
     def nonlinearity(self) -> float:
-        """The largest share by which the force departs from a constant stiffness over the stroke."""
+        """Return the largest relative deviation of the force from a constant stiffness."""
         linear = self.drive[0] * self.deflections
         return float(np.max(np.abs(self.forces[1:] / linear[1:] - 1)))
 
     @property
     def fatigue_margin(self) -> float:
-        """Stress borne for ever over that at the clamp at full stroke; NaN where the former is not known."""
+        """Return the fatigue limit over the clamp stress at full stroke; NaN if the limit is unknown."""
         return self.mechanism.fatigue / self.clamp_stress
 
     @property
     def yield_margin(self) -> float:
-        """Yield strength over the stress at the clamp at full stroke."""
+        """Return the yield strength over the clamp stress at full stroke."""
         return self.mechanism.yield_strength / self.clamp_stress
 
     @property
     def interfering(self) -> Mode | None:
-        """The lowest mode other than the drive mode that interferes with control."""
+        """Return the lowest mode that interferes with control, other than the drive mode."""
         return next((mode for mode in self.modes if self.interferes(mode)), None)
 
     def interferes(self, mode: Mode) -> bool:
-        """Whether a mode disturbs control: all but the drive mode, on which control works, may."""
+        """Tell whether a mode disturbs control; the drive mode, on which control works, never does."""
         return mode.interferes and mode is not self.modes[0]
 
     @property
     def named_modes(self) -> dict[str, Mode]:
-        """The modes by name, in their order; namesakes beyond the first are counted."""
+        """Return the modes by name in their order; repeated names are numbered."""
         counts: Counter[str] = Counter()
         named = {}
         for mode in self.modes:
@@ -121,8 +132,11 @@ class Evaluation:
 
 
 def peak_of(mechanism: Mechanism, actuator: float, sensor: float) -> float:
-    """How far the resonance of a mode rises over the line of the stage's mass, from its motion [1/sqrt(kg)] at actuator
-    and sensor: residue phi_a phi_s, 1/m of the mass, and 2 zeta of the resonance."""
+    """Return how far a mode's resonance rises above the line of the stage's mass.
+
+    It follows from the mode's motion [1/sqrt(kg)] at actuator and sensor. The residue is phi_a phi_s against 1/m of the
+    mass, and the resonance divides by 2 zeta.
+    """
     return abs(actuator * sensor) * float(mechanism.body.mass) / (2 * float(mechanism.damping_ratio))
 
 

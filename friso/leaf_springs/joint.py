@@ -1,4 +1,4 @@
-"""What the leaf springs of a stage are to its equations of motion: stiffness of the joint and parasitic mode."""
+"""Derive joint stiffness and parasitic mode of the equations of motion from leaf springs."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ from friso.stage.flexure import register_derivation
 
 @register_derivation("flexure")
 def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """`joint.stiffness` and the keys of [parasitic] of a stage whose leaves are given, by closed forms. Raises
-    InputError where a single mechanism buckles under its load."""
+    """Return `joint.stiffness` and the keys of [parasitic] for given leaves, by closed forms.
+
+    Raises InputError if a single mechanism buckles under its load.
+    """
     with np.errstate(all="ignore"):  # numbers that make no mechanism are found out by the rules of the stage file
         mechanism = Mechanism.of(flat)
         frequency, share = parasitic_mode(mechanism)
@@ -39,8 +41,11 @@ def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class VisibleModes:
-    """The modes of mechanisms other than the drive mode, arrays of shape (..., 7): frequency [Hz], and residue times
-    the mass of the stage, positive where actuator and sensor move in phase; those at the drive mode are 0."""
+    """The modes of mechanisms other than the drive mode, arrays of shape (..., 7).
+
+    They hold frequency [Hz], and residue times the mass of the stage. A residue is positive where actuator and sensor
+    move in phase. Entries at the drive mode are 0.
+    """
 
     frequency: np.ndarray
     residue: np.ndarray
@@ -48,7 +53,7 @@ class VisibleModes:
 
     @classmethod
     def of(cls, mechanism: Mechanism) -> VisibleModes:
-        """The modes of mechanisms by closed forms."""
+        """Compute the modes of mechanisms by closed forms."""
         settings = LeafSpringSettings.current()
         frequency, shapes = closed_forms.modes(mechanism)
         motion = along_motion(mechanism, mechanism.actuation, shapes) * along_motion(
@@ -60,7 +65,10 @@ class VisibleModes:
         return cls(frequency, residue, np.abs(residue) > least)
 
     def at(self, mode: np.ndarray) -> tuple[Any, Any]:
-        """Frequency [Hz] and residue, each (...), of one mode each; infinite and 0 where none is visible."""
+        """Return frequency [Hz] and residue, each (...), of one mode of each mechanism.
+
+        They are infinite and 0 if no mode is visible.
+        """
         picked = [
             np.take_along_axis(quantity, mode[..., None], axis=-1)[..., 0]
             for quantity in (self.frequency, self.residue)
@@ -70,17 +78,22 @@ class VisibleModes:
 
 
 def first_interfering(mechanism: Mechanism) -> Any:
-    """Frequency [Hz] of the lowest mode other than the drive mode that actuator and sensor see; infinite if none."""
+    """Return the frequency [Hz] of the lowest interfering mode; infinite if there is none.
+
+    Actuator and sensor both see the mode, and it is not the drive mode.
+    """
     visible = VisibleModes.of(mechanism)
     return visible.at(np.argmin(np.where(visible.visible, visible.frequency, np.inf), axis=-1))[0]
 
 
 def parasitic_mode(mechanism: Mechanism) -> tuple[Any, Any]:
-    """Frequency [Hz] and residue, times the stage's mass, of the mode whose resonance stands highest in the plant: the
-    largest residue over the square of the frequency. Where none is seen, that of the leaves, without weight.
+    """Return frequency [Hz] and residue of the mode whose resonance stands highest in the plant.
 
-    The model of the equations, a part m_p of the stage's mass m on a spring, has the residue m_p/(m (m - m_p)); it
-    knows none below 0, of modes in which actuator and sensor move against each other, of which the size counts here.
+    Residues are multiplied by the stage's mass. The mode has the largest residue over the square of its frequency. If
+    none is visible, the leaves' own mode is returned without weight.
+
+    In the equations, a part m_p of the stage's mass m moves on a spring, with the residue m_p/(m (m - m_p)). That is
+    never negative. If actuator and sensor move against each other, only the size of the residue counts.
     """
     settings = LeafSpringSettings.current()
     visible = VisibleModes.of(mechanism)

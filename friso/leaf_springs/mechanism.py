@@ -24,8 +24,11 @@ ALUMINIUM = 2700.0
 
 @dataclass(frozen=True)
 class MovingBody:
-    """The stage: mass [kg], moments of inertia [kg m^2] about axes through its centre of mass, and where that is [m],
-    each a triple for x, y, z. Products of inertia are 0."""
+    """The stage as a rigid body: mass [kg], moments of inertia [kg m^2], and centre of mass [m].
+
+    Moments of inertia are about axes through the centre of mass. Each triple stands for x, y, z. Products of inertia
+    are 0.
+    """
 
     mass: Any
     inertia: tuple[Any, Any, Any]
@@ -61,7 +64,10 @@ class Mechanism:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> Mechanism:
-        """The mechanism of a stage given as flat keys to SI numbers or arrays. Raises KeyError without [flexure]."""
+        """Build the mechanism of a stage given as flat keys to SI numbers or arrays.
+
+        Raises KeyError for a stage without [flexure].
+        """
         section = {key.removeprefix("flexure."): value for key, value in flat.items() if key.startswith("flexure.")}
         names = ("leaves", "length", "width", "thickness", "spacing", "young", "poisson", "density")
         shape = {name: section[name] for name in names}
@@ -87,7 +93,7 @@ class Mechanism:
         )
 
     def member(self, number: int) -> Mechanism:
-        """One of many mechanisms."""
+        """Return one of many mechanisms."""
 
         def pick(value: Any) -> Any:
             if isinstance(value, tuple):
@@ -100,64 +106,68 @@ class Mechanism:
 
     @property
     def weight(self) -> Any:
-        """Weight of the stage [N]."""
+        """Return the weight of the stage [N]."""
         return GRAVITY * self.body.mass
 
     @property
     def shear(self) -> Any:
-        """Shear modulus [Pa]."""
+        """Return the shear modulus [Pa]."""
         return self.young / (2 * (1 + self.poisson))
 
     @property
     def area(self) -> Any:
-        """Cross-section of a leaf [m^2]."""
+        """Return the cross-section of a leaf [m^2]."""
         return self.width * self.thickness
 
     @property
     def bending(self) -> Any:
-        """Second moment of area of a leaf in the direction of motion [m^4]."""
+        """Return the second moment of area of a leaf in the direction of motion [m^4]."""
         return self.width * self.thickness**3 / 12
 
     @property
     def edgewise(self) -> Any:
-        """Second moment of area of a leaf in its plane [m^4]."""
+        """Return the second moment of area of a leaf in its plane [m^4]."""
         return self.thickness * self.width**3 / 12
 
     @property
     def leaf_mass(self) -> Any:
-        """Mass of a leaf between its clamps [kg]."""
+        """Return the mass of a leaf between its clamps [kg]."""
         return self.density * self.area * self.length
 
     @property
     def depth(self) -> Any:
-        """Distance of the outermost leaves [m]."""
+        """Return the distance of the outermost leaves [m]."""
         return (self.leaves - 1) * self.spacing
 
     @property
     def offset_squares(self) -> Any:
-        """Sum over the leaves of their squared distance from the middle of the row [m^2]."""
+        """Return the sum over the leaves of their squared distance from the middle of the row [m^2]."""
         return self.spacing**2 * self.leaves * (self.leaves**2 - 1) / 12
 
     @property
     def offsets(self) -> np.ndarray:
-        """Places of the leaves along z [m], of a single mechanism, shape (leaves,)."""
+        """Return the places of a single mechanism's leaves along z [m], shape (leaves,)."""
         return (np.arange(int(self.leaves)) - (int(self.leaves) - 1) / 2) * float(self.spacing)
 
 
 def cube_inertia(mass: Any) -> tuple[Any, Any, Any]:
-    """Moments of inertia [kg m^2] of an aluminium cube of a mass [kg], which stands in for a stage whose own are not
-    known: it does not depend on the leaves."""
+    """Return the moments of inertia [kg m^2] of an aluminium cube of a mass [kg].
+
+    The cube stands in for a stage of unknown inertia. It does not depend on the leaves.
+    """
     moment = mass / 6 * (mass / ALUMINIUM) ** (2 / 3)
     return moment, moment, moment
 
 
 def _triple(section: Mapping[str, Any], name: str, default: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
-    """The three keys of a point or of inertias, each as given or its default."""
+    """Return the three keys of a point or of inertias, each as given or its default."""
     return tuple(section.get(f"{name}_{axis}", value) for axis, value in zip(AXES, default, strict=True))  # type: ignore[return-value]
 
 
 def along_motion(mechanism: Mechanism, point: tuple[Any, Any, Any], shapes: np.ndarray) -> np.ndarray:
-    """Displacement along z of a point of the stage, (..., modes), in motions of it about its reference point, the
-    middle of the leaf ends, shapes (..., 6, modes)."""
+    """Return the displacement of a point of the stage along z, (..., modes).
+
+    `shapes` (..., 6, modes) are motions of the stage about its reference point, the middle of the leaf ends.
+    """
     x, y = (np.asarray(coordinate, dtype=float)[..., None] for coordinate in (point[0] - mechanism.length, point[1]))
     return shapes[..., 2, :] + shapes[..., 3, :] * y - shapes[..., 4, :] * x

@@ -1,4 +1,4 @@
-"""Names of modes, by the part with the largest share of the kinetic energy."""
+"""Name modes by the part with the largest share of the kinetic energy."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ def mode_name(
     leaves: np.ndarray,
     leaf_mass: float,
 ) -> str:
-    """The name of a mode at unit modal mass.
+    """Return the name of a mode at unit modal mass.
 
     `stage` (6,) is the motion of the stage at its reference point, the middle of the leaf ends: translations, then
-    rotations; `mass` [kg] and `inertia` [kg m^2] (3,) are its own, about the centre of mass, which is `arm` [m] (3,)
-    away from the reference point. `leaves` (leaves, points, 3) are displacements of their middle lines at even places
-    from cart to stage, `leaf_mass` [kg] that of one. The energy that is nowhere else is torsion of the leaves.
+    rotations. `mass` [kg] and `inertia` [kg m^2] (3,) are the stage's, about its centre of mass. The centre lies `arm`
+    [m] (3,) away from the reference point.
+
+    `leaves` (leaves, points, 3) are displacements of the middle lines at even places from cart to stage. `leaf_mass`
+    [kg] is the mass of one leaf. Energy that is found nowhere else is torsion of the leaves.
     """
     speed = stage[:3] + np.cross(stage[3:], arm)
     energies = np.concatenate([mass * speed**2, np.asarray(inertia, dtype=float) * stage[3:] ** 2])
@@ -50,18 +52,24 @@ def mode_name(
 
 
 def _mean(values: np.ndarray) -> np.ndarray:
-    """Mean over the points along the leaves, axis 1, by the trapezoidal rule."""
+    """Return the mean over the points along the leaves, axis 1, by the trapezoidal rule."""
     return (values[:, 1:] + values[:, :-1]).mean(axis=1) / 2
 
 
 def _dynamic_part(shapes: np.ndarray) -> np.ndarray:
-    """The shapes (leaves, points) without what follows a shift of the stage statically."""
+    """Return the shapes (leaves, points) without their static part.
+
+    The static part is what follows a shift of the stage.
+    """
     x = np.linspace(0, 1, shapes.shape[1])
     return shapes - np.outer(shapes[:, -1], x**2 * (3 - 2 * x))
 
 
 def _number(shapes: np.ndarray) -> str:
-    """What is added for a shape of two waves or more, counted on the leaf that moves most."""
+    """Return what is added to the name of a shape with two waves or more.
+
+    Waves are counted on the leaf that moves most.
+    """
     settings = LeafSpringSettings.current()
     shape = shapes[np.argmax(np.sum(shapes**2, axis=1))]
     signs = np.sign(shape[np.abs(shape) > settings.shape_ripple * np.max(np.abs(shape))])

@@ -21,18 +21,19 @@ import numpy as np
 from friso.leaf_springs.settings import LeafSpringSettings
 
 CONVERGED, PEAK = 0.878, 0.63
-"""What more functions across the width leave of the stiffening (0.866 to 0.895 at a Poisson's ratio of 0.3, 0.854 to
-0.909 from 0.05 to 0.45), and of the excess of the stress (0.60, for square leaves 0.65), of leaves from 1 to 6 times as
-long as wide (tests/ritz.py)."""
+"""Share of the stiffening that remains with more functions across the width (0.866 to 0.895 at a Poisson's ratio of
+0.3, 0.854 to 0.909 from 0.05 to 0.45), and of the excess of the stress (0.60, for square leaves 0.65), of leaves from
+1 to 6 times as long as wide (tests/ritz.py)."""
 
 
 @dataclass(frozen=True)
 class Curl:
-    """The anticlastic curvature of a leaf under a bending moment that is odd ("s", as in the parallel motion of its
-    ends) or even ("1", as where they are turned against each other) about its middle.
+    """The anticlastic curvature of a leaf under a bending moment, odd ("s") or even ("1") in s.
 
-    g = -nu/(1 - nu^2) (m - a h1 - b h2), where m = s or 1 is the moment per flexural rigidity D w, and h1, h2 decay
-    from the clamps (`rates` [1/m]); a and b are such that g and its slope are 0 there.
+    The moment is odd in the parallel motion of its ends, and even where the ends turn against each other.
+
+    g = -nu/(1 - nu^2) (m - a h1 - b h2), where m = s or 1 is the moment per flexural rigidity D w. h1 and h2 decay from
+    the clamps (`rates` [1/m]). a and b make g and its slope 0 there.
     """
 
     poisson: Any
@@ -43,7 +44,10 @@ class Curl:
     @classmethod
     def of(cls, length: Any, width: Any, poisson: Any, odd: bool) -> Curl:
         # w^4/720 g'''' - (1 - nu) w^2/6 g'' + (1 - nu^2) g = -nu m; both squares are positive up to nu = 1/2
-        """The profile of leaves of a length and width [m]; `odd` for a moment that changes sign in the middle."""
+        """Return the curvature of leaves of a length and width [m].
+
+        `odd` stands for a moment that changes sign in the middle.
+        """
         middle, square = (1 - poisson) / 6, 4 * (1 - poisson**2) / 720
         root = np.sqrt(middle**2 - square)
         fast, slow = (np.sqrt(360 * (middle + sign * root)) / width for sign in (1, -1))
@@ -56,7 +60,7 @@ class Curl:
         return cls(poisson, (fast, slow), (a, at_clamp[0] - a), odd)
 
     def shape(self, s: Any, length: Any, derivative: int = 0) -> Any:
-        """m - a h1 - b h2 at s, or its second derivative."""
+        """Return m - a h1 - b h2 at s, or its second derivative."""
         moment = (s if self.odd else 1.0) if derivative == 0 else 0.0
         terms = (
             weight * rate**derivative * _decay(rate, s, length, self.odd)
@@ -65,13 +69,13 @@ class Curl:
         return moment - sum(terms)
 
     def curvature(self, s: Any, length: Any) -> Any:
-        """f'' at s for the moment m."""
+        """Return f'' at s for the moment m."""
         moment = s if self.odd else 1.0
         return moment + self.poisson**2 / (1 - self.poisson**2) * self.shape(s, length)
 
 
 def _decay(rate: Any, s: Any, length: Any, odd: bool) -> Any:
-    """sinh(rate s) / sinh(rate L/2), or with cosh, without overflow."""
+    """Return sinh(rate s) / sinh(rate L/2), or the same ratio of cosh, without overflow."""
     half = rate * length / 2
     sign = -1.0 if odd else 1.0
     size = np.abs(s)
@@ -80,10 +84,10 @@ def _decay(rate: Any, s: Any, length: Any, odd: bool) -> Any:
 
 
 def stiffening(length: Any, width: Any, poisson: Any, odd: bool = True) -> Any:
-    """By what factor the leaf is stiffer than a beam: from 1 (narrow) to 1/(1 - nu^2) (wide).
+    """Return the factor by which clamps make a leaf stiffer than a beam.
 
-    Odd: for the parallel motion of its ends, k = factor 12 E I/L^3. Even: for turning them against each other,
-    k = factor E I/L.
+    It grows from 1 for a narrow leaf to 1/(1 - nu^2) for a wide one. Odd: for the parallel motion of its ends, k =
+    factor 12 E I/L^3. Even: for turning them against each other, k = factor E I/L.
     """
     curl = Curl.of(length, width, poisson, odd)
     # compliance: integral of f'' m over that of m^2, times (1 - nu^2) for a beam
@@ -97,8 +101,10 @@ def stiffening(length: Any, width: Any, poisson: Any, odd: bool = True) -> Any:
 
 
 def compliance_profile(s: Any, length: Any, width: Any, poisson: Any) -> Any:
-    """Bending compliance at s over that of a beam, such that a beam with it has the stiffness of the plate in the
-    parallel motion of its ends."""
+    """Return the bending compliance at s relative to a beam.
+
+    A beam with this compliance has the stiffness of the plate in the parallel motion of its ends.
+    """
     curl = Curl.of(length, width, poisson, odd=True)
     stiff = 1 - (1 - poisson**2) * curl.curvature(s, length) / s
     factor = stiffening(length, width, poisson)
@@ -106,14 +112,17 @@ def compliance_profile(s: Any, length: Any, width: Any, poisson: Any) -> Any:
 
 
 def _moment_of(rate: Any, length: Any, odd: bool) -> Any:
-    """Integral over the leaf of the decaying function times m."""
+    """Return the integral over the leaf of the decaying function times m."""
     half = rate * length / 2
     return (length * rate / np.tanh(half) - 2) / rate**2 if odd else 2 * np.tanh(half) / rate
 
 
 def stress_factors(length: Any, width: Any, poisson: Any) -> tuple[Any, Any]:
-    """Bending stress at the clamp over that of a beam, 3 E t delta/L^2: its mean over the width, and the largest (but
-    for the very corners, where theory has no bound)."""
+    """Return the bending stress at the clamp relative to a beam, 3 E t delta/L^2.
+
+    The first factor is the mean over the width. The second is the largest, except at the very corners, where theory has
+    no bound.
+    """
     curl = Curl.of(length, width, poisson, odd=True)
     half = length / 2
     mean = stiffening(length, width, poisson)
@@ -122,32 +131,41 @@ def stress_factors(length: Any, width: Any, poisson: Any) -> tuple[Any, Any]:
 
 
 def warping_rate(width: Any, poisson: Any) -> Any:
-    """Rate [1/m] at which the restraint of warping by a clamp decays along a twisted leaf."""
+    """Return the rate [1/m] at which a clamp's restraint of warping decays along a twisted leaf."""
     return np.sqrt(24 * (1 - poisson)) / width
 
 
 def torsion_stiffness(length: Any, width: Any, thickness: Any, shear: Any, poisson: Any) -> Any:
-    """Torsional stiffness of a leaf between clamps [N m/rad], `shear` its shear modulus [Pa]."""
+    """Return the torsional stiffness of a leaf between clamps [N m/rad].
+
+    `shear` is its shear modulus [Pa]; lengths are in metres [m].
+    """
     u = warping_rate(width, poisson) * length / 2
     return torsion_constant(width, thickness) * shear / length / (1 - np.tanh(u) / u)
 
 
 def torsion_constant(width: Any, thickness: Any) -> Any:
-    """J of a rectangle [m^4] (Roark's formula), the width larger than the thickness."""
+    """Return J of a rectangle [m^4] (Roark's formula) whose width exceeds its thickness."""
     ratio = thickness / width
     return width * thickness**3 * (1 / 3 - 0.21 * ratio * (1 - ratio**4 / 12))
 
 
 def cubic_twist(s: Any, length: Any, width: Any, poisson: Any) -> Any:
-    """Rate of twist at s under a torque that goes with s^3, as that across a deflected leaf makes, in which a leaf free
-    to warp would have s^3: p - p''/rate^2 = s^3, with p = 0 at the clamps. s in half lengths, from -1 to 1."""
+    """Return the rate of twist at s under a torque that goes with s^3.
+
+    A force across a deflected leaf makes such a torque. A leaf free to warp would twist at the rate s^3. The clamps
+    change it: p - p''/rate^2 = s^3, with p = 0 at the clamps. s is in half lengths, from -1 to 1.
+    """
     rate = warping_rate(width, poisson) * length / 2
     return s**3 + 6 * s / rate**2 - (1 + 6 / rate**2) * _decay(rate, s, 2.0, odd=True)
 
 
 def tilted(shares: np.ndarray, torques: np.ndarray, places: np.ndarray, weighted_sum: float) -> np.ndarray:
-    """Compliances in torsion along a leaf (n,), changed by exp(tilt place^2) such that their sum stays (an even torque
-    twists the leaf as before) and that weighted by the square of the `torques` (n,) is `weighted_sum`."""
+    """Change compliances in torsion along a leaf (n,) by exp(tilt place^2).
+
+    Their sum stays, so that an even torque twists the leaf as before. Their sum weighted by the square of the `torques`
+    (n,) becomes `weighted_sum`.
+    """
     settings = LeafSpringSettings.current()
     tilt, total = 0.0, shares.sum()
     for _ in range(settings.tilt_iterations):
@@ -161,19 +179,24 @@ def tilted(shares: np.ndarray, torques: np.ndarray, places: np.ndarray, weighted
 
 
 def free_twist(s: Any, length: Any, width: Any, poisson: Any) -> Any:
-    """Rate of twist at s over that of a leaf free to warp, under an even torque."""
+    """Return the rate of twist at s relative to a leaf free to warp, under an even torque."""
     return 1 - _decay(warping_rate(width, poisson), s, length, odd=False)
 
 
 def stretching(length: Any, width: Any, poisson: Any) -> Any:
-    """By what factor a leaf is stiffer along its length than a rod, since its clamps forbid it to grow narrower: fitted
-    to shells (tests/shells.py) of 0.6 to 6 times the width in length and Poisson's ratios from 0 to 0.45."""
+    """Return by what factor a leaf is stiffer along its length than a rod.
+
+    Its clamps forbid it to grow narrower. The factor is fitted to shells (tests/shells.py) of 0.6 to 6 times the width
+    in length, with Poisson's ratios from 0 to 0.45.
+    """
     return 1 / (1 - 0.28 * poisson**2 * width / length)
 
 
 def edgewise_shear_factor(length: Any, width: Any, poisson: Any) -> Any:
-    """By what factor a leaf is stiffer against shear in its plane than a beam, its bending there being that of a beam
-    (fitted to the same shells)."""
+    """Return by what factor a leaf is stiffer against shear in its plane than a beam.
+
+    Its bending in that plane is taken as that of a beam. The factor is fitted to shells, as in `stretching`.
+    """
     ratio = length / width
     beam = 2.4 * (1 + poisson) * ratio
     return beam / np.maximum(beam - 0.55 * poisson**2 * ratio**2 - 0.076 - 0.13 * poisson, beam / 2)

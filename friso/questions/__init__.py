@@ -1,1 +1,4 @@
-"""The questions that friso answers, a folder each: the function, what it says, shows and writes."""
+"""The questions that friso answers, one folder each.
+
+A folder holds the question's function, and what its answer says, shows and writes.
+"""

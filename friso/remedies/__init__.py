@@ -1,6 +1,6 @@
-"""Remedies for a stage that hunts: settings and isolators optimised one remedy at a time, verified by cycles."""
+"""Find what stops a stage from hunting: settings and isolators, each optimised and verified by cycles."""
 
 from typing import Literal
 
 Changeable = Literal["controller", "joint"]
-"""What of a stage may be changed."""
+"""Parts of a stage that may be changed."""

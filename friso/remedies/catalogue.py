@@ -1,4 +1,4 @@
-"""The remedies that there are: what each changes, from the least change to the greatest."""
+"""List the remedies: what each one changes, from the least change to the greatest."""
 
 from __future__ import annotations
 
@@ -27,9 +27,11 @@ WIDTHS, DEPTH = (0.1, 1.5), 0.9
 
 @dataclass(frozen=True)
 class Remedy:
-    """A remedy by its `name`, the stage it begins with, and its variables, which are applied in this order; whether it
-    changes the controller alone, or a joint is needed (`buys_joint`); and the name of the remedy whose joint it `makes`
-    of leaf springs, if it does."""
+    """A remedy: its `name`, the stage that it starts from, and the variables that it changes.
+
+    Variables are applied in their order. `buys_joint` says that a joint is needed; otherwise only the controller
+    changes. `makes` names the remedy whose joint this one builds from leaf springs.
+    """
 
     name: str
     stage: Stage
@@ -38,7 +40,10 @@ class Remedy:
     makes: str = ""
 
     def changes(self, shares: np.ndarray) -> dict[str, Any]:
-        """The keys that change at shares of the ranges, (points, variables), to arrays of shape (points,)."""
+        """Return the keys that change at points, which are shares of the ranges (points, variables).
+
+        Each key has an array of shape (points,).
+        """
         flat, changed = self.stage.flat(), dict[str, Any]()
         for variable, share in zip(self.variables, shares.T, strict=True):
             change = variable.change({**flat, **changed}, variable.at(share))
@@ -47,22 +52,27 @@ class Remedy:
 
     @property
     def verifiable(self) -> bool:
-        """Whether cycles can verify it: not where a dither keeps the stage from coming to rest."""
+        """Tell whether cycles can verify the remedy.
+
+        They cannot if a dither keeps the stage moving.
+        """
         return not settings_of(self.stage.flat()).dither
 
     @property
     def of_setting(self) -> bool:
-        """Whether it is a setting against friction alone, with the present gains."""
+        """Tell whether the remedy is one setting against friction, with the present gains."""
         return self.name in {setting.name for setting in SETTINGS.values()}
 
     @classmethod
     def settled_on(cls, name: str, stage: Stage, buys_joint: bool = False) -> Remedy:
-        """A stage as it is, with nothing to vary."""
+        """Return a remedy that consists of one finished stage, with nothing to vary."""
         return cls(name, stage, (), buys_joint)
 
     def tuned(self, shares: np.ndarray) -> Stage:
-        """The stage at shares of the ranges, (variables,), its numbers rounded to four digits but where they are the
-        present ones."""
+        """Return the stage at shares of the ranges, shape (variables,).
+
+        Numbers are rounded to four digits, unless they are the present ones.
+        """
         numbers = {key: float(values[0]) for key, values in self.changes(shares[None]).items()}
         present = {variable.name: variable.present for variable in self.variables}
         return self.stage.with_numbers(
@@ -71,7 +81,7 @@ class Remedy:
 
 
 def remedies(stage: Stage, goal: Goal) -> list[Remedy]:
-    """The remedies that a goal allows, those that change least first."""
+    """Return the remedies that a goal allows, the least change first."""
     listed: list[Remedy] = []
     if goal.controller:
         listed += [Remedy("bandwidth", stage, (bandwidth_factor(),)), *_gains("gains", stage)]
@@ -82,18 +92,18 @@ def remedies(stage: Stage, goal: Goal) -> list[Remedy]:
 
 
 def with_bandwidth(remedy: Remedy) -> Remedy:
-    """A remedy together with the bandwidth."""
+    """Return a remedy that also varies the bandwidth."""
     return Remedy(f"{remedy.name}, and bandwidth", remedy.stage, (*remedy.variables, bandwidth_factor()))
 
 
 def _gains(name: str, stage: Stage, first: tuple[Variable, ...] = (), buys_joint: bool = False) -> list[Remedy]:
-    """All gains, where there are more than the bandwidth tells."""
+    """Return the remedy that varies all gains, if there are more than the bandwidth sets."""
     several = (*first, *variables.gains(stage))
     return [Remedy(name, stage, several, buys_joint)] if len(several) > 1 else []
 
 
 def _notch(stage: Stage) -> Iterator[Remedy]:
-    """A notch at the parasitic mode, with which the bandwidth can be higher."""
+    """Return a notch filter at the parasitic mode, which allows a higher bandwidth."""
     flat = stage.flat()
     if "parasitic.frequency" not in flat:
         return
@@ -115,7 +125,7 @@ def _notch(stage: Stage) -> Iterator[Remedy]:
 
 
 def _structures(stage: Stage) -> Iterator[Remedy]:
-    """The other structures that the controller of the stage can have, each with all its gains."""
+    """Return the other structures that the stage's controller can have, each with all its gains."""
     flat = stage.flat()
     stands = not pieces(flat, 1)[..., 2:].any()  # the reference jumps, or the stage is released
     for name, changes in controller_of(flat).structures(flat).items():
@@ -129,7 +139,10 @@ def _structures(stage: Stage) -> Iterator[Remedy]:
 
 
 def _restructured(stage: Stage, changes: Mapping[str, Any]) -> Stage:
-    """A stage with keys of its controller changed: numbers [SI], texts, or None for those that go."""
+    """Return a stage with other keys of its controller.
+
+    Changes are numbers [SI], texts, or None to remove a key.
+    """
     numbers = {key: value for key, value in changes.items() if isinstance(value, float)}
     keys = numeric_keys({key: value for key, value in {**stage.flat(), **changes}.items() if value is not None})
     texts = {key: exactly(value, keys[key].unit) if keys[key].unit else value for key, value in numbers.items()}
@@ -137,7 +150,7 @@ def _restructured(stage: Stage, changes: Mapping[str, Any]) -> Stage:
 
 
 def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """Each setting against friction that is tuned and that the stage has not got, by itself."""
+    """Return each setting against friction that the stage does not have yet, one at a time."""
     flat = stage.flat()
     if breakaway(flat) <= 0:
         return
@@ -151,7 +164,10 @@ def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
 
 
 def _isolators(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """An isolator, alone and with the gains; leaf springs of the file give way to a joint stated by its numbers."""
+    """Return an isolator, alone and together with the gains.
+
+    Leaf springs of the stage file are replaced by a joint with plain numbers.
+    """
     try:
         free = isolated(stage)
     except InputError:

@@ -1,4 +1,4 @@
-"""How large a change of a stage is: what has to be bought, how many keys change, and by how much."""
+"""Measure how large a change of a stage is: parts bought, keys changed, and by which factor."""
 
 from __future__ import annotations
 
@@ -18,9 +18,11 @@ PARTS = ("joint.", "flexure.")
 
 @dataclass(frozen=True, order=True)
 class ChangeSize:
-    """Changes are compared by whether a part is `bought`, then by the number of `keys` of the controller that change,
-    come or go, then by the `factor` by which those change that had a value and have one, all factors multiplied;
-    `scaled` is how many these are."""
+    """The size of a change, which orders changes from small to large.
+
+    Changes are compared first by whether a part is `bought`, then by the number of `keys` of the controller that
+    change. Last comes the `factor`: the product of the factors by which `scaled` numbers change.
+    """
 
     bought: bool
     keys: int
@@ -29,12 +31,12 @@ class ChangeSize:
 
     @property
     def mean(self) -> float:
-        """The factor by which each of these changes, on average: the geometric mean."""
+        """Return the geometric mean of the factors by which numbers change."""
         return float(self.factor ** (1 / max(1, self.scaled)))
 
 
 def change_size(before: Stage, after: Stage) -> ChangeSize:
-    """How large the change from one stage to another is."""
+    """Measure the change from one stage to another."""
     old, new = before.flat(), after.flat()
     bought = any(_differ(old.get(key), new.get(key)) for key in {*old, *new} if key.startswith(PARTS))
     keys = [key for key in {*old, *new} if key.startswith(f"{CONTROLLER}.") and _differ(old.get(key), new.get(key))]
@@ -43,7 +45,10 @@ def change_size(before: Stage, after: Stage) -> ChangeSize:
 
 
 def _octaves(old: Mapping[str, Any], new: Mapping[str, Any], key: str) -> float:
-    """The logarithm of the factor by which a number changes, upward or downward; 0 for what was none."""
+    """Return by how much a number changes, as the logarithm of a factor.
+
+    Upward and downward changes count alike. The result is 0 if there was no number.
+    """
     before, after = old.get(key), new.get(key)
     if isinstance(before, str) or isinstance(after, str) or not before or not after or before * after <= 0:
         return 0.0
@@ -51,6 +56,7 @@ def _octaves(old: Mapping[str, Any], new: Mapping[str, Any], key: str) -> float:
 
 
 def _differ(before: Any, after: Any) -> bool:
+    """Tell whether two values of a key differ by more than rounding."""
     settings = RemedySettings.current()
     if before is None or after is None or isinstance(before, str) or isinstance(after, str):
         return bool(before != after)

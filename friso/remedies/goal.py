@@ -1,4 +1,4 @@
-"""What a tuned machine has to do, and what may be changed for it."""
+"""Define what a tuned machine must achieve, and what may be changed for it."""
 
 from __future__ import annotations
 
@@ -15,10 +15,16 @@ SHARE = 0.95
 
 @dataclass(frozen=True)
 class Goal:
-    """In position is `within` [m]; the slowest twentieth of machines and moves has to be there `settle` [s] after the
-    reference stands (None: before the run ends) with at most `force_limit` [N] of the actuator (None: any); the
-    bandwidth does not exceed `bandwidth_limit` [Hz] (None: only what the stage file tells limits it). Modulus
-    `margin` and `distance` from hunting hold for all settled states. `controller` and `joint` may be changed."""
+    """The goal that a tuned machine must meet, and the parts that may be changed for it.
+
+    A machine is in position `within` [m] of its reference. The slowest 5 % of machines and moves must be there `settle`
+    [s] after the reference stands still; None means before the run ends. The actuator may use at most `force_limit`
+    [N]; None means any force. The bandwidth must not exceed `bandwidth_limit` [Hz]; None means that only the stage file
+    limits it.
+
+    All settled states must keep the modulus `margin` and the `distance` from hunting. `controller` and `joint` tell
+    what may be changed.
+    """
 
     within: float = 1e-6
     settle: float | None = None
@@ -31,6 +37,9 @@ class Goal:
     joint: bool = True
 
     def surely(self, machines: int) -> float:
-        """The share of so many machines that has to meet the goal for it to be taken that its share of all does: one
-        standard error more. Settings at the edge of what works would else be taken for ones that do half the time."""
+        """Return the share of a sample of machines that must meet the goal.
+
+        It is one standard error above the share wanted of all machines. Otherwise, settings at the edge of what works
+        would pass half of the time.
+        """
         return min(1.0, self.share + float(np.sqrt(self.share * (1 - self.share) / machines)))

@@ -1,4 +1,7 @@
-"""The least change of a controller's keys that still meets the goal, from settings that do."""
+"""Find the least change of a controller that still meets the goal.
+
+The search starts from settings that meet it.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 
 LEAST = ": the least change"
-"""What is added to the name of a remedy."""
+"""Suffix of the name of a remedy with the least change."""
 
 
 STEPS = np.append(np.linspace(1.0, 1.5, 26), np.geomspace(1.6, 8.0, 14))
@@ -26,8 +29,11 @@ just works on the machines of the search, which is not to say on others."""
 
 
 def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
-    """The remedy that varies each key of the controller by itself between its value `before` and the one in settings
-    that work, and somewhat further, all else being as `tuned`; None where there are no such keys."""
+    """Return a remedy that varies each changed key of the controller by itself.
+
+    Each key ranges from its value `before` to its `tuned` value, and somewhat beyond. All else is as `tuned`. Returns
+    None if no key of the controller changed.
+    """
     old, new = before.flat(), tuned.flat()
     variables = [
         _between(tuned, key, old[key], new[key])
@@ -41,8 +47,10 @@ def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
 
 
 def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
-    """A key between two values, beyond the one that works, and a little the other way, as far as a stage may have
-    that."""
+    """Return a key that varies between two values.
+
+    It also goes a little beyond both, as far as a stage allows.
+    """
     settings = RemedySettings.current()
     towards, away = (
         (new * settings.factor_beyond, old / settings.factor_away)
@@ -54,7 +62,7 @@ def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
 
 
 def _possible(tuned: Stage, key: str, value: float, otherwise: float) -> float:
-    """A value of a key, or another one where a stage may not have that."""
+    """Return a value of a key, or another value if the stage does not allow the first."""
     try:
         tuned.with_numbers({key: value})
     except InputError:
@@ -63,16 +71,21 @@ def _possible(tuned: Stage, key: str, value: float, otherwise: float) -> float:
 
 
 def least_changes(search: Search) -> Iterator[np.ndarray]:
-    """The least changes of a remedy of `least_remedy`, (variables,): fewer keys first, then smaller factors. Each key
-    is changed alone at first, as any such change is less than all those of more keys."""
+    """Return the least changes found for a remedy of `least_remedy`, each of shape (variables,).
+
+    Fewer keys come first, then smaller factors. Single keys are tried before all else, because any such change is
+    smaller than a change of several keys.
+    """
     yield from _of_one_key(search)
     search.optimise(partial(change_costs, search.remedy), _beginnings(search.remedy))
     yield from candidates(search)
 
 
 def _of_one_key(search: Search) -> Iterator[np.ndarray]:
-    """Changes of one key, the least first, as far as it goes either way: those that break nothing, with which enough of
-    the fresh machines meet the goal by their moves and margins, and nothing attracts the machines."""
+    """Return changes of a single key that work, the least first.
+
+    They break no constraint, enough fresh machines meet the goal, and nothing attracts the machines.
+    """
     settings = RemedySettings.current()
     wanted = partial(change_costs, search.remedy)
     home, _ = _ends(search.remedy).T
@@ -93,8 +106,10 @@ def _of_one_key(search: Search) -> Iterator[np.ndarray]:
 
 
 def _robust(search: Search, points: np.ndarray) -> Iterator[np.ndarray]:
-    """Those of points (points, variables) with which enough of the fresh machines meet the goal by their moves and
-    margins, and nothing attracts the machines."""
+    """Return the points (points, variables) that work on fresh machines.
+
+    Enough of them meet the goal by their moves and margins, and nothing attracts the machines.
+    """
     settings = RemedySettings.current()
     robust = points[search.share(points) >= search.goal.surely(search.fresh.count)] if len(points) else points
     for few in np.array_split(robust, -(-len(robust) // settings.survey_batch)) if len(robust) else ():
@@ -102,7 +117,10 @@ def _robust(search: Search, points: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
-    """How many keys points change, and below 1 by what factor, shape (points,)."""
+    """Return how large the changes of points are, shape (points,).
+
+    The integer part counts the keys that change; the fraction grows with the factor.
+    """
     logarithms = np.stack(
         [
             np.abs(np.log(variable.at(share) / variable.present))
@@ -114,8 +132,11 @@ def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
 
 
 def _beginnings(remedy: Remedy) -> np.ndarray:
-    """The settings that work, and then with some keys as they were, the fewest changed ones first, wholly and half as
-    far (in the logarithm), shape (points, variables)."""
+    """Return points to start a search from, shape (points, variables).
+
+    They are the working settings, then settings with some keys restored, wholly or half-way in the logarithm. Fewest
+    changed keys come first.
+    """
     home, works = _ends(remedy).T
     _, *some, every = sorted(product((0.0, 1.0), repeat=len(home)), key=sum)
     masks = [every, *some]
@@ -123,16 +144,17 @@ def _beginnings(remedy: Remedy) -> np.ndarray:
 
 
 def _ends(remedy: Remedy) -> np.ndarray:
-    """Shares at which the numbers are the present ones, and those of the settings that work, (variables, 2)."""
+    """Return the shares of the present numbers and of the working ones, shape (variables, 2)."""
     flat = remedy.stage.flat()
     return np.array([[v.share(v.present), v.share(flat[v.name])] for v in remedy.variables])
 
 
 def candidates(search: Search) -> Iterator[np.ndarray]:
-    """The least change of those of several keys tried that break nothing, (variables,), the same change taken further,
-    points on the way from it to the settings that work, and others that were tried, all of them the least change first:
-    those with which enough of the fresh machines meet the goal by their moves and margins, and nothing attracts the
-    machines; last all that were tried."""
+    """Return points to verify, each of shape (variables,), the least change first.
+
+    They are the least change tried that breaks no constraint, the same change taken further, and points between it and
+    the working settings. Other points tried follow. Points that work on fresh machines come before all others.
+    """
     settings = RemedySettings.current()
     wanted, points = partial(change_costs, search.remedy), search.points
     free = points.shares[points.meets(search.goal)]

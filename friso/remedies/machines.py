@@ -1,4 +1,7 @@
-"""Machines drawn around a stage, each with a move of its own, and laid over any way in which the stage is changed."""
+"""Draw machines around a stage, each with a move of its own.
+
+Any change of the stage can be applied to all of them.
+"""
 
 from __future__ import annotations
 
@@ -30,9 +33,12 @@ ADDED_KEYS = ("joint.stiffness", "joint.damping")
 
 @dataclass(frozen=True)
 class Fleet:
-    """Keys of the stage to what they are multiplied by on each machine (`ratios`), or what is added where they are 0
-    (`shifts`), and its share of the travel, all of shape (count,); which keys the file calls uncertain, and the default
-    spreads [%] of others; and how many draws that no stage may have were `left_out`, others being drawn instead."""
+    """Machines drawn around a stage, as changes of its keys, all of shape (count,).
+
+    `ratios` multiply a key on each machine, and `shifts` are added to keys that are 0. `travel` is each machine's share
+    of the travel. `from_file` lists the keys that the file calls uncertain, and `spreads` [%] the default spreads of
+    others. `left_out` counts invalid draws, which were replaced.
+    """
 
     ratios: Mapping[str, np.ndarray]
     shifts: Mapping[str, np.ndarray]
@@ -43,18 +49,22 @@ class Fleet:
 
     @property
     def count(self) -> int:
+        """Return the number of machines."""
         return len(self.travel)
 
     def take(self, numbers: np.ndarray) -> Fleet:
-        """The machines with these numbers."""
+        """Return the machines with these numbers."""
         ratios, shifts = (
             {key: value[numbers] for key, value in column.items()} for column in (self.ratios, self.shifts)
         )
         return replace(self, ratios=ratios, shifts=shifts, travel=self.travel[numbers])
 
     def laid_over(self, stage: Stage, changes: Mapping[str, Any], points: int) -> dict[str, Any]:
-        """Flat keys of all machines with all `points`, which are arrays of shape (points,): those of the first on
-        all machines come first. The controller is tuned for the stage and does not know what was drawn."""
+        """Return flat keys of all machines at all `points`, whose arrays have shape (points,).
+
+        All machines at the first point come first. The controller is tuned for the stage and does not know the drawn
+        values.
+        """
         flat = stage.flat()
         tuned = as_tuned(flat)
         for key, value in {**tuned, **changes}.items():
@@ -68,7 +78,10 @@ class Fleet:
         return flat
 
     def _of(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """The ratios of the keys that the stage has; both parts of a mass that was split are as heavy as that."""
+        """Return the ratios of the keys that the stage has.
+
+        Both parts of a mass that was split vary with the whole mass.
+        """
         ratios = {key: ratio for key, ratio in self.ratios.items() if key in flat}
         masses = [key for key in self.ratios if key.startswith("masses.")]
         for key in ("masses.cart", "masses.stage"):
@@ -78,8 +91,11 @@ class Fleet:
 
 
 def draw_fleet(stage: Stage, correlations: Correlations, count: int, seed: int) -> Fleet:
-    """Machines drawn as `friso compare` draws them; the first is that of the stage file, with its own move. Joints that
-    the file does not have vary by the default spreads. Raises InputError."""
+    """Draw machines around a stage as `friso compare` does.
+
+    The first is the stage file's own, with its own move. Joints that the file does not have vary by the default
+    spreads. Raises InputError.
+    """
     settings = RemedySettings.current()
     sample, flat = draw_machines(stage, correlations, max(count, LEAST), seed), stage.flat()
     keys = {key: values[:count] for key, values in sample.keys.items() if key in flat and not key.startswith("rail.")}

@@ -1,4 +1,4 @@
-"""The method of `friso tune`: every remedy optimised by itself, its best points verified, the least change first."""
+"""Run the method of `friso tune`: optimise each remedy by itself, and verify its best points."""
 
 from __future__ import annotations
 
@@ -53,10 +53,14 @@ cannot have that of leaf springs; or none of the usual sizes bears the stroke.""
 
 @dataclass(frozen=True)
 class Advice:
-    """The outcomes of all remedies, in the order of the catalogue, for a stage that was checked and measured itself
-    (`present`); the bandwidths with which it keeps its margin; what its edge of hunting depends on; what to relax where
-    nothing works; whether it was interrupted. The tables of the machine `as_built` take no part; they and the
-    `correlations` go with the stages that are written. `unmade` tells of remedies why no leaf springs make their joint.
+    """The outcomes of all remedies for a stage, in the order of the catalogue.
+
+    `case` is the check of the stage, and `present` its performance on machines. `limits` gives the bandwidths with
+    enough margin, and `sensitivities` what the edge of hunting depends on. `relaxed` says what to relax if nothing
+    works, and `interrupted` whether the search was ended early.
+
+    The tables `as_built` are not used in the search; they and the `correlations` are added to stage files that are
+    written. `unmade` gives the reason why no leaf springs make the joint of a remedy.
     """
 
     stage: Stage
@@ -76,44 +80,50 @@ class Advice:
 
     @property
     def needed(self) -> bool:
-        """Whether the stage as it is does not meet the goal."""
+        """Tell whether the stage as it is fails the goal."""
         return bool(unmet_goals(self.case, self.present, self.goal))
 
     @property
     def least(self) -> RemedyOutcome | None:
-        """The least change that works (see `ChangeSize`)."""
+        """Return the least change that works (see `ChangeSize`)."""
         return next(iter(self.working), None)
 
     def complete(self, tuned: Stage) -> Stage:
-        """A tuned stage with the tables of the machine as built; without them where they are of another controller."""
+        """Return a tuned stage with the tables of the machine as built.
+
+        Tables that belong to another controller are left out.
+        """
         try:
             return tuned.replace(self.as_built)
         except StageError:
             return tuned
 
     def size(self, outcome: RemedyOutcome) -> ChangeSize:
-        """How large the change is for a remedy that has settings."""
+        """Return how large the change of a remedy with settings is."""
         assert outcome.stage is not None
         return change_size(self.stage, outcome.stage)
 
     @property
     def working(self) -> tuple[RemedyOutcome, ...]:
-        """The remedies that work, those that change least first; leaf springs go with the joint that they make."""
+        """Return the remedies that work, the least change first.
+
+        Leaf springs count with the joint that they make.
+        """
         works = (outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
         return tuple(sorted(works, key=self.size))
 
     def made_of_leaves(self, outcome: RemedyOutcome) -> RemedyOutcome | None:
-        """What became of the joint of a remedy when made of leaf springs."""
+        """Return the outcome of a remedy's joint when made of leaf springs."""
         return next((other for other in self.outcomes if other.remedy.makes == outcome.remedy.name), None)
 
     @property
     def fastest(self) -> RemedyOutcome | None:
-        """The remedy that works and settles soonest."""
+        """Return the working remedy that settles soonest."""
         return min(self.working, key=lambda outcome: slowest(outcome, self.goal), default=None)
 
 
 def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
-    """The settling time [s] of the slowest twentieth with a remedy; infinite where it was not measured."""
+    """Return the settling time [s] of the slowest 5 % with a remedy; infinite if not measured."""
     return np.inf if outcome.measured is None else outcome.measured.slowest(goal)
 
 
@@ -127,8 +137,10 @@ def tune(
     progress: Progress = silent,
     begins: Callable[[], None] = lambda: None,
 ) -> Advice:
-    """The best points of every remedy that the goal allows, or of those with the names `chosen`; `begins` is called
-    before the first of the work. Raises InputError for a motion after which nothing has to settle."""
+    """Optimise and verify every remedy that the goal allows, or those named in `chosen`.
+
+    `begins` is called before the work starts. Raises InputError for a motion after which nothing has to settle.
+    """
     settings = RemedySettings.current()
     goal, budget, correlations = goal or Goal(), budget or Budget(), correlations or Correlations()
     _moves(stage)
@@ -192,16 +204,18 @@ def tune(
 
 
 def _not_seen(stage: Stage, correlations: Correlations, count: int, seed: int) -> Fleet:
-    """Machines drawn around a stage, without that of the stage file itself."""
+    """Draw machines around a stage, without the stage file's own machine."""
     return draw_fleet(stage, correlations, count + 1, seed).take(np.arange(1, count + 1))
 
 
 def machines_of_search(
     stage: Stage, correlations: Correlations, budget: Budget, seed: int, goal: Goal, drive: Stage
 ) -> Fleet:
-    """The machines that searches see: for settings that settle soonest the first of them. One that is far less robust
-    than all but a few of the share that may miss the goal would stand for many among so few: it is left out, and
-    another taken twice. The sampling and delay are those of the stage `drive`."""
+    """Return the machines on which searches try settings.
+
+    A machine that is far less robust than nearly all others would count for too many in so small a sample. It is left
+    out, and another one counts twice. Sampling and delay are taken from the stage `drive`.
+    """
     settings = RemedySettings.current()
     machines = draw_fleet(stage, correlations, settings.machine_factor * budget.machines, seed)
     many = draw_fleet(stage, correlations, settings.usual_machines, seed + settings.usual_seed)
@@ -217,8 +231,10 @@ def machines_of_search(
 
 @dataclass
 class _Session:
-    """The remedies of a stage that are tried one after the other, and their `outcomes` so far; `searching` is the one
-    under way."""
+    """The remedies of a stage, tried one after the other, with the `outcomes` so far.
+
+    `searching` is the search under way.
+    """
 
     stage: Stage
     drive: Stage
@@ -235,13 +251,13 @@ class _Session:
     unmade: dict[str, Unmade] = field(default_factory=dict)
 
     def tries(self, remedy: Remedy) -> None:
-        """A remedy, for the settings that settle soonest."""
+        """Try a remedy for the settings that settle soonest."""
         search = self._begun(remedy, self.budget.machines)
         search.optimise()
         self._ended(search, search.surveyed())
 
     def _made_of_leaves(self, outcome: RemedyOutcome) -> None:
-        """The leaf springs that make the joint of a remedy, verified as that was."""
+        """Verify leaf springs for the joint of a remedy, in the way the remedy was verified."""
         assert outcome.stage is not None
         remedy = outcome.remedy
         if outcome.stage.axis_kind != LINEAR:
@@ -257,10 +273,13 @@ class _Session:
             self.tries(made)
 
     def tries_less(self) -> None:
-        """The least change of the controller as it is, from the remedy of that which works and changes most, and then,
-        where that which changes least, however far, changes fewer keys still, from that; where none works, from what
-        changes least of the others. Once. Where some of the keys stay as they are, the others, if there are several,
-        have a search of their own, which takes its place if it changes less."""
+        """Search once for the least change of the present controller.
+
+        The search starts from the working remedy of this controller that changes most. It starts again from the one
+        that changes least, if that still is the smallest. If no change of this controller works, it starts from the
+        least of the other changes. Keys that stay as they are lead to a further search of the remaining keys; its
+        result is taken if it changes less.
+        """
         working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and outcome.stage]
         own = [outcome for outcome in working if outcome.remedy.stage is self.stage]
         if not working or self.tried_less:
@@ -281,7 +300,10 @@ class _Session:
                     self.outcomes[place] = fewer
 
     def _tries_less_than(self, outcome: RemedyOutcome) -> bool:
-        """The least change of the keys that a remedy which works changes; whether it has such keys."""
+        """Search for the least change of the keys that a working remedy changes.
+
+        Returns whether it changes any key that can be searched.
+        """
         settings = RemedySettings.current()
         assert outcome.stage is not None
         less = least_remedy(self.stage, outcome.stage, outcome.remedy)
@@ -292,7 +314,7 @@ class _Session:
         return True
 
     def interrupted(self) -> None:
-        """What is known of the remedy under way: its best point so far, not verified."""
+        """Record the best point so far of the remedy under way, which is not verified."""
         if self.searching is not None and self.outcomes[-1].interrupted:
             self.outcomes[-1] = _so_far(self.searching, self.outcomes[-1])
 
@@ -301,7 +323,7 @@ class _Session:
         return change_size(self.stage, outcome.stage)
 
     def _begun(self, remedy: Remedy, machines: int) -> Search:
-        """The search for a remedy, on so many of the machines."""
+        """Start the search for a remedy on so many of the machines."""
         self.report.begins(_steps(remedy, self.budget))
         several = self.machines.take(np.arange(machines))
         search = Search(remedy, self.goal, several, self.fresh, self.drive, self.budget, self.report)
@@ -310,7 +332,10 @@ class _Session:
         return search
 
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
-        """The first of a few points that is verified, or else the first that is not sure to work."""
+        """Return the first of a few points that is verified.
+
+        If none is, the first that is not sure to work is returned.
+        """
         settings = RemedySettings.current()
         unsure: RemedyOutcome | None = None
         tries, worked = 0, 0.0
@@ -335,9 +360,11 @@ class _Session:
             self._made_of_leaves(last)
 
     def _verified(self, search: Search, shares: np.ndarray) -> RemedyOutcome:
-        """A point on machines that were not seen before and, where these meet the goal, by its cycles. The interval of
-        the share of all machines that meet it has to lie at the share wanted or above: further ones are measured as
-        long as it does not say."""
+        """Measure a point on fresh machines, and verify it by its cycles if they meet the goal.
+
+        The interval of the share of machines that meet the goal must lie at the share wanted or above. While it leaves
+        that open, further machines are measured.
+        """
         settings = RemedySettings.current()
         remedy, goal = search.remedy, search.goal
         tuned = remedy.tuned(shares)
@@ -360,8 +387,11 @@ class _Session:
 
 
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
-    """The settings against friction that came closest to the goal, each together with the bandwidth: only where nothing
-    works that changes the controller alone. They change more than the bandwidth, and bring less than the gains do."""
+    """Return the settings against friction that came closest to the goal, with the bandwidth.
+
+    They are tried only if nothing works that changes the controller alone. They change more than the bandwidth does,
+    and bring less than the gains do.
+    """
     settings = RemedySettings.current()
     if any(outcome.certainty == "works" and not outcome.remedy.buys_joint for outcome in outcomes):
         return []
@@ -372,7 +402,7 @@ def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
 
 
 def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
-    """What is known of a remedy whose search was interrupted: its best point so far, not verified."""
+    """Return the best point so far of an interrupted search, which is not verified."""
     if not search.tried:
         return outcome
     points = search.points
@@ -384,7 +414,7 @@ def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
 
 
 def _moves(stage: Stage) -> None:
-    """Raises InputError for a motion after which nothing has to settle."""
+    """Check the motion. Raises InputError if nothing has to settle after it."""
     flat = stage.flat()
     kind = flat["motion.kind"]
     corner, duration = float(last_corner(flat)), flat["motion.duration"]
@@ -394,25 +424,28 @@ def _moves(stage: Stage) -> None:
 
 
 def _steps(remedy: Remedy, budget: Budget) -> int:
-    """How many steps a remedy takes, about."""
+    """Estimate how many steps of progress a remedy takes."""
     settings = RemedySettings.current()
     return (2 if len(remedy.variables) < 2 else _generations(budget)) + 4 + settings.progress_steps
 
 
 def _generations(budget: Budget) -> int:
-    """How many generations a search has at most."""
+    """Return the largest number of generations of a search."""
     settings = RemedySettings.current()
     return budget.generations + len(settings.near_ranges) * budget.refined
 
 
 class _Report:
-    """Counts the steps of all remedies; one that makes more than its own waits at the last of them."""
+    """Progress over all remedies, in steps.
+
+    A remedy that takes more steps than planned waits at the last of them.
+    """
 
     def __init__(self, progress: Progress, total: int) -> None:
         self.progress, self.total, self.done, self.end = progress, total, 0, 0
 
     def begins(self, steps: int) -> None:
-        """A remedy of so many steps begins."""
+        """Note that a remedy with so many steps begins."""
         self.done, self.end = self.end, min(self.end + steps, self.total)
 
     def __call__(self, label: str, steps: int = 1) -> None:

@@ -1,4 +1,4 @@
-"""What to relax where no remedy meets the goal: the points that break one constraint alone, or two, or three."""
+"""Find which parts of the goal to relax if no remedy meets it, at most three at a time."""
 
 from __future__ import annotations
 
@@ -21,8 +21,10 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class RelaxedGoal:
-    """A goal relaxed in up to three parts, with which a `remedy` meets it: its stage, the parts, and the factor by
-    which they are relaxed, all together."""
+    """A goal relaxed in up to three parts, which a `remedy` then meets.
+
+    It holds the stage, the relaxed parts, and the product of the factors by which they are relaxed.
+    """
 
     remedy: Remedy
     stage: Stage
@@ -31,8 +33,10 @@ class RelaxedGoal:
 
 
 def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) -> tuple[RelaxedGoal, ...]:
-    """The cheapest relaxation of each kind, the one that relaxes least first. Nothing is relaxed of the distance from
-    hunting: machines that are surveyed at the points named have nothing that attracts."""
+    """Return the cheapest relaxation of each kind, the smallest first.
+
+    The distance from hunting is never relaxed. Machines were surveyed at these points, and nothing attracts them.
+    """
     best: dict[tuple[str, ...], RelaxedGoal] = {}
     for outcome in outcomes:
         if outcome.points is None or not outcome.remedy.verifiable:
@@ -47,7 +51,7 @@ def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) 
 
 
 def _of_remedy(remedy: Remedy, points: TriedPoints, goal: Goal, machines: Fleet) -> Iterator[RelaxedGoal]:
-    """The cheapest relaxations of a remedy: those of one part each, or else of two, or of three."""
+    """Return the cheapest relaxations of a remedy, of one part each, or else of two or three."""
     settings = RemedySettings.current()
     needed = _needed(points, goal)
     far = [name for name, values in needed.items() if name != "within" and (values > settings.reasonable_factor).any()]
@@ -63,7 +67,10 @@ def _within(
     needed: Mapping[str, np.ndarray],
     limited: Sequence[str],
 ) -> Iterator[RelaxedGoal]:
-    """The same, some parts being `limited` in how far they may be relaxed."""
+    """Return the cheapest relaxations of a remedy.
+
+    Some parts are `limited` in how far they may be relaxed.
+    """
     settings = RemedySettings.current()
     needed = {name: values.copy() for name, values in needed.items()}
     count = np.sum([values > 1 for values in needed.values()], axis=0)
@@ -95,7 +102,7 @@ def _within(
 
 
 def _relaxed_goal(remedy: Remedy, point: TriedPoints, names: tuple[str, ...], goal: Goal, within: float) -> RelaxedGoal:
-    """The goal with parts relaxed for a point, the tolerance by the factor `within`."""
+    """Build the goal relaxed for a point, with the tolerance wider by the factor `within`."""
     values = {
         "margin": ("modulus margin", float(point.margin[0]), ""),
         "settle": ("settling time", float(_time(point)[0]), "s"),
@@ -113,8 +120,10 @@ def _relaxed_goal(remedy: Remedy, point: TriedPoints, names: tuple[str, ...], go
 
 
 def _tolerances(remedy: Remedy, shares: np.ndarray, goal: Goal, machines: Fleet) -> np.ndarray:
-    """By how much the tolerance has to be wider for points, shape (points,): the first of a few factors with which the
-    machines settle, in the time of the goal if it has one."""
+    """Return by which factor the tolerance must be wider for points, shape (points,).
+
+    It is the first of a few factors with which the machines settle, in the time of the goal if it has one.
+    """
     settings = RemedySettings.current()
     factors = np.full(len(shares), settings.looser_tolerance)
     open_still = np.arange(min(len(shares), settings.most_relaxed))
@@ -131,7 +140,7 @@ def _tolerances(remedy: Remedy, shares: np.ndarray, goal: Goal, machines: Fleet)
 
 
 def _needed(points: TriedPoints, goal: Goal) -> dict[str, np.ndarray]:
-    """The factors by which parts of the goal would have to be relaxed for each point."""
+    """Return the factors by which parts of the goal must be relaxed for each point."""
     settings = RemedySettings.current()
     none = np.zeros(len(points.margin))
     limit = goal.bandwidth_limit
@@ -147,5 +156,5 @@ def _needed(points: TriedPoints, goal: Goal) -> dict[str, np.ndarray]:
 
 
 def _time(points: TriedPoints) -> np.ndarray:
-    """The settling time within the tolerance, or else within the looser one [s]."""
+    """Return the settling time within the tolerance, or else within the looser one [s]."""
     return np.where(np.isfinite(points.settling), points.settling, points.looser)

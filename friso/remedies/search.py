@@ -1,7 +1,7 @@
-"""The best points of one remedy: differential evolution over whole generations in the engine's lanes, then surveys of
-what attracts the machines.
+"""Search the best points of one remedy, and survey what attracts the machines there.
 
-Storn, Price 1997 (doi:10.1023/A:1008202821328), as SciPy has it.
+The search is differential evolution (Storn and Price 1997, doi:10.1023/A:1008202821328), as in SciPy. Whole generations
+are simulated at once in the engine's lanes.
 """
 
 from __future__ import annotations
@@ -27,9 +27,12 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class Budget:
-    """Points of a generation for each variable, generations, and those about the best of these, each time; machines in
-    the moves that are tried and in the surveys; fresh machines on which an answer is measured, and `further` ones where
-    these leave open whether it is good enough."""
+    """The numbers of points, generations and machines that a search may try.
+
+    `points` counts the points of a generation for each variable. `refined` generations follow around the best points.
+    Machines for moves and surveys are fewer than the fresh machines on which an answer is measured. `further` machines
+    are added where these leave the answer open.
+    """
 
     points: int = 10
     generations: int = 16
@@ -42,11 +45,16 @@ class Budget:
 
 @dataclass(frozen=True)
 class TriedPoints:
-    """Points that were tried, one a row: their `shares` of the ranges (n, variables), and, each of shape (n,), the
-    settling time of the slowest twentieth [s] and within the looser tolerance, the same with the bandwidth lower by the
-    distance from hunting, the largest force [N] and least modulus margin of all but a twentieth, the bandwidth [Hz]
-    (see `loop_bandwidth`) of the machine of the stage file, and how near all machines are to settling, from 0 to 1 (see
-    `Search.measured`). Of those that are not `whole` moves were left out, which count as the best there may be."""
+    """Points that were tried, one in each row, with how the machines performed.
+
+    `shares` of the ranges have shape (n, variables); all other arrays have shape (n,). Settling times [s] are those of
+    the slowest 5 %: within the tolerance, within the looser one, and with the bandwidth lower by the distance from
+    hunting. Largest force [N] and least modulus margin hold for 95 % of the machines. The bandwidth [Hz] is that of the
+    stage file's machine (see `loop_bandwidth`). How near machines are to settling runs from 0 to 1 (see
+    `Search.measured`).
+
+    Points that are not `whole` were given up early, and the missing moves count as the best possible.
+    """
 
     shares: np.ndarray
     settling: np.ndarray
@@ -59,11 +67,11 @@ class TriedPoints:
     whole: np.ndarray
 
     def take(self, numbers: np.ndarray) -> TriedPoints:
-        """The points with these numbers."""
+        """Return the points with these numbers."""
         return TriedPoints(*(column[numbers] for column in vars(self).values()))
 
     def broken(self, goal: Goal) -> dict[str, np.ndarray]:
-        """Which points break a constraint of the goal, by its name."""
+        """Return for each constraint of the goal which points break it."""
         return {
             "bandwidth": np.isfinite(_most(goal.bandwidth_limit)) & ~(self.bandwidth <= _most(goal.bandwidth_limit)),
             "margin": self.margin < goal.margin,
@@ -74,11 +82,14 @@ class TriedPoints:
         }
 
     def meets(self, goal: Goal) -> np.ndarray:
-        """Which points break no constraint."""
+        """Return which points break no constraint."""
         return ~np.any([*self.broken(goal).values()], axis=0)
 
     def cost(self, goal: Goal, wanted: np.ndarray | None = None) -> np.ndarray:
-        """What is minimised: the settling time, or what is `wanted` small instead; or how far it breaks constraints."""
+        """Return what the search minimises: the settling time, or what is `wanted` small instead.
+
+        For points that break constraints, it is by how much they do.
+        """
         settings = RemedySettings.current()
         excess = np.maximum(0, goal.margin - self.margin)
         excess += np.where(np.isfinite(self.force), _excess(np.nan_to_num(self.force), goal.force_limit), 3.0)
@@ -96,15 +107,16 @@ def _most(limit: float | None) -> float:
 
 @np.errstate(over="ignore")  # a force that is not finite counts otherwise
 def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
-    """By what share values are above a limit."""
+    """Return by what share values exceed a limit."""
     return np.maximum(0, values / _most(limit) - 1)
 
 
 @dataclass
 class Search:
-    """The search for the best points of a remedy on `machines`, those that it takes having to do on `fresh` ones too:
-    what was `tried` so far, of how many points that were surveyed something `attracted` the machines, or may have, and
-    whether it was `cut`.
+    """The search for the best points of a remedy on `machines`.
+
+    Points that it returns must also work on `fresh` machines. `tried` holds all points so far. `attracted` counts
+    surveyed points at which something attracts the machines, or may. `cut` tells that the search took too much work.
     """
 
     remedy: Remedy
@@ -121,12 +133,12 @@ class Search:
 
     @property
     def points(self) -> TriedPoints:
-        """The points that were tried on all machines."""
+        """Return the points that were tried on all machines."""
         return (begun := self.begun).take(np.flatnonzero(begun.whole))
 
     @property
     def begun(self) -> TriedPoints:
-        """All points that were tried, those too that were given up before they had been tried on all machines."""
+        """Return all points that were tried, including those that were given up early."""
         return TriedPoints(
             *(np.concatenate(column) for column in zip(*(vars(s).values() for s in self.tried), strict=True))
         )
@@ -134,14 +146,16 @@ class Search:
     def optimise(
         self, wanted: Callable[[np.ndarray], np.ndarray] | None = None, start: np.ndarray | None = None
     ) -> None:
-        """Try points until they get no better, or until that takes too much work (`cut`): the settling time, or what is
-        `wanted` small, from points (points, variables) to numbers (points,). A search of several variables begins with
-        the points `start`, if any."""
+        """Try points until they improve no more, or until that takes too much work (`cut`).
+
+        The search minimises the settling time, or what is `wanted` small: a function from points (points, variables) to
+        numbers (points,). A search of several variables may begin with the points `start`.
+        """
         with self._allowed(self._work):
             self._optimise(wanted, start)
 
     def tries(self, points: np.ndarray) -> Iterator[np.ndarray]:
-        """Try points (points, variables), a few at a time: those of them that break nothing."""
+        """Try points (points, variables) a few at a time, and return those that break no constraint."""
         tuning = RemedySettings.current()
         for few in np.array_split(points, -(-len(points) // tuning.points_looked_at)):
             self.report(f"{self.remedy.name}: trying settings")
@@ -152,7 +166,10 @@ class Search:
             yield few[self.tried[-1].meets(self.goal)]
 
     def looked_at(self, points: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
-        """Points (variables,) that are looked at further, until finding the next one takes too much work (`cut`)."""
+        """Yield points (variables,) to look at further.
+
+        This ends when the next one takes too much work (`cut`).
+        """
         settings = RemedySettings.current()
         left = settings.looking_work * self._work
         while True:
@@ -166,13 +183,13 @@ class Search:
 
     @property
     def _work(self) -> float:
-        """What a search may take."""
+        """Return the work that a search may take."""
         settings = RemedySettings.current()
         return settings.search_work * (settings.setting_work_share if self.remedy.of_setting else 1.0)
 
     @contextmanager
     def _allowed(self, work: float) -> Iterator[Allowance]:
-        """So much work; where it does not suffice, the search is `cut`."""
+        """Allow so much work in the `with` block; if it does not suffice, the search is `cut`."""
         with allowance(work) as spent:
             try:
                 yield spent
@@ -180,6 +197,11 @@ class Search:
                 self.cut = True
 
     def _optimise(self, wanted: Callable[[np.ndarray], np.ndarray] | None, start: np.ndarray | None) -> None:
+        """Minimise the cost over the variables of the remedy.
+
+        One variable is searched on a grid, which is then refined. Several variables are searched by differential
+        evolution, then again in smaller ranges around the best point.
+        """
         tuning = RemedySettings.current()
         variables = len(self.remedy.variables)
         if variables == 0:
@@ -219,7 +241,7 @@ class Search:
             _evolve(cost, near, ends, self.budget.refined)
 
     def _at_the_limit(self, grid: np.ndarray) -> list[float]:
-        """Where between shares of its range a remedy of one variable comes to the limit of the bandwidth from below."""
+        """Return where between grid points one variable reaches the bandwidth limit from below."""
         settings = RemedySettings.current()
         limit = self.goal.bandwidth_limit
         if limit is None:
@@ -234,18 +256,22 @@ class Search:
         return roots
 
     def _bandwidth(self, shares: np.ndarray) -> np.ndarray:
-        """The bandwidths of points (points, variables) on the machine of the stage file [Hz]."""
+        """Return the bandwidths of points (points, variables) on the stage file's machine [Hz]."""
         return loop_bandwidths(self.remedy.stage, self.remedy.changes(shares), len(shares))
 
     def measured(
         self, shares: np.ndarray, most: np.ndarray | float = np.inf, wanted: np.ndarray | None = None
     ) -> TriedPoints:
-        """Points on the machines: the moves are run only where the loop is stable and has half of the margin and, of
-        remedies that vary more than the bandwidth, this is not far above its limit: such moves chatter and would take
-        most of the work. A point is near to settling in so far as machines settle, within the tolerance, the looser
-        one, and that at the lower bandwidth: where none is in position, the search sees where a few are. A point is
-        given up as soon as it costs more than `most` whatever the moves bring that are left; those machines that are
-        the slowest most often are tried first."""
+        """Measure points on the machines.
+
+        Moves are simulated only if the loop is stable with half of the margin wanted. A remedy of several variables
+        must also not exceed the bandwidth limit by far. Other moves chatter and would take most of the work.
+
+        A point counts as nearer to settling the more machines settle within the tolerance, the looser one, and the
+        tolerance at the lower bandwidth. The search thus sees progress even before any machine is in position. A
+        point is given up as soon as it must cost more than `most`. The machines that are slowest most often are
+        tried first.
+        """
         settings = RemedySettings.current()
         goal, count, machines = self.goal, len(shares), self.machines.count
         margin = quantile(-modulus_margins(self.remedy, shares, self.machines, self.drive), goal.share) * -1
@@ -291,7 +317,7 @@ class Search:
         return so_far()
 
     def _whole(self, batch: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
-        """Those of points that were tried which break nothing on all machines, the best first (see `surveyed`)."""
+        """Return the points that break no constraint on all machines, the best first (see `surveyed`)."""
         left = ~_same(batch, self.points.shares).any(axis=1)
         if left.any():
             self.tried.append(self.measured(batch[left]))
@@ -301,7 +327,7 @@ class Search:
         return points.shares[at[np.argsort(_order(points, wanted)[at], kind="stable")]]
 
     def clear(self, shares: np.ndarray) -> np.ndarray:
-        """With which points (points, variables) nothing attracts the machines, shape (points,)."""
+        """Tell at which points (points, variables) nothing attracts the machines, shape (points,)."""
         self.report(f"{self.remedy.name}: what attracts the machines")
         machines = self.machines.take(np.arange(min(self.budget.surveyed, self.machines.count)))
         clear = attraction(self.remedy, shares, machines, self.goal).clear.mean(axis=1) >= self.goal.share
@@ -309,8 +335,11 @@ class Search:
         return np.asarray(clear)
 
     def share(self, shares: np.ndarray) -> np.ndarray:
-        """How large a share of the fresh machines meet the goal by their moves and margins with points (points,
-        variables), shape (points,); of those with which too many lack the margin, the share that has it."""
+        """Return the share of fresh machines that meet the goal at points, shape (points,).
+
+        Moves and margins count. `shares` has shape (points, variables). If too many machines lack the margin, the share
+        with enough margin is returned.
+        """
         self.report(f"{self.remedy.name}: on other machines")
         goal = self.goal
         meets = modulus_margins(self.remedy, shares, self.fresh, self.drive) >= goal.margin
@@ -322,11 +351,13 @@ class Search:
         return np.asarray(meets.mean(axis=1))
 
     def surveyed(self, wanted: Callable[[np.ndarray], np.ndarray] | None = None) -> Iterator[np.ndarray]:
-        """The points first that settle soonest, or of which what is `wanted` small is least, shape (variables,), with
-        which enough of the fresh machines meet the goal, as far as nothing attracts the machines with them; those that
-        are alike are taken for one. After each batch without any, the next one is taken from farther away, as far as
-        there are as many: the best points are often at the edge of what works. Where there are none at all, the one
-        with which most of the fresh machines do."""
+        """Yield the best points of shape (variables,) at which nothing attracts the machines.
+
+        Points that settle soonest, or have least of what is `wanted` small, come first. Enough fresh machines must meet
+        the goal. Nearly equal points count as one. After a batch without success, the next points are taken farther
+        away, because the best points are often at the edge of what works. If there are none, the point that serves most
+        fresh machines is yielded.
+        """
         settings = RemedySettings.current()
         if not self.tried:
             return
@@ -370,9 +401,11 @@ class Search:
             yield from best[self.clear(best)]
 
     def _closer(self, point: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> list[np.ndarray]:
-        """Better points than one, (variables,), that was taken since something attracts with those that are better, or
-        too few machines meet the goal with them: of those drawn around it, and then around the one that is taken
-        instead, the best first."""
+        """Return better points near one, (variables,), that was taken because better ones failed.
+
+        Better points had attracted machines, or too few machines met the goal there. New points are drawn around the
+        one, then around the point that is taken next. The best comes first.
+        """
         settings = RemedySettings.current()
         goal, closer = self.goal, list[np.ndarray]()
         cost = self.measured(point[None]).cost(goal, None if wanted is None else wanted(point[None]))[0]
@@ -399,17 +432,23 @@ class Search:
 
 
 def _order(points: TriedPoints, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
-    """By what points are sorted, shape (n,): their settling time, or what is `wanted` small instead."""
+    """Return the measure by which points are sorted, shape (n,).
+
+    It is the settling time, or what is `wanted` small instead.
+    """
     return points.settling if wanted is None else wanted(points.shares)
 
 
 def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Which points (points, variables) are which of others, shape (points, others)."""
+    """Tell which points (points, variables) equal which others, shape (points, others)."""
     return (shares[:, None] == others[None]).all(axis=2)
 
 
 def _distance(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """How far points (points, variables) are from the nearest of others, shape (points,); infinitely without any."""
+    """Return the distance of points (points, variables) from the nearest other, shape (points,).
+
+    It is infinite if there are no others.
+    """
     return np.abs(shares[:, None] - others[None]).max(axis=2, initial=0.0).min(axis=1, initial=np.inf)
 
 
@@ -419,8 +458,11 @@ def _evolve(
     ends: list[tuple[float, float]],
     generations: int,
 ) -> None:
-    """Differential evolution from points (points, variables) between `ends`. A point takes the place of the one that it
-    is tried against only if it costs less than that, so `cost` is told how much that may be."""
+    """Run differential evolution from points (points, variables) between `ends`.
+
+    A new point replaces its rival only if it costs less; `cost` is told the rival's cost so that it can give up
+    early.
+    """
     settings = RemedySettings.current()
     most: np.ndarray | float = np.inf
 
@@ -452,15 +494,17 @@ def _evolve(
 
 
 def _agree(intermediate_result: Any) -> bool:
-    """Whether the points of a generation break no constraint and are as good as each other: before that, they may all
-    be as bad."""
+    """Tell whether the points of a generation break no constraint and are equally good.
+
+    Points that break constraints may all be equally bad, and the search must then go on.
+    """
     settings = RemedySettings.current()
     costs = intermediate_result.population_energies
     return bool(costs.max() < settings.worst_time and costs.std() <= settings.agreed_cost * costs.mean())
 
 
 def _apart(shares: np.ndarray, most: int, apart: float) -> np.ndarray:
-    """The first of points that are so far apart from each other, so many at most."""
+    """Return the first of points that lie so far apart from each other, at most so many."""
     chosen: list[np.ndarray] = []
     for row in shares:
         if len(chosen) < most and all(np.abs(row - other).max() > apart for other in chosen):

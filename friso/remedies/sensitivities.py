@@ -1,4 +1,7 @@
-"""What matters: derivatives of cycle, edge of hunting, settling time and modulus margin to keys of the stage file."""
+"""Compute which keys of the stage file matter.
+
+These are derivatives of cycle, edge of hunting, settling time and modulus margin.
+"""
 
 from __future__ import annotations
 
@@ -52,8 +55,11 @@ TABLES = ("masses.", "friction.", "joint.", "controller.", "bias.", "transmissio
 
 @dataclass(frozen=True)
 class EdgeDerivatives:
-    """The edge of hunting as a bandwidth [Hz] (a factor of it for a controller that states none), and its derivatives
-    to the keys [per SI unit], shape (keys,)."""
+    """The edge of hunting as a bandwidth [Hz], and its derivatives to the keys [per SI unit].
+
+    The derivatives have shape (keys,). For a controller that sets no bandwidth, the edge is a multiple of the present
+    one.
+    """
 
     edge: float
     by: np.ndarray
@@ -61,9 +67,12 @@ class EdgeDerivatives:
 
 @dataclass(frozen=True)
 class SettlingDerivatives:
-    """The settling `time` [s] of the stage's own move, from the last corner of the reference until the stage stays
-    `within` [m], and its derivatives to the keys [s per SI unit], shape (keys,). It jumps where a turning point crosses
-    the edge of the band: `jump` is by what share of the band the nearest one that decides is off it."""
+    """The settling `time` [s] of the stage's own move, and its derivatives [s per SI unit].
+
+    The time runs from the last corner of the reference until the stage stays `within` [m]. Derivatives to the keys have
+    shape (keys,). The time jumps where a turning point crosses the edge of the band. `jump` tells how far the nearest
+    turning point is from that edge, as a share of the band.
+    """
 
     within: float
     time: float
@@ -73,8 +82,11 @@ class SettlingDerivatives:
 
 @dataclass(frozen=True)
 class MarginDerivatives:
-    """The least modulus margin in all settled states and its derivatives to the keys [1/SI], shape (keys,), of the
-    state and at the frequency where the loop comes closest."""
+    """The least modulus margin of all settled states, and its derivatives to the keys [1/SI].
+
+    The derivatives have shape (keys,). They hold for the state and the frequency at which the loop comes closest to
+    -1.
+    """
 
     margin: float
     by: np.ndarray
@@ -82,8 +94,10 @@ class MarginDerivatives:
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """Derivatives of a stage to some keys, whose `values` are SI: of its cycle, edge of hunting, margin and settling
-    time; None where there is no such thing, none that is smooth, or, of settling, where it was not asked for.
+    """Derivatives of cycle, edge of hunting, margin and settling time to keys of a stage.
+
+    `values` of the keys are in SI. A part is None if the stage has no such quantity, or none that is smooth. The
+    settling time is also None if it was not asked for.
 
     Examples
     --------
@@ -101,7 +115,7 @@ class Sensitivities:
     settling: SettlingDerivatives | None = None
 
     def ranked(self) -> list[tuple[str, float]]:
-        """The keys with what a change of 1 % moves the edge by, the one that matters most first; empty without one."""
+        """Rank the keys by how far a change of 1 % moves the edge; empty without an edge."""
         if self.edge is None:
             return []
         moves = 0.01 * self.values * self.edge.by
@@ -112,16 +126,20 @@ class Sensitivities:
 def sensitivity(
     stage: Stage, keys: Sequence[str] | None = None, edge: Margin | None = None, within: float | None = None
 ) -> Sensitivities:
-    """Derivatives of cycle, edge of hunting and modulus margin to keys; all that the equations contain if none are
-    named. The `edge` is located unless it is given (that of a check). Those of the settling time, too, if it is said
-    what deviation counts as in position, `within` [m].
+    """Return derivatives of cycle, edge of hunting and modulus margin to `keys` of a `stage`.
 
-    The cycle's and the settling time's are exact: from variational equations along the keys, with saltation at kinks
-    (of the settling time, but for the share of a start that depends on keys, which is by central differences).
-    The edge's follow from the multipliers, exact derivatives of the flow, whose own change is taken by central
-    differences; they are those of a flip. The margin's are central differences of the loop at one frequency. Raises
-    InputError for an unknown key, for a deviation that is not positive, and, of the settling time, for keys of the
-    motion: the reference is taken as it is. Where a release begins may be asked for.
+    Without `keys`, all that the equations contain are taken. The `edge` is located, unless that of a check is given.
+    With `within` [m], the deviation that counts as in position, the settling time is derived, too.
+
+    Derivatives of the cycle and of the settling time are exact. They follow from variational equations along the keys,
+    with saltation at kinks. Only the part by which keys move the start of a move is by central differences.
+
+    The edge is that of a flip. Its derivatives follow from the multipliers, which are exact derivatives of the flow;
+    their own change is taken by central differences. Derivatives of the margin are central differences of the loop at
+    one frequency.
+
+    Raises InputError for an unknown key, and for a deviation that is not positive. For the settling time, it is also
+    raised for keys of the motion, since the reference is taken as it is. The start of a release is allowed.
 
     Examples
     --------
@@ -160,7 +178,10 @@ def sensitivity(
 
 
 def edge_sensitivities(stage: Stage, edge: Margin | None) -> Sensitivities:
-    """Those of the edge of hunting and of the margin alone, to all keys that the equations contain."""
+    """Return the derivatives of the edge of hunting and of the margin.
+
+    They are taken to all keys that the equations contain.
+    """
     flat = {**stage.flat(), **as_tuned(stage.flat())}
     names = _keys(flat)
     values = np.array([flat[name] for name in names])
@@ -169,14 +190,17 @@ def edge_sensitivities(stage: Stage, edge: Margin | None) -> Sensitivities:
 
 
 def _keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
-    """The keys that the equations contain, without those of the motion, and not 0."""
+    """Return the keys that the equations contain, except those of the motion and those that are 0."""
     contained = Ensemble.held(flat, 1).kernel.parameters
     return tuple(name for name in contained if name.startswith(TABLES) and flat[name])
 
 
 def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    """The same stage with equations that contain those of the keys that are decisive, as an exponent that is a whole
-    number is not. Raises InputError for one that they never contain."""
+    """Return the stage with equations that contain all given keys.
+
+    An exponent that is a whole number, for example, is otherwise built in. Raises InputError for a key that equations
+    never contain.
+    """
     decisive = [name for name in keys if name in decisive_keys(flat)]
     nearby = {**flat, **{name: np.nextafter(flat[name], np.inf) for name in decisive}}
     contained = Ensemble.held(nearby, 1).kernel.parameters if decisive else ()
@@ -189,7 +213,7 @@ def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str
 def _of_edge(
     stage: Stage, flat: Mapping[str, Any], keys: tuple[str, ...], edge: Margin | None
 ) -> EdgeDerivatives | None:
-    """The edge's derivatives; the edge is that of a check unless it is told."""
+    """Return the edge's derivatives; without an `edge`, the edge of a check is used."""
     edge = check_given(stage).judgement.margin if edge is None else edge
     moved = None if edge is None or not edge.certain else edge_derivatives(flat, keys, edge.factor, RTOL)
     if edge is None or moved is None:
@@ -203,8 +227,11 @@ def _of_edge(
 
 @np.errstate(all="ignore")
 def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) -> SettlingDerivatives | None:
-    """The derivatives of the time at which the stage last enters the band: by how much the position moves there, over
-    the speed at which it enters. None where motions beside it do not follow them."""
+    """Return the derivatives of the time at which the stage last enters the band `within` [m].
+
+    A derivative is the change of position there over the speed of entry. Returns None if neighbouring motions do not
+    follow.
+    """
     if pieces(flat, 1)[0, -1, 2]:
         return None  # the reference never stands still
     stages = Ensemble(flat, 1)
@@ -241,8 +268,7 @@ def _all_done(results: Results) -> bool:
 
 
 def _longest(flat: Mapping[str, Any], statistics: np.ndarray) -> tuple[int, Stand]:
-    """The place where the reference stands at which a stage settles last, and the column of its statistics that tells
-    when it entered the band there."""
+    """Return where the stage settles last, and the column of statistics with its time of entry."""
     columns = [STATISTICS.index(name) for name in ("inner_before", "inner_exit")]
     places = stands(flat)
     listed = [*zip(columns[-len(places) :], places, strict=True)]
@@ -258,9 +284,12 @@ def _is_smooth(
     by: np.ndarray,
     within: float,
 ) -> bool:
-    """Whether the stage, which `entered` the band at a time [s] (a `column` of its statistics), after `settling` [s],
-    enters it when the derivatives say it does with each key a little larger and smaller: not where it bounces on its
-    limiter so often that neighbouring motions part."""
+    """Tell whether the settling time changes smoothly with each key.
+
+    The stage `entered` the band at a time [s] in a `column` of its statistics, after `settling` [s]. Keys are changed a
+    little either way, and the new times are compared with the derivatives. They differ if the stage bounces on its
+    limiter so often that neighbouring motions part.
+    """
     settings = RemedySettings.current()
     step = settings.loop_change * np.array([flat[name] for name in keys])
     changes = np.concatenate([-np.diag(step), np.diag(step)])
@@ -275,14 +304,17 @@ def _is_smooth(
 
 
 def _starts(stages: Ensemble, flat: Mapping[str, Any], count: int) -> np.ndarray:
-    """The states in which stages begin their motion, shape (count, states)."""
+    """Return the states in which stages begin their motion, shape (count, states)."""
     displaced = Steady(0.0, np.broadcast_to(initial_displacement(flat), (count,)))
     sized = {**flat, "motion.size": size(flat)}
     return stages.kernel.settled(sized, displaced, count)[:, : len(stages.kernel.states)]
 
 
 def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...]) -> np.ndarray:
-    """Their derivatives to the keys, shape (states, keys), by central differences: they are settled states."""
+    """Return derivatives of the starting states to the keys, shape (states, keys).
+
+    They are central differences of settled states.
+    """
     settings = RemedySettings.current()
     columns = []
     for name in keys:
@@ -294,6 +326,10 @@ def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...])
 
 
 def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivatives | None:
+    """Return the least modulus margin and its derivatives by central differences.
+
+    Returns None if a settled state is unstable.
+    """
     settings = RemedySettings.current()
     members = settled_members(flat)
     loops = scan_stability(flat, members)
@@ -304,6 +340,7 @@ def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivati
     omega = np.array([2 * np.pi * closest.closest])
 
     def distance(changes: Mapping[str, float]) -> float:
+        """Return the distance of the loop from -1 with some keys changed."""
         nearby = {**flat, **changes}
         return float(np.abs(1 + response(nearby, worst, DriveTiming.of(nearby))(omega))[0])
 

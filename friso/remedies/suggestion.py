@@ -1,4 +1,7 @@
-"""Whether an isolator would settle a rigid stage that hunts: a few joints surveyed, as a first answer."""
+"""Suggest an isolator for a rigid stage that hunts.
+
+A few joints are surveyed for a first answer.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +27,11 @@ DAMPING = (0.05, DAMPING_RATIOS[1])
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A joint that was tried in a rigid stage, the `stage` with it: whether it `settles`, so that nothing attracts it
-    at its bandwidth and down to the distance below it, and its least modulus `margin` in all settled states. Where no
-    joint settles, it is the last one."""
+    """A joint tried in a rigid stage, and the `stage` with it.
+
+    `settles` tells that nothing attracts the stage at its bandwidth and down to the distance below it. `margin` is the
+    least modulus margin of all settled states. If no joint settles, it is the last one tried.
+    """
 
     stage: Stage
     settles: bool
@@ -35,8 +40,10 @@ class Suggestion:
 
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
 def suggestion(stage: Stage) -> Suggestion | None:
-    """The shortest stroke of a few with which an isolator settles a stage, with the softest joint that does not move
-    the cart; None for a stage that has a joint already, or can have none."""
+    """Return the shortest of a few strokes with which an isolator settles a stage.
+
+    The joint is the softest that does not move the cart. Returns None for a stage that has a joint or can have none.
+    """
     settings = RemedySettings.current()
     if stage.joint:
         return None
@@ -67,7 +74,7 @@ def suggestion(stage: Stage) -> Suggestion | None:
 
 
 def _shares(remedy: Remedy, stroke: float, damping: float) -> list[float]:
-    """The shares of the ranges of a joint at which it has a stroke [m] and a damping ratio."""
+    """Return the shares of a joint's ranges for a stroke [m] and a damping ratio."""
     settings = RemedySettings.current()
     wanted = (stroke, settings.suggested_force, damping)
     return [

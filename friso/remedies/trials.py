@@ -1,4 +1,4 @@
-"""Points tried on machines: all of them at once in the engine's lanes."""
+"""Try points on machines, all of them at once in the engine's lanes."""
 
 from __future__ import annotations
 
@@ -30,21 +30,24 @@ settling time that a thousandth is wrong, as a rule a tenth of that."""
 
 @dataclass(frozen=True)
 class Moves:
-    """Moves of points on machines, all of shape (points, machines): the time of `settling` [s] within the tolerance
-    (see `friso.hunting.criteria.settling`), and within the looser one, infinite where the stage is not in position when
-    the reference leaves or the run ends; and the largest `force` [N]."""
+    """Moves of points on machines, all arrays of shape (points, machines).
+
+    `settling` [s] is the time until the stage stays within the tolerance (see `friso.hunting.criteria.settling`). A
+    second time holds for the looser tolerance. Both are infinite if the stage is not in position when the reference
+    leaves or the run ends. `force` [N] is the largest force.
+    """
 
     settling: np.ndarray
     looser: np.ndarray
     force: np.ndarray
 
     def slowest(self, share: float) -> np.ndarray:
-        """The settling time [s] of all but the slowest machines of each point, shape (points,)."""
+        """Return the settling time [s] of all but the slowest machines of each point, shape (points,)."""
         return quantile(self.settling, share)
 
 
 def quantile(values: np.ndarray, share: float) -> np.ndarray:
-    """Of each row, the least value that so large a share of it does not exceed."""
+    """Return for each row the least value that so large a share of it does not exceed."""
     ordered = np.sort(values, axis=-1)
     return np.asarray(ordered[..., int(np.ceil(share * values.shape[-1])) - 1])
 
@@ -53,8 +56,10 @@ def quantile(values: np.ndarray, share: float) -> np.ndarray:
 def moves_of_points(
     remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0, rtol: float = RANKING
 ) -> Moves:
-    """The moves of points, as shares of the ranges of a remedy (points, variables), with a bandwidth lower by a factor
-    `slower`, to a relative tolerance `rtol`."""
+    """Simulate the moves of points, given as shares (points, variables) of a remedy's ranges.
+
+    The bandwidth is lower by the factor `slower`. `rtol` is the solver's relative tolerance.
+    """
     settings = RemedySettings.current()
     count = len(shares) * machines.count
     flat = faster(machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), 1 / slower)
@@ -72,7 +77,7 @@ def moves_of_points(
 
 
 def timing(drive: Stage) -> dict[str, float]:
-    """Sampling, delay and current loop of a stage, as flat keys."""
+    """Return sampling, delay and current loop of a stage as flat keys."""
     return {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
 
 
@@ -80,9 +85,11 @@ def timing(drive: Stage) -> dict[str, float]:
 def modulus_margins(
     remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage, slower: float = 1.0
 ) -> np.ndarray:
-    """The least modulus margin of the limit cases (0: not stable), shape (points, machines), with the sampling and
-    delay of the stage `drive`, and a bandwidth lower by a factor `slower`; with other gains at standstill that with
-    either."""
+    """Return the least modulus margin of the limit cases, shape (points, machines).
+
+    An unstable case counts as 0. Sampling and delay are those of the stage `drive`, and the bandwidth is lower by the
+    factor `slower`. Controllers with other gains at standstill get the smaller margin of both sets.
+    """
     flat = {**machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), **timing(drive)}
     flat = faster(flat, 1 / slower)
     count = len(shares) * machines.count
@@ -92,9 +99,11 @@ def modulus_margins(
 
 @dataclass(frozen=True)
 class Attraction:
-    """Whether anything hunting attracts machines at their bandwidth or down to the distance below it (`attracts`),
-    whether simulations decided that, and whether it is `certain`, as nothing may lie beyond these, all of shape
-    (points, machines)."""
+    """The result of a survey of what attracts machines, with arrays of shape (points, machines).
+
+    `attracts` tells whether hunting attracts a machine at its bandwidth or down to the distance below it. Further
+    arrays tell whether simulations decided that, and whether it is `certain` because nothing else can exist.
+    """
 
     attracts: np.ndarray
     decided: np.ndarray
@@ -102,11 +111,11 @@ class Attraction:
 
     @classmethod
     def none(cls, machines: int) -> Attraction:
-        """One point, with which nothing attracts so many machines."""
+        """Return one point at which nothing attracts so many machines."""
         return cls(np.zeros((1, machines), bool), *(np.ones((1, machines), bool) for _ in range(2)))
 
     def of_some(self, other: Attraction, machines: np.ndarray) -> Attraction:
-        """The same but for machines, given by their numbers, of which another one tells."""
+        """Return a copy in which another result holds for some machines, given by their numbers."""
         columns = {name: column.copy() for name, column in vars(self).items()}
         for name, column in columns.items():
             column[:, machines] = getattr(other, name)
@@ -114,19 +123,22 @@ class Attraction:
 
     @property
     def clear(self) -> np.ndarray:
-        """Which machines have nothing that attracts, as far as simulations reach."""
+        """Tell which machines have nothing that attracts, as far as simulations reach."""
         return ~self.attracts & self.decided
 
     @property
     def surely_clear(self) -> np.ndarray:
-        """Which machines surely have nothing that attracts."""
+        """Tell which machines surely have nothing that attracts."""
         return ~self.attracts & self.certain
 
 
 @np.errstate(all="ignore")
 def attraction(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal) -> Attraction:
-    """What attracts the machines with points, at the bandwidth and below it by the distance of the goal, by
-    simulations from many starts; closed orbits have to confirm it for the answer."""
+    """Survey what attracts the machines at points.
+
+    The bandwidth is that of the point, and lower ones down to the goal's distance. Simulations start from many states;
+    closed orbits have to confirm the final answer.
+    """
     flat = machines.laid_over(remedy.stage, remedy.changes(shares), len(shares))
     shape = len(shares), machines.count
     attracts, decided, certain = np.zeros(shape, bool), np.ones(shape, bool), np.ones(shape, bool)

@@ -1,4 +1,7 @@
-"""What an optimiser may change of a stage: numbers on logarithmic scales, and the keys that follow from them."""
+"""Define what an optimiser may change of a stage.
+
+These are numbers on logarithmic scales, and the keys that follow from them.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +29,10 @@ DAMPING_RATIOS = (0.01, 0.3)
 
 @dataclass(frozen=True)
 class Variable:
-    """A number between `low` and `high` (SI), tried evenly in its logarithm; next to the `present` one (NaN: there is
-    none) it is that."""
+    """A number between `low` and `high` (SI) on a logarithmic scale.
+
+    Close to the `present` number it takes exactly that; NaN means that there is none.
+    """
 
     name: str
     low: float
@@ -36,29 +41,29 @@ class Variable:
     present: float = float("nan")
 
     def at(self, share: np.ndarray) -> np.ndarray:
-        """Its values at shares of the range."""
+        """Return the values at shares of the range."""
         settings = RemedySettings.current()
         value = np.asarray(self.low * (self.high / self.low) ** share)
         return np.where(np.abs(share - self.share(self.present)) < settings.snap_share, self.present, value)
 
     def share(self, value: float) -> float:
-        """The share of the range at which it has a value."""
+        """Return the share of the range at which the variable has a value."""
         return float(np.log(value / self.low) / np.log(self.high / self.low))
 
 
 def of_key(key: str, low: float, high: float, present: float = float("nan")) -> Variable:
-    """A key of the stage file itself."""
+    """Return a variable that is a key of the stage file."""
     return Variable(key, low, high, lambda flat, value: {key: value}, present)
 
 
 def bandwidth_factor() -> Variable:
-    """How fast the controller is as a whole, as a factor of what it is."""
+    """Return the speed of the whole controller as a factor of the present one."""
     settings = RemedySettings.current()
     return Variable(BANDWIDTH, settings.slowest_factor, settings.fastest_factor, sped_up)
 
 
 def gains(stage: Stage) -> tuple[Variable, ...]:
-    """The gains of a controller against each other, then its bandwidth."""
+    """Return the ratios of a controller's gains, then its bandwidth, as variables."""
     settings = RemedySettings.current()
     flat, controller = stage.flat(), controller_of(stage.flat())
     shape = [of_key(controller.key(name), low, high) for name, (low, high) in controller.shaped_by.items()]
@@ -68,7 +73,7 @@ def gains(stage: Stage) -> tuple[Variable, ...]:
 
 
 def joint_variables(friction: float) -> tuple[Variable, ...]:
-    """Stroke, stiffness and damping of an isolator for the least static friction [N]."""
+    """Return stroke, stiffness and damping of an isolator for the least static friction [N]."""
 
     settings = RemedySettings.current()
 

@@ -1,4 +1,4 @@
-"""What became of a remedy: its stage, verified by cycles and on machines that the optimiser did not see."""
+"""Verify remedies by cycles, and on machines that the optimiser did not see."""
 
 from __future__ import annotations
 
@@ -34,9 +34,12 @@ Certainty = Literal["works", "unsure", "given up", "does not work"]
 
 @dataclass(frozen=True)
 class Performance:
-    """A stage on machines: its `moves`, modulus margins and what attracts, in rows of one; and of the stage itself the
-    least modulus margin in all settled states, `own_margin`, and the `stiffness` [N/m] against a load. `further`
-    machines are only known to meet all of the goal, or not, (n,)."""
+    """Measurements of a stage on machines, in rows of one point.
+
+    They are its `moves`, the modulus margins, and what attracts the machines. `own_margin` is the least modulus margin
+    of the stage itself in all settled states. `stiffness` [N/m] is its stiffness against a load. For `further`
+    machines, shape (n,), it is only known whether they meet the whole goal.
+    """
 
     moves: Moves
     margin: np.ndarray
@@ -47,31 +50,33 @@ class Performance:
 
     @property
     def count(self) -> int:
+        """Return the number of machines."""
         return self.margin.size + self.further.size
 
     def slowest(self, goal: Goal) -> float:
-        """The settling time [s] of the slowest twentieth of machines and moves; infinite where that is never."""
+        """Return the settling time [s] of the slowest 5 % of machines and moves; infinite if never."""
         return float(self.moves.slowest(goal.share)[0])
 
     def slowest_interval(self, goal: Goal) -> tuple[float, float]:
-        """The 95 % interval of that time, these machines being some of all there may be."""
+        """Return the 95 % interval of the settling time of the slowest 5 %, for machines as a sample."""
         low, high = quantile_interval(self.moves.settling[0], goal.share)
         return max(low, 0.0), high
 
     @property
     def median(self) -> float:
+        """Return the median settling time [s]."""
         return float(np.median(self.moves.settling))
 
     def force(self, goal: Goal) -> float:
-        """The largest force [N] of all but a twentieth of the machines."""
+        """Return the force [N] that 95 % of the machines do not exceed."""
         return float(quantile(self.moves.force, goal.share)[0])
 
     def least_margin(self, goal: Goal) -> float:
-        """The modulus margin that all but a twentieth of the machines have at least."""
+        """Return the modulus margin that 95 % of the machines keep."""
         return float(-quantile(-self.margin, goal.share)[0])
 
     def meets(self, goal: Goal) -> Mapping[str, np.ndarray]:
-        """Which machines meet each part of the goal, by its name."""
+        """Return for each part of the goal which machines meet it."""
         late = np.inf if goal.settle is None else goal.settle
         most = np.inf if goal.force_limit is None else goal.force_limit
         return {
@@ -82,7 +87,7 @@ class Performance:
         }
 
     def share(self, goal: Goal) -> Share:
-        """The probability that a machine meets all of the goal, with its interval."""
+        """Return the probability that a machine meets the whole goal, with its interval."""
         meets = np.append(self._meets_all(goal), self.further)
         return share(meets, np.ones(meets.shape, bool))
 
@@ -90,22 +95,25 @@ class Performance:
         return np.all([*self.meets(goal).values()], axis=0)
 
     def decides(self, goal: Goal) -> bool | None:
-        """Whether enough of all machines meet the goal; None where the interval leaves that open."""
+        """Tell whether enough machines meet the goal; None if the interval leaves that open."""
         meeting = self.share(goal)
         return True if meeting.low >= goal.share else False if meeting.high < goal.share else None
 
     def with_further(self, stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
-        """The same of a stage that was measured on further machines too."""
+        """Return the performance with further machines measured."""
         meets = performance_of(stage, machines, goal, drive)._meets_all(goal)
         return replace(self, further=np.append(self.further, meets))
 
 
 @dataclass(frozen=True)
 class RemedyOutcome:
-    """A remedy's best `stage` (None: none was found), measured, and checked by its cycles unless machines miss the goal
-    as it is; the reasons why that is not sure to work, or does not (empty: it works); the `windows` of its numbers; and
-    all points that were tried, of which `attracted` were given up because something attracted machines with them.
-    `shares` are where in the remedy's ranges it lies. The search may have been `cut`, since it took too much work.
+    """The outcome of a remedy: its best `stage`, how it performs, and whether it surely works.
+
+    `stage` is None if none was found. Its cycles are checked unless too many machines miss the goal. `doubts` are the
+    reasons why it is not sure to work; it works if there are none. `windows` tell how far each number may vary.
+
+    `points` are all settings tried; `attracted` counts those given up because something attracted machines. `shares`
+    locate the stage in the remedy's ranges. `cut` tells that the search took too much work.
     """
 
     remedy: Remedy
@@ -122,8 +130,10 @@ class RemedyOutcome:
 
     @property
     def certainty(self) -> Certainty:
-        """Whether it works: all was verified, or not; or nothing that works was found, in a whole search or one that
-        was given up."""
+        """Return whether the remedy works: surely, unsurely, or not at all.
+
+        A search without result may also have been given up.
+        """
         if self.interrupted:
             return "unsure"
         if self.stage is None:
@@ -131,14 +141,16 @@ class RemedyOutcome:
         return "unsure" if self.doubts else "works"
 
     def least_cost(self, goal: Goal) -> float:
-        """What the best of the points that were tried costs (see `TriedPoints.cost`); infinite without any."""
+        """Return the least cost of the points tried (see `TriedPoints.cost`); infinite without any."""
         return np.inf if self.points is None else float(self.points.cost(goal).min())
 
 
 @np.errstate(all="ignore")
 def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
-    """A stage on machines, with the sampling and delay of the stage `drive` for its margins. What attracts them is
-    surveyed only of those that meet the rest of the goal: of others nothing is said to."""
+    """Measure a stage on machines, with sampling and delay of the stage `drive` for its margins.
+
+    What attracts is surveyed only for machines that meet the rest of the goal; for others nothing is reported.
+    """
     settings = RemedySettings.current()
     remedy = Remedy.settled_on("", stage)
     flat = stage.flat()
@@ -157,9 +169,11 @@ def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> P
 
 
 def _stiffness(flat: Mapping[str, Any]) -> float:
-    """The stiffness [N/m] of the loop against a load on the stage, before the integral acts, with the gains that it has
-    at standstill. A joint takes nothing of it, as actuator and sensor are on the stage; the transmission does, where
-    the position is that of the motor."""
+    """Return the loop's stiffness [N/m] against a load on the stage, before the integral acts.
+
+    Gains are those at standstill. A joint does not reduce it, because actuator and sensor are on the stage. A
+    transmission does, if the position is measured at the motor.
+    """
     proportional, _ = slow_gains(gain_states(flat)[-1])
     if flat.get("encoder.position") == "motor":
         return float(in_series(proportional, flat["transmission.stiffness"]))
@@ -167,17 +181,20 @@ def _stiffness(flat: Mapping[str, Any]) -> float:
 
 
 def verified(stage: Stage) -> Case:
-    """The verdict of `friso check` on the stage as it is, by its cycles."""
+    """Return the verdict of `friso check` on the stage as it is, by its cycles."""
     return check_given(stage)
 
 
 def unmet_goals(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
-    """What of the goal a stage does not meet, or not surely: names of `friso.questions.tune.words.DOUBTS`."""
+    """Return which parts of the goal a stage misses, or may miss.
+
+    They are names of `friso.questions.tune.words.DOUBTS`.
+    """
     return (*unsettled_parts(case, measured, goal), *missed_parts(measured, goal))
 
 
 def unsettled_parts(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
-    """What the verdict on the stage itself, its bandwidth and its margin leave open."""
+    """Return what the stage's verdict, bandwidth and margin leave open."""
     settings = RemedySettings.current()
     judgement, edge = case.judgement, case.judgement.margin
     listed: list[str] = []
@@ -201,7 +218,7 @@ def unsettled_parts(case: Case, measured: Performance, goal: Goal) -> tuple[str,
 
 
 def missed_parts(measured: Performance, goal: Goal) -> tuple[str, ...]:
-    """The parts of the goal that too many machines miss."""
+    """Return the parts of the goal that too many machines miss."""
     parts = measured.meets(goal)
     listed = [name for name, meets in parts.items() if np.mean(meets) < goal.share]
     if not listed and np.mean(np.all([*parts.values()], axis=0)) < goal.surely(measured.count):
@@ -210,7 +227,10 @@ def missed_parts(measured: Performance, goal: Goal) -> tuple[str, ...]:
 
 
 def _near(low: object, high: object, distance: float) -> bool:
-    """Whether a window of bandwidths, its ends factors (None: as far as the search goes), comes within the distance."""
+    """Tell whether a window of bandwidths comes within the distance.
+
+    Its ends are factors; None means as far as the search goes.
+    """
     first = getattr(low, "outside", 0.0) if low is not None else 0.0
     last = getattr(high, "outside", np.inf) if high is not None else np.inf
     return bool(first < distance and last > 1 / distance)

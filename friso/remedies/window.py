@@ -1,4 +1,4 @@
-"""The window of points in which an answer holds: each number varied by itself."""
+"""Find the range of each number in which an answer holds, all others as tuned."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ from friso.remedies.trials import attraction
 
 @dataclass(frozen=True)
 class VariableWindow:
-    """From `low` to `high` of a variable of a remedy (SI, or factors), all else being as tuned, machines meet the goal;
-    whether it goes on to the end of the range that was searched, `open_below` and `open_above`."""
+    """The range from `low` to `high` of a variable in which machines meet the goal.
+
+    Its ends are in SI, or factors. All else is as tuned. `open_below` and `open_above` tell that the range reaches an
+    end of the search.
+    """
 
     name: str
     low: float
@@ -27,10 +30,12 @@ class VariableWindow:
 
 
 def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
-    """The windows about points, shape (variables,), by moves and margins of the machines of the search: on a grid, then
-    their ends by halving what lies between them and the next value that was tried; and then as far as nothing attracts
-    these machines at the ends. None where the points themselves do not meet the goal on these machines, or where that
-    takes too much work."""
+    """Return the windows around a point, shape (variables,), on the machines of the search.
+
+    Moves and margins are tried on a grid, and the ends are refined by bisection. The ends are then drawn in until
+    nothing attracts the machines there. Returns None if the point itself misses the goal on these machines, or takes
+    too much work.
+    """
     settings = RemedySettings.current()
     variables, grid = search.remedy.variables, np.linspace(0, 1, settings.window_points)
     inside, outside = np.empty((len(variables), 2)), np.full((len(variables), 2), np.nan)
@@ -67,8 +72,10 @@ def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
 def _halve(
     inside: np.ndarray, outside: np.ndarray, ends: np.ndarray, does: Callable[[np.ndarray, np.ndarray], np.ndarray]
 ) -> None:
-    """Halve what lies between the last places that do and the next, which do not, (variables, 2), at some of the ends:
-    `ends` are numbers of variables and sides (n, 2)."""
+    """Bisect between the last places that work and the next ones that do not, (variables, 2).
+
+    `ends` selects some of the ends by numbers of variables and sides, (n, 2).
+    """
     settings = RemedySettings.current()
     rows, sides = ends.T
     for _ in range(settings.window_halvings if len(ends) else 0):
@@ -78,13 +85,15 @@ def _halve(
 
 
 def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Whether points meet the goal, by moves and margins, with one variable each, that of a number (n,), at another
-    place (n,)."""
+    """Tell whether points meet the goal by moves and margins if one variable each is moved.
+
+    `numbers` (n,) select the variables, and `places` (n,) are their new shares.
+    """
     return search.measured(_moved(shares, numbers, places)).meets(search.goal)
 
 
 def _clear(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Whether nothing attracts the machines with such points."""
+    """Tell whether nothing attracts the machines at points with one variable each moved."""
     if not len(places):
         return np.ones(0, bool)
     survey = attraction(search.remedy, _moved(shares, numbers, places), search.machines, search.goal)
@@ -92,7 +101,7 @@ def _clear(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.n
 
 
 def _moved(shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Points with one variable each, that of a number (n,), at another place (n,)."""
+    """Return points with one variable each, of a number (n,), moved to another place (n,)."""
     tried = np.repeat(shares[None], len(places), axis=0)
     tried[np.arange(len(places)), numbers] = places
     return tried

@@ -1,5 +1,5 @@
-"""What a person looks at: figures as plain data, their renderers, and the report.
+"""Show results to people: figures as plain data, their renderers, and the report.
 
-Nothing is imported here: matplotlib, plotly, jinja2 and xarray are heavy, so the command line imports the
-module it needs when it needs it.
+Nothing is imported here, because matplotlib, plotly, jinja2 and xarray are heavy. The command line imports a module
+when it needs it.
 """

@@ -1,4 +1,4 @@
-"""How the cases of a check are named and coloured: the same in every figure, sentence and table."""
+"""Name and colour the cases of a check alike in every figure, sentence and table."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ BANDS = dict(zip(SETTLING_BANDS, ("1 µm", "10 µm"), strict=True))
 
 
 def band_text(band: float) -> str:
-    """A band of settling in words."""
+    """Write a settling band in words."""
     return axis_shown().text(BANDS[band])
 
 
 @dataclass(frozen=True)
 class ShownCase:
-    """One case as the figures and the report show it: always under this label, in this colour."""
+    """One case of a check with its label and its colour."""
 
     key: str
     label: str
@@ -35,17 +35,21 @@ class ShownCase:
 
 
 def shown_cases(cases: Mapping[str, Case]) -> tuple[ShownCase, ...]:
-    """The cases, each once: where "given" repeats the locked or the free case, that one says "(as given)"."""
+    """Return the cases, each once.
+
+    If "given" repeats the locked or the free case, that case is labelled "(as given)".
+    """
     labels = _labels([*cases], cases["given"].stage if "given" in cases else None)
     return tuple(ShownCase(key, label, COLOURS[key], cases[key]) for key, label in labels.items())
 
 
 def case_labels(stage: Stage) -> dict[str, str]:
-    """The names of the cases of a stage that are shown, to what they are called."""
+    """Return the labels of the cases of a stage that are shown, by name."""
     return _labels([*stage.variants()], stage)
 
 
 def _labels(names: Collection[str], stage: Stage | None) -> dict[str, str]:
+    """Return labels by name; the case that equals the stage as given says so."""
     joint = stage.joint if stage else None
     variant = "locked" if joint and joint.locked else "free"
     twin = variant if joint and variant in names else None

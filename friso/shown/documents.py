@@ -1,4 +1,4 @@
-"""What JSON documents share."""
+"""Provide what all JSON documents share."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ from friso.axis import axis_shown
 
 
 def plain_json(value: Any) -> Any:
-    """What JSON knows: plain numbers, texts, lists and tables; null for infinite and undefined numbers. The units with
-    which keys end are those of the axis that is spoken of: "amplitude_m" is "amplitude_rad" on a rotary one."""
+    """Return a value as JSON knows it: plain numbers, texts, lists and tables.
+
+    Infinite and undefined numbers become null. Units at the end of keys follow the kind of axis: "amplitude_m" becomes
+    "amplitude_rad" on a rotary one.
+    """
     if isinstance(value, dict):
         axis = axis_shown()
         return {axis.suffix(key) if isinstance(key, str) else key: plain_json(item) for key, item in value.items()}
@@ -28,5 +31,5 @@ def plain_json(value: Any) -> Any:
 
 
 def unit_suffix(unit: str) -> str:
-    """How a key of a document ends by its unit: "_n_s_per_m" for "N*s/m", nothing for a number without one."""
+    """Return the suffix of a key for a unit: "_n_s_per_m" for "N*s/m", empty without a unit."""
     return f"_{unit.lower().replace('*', '_').replace('/', '_per_').replace('^', '')}" if unit else ""

@@ -1,4 +1,4 @@
-"""The files of a command: names to what they hold."""
+"""Describe the files of a command: names, and what the files hold."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ Files = Mapping[str, Content]
 
 
 def pictures(figures: Iterable[Figure], forms: Iterable[str] | None = None) -> dict[str, Content]:
-    """Every figure in all forms ("png", "svg", "pdf"), each drawn when it is written, or as it goes on a page, at the
-    latest."""
+    """Return every figure in all forms ("png", "svg", "pdf").
+
+    Each is drawn when it is written, or when a page shows it.
+    """
     forms = FORMATS if forms is None else (*forms,)
     several = [image_files(figure, figure.name, forms, shown=[ON_PAGE]) for figure in figures]
     return {name: content for images in several for name, content in images.items()}
@@ -27,7 +29,10 @@ def pictures(figures: Iterable[Figure], forms: Iterable[str] | None = None) -> d
 def image_files(
     figure: Figure, stem: str, forms: Iterable[str] = FORMATS, shown: Iterable[Image] = ()
 ) -> dict[str, Content]:
-    """A figure in some forms, in files that begin with a stem; it is also `shown` as such images on a page."""
+    """Return a figure in some forms, in files whose names begin with a stem.
+
+    It may also be `shown` as such images on a page.
+    """
     forms = [*forms]
     draw_beforehand([figure], [*shown, *map(Image, forms)])
     return {f"{stem}.{form}": partial(save, figure) for form in forms}

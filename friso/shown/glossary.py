@@ -1,4 +1,4 @@
-"""The glossary on pages: a word that it explains is linked, where it first stands, to its meaning at the page's end."""
+"""Link words on a page to the glossary at its end, each where it first stands."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ class GlossaryRow:
 
     @property
     def name(self) -> str:
-        """All its words."""
+        """Return all words of the row as text."""
         return ", ".join(self.words)
 
     @property
     def place(self) -> str:
-        """Its anchor on a page."""
+        """Return the row's anchor on a page."""
         return "word-" + re.sub(r"\W+", "-", self.words[0].lower())
 
 
 @cache
 def entries() -> Mapping[str, GlossaryRow]:
-    """What the glossary explains, by its words in small letters.
+    """Return the rows of the glossary by their words in small letters.
 
-    Words that mean this in one context only stand there as "slope (of the return map)": they are left out, since pages
-    use them in others too.
+    Words with this meaning in one context only stand there as "slope (of the return map)". They are left out, since
+    pages use them in other contexts, too.
     """
     text = (resources.files("friso.shown") / "templates" / "glossary.md").read_text(encoding="utf-8")
     plain = re.sub(r"[*`]", "", text)
@@ -51,19 +51,19 @@ def entries() -> Mapping[str, GlossaryRow]:
 
 @cache
 def _any_word() -> re.Pattern[str]:
-    """Any of the words, or its plural; longer ones first."""
+    """Return a pattern for any of the words or its plural; longer words come first."""
     words = sorted(entries(), key=len, reverse=True)
     return re.compile(rf"(?<![\w-])({'|'.join(map(re.escape, words))})s?(?![\w-])", flags=re.IGNORECASE)
 
 
 class Glossary:
-    """What one page explains: the entries `used` on it, in the order of their first words."""
+    """The rows of the glossary `used` on one page, in the order of their first words."""
 
     def __init__(self) -> None:
         self.used: dict[str, GlossaryRow] = {}
 
     def linked(self, text: str) -> Markup:
-        """The text, escaped, with links from words that are new on the page."""
+        """Return a text, escaped, with links from words that are new on the page."""
         parts, end = [], 0
         text = escaped(text)
         for match in _any_word().finditer(text):
@@ -76,4 +76,5 @@ class Glossary:
 
     @staticmethod
     def _link(word: str, entry: GlossaryRow) -> Markup:
+        """Return a link from a word to its row."""
         return Markup('<a class="word" href="#{}" title="{}">{}</a>').format(entry.place, entry.meaning, word)

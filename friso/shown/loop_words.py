@@ -1,4 +1,4 @@
-"""That a loop is not stable, which comes before anything that friction makes of it."""
+"""Say that a loop is unstable, which comes before anything that friction does."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
 
 
 def unstable_loop(states: tuple[LoopState, ...]) -> list[str]:
-    """In which of its states the loop of the stage as its file gives it is unstable; nothing where it is stable."""
+    """Say in which states the loop of the stage as given is unstable; nothing for a stable loop."""
     return [f"The loop of the stage as its file gives it is {unstable_where(states)}."] if states else []
 
 
 def unstable_where(states: tuple[LoopState, ...]) -> str:
-    """In which of its states a loop is unstable, and what to do about it."""
+    """Say in which states a loop is unstable, and what to do about it."""
     where = listed([f"while the stage {state}" for state in states], "and")
     return f"unstable {where}, whatever the friction: retune the controller (friso bode)"

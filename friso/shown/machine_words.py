@@ -1,4 +1,4 @@
-"""By how much drawn machines differ from each other."""
+"""Say by how much drawn machines differ from each other."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 
 def spread_sentences(from_file: Sequence[str], spreads: Mapping[str, float]) -> list[str]:
-    """The keys that vary as the stage file says, and the default spreads [%] of others."""
+    """Say which keys vary as the stage file says, and the default spreads [%] of others."""
     sentences = [f"Uncertain as in the stage file: {', '.join(from_file)}."] if from_file else []
     if spreads:
         listed = ", ".join(f"{key} ±{spread:g} %" for key, spread in spreads.items())

@@ -1,4 +1,7 @@
-"""Every page that friso writes: one skeleton, the answer first, which a template of a command may change."""
+"""Write every page of friso from one skeleton, with the answer first.
+
+The template of a command may change parts of it.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def made_with() -> str:
-    """The version of friso, and what other packages bring to it."""
+    """Return the version of friso, and what other packages add to it."""
     return " with ".join([VERSION, *filter(None, [listed(foreign(), "and")])])
 
 
@@ -37,19 +40,21 @@ OWN_TEMPLATES = "friso.shown"
 CONTENTS: Mapping[str, Any] = MappingProxyType(
     {"verdicts": (), "sentences": (), "notes": (), "columns": (), "rows": (), "computed": ""}
 )
-"""What every page shows of its values, where it has them: sentences with a colour, and others; notes below them; a
-table, whose columns are texts or have a label and a colour, and whose rows are a text and a list of texts; and how it
-was `computed`, after the version of friso, without the full stop."""
+"""Values that every page shows if it has them.
+
+`verdicts` have a colour and `sentences` have none; `notes` stand below them. `columns` of the table are texts, or have
+a label and a colour. Its `rows` are a text and a list of texts. `computed` says how the result was computed; it
+follows the version of friso and has no full stop.
+"""
 
 
 @dataclass(frozen=True)
 class Report:
-    """The page of a `command`: the name at its head, its figures, the stage file and its source, and its contents by
-    name, `values`: those of `CONTENTS`, and what else its template names.
+    """The page of a `command`: name, figures, stage file, and contents by name.
 
-    A template of the command's name, if there is one, extends `page.html`, and changes its blocks: answer, table,
-    figures, footer. It stands in the folder templates of a package, `templates`. `scripted` pages load plotly without
-    figures of their own kind.
+    `values` holds the contents named in `CONTENTS`, and what else the template of the command names. That template, if
+    there is one, extends `page.html` and changes its blocks: answer, table, figures, footer. It stands in the folder
+    templates of the package `templates`. `scripted` pages load plotly without figures of their own kind.
     """
 
     command: str
@@ -72,14 +77,17 @@ class Report:
         templates: str = OWN_TEMPLATES,
         **values: Any,
     ) -> Report:
-        """The page about a stage, or about none; `name` stands at the head where the stage has none."""
+        """Return the page about a stage, or about none.
+
+        `name` stands at the head if the stage has no name.
+        """
         if stage is None:
             return cls(command, name, figures, templates=templates, values=values)
         about = (stage.to_toml(), stage.source)
         return cls(command, stage.name or name, figures, *about, templates=templates, values=values)
 
     def html(self) -> str:
-        """The page: it opens offline, prints, and is the same bytes on every run."""
+        """Return the page, which opens offline and prints; every run gives the same bytes."""
         draw_beforehand(self.figures, [ON_PAGE])
         figures = [(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in self.figures]
         scripts = plotly_renderer.script() if figures or self.scripted else None
@@ -91,13 +99,16 @@ class Report:
 
 
 def script(name: str) -> Markup:
-    """A script of friso/shown/templates, to stand in a page."""
+    """Return a script of friso/shown/templates, to stand in a page."""
     return Markup((resources.files("friso.shown") / "templates" / f"{name}.js").read_text(encoding="utf-8"))
 
 
 def environment(package: str = OWN_TEMPLATES) -> Environment:
-    """The templates of a package, and those of friso/shown/templates, for one page: texts are escaped, a name without a
-    value is an error, and words of `explained` texts are linked to what the `glossary` says of them."""
+    """Return the templates of a package and of friso/shown/templates, for one page.
+
+    Texts are escaped, and a name without a value is an error. Words of `explained` texts are linked to the
+    `glossary`.
+    """
     templates = Environment(
         loader=ChoiceLoader([PackageLoader(name) for name in dict.fromkeys((package, OWN_TEMPLATES))]),
         autoescape=True,
@@ -112,12 +123,15 @@ def environment(package: str = OWN_TEMPLATES) -> Environment:
 
 
 def _escaped_text(value: Any) -> Any:
-    """What a template puts into a page: texts escaped, markup of friso's own as it is."""
+    """Return what a template puts into a page: texts escaped, friso's own markup as it is."""
     return value if isinstance(value, Markup) or not isinstance(value, str) else escaped(value)
 
 
 def print_image(figure: Figure, form: str = "svg", noted: bool = True) -> Markup:
-    """The figure as a data address, to stand in quotation marks: what is printed, and what is seen without scripts."""
+    """Return the figure as a data address in quotation marks.
+
+    It is printed, and seen in browsers without scripts.
+    """
     content = image(figure, form, headed=False, noted=noted)
     if form == "svg":
         return Markup(f"data:image/svg+xml,{_plain(content.decode())}")
@@ -125,13 +139,13 @@ def print_image(figure: Figure, form: str = "svg", noted: bool = True) -> Markup
 
 
 def _plain(svg: str) -> str:
-    """An SVG as it may stand in an address in quotation marks: half of what base64 takes."""
+    """Return an SVG as it may stand in an address in quotation marks, half as long as in base64."""
     element = re.sub(r"\s+", " ", _UNSEEN.sub("", svg[svg.index("<svg") :]))
     return _PATH.sub(_shortened, element).translate(_IN_ADDRESSES)
 
 
 _UNSEEN = re.compile(r'<!--.*?-->|<metadata>.*?</metadata>|(?<=<g) id="[^"]*"', re.DOTALL)
-"""What nothing shows or refers to, names of groups among it."""
+"""Parts of an SVG that nothing shows or refers to, such as names of groups."""
 
 _PATH, _SPACED = re.compile(r'(?<= d=")[^"]*'), re.compile(r" ?([A-Za-z]) ?")
 """The lines of an element, and their commands, which need no blanks."""
@@ -144,7 +158,10 @@ TENTHS = 10
 
 
 def _shortened(path: re.Match[str]) -> str:
-    """Lines in less text: straight ones from each place to the next, to a tenth of a point."""
+    """Write the lines of an SVG path in less text.
+
+    Lines are straight from each place to the next, to a tenth of a point.
+    """
     if not _STRAIGHT.fullmatch(path[0]):
         return _SPACED.sub(r"\1", path[0])
     parts, here, last = [], (0, 0), ""
@@ -164,7 +181,7 @@ def _shortened(path: re.Match[str]) -> str:
 
 
 def _tenths(number: int, apart: bool) -> str:
-    """A number of tenths; `apart` from a number before it, where its sign is not."""
+    """Write a number of tenths; `apart` separates it from a number before it unless its sign does."""
     text = f"{number / TENTHS:g}".replace("0.", ".", 1) if abs(number) < TENTHS else f"{number / TENTHS:g}"
     return f" {text}" if apart and number >= 0 else text
 

@@ -1,1 +1,1 @@
-"""How some commands ask, where that takes more than showing the answer: a module each, with the function `run`."""
+"""Run commands that do more than show an answer: one module each, with the function `run`."""

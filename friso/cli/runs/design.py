@@ -1,4 +1,4 @@
-"""`friso design`: where nothing meets the specification, it says what to relax by how much."""
+"""Run `friso design`; without a design, say which requirement to relax and by how much."""
 
 from __future__ import annotations
 

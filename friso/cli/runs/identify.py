@@ -1,4 +1,4 @@
-"""`friso identify`: what was said of logs is kept for the next time, and asked for where it is missing."""
+"""Run `friso identify`: keep what the user said of logs, and ask for what is missing."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ if TYPE_CHECKING:
 
 
 def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], shown: Shown) -> None:
-    """Ask what logs show, and keep what was said of them. Raises InputError with the command to type where a question
-    about a log is open."""
+    """Identify a machine from logs, and keep what the user said of them for the next time.
+
+    Raises InputError with the command to type if a question about a log is open.
+    """
     from friso.identification.sources import OpenQuestions
     from friso.interface.output_folder import OutputFolder
     from friso.questions.identify.page import STAGE
@@ -56,7 +58,10 @@ def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], show
 
 
 def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> list[Path]:
-    """Keep what was said of logs, by file, for the next time, where it is not kept so already: the files written."""
+    """Store what the user said of each log, and return the files written.
+
+    A log whose record already says the same is left out.
+    """
     from friso.identification.logs.mapping import load_mapping, mapping_text
     from friso.identification.sources import kept_at
     from friso.interface.output_folder import write
@@ -80,5 +85,5 @@ def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> list[Path]:
 
 
 def _command(options: Sequence[str]) -> str:
-    """The command as it was called, with more options: to be copied."""
+    """Return the command as it was called, with further options, ready to be copied."""
     return " ".join(["friso", *map(shell_word, sys.argv[1:]), *options])

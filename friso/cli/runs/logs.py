@@ -1,4 +1,4 @@
-"""`friso logs`: files that cannot be read are told beside those that can."""
+"""Run `friso logs`: report files that cannot be read beside those that can."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from friso.interface.question import Question
 
 
 def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
-    """Ask what files hold, and write the page where there is anything to show."""
+    """Show what the files hold, and write the page if there is anything to show."""
     from friso.interface.output_folder import output_folder
 
     target = output_folder(question.name, shown.out, shown.overwrite, about[0])

@@ -1,4 +1,4 @@
-"""`friso map`: results go into a store beside the stage file, the figure and the page beside the store."""
+"""Run `friso map`: results go into a store, with the figure and the page beside it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from friso.interface.question import Question
 
 
 def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
-    """Run or resume a study, or say whether its store is whole (--check)."""
+    """Run or resume a study, or check with --check whether its store is complete."""
     from friso.axis import speak_of
     from friso.interface.output_folder import output_folder
     from friso.questions.map.study import write_beside
@@ -32,6 +32,10 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
         place = answer.store or source
 
         def written() -> list[Path]:
+            """Write figure, page and exports, and return their paths.
+
+            They go beside the store, or into another folder that was named.
+            """
             if elsewhere is not None:
                 return [*elsewhere.write(answer.files(progress), progress), *answer.exports]
             return write_beside(answer.files_beside(progress), place, shown.overwrite, progress)

@@ -1,10 +1,12 @@
 """LinuxCNC INI file
 
-The gains of a joint go to the HAL component `pid`: output = P e + I sum(e) T + D e' + FF0 r + FF1 r' + FF2 r'' + BIAS,
-e behind MAX_ERROR and DEADBAND, the output within MAX_OUTPUT, where the integral rests while it would drive it further.
-e' is r' - y', as in versions with the pins command-deriv and feedback-deriv; older ones differentiate the error behind
-its deadband. In torque mode the output is a force; in velocity mode it is a velocity, which the drive's own loop
-follows, in whatever unit the drive is scaled to: FF1 = 1 where that is machine units per second.
+The gains of a joint go to the HAL component `pid`: output = P e + I sum(e) T + D e' + FF0 r + FF1 r' + FF2 r'' + BIAS.
+The error e is taken after MAX_ERROR and DEADBAND, and the output is limited to MAX_OUTPUT. At that limit the integral
+rests while it would drive the output further. e' is r' - y', as in versions with the pins command-deriv and
+feedback-deriv. Older versions differentiate the error after its deadband.
+
+In torque mode the output is a force. In velocity mode it is a velocity, which the drive's own loop follows, in the unit
+that the drive is scaled to. FF1 = 1 if that unit is machine units per second.
 """
 
 from __future__ import annotations
@@ -100,14 +102,18 @@ HELD_OF_CASCADE = frozenset(("kv", "position_integral_time", "velocity_feedforwa
 
 
 def recognises(name: str, text: str) -> bool:
-    """By a section of a joint, an axis or the whole machine."""
+    """Recognise the file by a section of a joint, an axis or the whole machine."""
     return re.search(rf"^[ \t]*\[(?:{_AXIS}|EMC|EMCMOT|TRAJ)\]", text, re.MULTILINE) is not None
 
 
 def whole(text: str, beside: Beside) -> str:
-    """The text with what #INCLUDE names in place of its line, where that is in the folder of the file."""
+    """Replace each #INCLUDE line by the text of the file that it names.
+
+    Only files in the folder of the INI file are taken in. Included files cannot include others.
+    """
 
     def taken_in(line: re.Match[str]) -> str:
+        """Return the text that takes the place of an #INCLUDE line."""
         included = beside(line[1])
         return line[0] if included is None else _INCLUDE.sub("", included)
 
@@ -115,7 +121,10 @@ def whole(text: str, beside: Beside) -> str:
 
 
 def axes(text: str) -> tuple[AxisParameters, ...]:
-    """Joints (2.8 and later) or axes with a P. Raises InputError where there is none, or a file is no INI file."""
+    """Return the joints (LinuxCNC 2.8 and later) or axes that have a gain P.
+
+    Raises InputError if there is none, or if the text is no INI file.
+    """
     sections = _sections(text)
     included = _INCLUDE.findall(text)[:3]
     machine = {
@@ -146,15 +155,18 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
 
 
 def _letter(name: str, letters: str, counts: Mapping[str, int]) -> str:
-    """The letter of a joint, where each letter of the machine has one joint."""
+    """Return the letter of a joint, such as X; empty if a letter has several joints."""
     number = int(name.partition("_")[2])
     is_named = name.startswith("JOINT") and number < len(letters) and counts[letters[number]] == 1
     return letters[number] if is_named else ""
 
 
 def _sections(text: str) -> dict[str, dict[str, str]]:
-    """Variables by section, the first of a name, as LinuxCNC takes them; the names of those that others with another
-    value follow are that of REPEATED. Raises InputError."""
+    """Read the variables of an INI file by section.
+
+    LinuxCNC takes the first of several equal names, and so does this reader. The entry REPEATED lists the names whose
+    later values differ. Raises InputError for lines that are no INI syntax.
+    """
     sections: dict[str, dict[str, str]] = {}
     section: dict[str, str] = {}
     repeated: dict[tuple[str, str], None] = {}
@@ -184,7 +196,10 @@ def _sections(text: str) -> dict[str, dict[str, str]]:
 
 
 def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
-    """The machine, and what 1 of the output is. Raises InputError for a stepper without an encoder: it has no loop."""
+    """List what the file leaves open: the machine, its unit, and what an output of 1 does.
+
+    Raises InputError for a stepper without an encoder, which has no loop that could hunt.
+    """
     stepped = any(name.startswith("STEPGEN") or name in ("STEPLEN", "STEPSPACE") for name in axis.values)
     if stepped and not any(name.startswith("ENCODER") for name in axis.values):
         raise InputError("", "a stepper: its steps are counted, not its position", "a servo axis, whose loop can hunt")
@@ -211,15 +226,21 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
 
 
 def _in_velocity(axis: AxisParameters, answers: UserAnswers) -> bool:
-    """Whether the output is a velocity: as the user says, who gives a gain of the drive's loop or a force; else where
-    the file does, by an FF1 of about 1 and no D."""
+    """Tell whether the output of `pid` is a velocity and not a force.
+
+    An answer of the user decides: a gain of the drive's loop, or a force per output. Otherwise the output counts as a
+    velocity if FF1 is about 1 and D is 0.
+    """
     if FORCE in answers or VELOCITY in answers or "controller.kp" in answers:
         return FORCE not in answers
     return _unity(axis) and not axis.is_set("D")
 
 
 def _of_the_velocity_loop(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> list[OpenQuestion]:
-    """What no INI file has of the drive that follows a velocity."""
+    """List what an INI file cannot tell of the drive's velocity loop.
+
+    Its gain and its sample time are asked for, and the scale of the output unless FF1 is about 1.
+    """
     gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
     meaning = "gain of the drive's velocity loop, whose integral time, if any, is controller.velocity_integral_time"
     if _unity(axis) and VELOCITY not in answers:
@@ -236,7 +257,12 @@ def _of_the_velocity_loop(axis: AxisParameters, answers: UserAnswers, kind: Axis
 
 
 def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
-    """Controller, drive and move of an axis. Raises InputError for what friso cannot describe."""
+    """Build controller, drive and move of an axis.
+
+    Raises InputError for what friso cannot describe.
+
+    Parameters without a place in a stage are listed in sentences.
+    """
     kind = _kind(axis)
     unit = _metres(axis, answers, kind)
     left = [text.format(axis.number(key)) for key, text in NOT_CARRIED.items() if axis.is_set(key)]
@@ -276,7 +302,12 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
 def _torque(
     axis: AxisParameters, answers: UserAnswers, kind: AxisKind, unit: float
 ) -> tuple[dict[str, object], list[str]]:
-    """The table [controller] where the output is a force."""
+    """Build the table [controller] of a PID loop whose output is a force.
+
+    `unit` is the machine unit [m or rad].
+
+    Raises InputError for a negative gain.
+    """
     scale = answers.value(FORCE, FORCE_FIELD.on(kind)) / unit
     gain = {name: axis.number(name, 0.0) * scale for name in ("P", "I", "D", "FF1", "FF2")}
     for name in ("P", "I", "D"):
@@ -303,8 +334,11 @@ def _torque(
 def _velocity(
     axis: AxisParameters, answers: UserAnswers, kind: AxisKind, unit: float
 ) -> tuple[dict[str, object], list[str]]:
-    """The table [controller] where the output is the velocity that the drive follows; raises InputError for a D, for
-    which a cascade has no place."""
+    """Build the table [controller] of a cascade whose outer loop commands a velocity.
+
+    `unit` is the machine unit [m or rad]. Raises InputError for a D, which has no place in a cascade, and for a P that
+    is not positive.
+    """
     if axis.is_set("D"):
         expected = f"D = 0 with an output that is a velocity; or {FORCE}, with one that is a force"
         raise InputError("D", f"{axis.number('D'):g}", expected, f'--set {FORCE}="20 N"')
@@ -334,20 +368,23 @@ def _velocity(
 
 
 def _unity(axis: AxisParameters) -> bool:
-    """Whether FF1 says that the output is in machine units per second."""
+    """Tell whether FF1 is about 1, so that the output is in machine units per second."""
     return UNITY[0] <= axis.number("FF1", 0.0) <= UNITY[1]
 
 
 def _kind(axis: AxisParameters) -> AxisKind:
-    """Linear or rotary. Raises InputError for a type that is neither."""
+    """Return whether the axis is linear or rotary. Raises InputError for any other type."""
     if (name := str(axis.values.get("TYPE", TYPES[0]))).upper() not in TYPES:
         raise InputError("TYPE", quoted(name), f"one of {', '.join(TYPES)}", f"TYPE = {TYPES[0]}")
     return ROTARY if name.upper() == TYPES[1] else LINEAR
 
 
 def _unit_of(axis: AxisParameters) -> str | None:
-    """The machine unit of an axis, as the file says; None where it does not, or where axis and machine differ: by
-    LinuxCNC's manual the axis's counts, by its program the machine's."""
+    """Return the machine unit of an axis, as the file gives it.
+
+    Returns None if the file gives none, or if axis and machine give different units. LinuxCNC's manual then uses the
+    axis's unit, but its program uses the machine's.
+    """
     kind = _kind(axis)
     names = (axis.machine.get("unit" if kind == LINEAR else "angle"), axis.values.get("UNITS"))
     units = {_unit_named(str(name), kind) for name in names if name is not None}
@@ -355,7 +392,10 @@ def _unit_of(axis: AxisParameters) -> str | None:
 
 
 def _unit_named(name: str, kind: AxisKind) -> str:
-    """A machine unit by its name, or, as older files have it, by how many of it are a millimetre or a degree."""
+    """Return the name of a machine unit.
+
+    Older files give the unit as a number: how many units make a millimetre or a degree.
+    """
     units, base = (LENGTHS, 1e-3) if kind == LINEAR else (ANGLES, ANGLES["deg"])
     try:
         size = base / float(name)
@@ -365,7 +405,7 @@ def _unit_named(name: str, kind: AxisKind) -> str:
 
 
 def _metres(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> float:
-    """The machine unit in metres or radians. Raises InputError for an unknown one."""
+    """Return the size of the machine unit [m or rad]. Raises InputError for an unknown unit."""
     units = LENGTHS if kind == LINEAR else ANGLES
     name = answers.choice(UNIT, tuple(units)) if UNIT in answers else _unit_of(axis)
     if name not in units:
@@ -374,7 +414,10 @@ def _metres(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> float
 
 
 def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
-    """The unit, and what an output of 1 makes: a force, or a velocity that a cascade's inner loop follows."""
+    """List what is needed to write parameters: the machine unit, and what an output of 1 does.
+
+    An output of 1 is a velocity for a cascade, and a force for any other controller.
+    """
     kind = axis_of(flat)
     asked = [OpenQuestion(UNIT, "unit of the machine", '"mm"' if kind == LINEAR else '"deg"')]
     if flat["controller.kind"] == "cascade":
@@ -386,7 +429,10 @@ def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion,
 
 
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
-    """The parameters of the `pid` component. Raises InputError for a controller that it is not."""
+    """Compute the parameters of the `pid` component from a stage.
+
+    Raises InputError for a controller that the component cannot be.
+    """
     kind = axis_of(flat)
     units = LENGTHS if kind == LINEAR else ANGLES
     unit = units[answers.choice(UNIT, tuple(units))]
@@ -421,7 +467,10 @@ def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
 
 
 def _of_cascade(flat: FlatStage, unit: float, scale: float) -> Parameters:
-    """Those whose output is the velocity that a drive follows, of `scale` machine units per second where it is 1."""
+    """Compute the parameters of a cascade's outer loop, whose output commands a velocity.
+
+    `unit` is the machine unit [m or rad]. An output of 1 stands for `scale` machine units per second.
+    """
     kv, time = flat["controller.kv"], flat.get("controller.position_integral_time")
     ahead = flat["controller.velocity_feedforward"] / scale
     kv /= scale
@@ -431,7 +480,7 @@ def _of_cascade(flat: FlatStage, unit: float, scale: float) -> Parameters:
 
 
 def text(settings: Mapping[str, float]) -> str:
-    """The lines of a section."""
+    """Write parameters as the lines of a joint's section."""
     lines = [f"{name} = {value:.12g}" for name, value in settings.items()]
     return "\n".join(["[JOINT_0]", *lines, ""])
 

@@ -44,7 +44,7 @@ AHEAD = (POSITION_FILTER, TRAJECTORY)
 
 
 def _symbols(modes: tuple[str, ...], *before: str) -> dict[str, float]:
-    """What modes are called in Python, each name behind what may stand before it."""
+    """Return the number of each mode by the names that Python scripts use for it."""
     return {f"{start}{name}": number for start in before for number, name in enumerate(modes)}
 
 
@@ -94,7 +94,7 @@ HELD = frozenset({"kv", "kp", "velocity_integral_time", "force_limit", "integral
 """Names in [controller] that the parameters hold."""
 
 FED_FORWARD = frozenset({"velocity_feedforward", "acceleration_feedforward"})
-"""Those that they hold where the drive's own trajectories feed them forward: the velocity whole."""
+"""Names in [controller] that parameters hold if the drive's own trajectories feed them forward."""
 
 
 _LINE = re.compile(r"[ \t]*(odrv[0-9]{1,3})\.([\w.]{1,200})[ \t]*=(?!=)[ \t]*([^#]*)(?:#.*)?")
@@ -127,20 +127,23 @@ IN_TURNS_INSTEAD = (
 )
 
 GAINS_IN, TURNS, COUNTS = "gains_in", "turns", "counts"
-"""What the user may say where nothing in a file tells which firmware it is of."""
+"""Answer of the user, and its choices, if nothing in a file reveals the firmware."""
 
 _RECOGNISED = re.compile(r"^[ \t]*odrv[0-9]{1,3}\.axis[0-9]{1,3}\.[\w.]{1,180}[ \t]*=(?!=)", re.MULTILINE)
 
 
 def recognises(name: str, text: str) -> bool:
-    """By being JSON with gains of an axis, or lines for odrivetool."""
+    """Recognise JSON with the gains of an axis, or lines for odrivetool."""
     in_json = text.lstrip().startswith("{") and '"axis' in text and "vel_integrator_gain" in text
     return in_json or bool(_RECOGNISED.search(text))
 
 
 def axes(text: str) -> tuple[AxisParameters, ...]:
-    """Axes with gains. Raises InputError for what is no JSON and no lines for odrivetool, and for firmware whose units
-    or names are others."""
+    """Return the axes that have gains.
+
+    Raises InputError for a text that is neither JSON nor lines for odrivetool. Firmware with other units or names is
+    refused, too.
+    """
     in_lines = not text.lstrip().startswith("{")
     held: dict[tuple[str, str], dict[str, Any]] = {}
     for key, value in (_settings(text) if in_lines else _entries(text)).items():
@@ -163,8 +166,11 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
 
 
 def _settings(text: str) -> dict[str, Any]:
-    """What lines for odrivetool set, the last of a name: numbers (of arithmetic too), true and false, and texts. Raises
-    InputError for a line that is none of theirs."""
+    """Read the parameters that lines for odrivetool set; the last of equal names counts.
+
+    Values are numbers, arithmetic, true, false, or texts. Raises InputError for a line that odrivetool would not
+    take.
+    """
     values: dict[str, Any] = {}
     lines = text.splitlines()
     if len(lines) > MOST_KEYS:
@@ -181,7 +187,10 @@ def _settings(text: str) -> dict[str, Any]:
 
 
 def _refuse_other_firmware(axis: AxisParameters) -> None:
-    """Raises InputError for firmware whose gains are in counts, or whose names are others."""
+    """Raise InputError for firmware other than 0.5.1 to 0.5.6.
+
+    Older firmware has gains in counts, and newer firmware has other names of parameters.
+    """
     if IN_TURNS in axis.values:
         return
     if name := _sign_of(axis, NEWEST):
@@ -191,13 +200,13 @@ def _refuse_other_firmware(axis: AxisParameters) -> None:
 
 
 def _in_counts(name: str, value: str) -> InputError:
-    """The refusal of gains that are in counts, as a parameter or the user tells."""
+    """Build the refusal of gains that are in encoder counts."""
     actual = f"{quoted(value)}, as in firmware up to 0.4, whose gains are in counts of the encoder and amperes"
     return InputError(name, actual, TURNS_EXPECTED, IN_TURNS_INSTEAD)
 
 
 def _sign_of(axis: AxisParameters, names: frozenset[str]) -> str:
-    """A parameter that has one of the names, or a symbol that begins with one; "" for none."""
+    """Return the first parameter or symbol that reveals the firmware; empty if there is none."""
     for key, value in axis.values.items():
         symbol = re.match("CTRL_MODE|CONTROL_MODE|ControlMode", value) if isinstance(value, str) else None
         if names & {key.rpartition(".")[2], ".".join(key.split(".")[:2]), symbol[0] if symbol else ""}:
@@ -206,13 +215,16 @@ def _sign_of(axis: AxisParameters, names: frozenset[str]) -> str:
 
 
 def _fastest(axis: AxisParameters) -> str:
-    """A limit of the velocity that no motor reaches in turns per second; "" for none."""
+    """Return a velocity limit that no motor reaches in turns per second; empty if there is none."""
     limits = (f"{place}.vel_limit" for place in (CONFIG, MOVE))
     return next((key for key in limits if axis.is_set(key) and axis.number(key) > FASTEST), "")
 
 
 def _entries(text: str) -> dict[str, Any]:
-    """The entries of a JSON document by their places. Raises InputError for what is none."""
+    """Return the entries of a JSON document by their places.
+
+    Raises InputError for a text that is no JSON.
+    """
     try:
         document = json.loads(text)
     except RecursionError:
@@ -235,7 +247,10 @@ def _entries(text: str) -> dict[str, Any]:
 
 
 def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
-    """The machine, and what a turn of the motor moves. Raises InputError for an axis that controls no position."""
+    """List what the file leaves open: the machine, and how far a turn of the motor moves it.
+
+    Raises InputError for an axis that does not control a position.
+    """
     mode = _mode(axis, "control_mode", POSITION_CONTROL)
     if mode != POSITION_CONTROL:
         raise InputError(f"{CONFIG}.control_mode", f"{mode:g}", "3, control in position", '"control_mode": 3')
@@ -257,12 +272,17 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
 
 
 def _mode(axis: AxisParameters, name: str, default: float) -> float:
-    """The number of a mode, which may be written as it is called."""
+    """Return the number of a mode, which the file may also give by name."""
     return axis.number(f"{CONFIG}.{name}", default, SYMBOLS[name])
 
 
 def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
-    """Controller, drive and move of an axis. Raises InputError for what friso cannot describe."""
+    """Build controller, drive and move of an axis.
+
+    Raises InputError for what friso cannot describe.
+
+    Settings without a place in a stage are listed in sentences.
+    """
     kind, travel = answers.kind_of(TRAVEL, TRAVELS)
     force = 2 * pi / travel  # [N] for a torque of 1 N m
     number = lambda name, default=None: axis.number(f"{CONFIG}.{name}", default)  # noqa: E731
@@ -300,7 +320,7 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
 
 
 def _torque_limit(axis: AxisParameters) -> float:
-    """Torque [N m] that the motor gives at most."""
+    """Return the largest torque of the motor [N m], from its torque and current limits."""
     torque = axis.number(f"{MOTOR}.torque_lim") if axis.is_set(f"{MOTOR}.torque_lim") else inf
     if not axis.is_set(f"{MOTOR}.current_lim"):
         return torque
@@ -308,7 +328,10 @@ def _torque_limit(axis: AxisParameters) -> float:
 
 
 def _motion(axis: AxisParameters, kind: AxisKind, travel: float) -> dict[str, Mapping[str, Any]]:
-    """The move of the drive's own trajectories, where it has any."""
+    """Build the move that the drive's own trajectory generator makes; empty without one.
+
+    `travel` is how far one turn moves the load [m or rad].
+    """
     if not all(axis.is_set(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit")):
         return {}
     fastest, acceleration = (axis.number(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit"))
@@ -325,7 +348,7 @@ def _motion(axis: AxisParameters, kind: AxisKind, travel: float) -> dict[str, Ma
 
 
 def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ...]:
-    """What a stage cannot say of the axis, in sentences."""
+    """List in sentences the settings of the axis that a stage cannot describe."""
     left = ["the position is the estimate of a phase-locked loop too, which follows a steady motion without an error"]
     if IN_TURNS not in axis.values:
         left.append(
@@ -368,7 +391,7 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
 
 
 def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
-    """What a turn moves, where no transmission tells."""
+    """Ask how far a turn moves the load, unless a transmission tells."""
     if TRAVEL in answers or travel_of(flat) is not None:
         return ()
     return (
@@ -377,7 +400,10 @@ def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion,
 
 
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
-    """The parameters of an axis. Raises InputError for a controller that is no P over P or PI."""
+    """Compute the parameters of an ODrive axis from a stage.
+
+    Raises InputError for a controller other than a position loop with P over a velocity loop with P or PI.
+    """
     name = "controller."
     if flat["controller.kind"] != "cascade":
         raise lacks(f'kind = "{flat["controller.kind"]}"', "a cascade, the only structure that this drive has")
@@ -413,7 +439,7 @@ def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
 
 
 def _loop_of_velocity(flat: FlatStage) -> str:
-    """The filter of the velocity that a phase-locked loop can stand for; empty where there is none."""
+    """Return the velocity filter that a phase-locked loop can stand for; empty without one."""
     places = [place for place in row_keys(flat, FILTERS_KEY) if flat[f"{place}.path"] == FEEDBACK]
     if len(places) != 1 or flat[f"{places[0]}.kind"] != "low_pass":
         return ""
@@ -422,7 +448,7 @@ def _loop_of_velocity(flat: FlatStage) -> str:
 
 
 def text(settings: Mapping[str, float]) -> str:
-    """The lines that odrivetool takes."""
+    """Write parameters as lines for odrivetool."""
     return "".join(f"odrv0.axis0.{name} = {value:.12g}\n" for name, value in settings.items())
 
 

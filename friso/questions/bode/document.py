@@ -1,4 +1,4 @@
-"""The JSON document of `friso bode`."""
+"""Build the JSON document of `friso bode`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from friso.shown.documents import plain_json
 
 
 def bode_document(bode: Bode) -> dict[str, Any]:
-    """The JSON document of `bode`; infinite and undefined numbers are null."""
+    """Return the JSON document of a linear analysis.
+
+    Infinite and undefined numbers become null.
+    """
     joint = bode.stage.joint
     state = "given" if joint is None else ("locked" if joint.locked else "free")
     crossover = bode.stage.controller.bandwidth_key is not None
@@ -45,6 +48,7 @@ def bode_document(bode: Bode) -> dict[str, Any]:
 
 
 def _margins(margins: Margins) -> dict[str, Any]:
+    """Return the stability margins and poles of one loop."""
     return {
         "stable": margins.stable,
         "crossovers_hz": list(margins.crossovers),
@@ -60,7 +64,7 @@ def _margins(margins: Margins) -> dict[str, Any]:
 
 
 def _at(bode: Bode, member: Members, margins: Margins) -> dict[str, Any]:
-    """The margins of a member of the family, and which one it is."""
+    """Return the margins of a state of the family, and which state it is."""
     at = {
         "bias_n": float(member.bias[0]),
         "speed_m_per_s": float(member.speed[0]),
@@ -71,10 +75,15 @@ def _at(bode: Bode, member: Members, margins: Margins) -> dict[str, Any]:
 
 
 def _limiter(bode: Bode, touched: bool) -> str | None:
+    """Return the side of the limiter, or None for a stage whose limiter has only one state."""
     return side(touched) if has_limiter(bode) else None
 
 
 def _limits(margins: Limits, unit: str) -> dict[str, Any]:
+    """Return the ranges of the crossover that are stable or have a good modulus margin.
+
+    `unit` is part of the names: "hz", or "factor" for multiples of the bandwidth.
+    """
     return {
         f"highest_stable_crossover_{unit}": margins.highest_stable,
         "still_stable_there": margins.open_ended,

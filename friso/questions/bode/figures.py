@@ -1,4 +1,7 @@
-"""The figures of a linear analysis: plant, open loop, Nyquist and sensitivity, in all limit cases and the family."""
+"""Draw a linear analysis: plant, open loop, Nyquist plot and sensitivity.
+
+Each figure shows the limit cases, and some show the whole family of states behind them.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,7 @@ LEAST_PHASE = -720.0
 """Phases [deg] below this one, as of a delay at high frequencies, are left out of view."""
 
 NEAR = ((-3.0, 1.5), (-1.5, 1.5))
-"""What is seen of the complex plane about -1."""
+"""Part of the complex plane around -1 that the Nyquist plot shows."""
 
 KEPT = (0.02, 5.0)
 """Sizes of the loop that are drawn of the family in it."""
@@ -60,16 +63,17 @@ LOST = "#eeb48f"
 
 
 def bode_figures(bode: Bode) -> tuple[Figure, ...]:
-    """All figures, in the order in which they are read."""
+    """Return all figures in the order in which they are read."""
     return (*first_figures(bode), *_drawn(bode, (_speeds(bode), _nyquist(bode), _sensitivity(bode))))
 
 
 def first_figures(bode: Bode) -> tuple[Figure, ...]:
-    """The first of them, which show the limit cases alone: the others need the family behind these, and take longer."""
+    """Return the figures of the limit cases alone, which need less time than the family."""
     return _drawn(bode, (_plant(bode), *_cascade(bode), _loop(bode)))
 
 
 def _drawn(bode: Bode, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
+    """Name the stage in figures, and leave out figures without panels."""
     return tuple(replace(figure, subject=bode.stage.name) for figure in figures if figure.panels)
 
 
@@ -85,8 +89,11 @@ class ResponseCurve:
 
 
 def phases(responses: Sequence[np.ndarray]) -> list[Array]:
-    """Phases [deg], each of shape (k,), without jumps of a turn: the first begins between -315 and 45 degrees, and the
-    others lie in the same turn at high frequencies, where all of them do the same."""
+    """Return phases [deg] of complex responses (k,) without jumps of 360 degrees.
+
+    The first phase begins between -315 and 45 degrees. The others are shifted by whole turns until they agree with it
+    at high frequencies, where all loops behave alike.
+    """
     angles = [np.angle(response) for response in responses]
     lagging = [np.where(angle > np.pi - 1e-9, angle - 2 * np.pi, angle) for angle in angles]  # half a turn is a lag
     first, *others = [np.degrees(np.unwrap(angle)) for angle in lagging]
@@ -96,12 +103,12 @@ def phases(responses: Sequence[np.ndarray]) -> list[Array]:
 
 
 def magnitude(response: np.ndarray) -> Array:
-    """Absolute value [dB]."""
+    """Return the absolute value of a complex response [dB]."""
     return 20 * np.log10(np.abs(response))
 
 
 def _plant(bode: Bode) -> Figure:
-    """Stage position over actuator force, with the mass lines (thesis, Fig. 7)."""
+    """Draw stage position over actuator force, with lines of pure masses (thesis, Fig. 7)."""
     curves = [_curve(name, case.plant) for name, case in bode.cases.items()]
     sizes = np.concatenate([np.abs(curve.response) for curve in curves])
     axis = Axis("Magnitude", "m/N", (float(sizes.min()) / 2, float(sizes.max()) * 2), log=True, prefixed=False)
@@ -123,7 +130,7 @@ def _plant(bode: Bode) -> Figure:
 
 
 def _loop(bode: Bode) -> Figure:
-    """The open loop in the limit cases."""
+    """Draw the open loop in the limit cases."""
     caption = (
         "The loop cut at the actuator: controller, plant and, if the stage file has one, the drive. The phase margin "
         "is the distance to −180° where the magnitude crosses 0 dB."
@@ -133,7 +140,10 @@ def _loop(bode: Bode) -> Figure:
 
 
 def _cascade(bode: Bode) -> Iterator[Figure]:
-    """What a drive's own Bode plots show of a cascade: the plant of its velocity loop, and each loop."""
+    """Yield the figures of a cascade: the plant of its velocity loop, then each loop opened.
+
+    A drive's own software shows such Bode plots.
+    """
     if not bode.cascades:
         return
     from_sliding = sorted(bode.cascades, key=lambda name: name.startswith("stuck"))  # whose phase begins at 0
@@ -159,7 +169,10 @@ def _cascade(bode: Bode) -> Iterator[Figure]:
 
 
 def _speeds(bode: Bode) -> Figure:
-    """The open loop at prescribed speeds of the cart (thesis, Fig. 8); no panels without friction."""
+    """Draw the open loop at prescribed speeds of the cart (thesis, Fig. 8).
+
+    A stage without friction gives a figure without panels.
+    """
     caption = (
         "The same while the cart slides at a prescribed speed"
         f"{', limiter free' if has_limiter(bode) else ''} (thesis, Fig. 8): the faster it slides, the sooner the "
@@ -178,12 +191,12 @@ def _speeds(bode: Bode) -> Figure:
 
 
 def _marked(curve: ResponseCurve, stable: bool) -> ResponseCurve:
-    """The curve of a loop; dashed, and labelled so, if it is not stable."""
+    """Return the curve of a loop, dashed and labelled if the loop is unstable."""
     return curve if stable else replace(curve, label=f"{curve.label} (unstable)", dash="dashed")
 
 
 def _nyquist(bode: Bode) -> Figure:
-    """The loop about -1: limit cases, and the family behind them."""
+    """Draw the open loop near -1: the limit cases, with the family behind them."""
     family = [
         *_family(bode, True, "stable states of the family", LIGHT),
         *_family(bode, False, "unstable states of the family", LOST),
@@ -208,7 +221,7 @@ def _nyquist(bode: Bode) -> Figure:
 
 
 def _family(bode: Bode, stable: bool, name: str, shade: str) -> list[Series]:
-    """Evenly picked members that are stable, or those that are not, where they are in view."""
+    """Return evenly picked stable or unstable members of the family, where they are in view."""
     numbers = np.flatnonzero(bode.scan.stable == stable) if has_family(bode) else np.empty(0, int)
     picked = numbers[np.linspace(0, len(numbers) - 1, min(DRAWN[stable], len(numbers))).round().astype(int)]
     lines = []
@@ -220,7 +233,7 @@ def _family(bode: Bode, stable: bool, name: str, shade: str) -> list[Series]:
 
 
 def _sensitivity(bode: Bode) -> Figure:
-    """Sensitivity of the limit cases that are stable, and the band of the family."""
+    """Draw the sensitivity of the stable limit cases, and the band of the stable family."""
     stable = bode.scan.stable
     lines = tuple(
         Series(_hertz(bode), -magnitude(1 + curve.response), curve.label, curve.colour, curve.dash, curve.width)
@@ -246,8 +259,10 @@ def _sensitivity(bode: Bode) -> Figure:
 
 
 def loop_panels(hertz: Array, curves: Sequence[ResponseCurve]) -> tuple[Panel, ...]:
-    """Magnitude [dB] and phase [deg] of loops over frequencies (k,) [Hz], with the lines at 0 dB and half a turn; none
-    of no loops."""
+    """Return panels of magnitude [dB] and phase [deg] of loops over frequencies (k,) [Hz].
+
+    Lines mark 0 dB and odd multiples of 180 degrees. Without loops there are no panels.
+    """
     if not curves:
         return ()
     sizes = np.concatenate([magnitude(curve.response) for curve in curves])
@@ -260,12 +275,16 @@ def loop_panels(hertz: Array, curves: Sequence[ResponseCurve]) -> tuple[Panel, .
 
 
 def _magnitudes(hertz: Array, curves: Sequence[ResponseCurve], axis: Axis, of: Callable[[np.ndarray], Array]) -> Panel:
+    """Return the panel of a measure of size, such as [dB], over frequencies (k,) [Hz]."""
     lines = (Series(hertz, of(curve.response), curve.label, curve.colour, curve.dash, curve.width) for curve in curves)
     return Panel("", Axis.of_frequency(hertz), axis, tuple(lines))
 
 
 def _phases(hertz: Array, curves: Sequence[ResponseCurve]) -> Panel:
-    """The phases, without labels: those stand above the magnitudes."""
+    """Return the panel of phases over frequencies (k,) [Hz], without labels.
+
+    The labels stand in the panel of magnitudes above.
+    """
     angles = zip(curves, phases([curve.response for curve in curves]), strict=True)
     lines = tuple(Series(hertz, y, "", curve.colour, curve.dash, curve.width) for curve, y in angles)
     least = QUARTER * np.floor((min(line.y.min() for line in lines) + 1) / QUARTER)
@@ -278,20 +297,25 @@ def _phases(hertz: Array, curves: Sequence[ResponseCurve]) -> Panel:
 
 
 def _curve(name: str, response: np.ndarray) -> ResponseCurve:
-    """A response of a limit case."""
+    """Return the response of a limit case in its colour and style."""
     return ResponseCurve(response, label(name), colour(name), dash(name), WIDTHS["touched" in name])
 
 
 def _loop_of(name: str, case: BodeCase) -> ResponseCurve:
+    """Return the open loop of a limit case, marked if it is unstable."""
     return _marked(_curve(name, case.loop), case.margins.stable)
 
 
 def _masses(bode: Bode) -> list[float]:
-    """All that moves, and what moves with the actuator, if that can move without the cart [kg]."""
+    """Return the moving masses [kg]: all that moves, and the part that moves without the cart.
+
+    Only a free joint lets the actuator move without the cart.
+    """
     flat = bode.stage.flat()
     free = "joint.locked" in flat and not flat["joint.locked"]
     return [float(moving_mass(flat)), *([float(moving_mass({**flat, "masses.cart": 0.0}))] if free else [])]
 
 
 def _hertz(bode: Bode) -> Array:
+    """Return the frequencies of the analysis [Hz]."""
     return bode.omega / (2 * np.pi)

@@ -1,4 +1,7 @@
-"""The page of `friso bode`: one file that opens offline, prints, and is the same bytes on every run."""
+"""Write the page of `friso bode`: one file that opens offline and prints.
+
+Every run of the command gives the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -21,14 +24,14 @@ DEFINITIONS = (
 
 
 def bode_files(bode: Bode) -> dict[str, Content]:
-    """The page, and every figure in all formats."""
+    """Return the page, and every figure in all formats."""
     figures = bode_figures(bode)
     images = pictures(figures)
     return {"bode.html": bode_html(bode, figures), **images}
 
 
 def bode_html(bode: Bode, figures: Sequence[Figure]) -> str:
-    """The whole page of a linear analysis and its figures."""
+    """Return the page of a linear analysis with its figures."""
     states = shown_states(bode)
     verdict, *further = stability(bode)
     return Report.of_stage(

@@ -1,4 +1,7 @@
-"""Is the loop stable, stuck or sliding, and how fast may it be: limit cases, margins, Bode plots."""
+"""Analyse whether the loop is stable, stuck or sliding, and how fast it may be.
+
+The answer holds limit cases, margins and Bode plots.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +23,10 @@ EXAMPLE = '"0.1 Hz..1 kHz"'
 
 
 class BodeAnswer(Answer):
-    """The linear analysis of a stage: `result` is a `Bode` with its limit cases, margins and limits."""
+    """The linear analysis of a stage; `result` is a `Bode` with limit cases, margins and limits."""
 
     def first_figures(self) -> Sequence[Figure]:
-        """The figures of the limit cases, which are there sooner than the others."""
+        """Return the figures of the limit cases, which are ready before the others."""
         from friso.questions.bode.figures import first_figures
 
         return first_figures(self.result)
@@ -72,7 +75,10 @@ def bode(
 
 
 def _band(entry: str | tuple[float, float], stage: Stage) -> tuple[float, float]:
-    """Both ends [Hz] of a range of frequencies that the drive knows. Raises InputError."""
+    """Return both ends [Hz] of a range of frequencies.
+
+    Raises InputError for a text that is no increasing range, or a range beyond half the sampling frequency.
+    """
     text = entry if isinstance(entry, str) else f"{text_of(entry[0], 'Hz')}..{text_of(entry[1], 'Hz')}"
     first, _, last = text.partition("..")
     if not (first.strip() and last.strip()):

@@ -1,4 +1,4 @@
-"""How the states of a linear analysis are named and coloured: the same in every figure, sentence and table."""
+"""Name and colour the states of a linear analysis alike in every figure, sentence and table."""
 
 from __future__ import annotations
 
@@ -23,8 +23,11 @@ _ENDINGS = {"touched": "limiter touched", "touched-series": "limiter in series"}
 
 @dataclass(frozen=True)
 class ShownState:
-    """A state with its margins, always under this label, in this colour; `where` says which state it is, if the label
-    does not; and, of a cascade in a limit case, the margins of each of its `loops`."""
+    """A state with its margins, label and colour.
+
+    `where` says which state it is, if the label does not. `loops` holds the margins of each loop of a cascade in a
+    limit case.
+    """
 
     label: str
     colour: str
@@ -34,7 +37,10 @@ class ShownState:
 
 
 def shown_states(bode: Bode) -> tuple[ShownState, ...]:
-    """The limit cases, the worst of all settled states, and the worst of the whole family, if that is another one."""
+    """Return the states shown: the limit cases, the worst settled state, and the worst of all.
+
+    The worst of all is left out if it is the worst settled state.
+    """
     cases = [
         ShownState(label(name), colour(name), _speed(case.members), case.margins, _loops(bode, name))
         for name, case in bode.cases.items()
@@ -49,59 +55,67 @@ def shown_states(bode: Bode) -> tuple[ShownState, ...]:
 
 
 def _loops(bode: Bode, name: str) -> Mapping[CascadeLoop, Margins]:
-    """The margins of the loops of a cascade in a limit case."""
+    """Return the margins of a cascade's loops in a limit case; empty for other controllers."""
     return bode.cascades[name].margins if name in bode.cascades else {}
 
 
 def label(name: str) -> str:
-    """A limit case in words: "stuck-touched" is "Stuck, limiter touched"."""
+    """Return a limit case in words: "stuck-touched" is "Stuck, limiter touched"."""
     move, _, rest = name.partition("-")
     first = {"given": "As given"}.get(move, move.capitalize())
     return ", ".join([first, *([_ENDINGS[rest]] if rest else [])])
 
 
 def colour(name: str) -> str:
+    """Return the colour of a limit case."""
     return COLOURS[name.removesuffix(SERIES)]
 
 
 def dash(name: str) -> Dash:
+    """Return the line style of a limit case: dashed where the limiter acts in series."""
     return "dashed" if name.endswith(SERIES) else "solid"
 
 
 def place(member: Members, bode: Bode) -> str:
-    """A state in words, as far as states differ: "sliding at 1.78 mm/s, limiter free"."""
+    """Return a state in words, as far as states differ: "sliding at 1.78 mm/s, limiter free"."""
     return in_words(cart(member) if has_friction(bode) else "", bool(member.touched[0]), has_limiter(bode))
 
 
 def in_words(cart: str, touched: bool, limited: bool) -> str:
-    """What the cart does and, if there are two possibilities, whether the limiter is touched."""
+    """Join what the cart does with the state of the limiter, if the limiter has two states."""
     return ", ".join([*([cart] if cart else []), *([f"limiter {side(touched)}"] if limited else [])]) or "as given"
 
 
 def cart(member: Members) -> str:
-    """What the cart does."""
+    """Say what the cart does: stuck, under a bias force, or sliding at a speed."""
     if not member.stuck[0]:
         return f"sliding{'' if member.forward[0] else ' backwards'} at {with_unit(member.speed[0], 'm/s')}"
     return f"stuck under a bias force of {with_unit(member.bias[0], 'N')}" if member.bias[0] else "stuck"
 
 
 def side(touched: bool) -> str:
+    """Return the limiter's state in a word: "touched" or "free"."""
     return "touched" if touched else "free"
 
 
 def has_limiter(bode: Bode) -> bool:
-    """Whether the limiter may be touched or not; it is always the same where the joint is locked or has no stroke."""
+    """Tell whether the limiter can be both free and touched.
+
+    It cannot where the joint is locked or has no stroke.
+    """
     return bool(np.ptp(bode.scan.members.touched.astype(int)))
 
 
 def has_family(bode: Bode) -> bool:
-    """Whether there are states behind the limit cases: only friction makes some."""
+    """Tell whether there are states beside the limit cases, which only friction creates."""
     return len(bode.scan.members) > len(bode.cases)
 
 
 def has_friction(bode: Bode) -> bool:
+    """Tell whether the stage has a friction law."""
     return bode.stage.flat()["friction.model"] != "none"
 
 
 def _speed(member: Members) -> str:
+    """Return the sliding speed in words; empty for a stuck state."""
     return "" if member.stuck[0] else f"at {with_unit(member.speed[0], 'm/s')}"

@@ -1,4 +1,7 @@
-"""The table of a linear analysis: what is named, and its text for each state."""
+"""Write the table of a linear analysis.
+
+Each row names a quantity and has its text for each state.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ ANY = "no limit"
 
 
 def rows(states: tuple[ShownState, ...]) -> list[tuple[str, list[str]]]:
-    """The rows of which some state has something to say."""
+    """Return the rows of the table; rows in which no state has an entry are left out."""
     texts = [("State", [item.where or NOTHING for item in states])]
     texts += [(name, [text(item.margins) for item in states]) for name, text in _ROWS.items()]
     for loop in get_args(CascadeLoop):
@@ -33,16 +36,20 @@ def rows(states: tuple[ShownState, ...]) -> list[tuple[str, list[str]]]:
 
 
 def _of_loop(item: ShownState, loop: CascadeLoop, name: str) -> str:
-    """A row of one loop of a cascade."""
+    """Return one entry for a loop of a cascade."""
     return _ROWS[name](item.loops[loop]) if loop in item.loops else NOTHING
 
 
 def decibels(factor: float) -> float:
+    """Convert a factor to decibels [dB]."""
     return 20 * math.log10(factor)
 
 
 def growth(margins: Margins) -> str:
-    """How fast a deviation from an unstable state grows; on the edge of stability it does not."""
+    """Say how fast a deviation from an unstable state grows.
+
+    On the edge of stability it neither decays nor grows.
+    """
     if margins.on_the_edge:
         return "neither decays nor grows"
     pole = margins.poles[margins.poles.real.argmax()]
@@ -51,31 +58,38 @@ def growth(margins: Margins) -> str:
 
 
 def _number(value: float, none: float, text: Callable[[float], str]) -> str:
-    """A margin in words; `none` is its value where nothing brings the loop to its edge of stability."""
+    """Write a margin in words.
+
+    `none` is the margin's value if no change of gain, phase or delay reaches the edge of stability.
+    """
     if math.isnan(value):
         return NOTHING
     return ANY if value == none else text(value)
 
 
 def _factor(value: float) -> str:
+    """Write a gain margin [dB] with its sign."""
     return _signed(decibels(value), "+")
 
 
 def _signed(size: float, sign: str = "") -> str:
-    """A size [dB]; nothing is minus zero."""
+    """Write a size [dB], never as minus zero."""
     return f"{round(size, 1) + 0.0:{sign}.1f} dB".replace("-", "−")
 
 
 def _peak(margins: Margins) -> str:
+    """Write the peak sensitivity as a factor and in dB."""
     peak = margins.peak_sensitivity
     return f"{peak:.3g} ({_signed(decibels(peak))})" if margins.stable else NOTHING
 
 
 def _slowest(margins: Margins) -> str:
+    """Write the time constant of the slowest pole [s]."""
     return with_unit(-1 / margins.abscissa, "s") if margins.stable else NOTHING
 
 
 def _least_damped(margins: Margins) -> str:
+    """Write the damping ratio and the frequency of the least damped pole."""
     swinging = margins.poles[margins.poles.imag != 0]
     if not margins.stable or not swinging.size:
         return NOTHING

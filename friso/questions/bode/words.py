@@ -1,5 +1,4 @@
-"""The results of a linear analysis in sentences: where the controller is stable, why not elsewhere, how fast it may
-be."""
+"""Say in sentences where the controller is stable, why not elsewhere, and how fast it may be."""
 
 from __future__ import annotations
 
@@ -35,13 +34,16 @@ TARGET = (
 
 
 def sentences(bode: Bode) -> list[str]:
-    """All that is said, in order."""
+    """Return all sentences of the answer in order."""
     limits = [crossover_heading(bode), *crossovers(bode).values()]
     return [*stability(bode), *limits, *crossover_meaning(bode), *caveats(bode)]
 
 
 def stability(bode: Bode) -> list[str]:
-    """Whether the one controller is stable in the settled states, and how well; whether in all others; and why not."""
+    """Say whether the controller is stable in the settled states, and with which margin.
+
+    Then say whether it is stable in all other states, and why not.
+    """
     if len(bode.scan.members) == 1:
         margins = bode.settled[1]
         state = f"stable, {_margin(margins)}" if margins.stable else f"not stable: a deviation {growth(margins)}"
@@ -60,17 +62,19 @@ def stability(bode: Bode) -> list[str]:
 
 
 def _tuned(bode: Bode) -> str:
+    """Say at which crossover or bandwidth the controller is tuned."""
     crossover = bandwidth(bode.stage.flat())
     return "As given" if crossover is None else f"At {with_unit(crossover, 'Hz')}"
 
 
 def _margin(margins: Margins) -> str:
+    """Write the modulus margin with the frequency at which the loop is closest to -1."""
     margin = f"modulus margin {margins.modulus_margin:.3g} (peak sensitivity {margins.peak_sensitivity:.3g})"
     return f"{margin} at {with_unit(margins.closest, 'Hz')}"
 
 
 def crossover_heading(bode: Bode) -> str:
-    """What the sentences of `crossovers` are about."""
+    """Return the heading of the sentences on how fast the controller can be."""
     if len(bode.scan.members) == 1:
         return f"How fast this controller can be, {_subject(bode)}:"
     settled = "settled states" if has_friction(bode) else "limit cases"
@@ -78,7 +82,10 @@ def crossover_heading(bode: Bode) -> str:
 
 
 def crossovers(bode: Bode) -> dict[str, str]:
-    """By joint: at which crossovers (or bandwidths, of a controller by gains) it is stable, and comfortably so."""
+    """Say by state of the joint at which crossovers the loop is stable, and with a good margin.
+
+    A controller given by gains has bandwidths in place of crossovers.
+    """
     joint = bode.stage.joint
     as_given = "" if joint is None else ("locked" if joint.locked else "free")
     labels = {name: f"{name.capitalize()}{' (as given)' if name == as_given else ''}" for name in bode.limits}
@@ -87,13 +94,16 @@ def crossovers(bode: Bode) -> dict[str, str]:
 
 
 def crossover_meaning(bode: Bode) -> list[str]:
-    """What the crossover is that a stage file states: not where the loop crosses 0 dB."""
+    """Say that the crossover of a stage file is not where the loop crosses 0 dB."""
     return [TARGET] if _crossing(bode) and bode.stage.controller.bandwidth_name == "crossover" else []
 
 
 def caveats(bode: Bode) -> list[str]:
-    """That a loop is looked at on one flank of a backlash; that stability does not go on for ever, where the search
-    found no end."""
+    """Return the limits of the analysis in sentences.
+
+    The loop is analysed on one flank of a backlash. If the search found no upper limit, effects that the stage file
+    leaves out will set one.
+    """
     ends = {limits.searched[1] for limits in bode.limits.values() if limits.open_ended}
     flanks = [BACKLASH] if structure(bode.stage.flat()).plays else []
     if not ends:
@@ -112,20 +122,22 @@ def caveats(bode: Bode) -> list[str]:
 
 
 def _crossing(bode: Bode) -> bool:
-    """Whether a key of the controller states its bandwidth."""
+    """Tell whether a key of the controller sets its bandwidth."""
     return bode.stage.controller.bandwidth_key is not None
 
 
 def _subject(bode: Bode) -> str:
+    """Say in which measure the bandwidth is given."""
     return f"in {bode.stage.controller.bandwidth_name}s" if _crossing(bode) else "in multiples of its bandwidth"
 
 
 def _unit(bode: Bode) -> str:
+    """Return the unit of the bandwidth: hertz, or multiples of the present one."""
     return "Hz" if _crossing(bode) else "times this bandwidth"
 
 
 def _states_checked(bode: Bode) -> str:
-    """The family in words."""
+    """Describe the family of states that were checked."""
     members = bode.scan.members
     parts = []
     if has_friction(bode):
@@ -138,7 +150,7 @@ def _states_checked(bode: Bode) -> str:
 
 
 def _where(bode: Bode) -> list[str]:
-    """The states that are not stable: stuck ones (or any, without friction), and the ranges of speed."""
+    """List the unstable states: stuck ones by bias force, sliding ones by range of speed."""
     members, stable = bode.scan.members, bode.scan.stable
     states = []
     for touched in np.unique(members.touched[members.stuck & ~stable]).tolist():
@@ -148,7 +160,7 @@ def _where(bode: Bode) -> list[str]:
 
 
 def _stuck(unstable: np.ndarray, bode: Bode) -> str:
-    """Stuck under these bias forces [N], or under any; nothing without friction."""
+    """Name the unstable stuck states by their bias forces [N]; empty without friction."""
     if not has_friction(bode):
         return ""
     low, high = float(unstable.min()), float(unstable.max())
@@ -158,13 +170,14 @@ def _stuck(unstable: np.ndarray, bode: Bode) -> str:
 
 
 def _speeds(unstable: Unstable, bode: Bode) -> str:
+    """Name a range of sliding speeds in which the loop is unstable."""
     speeds = bode.scan.members.speed[~bode.scan.members.stuck]
     window = window_with_unit(unstable.low, unstable.high, (float(speeds.min()), float(speeds.max())), "m/s")
     return in_words(f"sliding{'' if unstable.forward else ' backwards'}, {window}", unstable.touched, has_limiter(bode))
 
 
 def _why(bode: Bode) -> list[str]:
-    """What makes states unstable: friction that falls with speed, or tuning."""
+    """Say why states are unstable: by friction that falls with speed, or by tuning."""
     settled = all(case.margins.stable for name, case in bode.cases.items() if not name.endswith(SERIES))
     if not (settled and bode.scan.stable[bode.scan.members.stuck].all()):
         even = ": not even all settled states (listed below) are stable" if has_friction(bode) else ""
@@ -178,6 +191,7 @@ def _why(bode: Bode) -> list[str]:
 
 
 def _limits(bode: Bode, name: str) -> str:
+    """Say over which crossovers the loop is stable, and over which its modulus margin is good."""
     limits = bode.limits[name]
     stable = _remark(bode, name, limits.highest_stable, "lost first", limits.first_lost)
     calm = _remark(bode, name, limits.highest_comfortable, "closest to −1", limits.closest)
@@ -188,7 +202,7 @@ def _limits(bode: Bode, name: str) -> str:
 
 
 def _remark(bode: Bode, name: str, end: float | None, meaning: str, member: Members | None) -> str:
-    """Which state ends a range of crossovers, or is why there is none."""
+    """Name the state that limits a range of crossovers, or the state for which there is no range."""
     if member is None or len(bode.scan.members) == 1:
         return ""
     where = f"above {with_unit(end, _unit(bode))}" if end else "as given"
@@ -197,12 +211,13 @@ def _remark(bode: Bode, name: str, end: float | None, meaning: str, member: Memb
 
 
 def _windows(ranges: Sequence[Range], limits: Limits, bode: Bode) -> str:
+    """Write ranges of the bandwidth in words; say so if there is none."""
     unit = _unit(bode)
     windows = [window_with_unit(*window, limits.searched, unit) for window in ranges]
     return listed(windows, "and") or f"none from {range_with_unit(*limits.searched, unit)}"
 
 
 def tables(bode: Bode) -> list[AnswerTable]:
-    """Margins in each state."""
+    """Return the table of margins in each state."""
     states = shown_states(bode)
     return [AnswerTable(bode.stage.name, [item.label for item in states], rows(states))]

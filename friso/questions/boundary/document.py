@@ -1,4 +1,4 @@
-"""The JSON document of `friso boundary`."""
+"""Build the JSON document of `friso boundary`."""
 
 from __future__ import annotations
 
@@ -21,12 +21,13 @@ from friso.studies.boundary_lines import (
 
 
 def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
-    """The JSON document of `boundary`; values of the keys in the units of the command line."""
+    """Return the JSON document of a boundary, with values in the units of the command line."""
     document = _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
     return plain_json({"conclusion": conclusion(traced, keys), **document})
 
 
 def _of_diagram(traced: Diagram, key: ShownKey) -> dict[str, Any]:
+    """Return the special points, the branches of cycles, and the verdicts at both ends of one key."""
     branches = lines(traced)
     points = [_point(line, k, key) for line in branches for k in line.special]
     return {
@@ -39,6 +40,7 @@ def _of_diagram(traced: Diagram, key: ShownKey) -> dict[str, Any]:
 
 
 def _point(line: Line, k: int, key: ShownKey) -> dict[str, Any]:
+    """Return a special point of a branch: its value, kind, error, and the cycle there."""
     return {
         "value": key.number(line.at[k, 0]),
         "kind": line.kinds[k],
@@ -50,6 +52,7 @@ def _point(line: Line, k: int, key: ShownKey) -> dict[str, Any]:
 
 
 def _branch(line: Line, key: ShownKey) -> dict[str, Any]:
+    """Return a branch of cycles with amplitude, period and multiplier along the key."""
     multiplier = line.multiplier[line.ordinary]
     return {
         "cycle": line.shape,
@@ -63,6 +66,7 @@ def _branch(line: Line, key: ShownKey) -> dict[str, Any]:
 
 
 def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
+    """Return the curves in the plane of two keys, how they end and meet, and the corner verdicts."""
     x, y = keys
     verdicts = [verdict for _, _, verdict in corner_verdicts(traced)]
     return {
@@ -79,6 +83,7 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
 
 
 def _meeting(meeting: Meeting, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
+    """Return where and how two curves meet, and whether one cycle changes there."""
     return {
         "curves": list(meeting.curves),
         "how": meeting.kind,
@@ -89,6 +94,7 @@ def _meeting(meeting: Meeting, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
 
 
 def _curve(line: Line, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
+    """Return a curve in the plane of two keys, with the cycle along it."""
     return {
         "kind": line.kinds[0],
         "cycle": line.shape,
@@ -101,5 +107,5 @@ def _curve(line: Line, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
 
 
 def _numbers(values: np.ndarray, keys: tuple[ShownKey, ...]) -> list[list[float]]:
-    """Values of both keys [SI], shape (n, 2), in the units shown."""
+    """Return values of both keys [SI], shape (n, 2), in the units shown."""
     return [[key.number(value) for key, value in zip(keys, row, strict=True)] for row in values.tolist()]

@@ -1,4 +1,4 @@
-"""The figures of a boundary of hunting: branches of cycles over one key, curves in the plane of two."""
+"""Draw a boundary of hunting: branches of cycles over one key, or curves in the plane of two."""
 
 from __future__ import annotations
 
@@ -58,13 +58,13 @@ NODES = {
 }
 
 LOST = "a change, no curve begun"
-"""What is said of places between stages that differ, where no curve could be begun."""
+"""Label of places between stages that differ, where no curve could be started."""
 
 LOST_END = "cycle not followed farther"
-"""What is said of ends of curves inside the range."""
+"""Label of ends of curves inside the range."""
 
 MEETING = "curves meet"
-"""What is said of places where two curves cross, end on each other, or begin or cease to run together."""
+"""Label of places where two curves cross, end on each other, or begin or cease to run together."""
 
 REACH = 2.5
 """Multipliers up to which they are shown."""
@@ -77,13 +77,16 @@ MARGIN = 0.02
 
 
 def boundary_figure(traced: Diagram | Plane, keys: tuple[ShownKey, ...], subject: str = "") -> Figure:
-    """The branches over one key, or the curves in the plane of two; special points are named in the units shown."""
+    """Return the figure of a boundary; special points are named in the units shown."""
     figure = _diagram(traced, keys[0]) if isinstance(traced, Diagram) else _plane(traced)
     return replace(figure, subject=subject)
 
 
 def _diagram(traced: Diagram, key: ShownKey) -> Figure:
-    """Amplitude, period and multiplier of all cycles over the key; the legend stands above the first of them."""
+    """Draw amplitude, period and multiplier of all cycles over one key.
+
+    The legend stands above the first panel.
+    """
     branches, x = lines(traced), _axis(traced.space.ranges[0])
     sizes = [size for line in branches for size in line.amplitude]
     log = max(sizes, default=0.0) > LOGARITHMIC * min(sizes, default=0.0)
@@ -100,7 +103,10 @@ def _diagram(traced: Diagram, key: ShownKey) -> Figure:
 
 
 def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: ShownKey | None = None) -> Panel:
-    """One measure of all branches, with their special points; with labels if there is a key."""
+    """Draw one measure of all branches with their special points.
+
+    Labels are added if there is a key.
+    """
     labels: set[str] = set()
     series = []
     for line in branches:
@@ -120,7 +126,10 @@ def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: Show
 
 
 def _runs(line: Line) -> Iterator[tuple[bool, np.ndarray]]:
-    """The parts of a branch between changes: whether its cycles attract there, and the numbers of its points."""
+    """Yield the parts of a branch between changes of stability.
+
+    Each part comes with whether its cycles attract, and with the numbers of its points.
+    """
     changes = np.flatnonzero(np.diff(line.attracts)) + 1
     for legs in np.split(np.arange(line.attracts.size), changes):
         if legs.size:
@@ -128,7 +137,7 @@ def _runs(line: Line) -> Iterator[tuple[bool, np.ndarray]]:
 
 
 def _plane(traced: Plane) -> Figure:
-    """The curves, and between them the verdicts at the nodes of the grid."""
+    """Draw the curves on which hunting ends, and the verdicts at the nodes of the grid."""
     x, y = (_axis(swept, MARGIN) for swept in traced.space.ranges)
     curves = lines(traced)
     series = tuple(
@@ -160,11 +169,12 @@ def _plane(traced: Plane) -> Figure:
 
 
 def _marks(places: Sequence[np.ndarray] | np.ndarray, label: str, colour: str, symbol: Symbol) -> tuple[Markers, ...]:
-    """Marks at places in the plane [SI], each of shape (2,), if there are any."""
+    """Return marks at places in the plane [SI], each of shape (2,); nothing for no places."""
     x, y = np.reshape(places, (-1, 2)).T
     return (Markers(x, y, label, colour, symbol),) if x.size else ()
 
 
 def _axis(swept: KeyRange, margin: float = 0.0) -> Axis:
+    """Return the axis of a key over its range, widened on both sides by a share of the range."""
     low, high = swept.at(np.array([-margin, 1 + margin])).tolist()
     return Axis(quantity(swept.key), swept.unit, (low, high), swept.log)

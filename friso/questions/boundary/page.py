@@ -1,4 +1,4 @@
-"""The files of `friso boundary`: the page, the figure, and the table of its points."""
+"""Write the files of `friso boundary`: the page, the figure, and the table of points."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from friso.studies.boundary_lines import lines
 
 
 def boundary_files(traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: Stage, stem: str) -> dict[str, Content]:
-    """The page, the figure in all formats, and the table of its points."""
+    """Return the page, the figure in all formats, and the table of points."""
     figure = boundary_figure(traced, keys, stage.name)
     if isinstance(traced, Plane):
         figure = with_places(figure, [(SHOWN, stage)], [key.key for key in keys])
@@ -29,7 +29,7 @@ def boundary_files(traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: S
 
 
 def boundary_html(traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: Stage, figure: Figure) -> str:
-    """The whole page of a boundary and its figure."""
+    """Return the page of a boundary with its figure."""
     answer, *details = sentences(traced, keys)
     return Report.of_stage(
         "boundary", stage, [replace(figure, note="")], sentences=[answer], details=details, note=figure.note
@@ -37,7 +37,10 @@ def boundary_html(traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: St
 
 
 def _write_table(traced: Diagram | Plane, path: Path) -> None:
-    """One row per point of a line: special ones have a kind and an error."""
+    """Write a CSV table with one row per point of a line.
+
+    Special points have a kind and an error.
+    """
     import pandas as pd
 
     keys = [f"{swept.key} [{swept.unit}]" if swept.unit else swept.key for swept in traced.space.ranges]

@@ -1,4 +1,4 @@
-"""Where hunting ends: over one key, or in the plane of two."""
+"""Answer where hunting ends, over one key or in the plane of two."""
 
 from __future__ import annotations
 
@@ -36,7 +36,10 @@ if TYPE_CHECKING:
 
 
 class BoundaryAnswer(Answer):
-    """Where hunting ends: `result` is a `Diagram` over one key or a `Plane` of two; `texts`, its ranges as given."""
+    """The values at which hunting ends, over one key or two.
+
+    `result` is a `Diagram` over one key or a `Plane` of two. `texts` holds the ranges as the user gave them.
+    """
 
     stage: Stage
     texts: Sequence[str]
@@ -44,36 +47,36 @@ class BoundaryAnswer(Answer):
 
     @cached_property
     def keys(self) -> tuple[ShownKey, ...]:
-        """The keys, in the units in which their ranges were given."""
+        """Return the keys in the units in which their ranges were given."""
         ranges = zip(self.result.space.ranges, self.texts, strict=True)
         return tuple(_in_its_unit(swept, text, self.axis_kind) for swept, text in ranges)
 
     def sentences(self) -> Sequence[str]:
-        """Where hunting ends, in one sentence."""
+        """Return where hunting ends, in one sentence."""
         from friso.questions.boundary.words import conclusion
 
         return [conclusion(self.result, self.keys)]
 
     def details(self) -> Sequence[str]:
-        """Every special point, branch and curve."""
+        """Return a sentence on every special point, branch and curve."""
         from friso.questions.boundary.words import sentences
 
         return sentences(self.result, self.keys)[1:]
 
     def figures(self) -> Sequence[Figure]:
-        """The branches of cycles, or the curves on which hunting ends."""
+        """Return the figure of the branches of cycles, or of the curves on which hunting ends."""
         from friso.questions.boundary.figures import boundary_figure
 
         return [boundary_figure(self.result, self.keys, self.stage.name)]
 
     def document(self) -> dict[str, Any]:
-        """Points, branches and curves."""
+        """Return points, branches and curves as a document."""
         from friso.questions.boundary.document import boundary_document
 
         return boundary_document(self.result, self.keys)
 
     def files(self) -> Files:
-        """The page, the figure, and the table of its points."""
+        """Return the page, the figure, and the table of points."""
         from friso.questions.boundary.page import boundary_files
 
         return boundary_files(self.result, self.keys, self.stage, f"{self.name}_boundary")
@@ -129,6 +132,7 @@ def boundary(
     from friso.studies.boundary import boundary as traced_boundary
 
     def begins() -> None:
+        """Report what is computed, and whether the loop is unstable, before the work starts."""
         mention_unstable_loop(chosen)
         progress(0, 0, f"following cycles over {' and '.join(ranges)}")
 
@@ -137,7 +141,10 @@ def boundary(
 
 
 def _in_its_unit(swept: KeyRange, text: str, axis: AxisKind) -> ShownKey:
-    """A key in the unit in which its range was given, that of the last value."""
+    """Return a key with the unit in which its range was given.
+
+    The unit of the upper end counts; without one, values are in SI.
+    """
     from friso.questions.boundary.words import ShownKey
 
     match = re.search(r"\.\.\s*[-+.\deE]*\s*([^:]*)", text)

@@ -1,4 +1,4 @@
-"""A boundary of hunting in words: where hunting ends, each special point, branch and curve, and the verdicts."""
+"""Describe a boundary of hunting in words: where hunting ends, and what happens at each point."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ MEANINGS = {
     "fold": "it has merged with another cycle, and neither exists",
     "torus": "it still exists, but motions spiral away from it",
 }
-"""What has become of a cycle on the other side of a special point."""
+"""State of a cycle on the other side of a special point."""
 BASIN = "Asymmetric cycles bound the basin of the hunting cycle."
 
 
@@ -60,22 +60,22 @@ PLAIN = 1e-5
 
 @dataclass(frozen=True)
 class ShownKey:
-    """A key and the unit in which its values are printed: its name, and its value in SI."""
+    """A key and the unit in which its values are printed; `factor` is that unit in SI."""
 
     key: str
     unit: str = ""
     factor: float = 1.0
 
     def number(self, value: float) -> float:
-        """A value [SI] in the unit."""
+        """Convert a value [SI] to the unit shown."""
         return float(f"{value / self.factor:.15g}")
 
     def text(self, value: float, digits: int = 6) -> str:
-        """A value [SI] with its unit."""
+        """Write a value [SI] with its unit."""
         return self._with_unit(f"{self.number(value):.{digits}g}")
 
     def uncertain(self, value: float, error: float) -> str:
-        """A value with its error [SI], to a digit more than that."""
+        """Write a value and its error [SI], to one digit beyond the error's first."""
         if not math.isfinite(error):
             return f"{self.text(value)} (error unknown)"
         number, off = self.number(value), self.number(error)
@@ -83,15 +83,16 @@ class ShownKey:
         return self._with_unit(f"{rounded:.6g} ± {float(f'{off:.1g}'):g}")
 
     def as_known(self, value: float, error: float) -> str:
-        """A value with its error [SI], left out where the digits do not show it."""
+        """Write a value [SI], with its error unless the error is too small to show in the digits."""
         return self.text(value) if error < PLAIN * abs(value) else self.uncertain(value, error)
 
     def extent(self, values: Array, swept: KeyRange) -> str:
-        """From the lowest value [SI] to the highest inside a range."""
+        """Write the lowest and highest of some values [SI] that lie in a range."""
         low, high = self.number(max(swept.low, float(values.min()))), self.number(min(swept.high, float(values.max())))
         return self._with_unit(f"{low:.6g} to {high:.6g}")
 
     def _with_unit(self, numbers: str) -> str:
+        """Add the unit to numbers, if the key has one."""
         return f"{numbers} {pretty(self.unit)}".rstrip()
 
 
@@ -104,18 +105,21 @@ SHOWN_CURVES = 3
 
 
 def sentences(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """All that is said, in order, the answer first."""
+    """Return all sentences in order, the answer first."""
     details = _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
     return [conclusion(traced, keys), *details]
 
 
 def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
-    """Where hunting is possible, and where it ends; first of all, where the loop is not stable."""
+    """Say where hunting is possible and where it ends.
+
+    First of all, say where the loop is unstable even without friction.
+    """
     return " ".join([*_unstable(traced, keys), _where(traced, keys)])
 
 
 def _unstable(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """At which of the values tried the loop is not stable, whatever the friction."""
+    """Say at which of the values tried the loop is unstable, whatever the friction."""
     if not traced.unstable.any():
         return []
     points = traced.places[:, None] if isinstance(traced, Diagram) else traced.space.grid(traced.nodes)[traced.allowed]
@@ -129,6 +133,7 @@ def _unstable(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 
 def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
+    """Say where hunting begins and ends over one key, or along which curves over two."""
     if isinstance(traced, Diagram):
         return f"{_edges(traced, keys[0])} {end_sentence(traced, keys[0])}"
     if edge := plane_edge(traced):
@@ -145,16 +150,20 @@ def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
-    """Below or above which values of one key hunting is possible, from one end of the other one's range to the other:
-    the first and last, and what lies farther out in between."""
+    """Describe an edge of hunting that runs across the whole plane.
+
+    The sentence gives the values of one key at both ends of the other, and the farthest values in between.
+    """
     along, across = keys[edge.along], keys[1 - edge.along]
     side, other = ("below", "above") if edge.below else ("above", "below")
 
     def ends(k: int) -> str:
+        """Write the value or range of values at which hunting ends, at a place across."""
         low, high = (along.text(float(column[k]), ROUGHLY) for column in (edge.low, edge.high))
         return low if edge.low[k] == edge.high[k] else f"{low} to {high}"
 
     def at(k: int) -> str:
+        """Write the value of the other key at a place across."""
         return f"{across.key} = {across.text(float(edge.across[k]), ROUGHLY)}"
 
     answer = f"Hunting is possible {side} {along.key} = {ends(0)} at {at(0)}, and {side} {ends(-1)} at {at(-1)}"
@@ -165,7 +174,7 @@ def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
-    """At which corners of the plane hunting is possible."""
+    """Say at which corners of the plane hunting is possible."""
     corners = corner_verdicts(traced)
     hunting = [_place((x, y), keys) for x, y, verdict in corners if verdict == ATTRACTS]
     unknown = sum(verdict == UNKNOWN for _, _, verdict in corners)
@@ -176,7 +185,7 @@ def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int = 6) -> str:
-    """From where to where the curve with a number runs, and how it ends there."""
+    """Say from where to where a curve runs, and how it ends there."""
     line, ends = lines(traced)[number], [end for end in curve_ends(traced) if end.line == number]
     name = f"A {line.kinds[0]} of {CYCLES[line.shape]} runs"
     start, stop = (_place(end.at.tolist(), keys, digits) for end in ends)
@@ -189,7 +198,7 @@ def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int 
 
 
 def _first_meetings(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """The sentences about meetings of curves that stand in the answer."""
+    """Return the first sentences about meetings of curves, and how many more there are."""
     texts = meeting_sentences(traced, keys)
     more = len(texts) - SHOWN_CURVES
     rest = [f"Curves meet at {more} more {'places' if more > 1 else 'place'}."] if more > 0 else []
@@ -197,11 +206,12 @@ def _first_meetings(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 
 def meeting_sentences(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Tell for each meeting of two curves which these are, where they meet, and whether one cycle does both."""
+    """Say for each meeting of two curves where they meet, and whether one cycle changes there."""
     return [_meeting(meeting, lines(traced), keys) for meeting in curve_meetings(traced)]
 
 
 def _meeting(meeting: Meeting, curves: Sequence[Line], keys: tuple[ShownKey, ...]) -> str:
+    """Describe one meeting of two curves: they cross, end on each other, or run together."""
     names = [f"{curves[number].kinds[0]} of {CYCLES[curves[number].shape]}" for number in meeting.curves]
     pair = f"A {names[0]} and a {names[1]}" if names[0] != names[1] else f"Two curves of a {names[0]}"
     places, one = [_place(place, keys) for place in meeting.places.tolist()], "both are changes of one cycle"
@@ -226,7 +236,7 @@ ENDS = {
 
 
 def _edges(traced: Diagram, key: ShownKey) -> str:
-    """Where hunting begins and ends over the range, and how finely that was looked for."""
+    """Say where hunting begins and ends over the range, and how many values were tried."""
     changes, verdicts = stability_changes(traced), place_verdicts(traced)
     values_tried = f"{len(verdicts)} values were tried"
     unknown = f"; unknown at {verdicts.count(UNKNOWN)} of them" if UNKNOWN in verdicts else ""
@@ -244,8 +254,10 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
 
 
 def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors: Mapping[float, float]) -> list[str]:
-    """Ranges, or their ends, in which a cycle attracts between the values that were tried; `turns` are the values at
-    which one begins to (true), or ceases to, in ascending order."""
+    """Say between which of the values tried a cycle attracts as well.
+
+    `turns` are the values at which a cycle begins (true) or ceases to attract, in ascending order.
+    """
     text = {value: key.as_known(value, errors[value]) for value, _ in turns}
     ranges = [(low, high) for (low, begins), (high, begins_too) in pairwise(turns) if begins and not begins_too]
     within = {value for ends in ranges for value in ends}
@@ -258,26 +270,30 @@ def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors:
 
 
 def _if_unstable(traced: Diagram, change: StabilityChange) -> str:
-    """Say that a change lies where the loop is unstable anyway; "" where it is not."""
+    """Return a remark if a change lies where the loop is unstable anyway; empty otherwise."""
     beside = np.argmin(np.abs([traced.value(place) - change.low for place in traced.places]))
     return " (where the loop is unstable anyway)" if traced.unstable[beside] else ""
 
 
 def _between(change: StabilityChange, key: ShownKey, errors: Mapping[float, float]) -> str:
-    """Where hunting begins or ends; `errors` of special points [SI] by their values."""
+    """Say at which value, or between which values, hunting begins or ends.
+
+    `errors` holds the errors of special points [SI] by their values.
+    """
     if change.low == change.high:
         return f"at {key.key} = {key.as_known(change.low, errors[change.low])}"
     return f"between {key.key} = {key.text(change.low)} and {key.text(change.high)}, where no cycle could be followed"
 
 
 def _of_diagram(traced: Diagram, key: ShownKey) -> list[str]:
+    """Describe each special point and each branch over one key."""
     branches = lines(traced)
     turns = sorted((line.at[k, 0], _turn(line, k, key)) for line in branches for k in line.special)
     return [*(text for _, text in turns), *(_branch_sentence(line, key, traced.space) for line in branches)]
 
 
 def _turn(line: Line, k: int, key: ShownKey) -> str:
-    """What happens to a cycle at a special point of its branch as the key rises."""
+    """Say what happens to a cycle at a special point as the key rises."""
     value = float(line.at[k, 0])
     above = [j for j in (k - 1, k + 1) if 0 <= j < len(line.at) and line.at[j, 0] > value]
     goes_on = bool(above) if line.kinds[k] == "fold" else any(line.attracts[min(j, k)] for j in above)
@@ -297,20 +313,21 @@ _VERBS = {
 
 
 def _branch_sentence(line: Line, key: ShownKey, space: Space) -> str:
-    """Over which values a branch was followed, and how it ends."""
+    """Say over which values a branch was followed, and how it ends."""
     pair = "Asymmetric cycles, which bound the basin of the hunting cycle where they repel,"
     name = pair if line.shape == "asymmetric" else "Hunting cycles"
     return f"{name} were followed over {key.extent(line.at[:, 0], space.ranges[0])}{_ends(line)}."
 
 
 def end_sentence(traced: Diagram, key: ShownKey) -> str:
-    """The verdicts at both ends of the range."""
+    """Give the verdicts at both ends of the range."""
     swept = traced.space.ranges[0]
     first, last = end_verdicts(traced)
     return f"At {key.text(swept.low)}: {VERDICTS[first]}; at {key.text(swept.high)}: {VERDICTS[last]}."
 
 
 def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+    """Describe each curve in the plane of two keys, their meetings, and the corners."""
     curves = lines(traced)
     text = [f"{_course(traced, number, keys)} ({_accuracy(line, keys)})." for number, line in enumerate(curves)]
     text += meeting_sentences(traced, keys) or ["No two of the curves meet."] * (len(curves) > 1)
@@ -322,7 +339,7 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 
 def _accuracy(line: Line, keys: tuple[ShownKey, ...]) -> str:
-    """How many points a curve has, and their largest errors."""
+    """Say how many points a curve has, and how large their errors are."""
     finite = line.error[np.isfinite(line.error).all(axis=1)]
     errors = ", ".join(key.text(error, 1) for key, error in zip(keys, finite.max(axis=0, initial=0.0), strict=True))
     unknown = len(line.error) - len(finite)
@@ -332,7 +349,7 @@ def _accuracy(line: Line, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """The verdicts at the corners, in one sentence where they agree."""
+    """Give the verdicts at the corners, in one sentence if they agree."""
     corners = corner_verdicts(traced)
     if len({verdict for _, _, verdict in corners}) == 1:
         return [f"At all four corners: {VERDICTS[corners[0][2]]}."]
@@ -340,15 +357,18 @@ def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 
 def _untraced(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+    """Say where a change was found but no curve could be started."""
     places = [_place(values, keys) for values in lost_places(traced).tolist()]
     return [f"A change was found near {'; '.join(places)}, but no curve could be started there."] if places else []
 
 
 def _place(values: Sequence[float], keys: tuple[ShownKey, ...], digits: int = 6) -> str:
+    """Write a place in the plane as values of both keys."""
     return ", ".join(f"{key.key} = {key.text(value, digits)}" for key, value in zip(keys, values, strict=True))
 
 
 def _no_boundary(space: Space, keys: tuple[ShownKey, ...]) -> str:
+    """Say that hunting neither begins nor ends in the range."""
     between = (
         f"{key.key} {key.text(swept.low)} to {key.text(swept.high)}"
         for key, swept in zip(keys, space.ranges, strict=True)
@@ -357,7 +377,7 @@ def _no_boundary(space: Space, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _ends(line: Line) -> str:
-    """How a line ends, to follow where it runs."""
+    """Say how a line ends, to follow the words on where it runs."""
     if set(line.ends) == {END_OF_RANGE}:
         return ", to both ends of the range"
     return f"; ends: {'; '.join(dict.fromkeys(line.ends))}"

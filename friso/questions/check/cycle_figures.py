@@ -1,4 +1,4 @@
-"""The figures of a hunting cycle: the return map that shows whether there is one, and the cycle itself."""
+"""Draw hunting cycles: the return map that shows whether one exists, and the cycle itself."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _WORDS = {True: "attracts", False: "repels"}
 
 
 def return_map_figure(cases: list[ShownCase]) -> Figure:
-    """How far each swing reaches against the one before: the map, and this motion's own swings."""
+    """Draw how far each swing reaches against the one before, with the swings of this motion."""
     panels = tuple(panel for item in cases for panel in _return_map(item))
     caption = (
         "Each swing of the stage past its target (curve: from the positive side), given by its turning point, against "
@@ -46,6 +46,10 @@ def return_map_figure(cases: list[ShownCase]) -> Figure:
 
 
 def _return_map(item: ShownCase) -> list[Panel]:
+    """Return the panel of a case's return map; none if swings were not followed.
+
+    It shows the map, the diagonal, the swings of this motion, the cycles, and the basin of hunting.
+    """
     hunting = item.case.judgement.hunting
     if hunting.returns is None or not np.any(hunting.returns.returns > 0):
         return []
@@ -65,13 +69,15 @@ def _return_map(item: ShownCase) -> list[Panel]:
 
 
 def _mirrored(hunting: Hunting) -> bool:
-    """Whether swings to one side are mirror images of those to the other: then one curve tells where they end."""
+    """Tell whether swings to one side mirror those to the other, so that one curve describes both."""
     return bool(hunting.cycles) and all(cycle.symmetric for cycle in hunting.cycles)
 
 
 def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:
-    """Strips over the distances up to `reach` [m] from which swings go on for ever, by a map that was followed from
-    swing to swing, of a stage that is its own mirror image."""
+    """Return strips over the distances up to `reach` [m] from which hunting goes on for ever.
+
+    The return map is followed from swing to swing. The stage has to be its own mirror image.
+    """
     starts = np.linspace(0.0, reach, _STARTS)
     at = starts
     for _ in range(_FOLLOWED):
@@ -84,7 +90,7 @@ def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:
 
 
 def _swings(item: ShownCase) -> Array:
-    """How far the stage swings to one side and the other in turn [m], after the last corner of the reference."""
+    """Return the sizes of swings [m] to alternate sides, after the reference's last corner."""
     trace = trace_of(item)
     late = samples(trace, "turning_time") > last_corner(item.case.stage.flat())
     turns = samples(trace, "turning_deviation")[late]
@@ -93,8 +99,10 @@ def _swings(item: ShownCase) -> Array:
 
 
 def _fixed_points(cycles: tuple[Cycle, ...]) -> tuple[Markers, ...]:
-    """The cycles by their two turning points, those that attract and those that repel; of a stage that is its own
-    mirror image also the mirror images."""
+    """Return marks of the cycles by their two turning points, by attracting and repelling.
+
+    For a stage that is its own mirror image, the mirror images are marked, too.
+    """
     mirrored = any(cycle.symmetric for cycle in cycles)
     markers = []
     for attracts, label in _WORDS.items():
@@ -108,7 +116,7 @@ def _fixed_points(cycles: tuple[Cycle, ...]) -> tuple[Markers, ...]:
 
 
 def cycle_figure(cases: list[ShownCase]) -> Figure:
-    """One period of every cycle in time, and as a loop of velocity over position."""
+    """Draw one period of every cycle over time, and as a loop of velocity over position."""
     panels = tuple(panel for item in cases if item.case.judgement.hunting.cycles for panel in _cycle_panels(item))
     caption = (
         "One period: the stage sticks off its target while the integral action winds up the actuator force, breaks "
@@ -119,6 +127,10 @@ def cycle_figure(cases: list[ShownCase]) -> Figure:
 
 
 def _cycle_panels(item: ShownCase) -> list[Panel]:
+    """Return the panels of a case's cycles.
+
+    They show position and force over time, and velocity over position.
+    """
     cycles = item.case.judgement.hunting.cycles
     time = Axis("Time", "s", (0.0, max(cycle.period for cycle in cycles)))
     names = ["stage"] if len(cycles) == 1 else [_WORDS[cycle.attracts] for cycle in cycles]
@@ -134,7 +146,7 @@ def _cycle_panels(item: ShownCase) -> list[Panel]:
 
 
 def _positions(cycle: Cycle, label: str, colour: str) -> list[Series]:
-    """The stage, and the cart where it is seen to move otherwise."""
+    """Return the stage's position, and the cart's where it visibly differs."""
     lines = [_line(cycle, "time", "position", label, colour)]
     if "cart_position" in cycle.trace:
         cart = _line(cycle, "time", "cart_position", "cart", INK)
@@ -144,4 +156,5 @@ def _positions(cycle: Cycle, label: str, colour: str) -> list[Series]:
 
 
 def _line(cycle: Cycle, x: str, y: str, label: str, colour: str) -> Series:
+    """Return one signal of a cycle over another, solid if the cycle attracts, dashed if it repels."""
     return Series(samples(cycle.trace, x), samples(cycle.trace, y), label, colour, _DASHES[cycle.attracts])

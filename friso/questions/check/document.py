@@ -1,4 +1,4 @@
-"""The JSON document of `friso check` (design.md, section 3)."""
+"""Build the JSON document of `friso check` (design.md, section 3)."""
 
 from __future__ import annotations
 
@@ -26,8 +26,10 @@ def check_document(
     isolator: Suggestion | None = None,
     laws: VerdictsByLaw | None = None,
 ) -> dict[str, Any]:
-    """The cases with their verdicts, what stages drawn from an uncertain one do, what an isolator would, and the
-    verdicts across friction laws."""
+    """Return the cases with their verdicts as a JSON document.
+
+    Results on drawn stages, on an isolator and across friction laws are added if they were computed.
+    """
     document = {name: _case(case) for name, case in cases.items()}
     if draws is not None:
         for name, case in document.items():
@@ -45,6 +47,7 @@ def check_document(
 
 
 def _isolator(isolator: Suggestion) -> dict[str, Any]:
+    """Return the suggested isolator, and whether the stage settles on it."""
     flat = isolator.stage.flat()
     return {
         "settles": isolator.settles,
@@ -56,12 +59,13 @@ def _isolator(isolator: Suggestion) -> dict[str, Any]:
 
 
 def _feeding(feeding: Feeding) -> dict[str, Any]:
-    """Down to which share of friction, and of backlash, hunting lasts, and from which on it does not."""
+    """Return the shares of friction and of backlash down to which hunting lasts."""
     parts = {"friction": feeding.friction, "backlash": feeding.backlash}
     return {name: asdict(part) | {"needed": part.needed} for name, part in parts.items() if part}
 
 
 def _case(case: Case) -> dict[str, Any]:
+    """Return everything known about one case: verdict, run, cycle, margins and basins."""
     into_1um, into_10um = case.settling_time.values()
     last_1um, last_10um = case.in_the_end.values()
     judgement = case.judgement
@@ -105,6 +109,7 @@ def _case(case: Case) -> dict[str, Any]:
 
 
 def _cycle(cycle: Cycle) -> dict[str, Any]:
+    """Return the properties of a hunting cycle."""
     return {
         "amplitude_m": cycle.amplitude,
         "period_s": cycle.period,
@@ -120,6 +125,7 @@ def _cycle(cycle: Cycle) -> dict[str, Any]:
 
 
 def _swing(swing: Swing) -> dict[str, Any]:
+    """Return amplitude and period of a swing that was observed in a run."""
     return {
         "amplitude_m": swing.amplitude,
         "period_s": swing.period,
@@ -129,6 +135,7 @@ def _swing(swing: Swing) -> dict[str, Any]:
 
 
 def _kick(judgement: Judgement) -> dict[str, Any] | None:
+    """Return the displacements and pushes that start hunting; None if they were not searched."""
     if judgement.displacement is None or judgement.push is None:
         return None
     return {
@@ -140,12 +147,13 @@ def _kick(judgement: Judgement) -> dict[str, Any] | None:
 
 
 def _margin(edge: Margin) -> dict[str, Any]:
+    """Return the margin of the verdict in bandwidth."""
     crossover = {"factor": edge.factor, "crossover_hz": edge.crossover, "certain": edge.certain}
     return {**crossover, "settles_at_factor": edge.quiet, "reserve": edge.reserve}
 
 
 def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
-    """One end of the bandwidths at which something attracts."""
+    """Return one end of the bandwidths at which something attracts."""
     if end is None:
         return None
     return {
@@ -157,10 +165,13 @@ def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
 
 
 def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
-    """At which multiples of a parameter hunting begins, or ends: of the last with which it is as with the parameter
-    itself, and the next with which it is not."""
+    """Return the multiples of a parameter at which hunting begins or ends.
+
+    Each end gives the last multiple with the same verdict and the next one with another verdict.
+    """
 
     def end(one: MarginEnd | None) -> dict[str, Any] | None:
+        """Return one end of a margin; None if hunting does not change on that side."""
         return one and {"same_at_factor": one.same, "other_at_factor": one.other, "certain": one.certain}
 
     return {
@@ -173,7 +184,7 @@ def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
 
 
 def joint_margins_document(stage: Stage, margins: Mapping[str, ParameterMargin]) -> dict[str, Any]:
-    """The margins of a stage in keys of its joint: as multiples of its own values, and as values of these keys."""
+    """Return the margins of a stage in the keys of its joint, as multiples and as values."""
     document, flat, fields = {}, stage.flat(), stage.numeric_keys()
     for key, margin in margins.items():
         entry, unit = _parameter_margin(margin), unit_suffix(fields[key].unit)
@@ -184,7 +195,7 @@ def joint_margins_document(stage: Stage, margins: Mapping[str, ParameterMargin])
 
 
 def draws_document(draws: Draws, case: str) -> dict[str, Any]:
-    """What became of the stages drawn, in a case."""
+    """Return the verdicts of the stages drawn, for one case."""
     from friso.hunting.criteria import ATTRACTED, VERDICT_CRITERION
 
     fates = draws.fates[case]
@@ -202,4 +213,5 @@ def draws_document(draws: Draws, case: str) -> dict[str, Any]:
 
 
 def _share_document(share: Share) -> dict[str, float]:
+    """Return a probability with its confidence interval."""
     return {"probability": share.probability, "low": share.low, "high": share.high}

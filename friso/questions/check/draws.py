@@ -1,4 +1,4 @@
-"""What stages drawn from an uncertain one do: the table, the sentences and the figure."""
+"""Show what stages drawn from an uncertain one do: in the table, in sentences and in a figure."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_LISTED = 4
 
 
 def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
-    """The rows of the table of draws, one text per case."""
+    """Return the rows of the table of draws, with one text per case."""
     fates = [draws.fates[name] for name in case_labels(draws.stage)]
     rows = [
         ("Hunts after this move", [share_with_interval(fate.share(("hunts",))) for fate in fates]),
@@ -41,7 +41,7 @@ def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
 
 
 def draws_sentences(draws: Draws) -> list[str]:
-    """What the draws say, a sentence per case, and what was left out."""
+    """Say what the draws do, in one sentence per case, and which draws were left out."""
     sample = draws.sample
     sentences = [f"{label}: {_sentence(draws.fates[name], draws)}" for name, label in case_labels(draws.stage).items()]
     if sample.left_out:
@@ -52,6 +52,7 @@ def draws_sentences(draws: Draws) -> list[str]:
 
 
 def _sentence(fates: Fates, draws: Draws) -> str:
+    """Say with which probability a case hunts, and which key matters most."""
     failed, keys = fates.counts["failed"], fates.separations(draws.sample.keys)
     lost = int(np.count_nonzero(fates.unstable))
     sentences = (
@@ -73,7 +74,7 @@ def _sentence(fates: Fates, draws: Draws) -> str:
 
 
 def draws_figure(draws: Draws) -> Figure:
-    """The verdicts over the key that decides most, case by case, as bars on top of each other."""
+    """Draw the verdicts as stacked bars over the most influential key, case by case."""
     panels = [_panel(label, draws.fates[name], draws) for name, label in case_labels(draws.stage).items()]
     caption = (
         f"{draws.sample.count} stages drawn from the uncertain keys (seed {draws.seed}), by the key that best "
@@ -83,6 +84,7 @@ def draws_figure(draws: Draws) -> Figure:
 
 
 def _panel(label: str, fates: Fates, draws: Draws) -> Panel:
+    """Return the stacked bars of one case over the key that best separates its verdicts."""
     keys = draws.sample.keys
     key = next(iter(fates.separations(keys) or keys))
     edges = np.histogram_bin_edges(keys[key], BINS)

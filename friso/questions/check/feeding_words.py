@@ -1,4 +1,4 @@
-"""What feeds the hunting of a stage with a backlash, in words."""
+"""Say whether friction or backlash feeds the hunting of a stage."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from friso.quantities import percent
 
 
 def feeding_sentences(feeding: Feeding) -> list[str]:
-    """Whether hunting ends without friction, or without backlash, and where."""
+    """Say whether hunting ends without friction or without backlash, and at which share."""
     friction, backlash = feeding.friction, feeding.backlash
     if friction is None:
         feeds = "The backlash feeds it" if backlash.needed else "The backlash does not feed it"
@@ -25,7 +25,7 @@ def feeding_sentences(feeding: Feeding) -> list[str]:
 
 
 def _course(name: str, decline: Decline) -> str:
-    """What becomes of it as one of both is scaled down."""
+    """Say how hunting changes as friction or backlash is scaled down."""
     if decline.gone == 0:
         return f"it shrinks in proportion to the {name}, and is gone without it"
     if decline.gone is None:
@@ -34,6 +34,7 @@ def _course(name: str, decline: Decline) -> str:
 
 
 def _doubt(*declines: Decline) -> list[str]:
+    """Return a sentence if the result is not certain; nothing otherwise."""
     certain = all(decline.certain for decline in declines)
     doubt = "That is not certain: some simulations were given up, or swings too small for them to see may last."
     return [] if certain else [doubt]

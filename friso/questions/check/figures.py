@@ -1,4 +1,4 @@
-"""The figures of `friso check` and `friso simulate`, from what these computed to plain data."""
+"""Draw the figures of `friso check` and `friso simulate` as plain data."""
 
 from __future__ import annotations
 
@@ -42,7 +42,10 @@ _PERIODS = 4  # hunting periods shown of the force shares
 
 
 def check_figures(cases: Mapping[str, Case]) -> tuple[Figure, ...]:
-    """Every figure that the cases have data for, the most telling first; none for cases without traces."""
+    """Return every figure for which the cases have data, the most telling first.
+
+    Cases without traces have no figures.
+    """
     with_trace = [item for item in shown_cases(cases) if item.case.trace is not None]
     if not with_trace:
         return ()
@@ -52,7 +55,7 @@ def check_figures(cases: Mapping[str, Case]) -> tuple[Figure, ...]:
 
 
 def response_figure(trace: xr.Dataset) -> Figure:
-    """Position, error, force and joint deflection of one simulated run, over the whole of it."""
+    """Draw position, error, force and joint deflection over one whole run."""
     time = samples(trace, "time")
     reference = Series(time, samples(trace, "reference"), "reference", GREY, "dashed")
     position = Series(time, samples(trace, "position"), "position", BLUE)
@@ -76,8 +79,10 @@ def response_figure(trace: xr.Dataset) -> Figure:
 
 
 def _late(trace: xr.Dataset) -> float:
-    """The time [s] from which on a run shows what it does at its end: half of what follows the last change of its
-    reference."""
+    """Return the time [s] from which a run shows its final behaviour.
+
+    It is half-way between the last change of the reference and the end of the run.
+    """
     time, reference = samples(trace, "time"), samples(trace, "reference")
     changes = np.flatnonzero(np.diff(reference))
     begin = time[changes[-1]] if len(changes) and changes[-1] < 0.9 * len(time) else time[0]
@@ -88,7 +93,10 @@ _TIME = Axis("Time", "s")
 
 
 def _settling_figure(cases: list[ShownCase]) -> Figure:
-    """Deviation after the move with the counted peaks (thesis, Fig. 5), and how each case settles."""
+    """Draw the deviation after the move with its counted peaks (thesis, Fig.
+
+    5), and the settling.
+    """
     start, end = _window(cases)
     lines, peaks = [], []
     for item in cases:
@@ -119,7 +127,10 @@ def _settling_figure(cases: list[ShownCase]) -> Figure:
 
 
 def _settling(cases: list[ShownCase]) -> Panel:
-    """Size of the deviation over the whole run on a logarithmic scale, with the settling bands."""
+    """Draw the size of the deviation over the whole run with the settling bands.
+
+    The scale is logarithmic, so that both the move and the standstill are seen.
+    """
     lines = []
     for item in cases:
         size = np.maximum(np.abs(_deviation(item)), _FLOOR)
@@ -132,7 +143,7 @@ def _settling(cases: list[ShownCase]) -> Panel:
 
 
 def _overview(cases: list[ShownCase]) -> Figure:
-    """Reference and position, and the actuator force, over the whole run, the cases side by side."""
+    """Draw reference, position and actuator force over the whole run, with the cases side by side."""
     view = common_range([samples(trace_of(item), "position") for item in cases], least=2 * min(BANDS))
     panels = []
     for item in cases:
@@ -154,7 +165,10 @@ def _overview(cases: list[ShownCase]) -> Figure:
 
 
 def _force_limit(cases: list[ShownCase]) -> tuple[Limit, ...]:
-    """The force limit of the controller, where a case comes near it: a distant one would flatten all."""
+    """Return the controller's force limit if a case comes near it.
+
+    A distant limit would flatten all curves.
+    """
     bound = cases[0].case.stage.controller.force_limit
     forces = np.abs(np.concatenate([samples(trace_of(item), "force") for item in cases]))
     if bound is None or not np.any(forces[np.isfinite(forces)] > bound / 2):
@@ -163,7 +177,10 @@ def _force_limit(cases: list[ShownCase]) -> tuple[Limit, ...]:
 
 
 def _shares(cases: list[ShownCase]) -> Figure:
-    """P, I and D shares of the actuator force after the move (thesis, Fig. 13), one scale for all cases."""
+    """Draw the P, I and D shares of the actuator force after the move (thesis, Fig. 13).
+
+    All cases have one scale.
+    """
     start, end = _window(cases)
     periods = [item.case.period for item in cases if item.case.period and np.isfinite(item.case.period)]
     if periods:
@@ -189,7 +206,7 @@ def _shares(cases: list[ShownCase]) -> Figure:
 
 
 def _joint(cases: list[ShownCase]) -> Figure:
-    """Joint deflection with its limits, over the whole run and its settled part, where the joint is free."""
+    """Draw the joint's deflection with its stroke limits, for cases whose joint is free."""
     start, end = _window(cases)
     panels = []
     for item in cases:
@@ -211,7 +228,10 @@ def _joint(cases: list[ShownCase]) -> Figure:
 
 
 def _friction(with_trace: list[ShownCase]) -> Figure:
-    """Friction against velocity and displacement of the cart: while a case hunts, else the whole run."""
+    """Draw friction against velocity and displacement of the cart.
+
+    If a case hunts, only the settled part of the runs is drawn; otherwise the whole runs.
+    """
     cases = [item for item in with_trace if "friction_force" in trace_of(item)]
     hunting = any(item.case.peaks for item in cases)
     start, end = _window(with_trace) if hunting else (-np.inf, np.inf)
@@ -236,7 +256,7 @@ def _friction(with_trace: list[ShownCase]) -> Figure:
 
 
 def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
-    """The lines, those that hardly move beside the others as the point at which they rest."""
+    """Return a panel of lines; a line that hardly moves beside the others becomes a point."""
     spans = [_span(line.x) for line in lines]
     rest = [span <= 0.01 * max(spans) for span in spans]
     points = [
@@ -249,23 +269,27 @@ def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
 
 
 def _window(cases: list[ShownCase]) -> tuple[float, float]:
-    """Begin and end [s] of the settled part: from where peaks count, or the later half of a shorter run."""
+    """Return begin and end [s] of the settled part of the runs.
+
+    It begins where peaks are counted, or half-way through a shorter run.
+    """
     end = max(float(samples(trace_of(item), "time")[-1]) for item in cases)
     return (COUNTED_AFTER if end > COUNTED_AFTER else end / 2), end
 
 
 def _deviation(item: ShownCase) -> Array:
+    """Return position minus reference [m] of a case's run."""
     return samples(trace_of(item), "position") - samples(trace_of(item), "reference")
 
 
 def _cut(item: ShownCase, values: Array, start: float, end: float) -> tuple[Array, Array]:
-    """Time [s] and values between start and end [s]."""
+    """Return times [s] and values between start and end [s]."""
     time = samples(trace_of(item), "time")
     inside = (time >= start) & (time <= end)
     return time[inside], values[inside]
 
 
 def _span(values: Array) -> float:
-    """Largest less smallest finite value; 0 where there are none."""
+    """Return the largest minus the smallest finite value; 0 if there is none."""
     finite = values[np.isfinite(values)]
     return float(np.ptp(finite)) if finite.size else 0.0

@@ -1,4 +1,4 @@
-"""What an isolator would do for a rigid stage, in a sentence."""
+"""Say what an isolator would do for a rigid stage."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LITTLE = 0.5
 
 
 def isolator_sentence(suggestion: Suggestion) -> str:
-    """Whether it would settle on an isolator, and on which."""
+    """Say whether the stage would settle on the suggested isolator."""
     flat = suggestion.stage.flat()
     joint = (
         f"an isolator of k_j = {with_unit(flat['joint.stiffness'], 'N/m')}, stroke "

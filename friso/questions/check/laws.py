@@ -1,4 +1,7 @@
-"""The verdict across friction laws: sentences, the table, and the part of the JSON document."""
+"""Compare the verdict across friction laws.
+
+Sentences, the table and the JSON document share this comparison.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,10 @@ COUNTS = {3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9:
 
 
 def laws_sentences(laws: VerdictsByLaw) -> list[str]:
-    """Case by case whether the verdict depends on the law, and what would decide; then which laws were not tried."""
+    """Say case by case whether the verdict depends on the friction law.
+
+    Then say which measurement would decide, and name the laws that were not tried.
+    """
     labels = case_labels(laws.stage)
     says = [f"{labels[case]}: {_sentence(laws, case)}{_beyond(laws, case)}" for case in labels]
     if laws.left_out:
@@ -35,13 +41,14 @@ def laws_sentences(laws: VerdictsByLaw) -> list[str]:
 
 
 def _misses(verdict: LawVerdict) -> str:
-    """By how much a law that was tried misses the virgin curve; "" where it reproduces it."""
+    """Say by how much a law misses the virgin curve; empty if the law reproduces it."""
     off = next((item.off for item in verdict.conversion.lost if item.kind == "virgin"), 0.0)
     advice = "leave it out if the virgin curve of this machine was measured"
     return f"{verdict.law} misses the virgin curve by {percent(off)} of break-away: {advice}." if off else ""
 
 
 def _sentence(laws: VerdictsByLaw, case: str) -> str:
+    """Say for one case what the stage does under each law, and which measurement would decide."""
     hunts, edges = laws.hunts(case), _edges(laws, case)
     if hunts is not None:
         verdicts = {name for verdict in laws.verdicts for name in verdict.verdicts(case)}
@@ -65,7 +72,7 @@ def _sentence(laws: VerdictsByLaw, case: str) -> str:
 
 
 def _all(laws: VerdictsByLaw) -> str:
-    """The laws that were tried."""
+    """Say how many laws were tried."""
     count = len(laws.verdicts)
     if count == 1:
         return "the one law that was tried"
@@ -73,7 +80,10 @@ def _all(laws: VerdictsByLaw) -> str:
 
 
 def _does(verdicts: set[str]) -> str:
-    """What a stage does that has one of these verdicts, which all hunt or all do not."""
+    """Return what a stage with these verdicts does, such as "can hunt".
+
+    All verdicts must agree on whether the stage hunts.
+    """
     if verdicts <= {"hunts"}:
         return "hunts"
     if verdicts <= {"hunts", "bistable"}:
@@ -82,8 +92,7 @@ def _does(verdicts: set[str]) -> str:
 
 
 def _open(verdict: LawVerdict, case: str) -> str:
-    """What the stage does under a law with which values of what is open in it, where it does not do the same with
-    all."""
+    """Say what the stage does under one law with different values of its free parameters."""
     trials: dict[str, list[Trial]] = {}
     for trial in verdict.trials:
         does = _does({trial.cases[case].verdict}) if trial.certain(case) else "is not certain"
@@ -95,7 +104,7 @@ def _open(verdict: LawVerdict, case: str) -> str:
 
 
 def _values(verdict: LawVerdict, trials: Sequence[Trial]) -> str:
-    """The values of what is open in a law, key by key, in some trials."""
+    """Write the values of a law's free parameters, key by key, in some trials."""
     converted, fields = verdict.conversion.stage.flat(), declared_keys(verdict.conversion.stage.flat())
     texts = []
     for key in verdict.conversion.open:
@@ -110,7 +119,7 @@ def _values(verdict: LawVerdict, trials: Sequence[Trial]) -> str:
 
 
 def _edges(laws: VerdictsByLaw, case: str) -> str:
-    """Over which bandwidths the edge of hunting lies under all laws."""
+    """Say over which bandwidths the edge of hunting lies under all laws."""
     edges = [edge for verdict in laws.verdicts if (edge := verdict.edges(case))]
     unsought = [verdict.law for verdict in laws.verdicts if not verdict.edges_sought(case)]
     part = "in part " if any(verdict.edges(case) for verdict in laws.verdicts if verdict.law in unsought) else ""
@@ -125,7 +134,10 @@ def _edges(laws: VerdictsByLaw, case: str) -> str:
 
 
 def _beyond(laws: VerdictsByLaw, case: str) -> str:
-    """That advice keeps clear of the edge under the stage's own law, where that is not the highest."""
+    """Warn that advice keeps clear of the edge under the stage's own law alone.
+
+    The warning is empty if that edge is the highest.
+    """
     own, *others = laws.verdicts
     edges = own.edges(case)
     highest = max((other[1] for verdict in others if (other := verdict.edges(case))), default=0.0)
@@ -135,7 +147,7 @@ def _beyond(laws: VerdictsByLaw, case: str) -> str:
 
 
 def _span(laws: VerdictsByLaw, ends: tuple[float, float]) -> str:
-    """Edges in hertz, or in factors of the bandwidth."""
+    """Write a range of edges in hertz, or as multiples of the bandwidth."""
     low, high = ends
     if laws.in_hertz:
         return range_with_unit(low, high, "Hz")
@@ -144,12 +156,15 @@ def _span(laws: VerdictsByLaw, ends: tuple[float, float]) -> str:
 
 
 def laws_columns(laws: VerdictsByLaw) -> list[str]:
-    """The laws, the stage's own first."""
+    """Return the names of the laws, the stage's own law first."""
     return [verdict.law + (" (as given)" if k == 0 else "") for k, verdict in enumerate(laws.verdicts)]
 
 
 def laws_rows(laws: VerdictsByLaw) -> list[tuple[str, list[str]]]:
-    """The rows of the table, a column per law: verdict, amplitude and edge case by case, and what was drawn."""
+    """Return the rows of the table with one column per law.
+
+    Verdict, amplitude and edge come case by case, then what was varied and what is not reproduced.
+    """
     rows = []
     for case, label in case_labels(laws.stage).items():
         rows += [
@@ -164,15 +179,18 @@ def laws_rows(laws: VerdictsByLaw) -> list[tuple[str, list[str]]]:
 
 
 def _verdict(verdict: LawVerdict, case: str) -> str:
+    """Write the verdicts under a law, and whether they are certain."""
     return f"{' or '.join(verdict.verdicts(case))}{'' if verdict.certain(case) else ' (not certain)'}"
 
 
 def _amplitude(verdict: LawVerdict, case: str) -> str:
+    """Write the range of hunting amplitudes under a law."""
     sizes = verdict.amplitudes(case)
     return range_with_unit(*sizes, "m") if sizes else NOTHING
 
 
 def _edge(laws: VerdictsByLaw, verdict: LawVerdict, case: str) -> str:
+    """Write the edge of hunting under a law, and whether it is certain."""
     edges = verdict.edges(case)
     if edges is None:
         return NOTHING if verdict.edges_sought(case) else "not determined"
@@ -181,17 +199,21 @@ def _edge(laws: VerdictsByLaw, verdict: LawVerdict, case: str) -> str:
 
 
 def _drawn(verdict: LawVerdict) -> str:
+    """Name the free parameters of a law that were varied."""
     keys = dict.fromkeys(key for trial in verdict.trials for key in trial.drawn)
     return ", ".join(key.removeprefix("friction.") for key in keys) or NOTHING
 
 
 def _not_kept(verdict: LawVerdict) -> str:
+    """Name the measured effects that a law does not reproduce."""
     return ", ".join(SHOWN[item.kind] for item in verdict.conversion.lost) or NOTHING
 
 
 def laws_document(laws: VerdictsByLaw) -> dict[str, Any]:
-    """Law by law and case by case, with every trial; whether the verdict depends on the law or is not certain, and what
-    would decide."""
+    """Return the verdicts law by law and case by case, with every trial.
+
+    For each case the document says whether the verdict depends on the law, and what would decide.
+    """
     cases = {}
     for case in case_labels(laws.stage):
         cases[case] = {
@@ -209,6 +231,7 @@ def laws_document(laws: VerdictsByLaw) -> dict[str, Any]:
 
 
 def _law(verdict: LawVerdict, case: str) -> dict[str, Any]:
+    """Return the verdicts and trials of one law in a case."""
     return {
         "verdicts": list(verdict.verdicts(case)),
         "trials": [_trial(trial, case) for trial in verdict.trials],
@@ -218,6 +241,7 @@ def _law(verdict: LawVerdict, case: str) -> dict[str, Any]:
 
 
 def _trial(trial: Trial, name: str) -> dict[str, Any]:
+    """Return the result of one trial of a law: verdict, cycle and edge of hunting."""
     case = trial.cases[name]
     cycle, edge = case.judgement.cycle, case.judgement.margin
     return {

@@ -1,4 +1,4 @@
-"""How much static friction, stroke or stiffness may differ from its value before a stage hunts, or hunts no more."""
+"""Say how far static friction, stroke or stiffness may change before the verdict does."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ if TYPE_CHECKING:
 
 
 def friction_sentences(case: Case) -> list[str]:
-    """Where hunting begins, or ends, if static friction is not what the stage file says; none where that was not
-    asked, or where no friction law tells static and Coulomb friction."""
+    """Say at which static friction hunting begins or ends.
+
+    Nothing is said if this was not searched, or if the friction law does not separate static from Coulomb friction.
+    """
     margin = case.static_friction
     if margin is None:
         return []
@@ -25,8 +27,11 @@ def friction_sentences(case: Case) -> list[str]:
 
 
 def margin_sentence(name: str, margin: ParameterMargin, remark: str = "", lowest: str = "") -> str:
-    """Where hunting begins, or ends, in a parameter with a name; with a remark, and what the parameter is at the
-    `lowest` value searched, if that has a name."""
+    """Say at which values of a parameter hunting begins or ends.
+
+    `name` is the parameter in words, and `remark` is added to the sentence. `lowest` names the parameter at the lowest
+    value searched, if that has a name.
+    """
     does, starts = ("ends", "ends") if margin.attracts else ("begins", "starts")
     sure = all(end.certain for end in (margin.below, margin.above) if end)
     doubt = "" if sure else "; this is not certain"
@@ -42,18 +47,26 @@ def margin_sentence(name: str, margin: ParameterMargin, remark: str = "", lowest
 
 
 def joint_sentences(margins: Mapping[str, ParameterMargin]) -> list[str]:
-    """Where hunting begins, or ends, if a joint's stroke or stiffness is not as designed, for margins by their keys."""
+    """Say at which stroke or stiffness of the joint hunting begins or ends.
+
+    `margins` holds the margins by their keys.
+    """
     return [margin_sentence(key.replace(".", " "), margin, " (joint free)") for key, margin in margins.items()]
 
 
 def margin_ways(margin: ParameterMargin) -> list[str]:
-    """Below and above which multiple of its value a parameter makes hunting begin, or end: never farther off than it
-    does begin, and never nearer than it has ended."""
+    """Return the multiples of a parameter beyond which the verdict changes, in words.
+
+    Numbers are rounded to the safe side: hunting never begins sooner, and never ends later, than stated.
+    """
     return [_way(margin, side, end) for side in (-1, 1) if (end := margin.end(side))]
 
 
 def thin_margins(case: Case) -> list[str]:
-    """What brings hunting back in a case that settles, within the factor that advice keeps off an edge."""
+    """Return what brings hunting back in a case that settles, if its reserve is small.
+
+    Small means less than the distance from an edge that advice keeps.
+    """
     distance, thin = SEARCH_LIMITS.edge_distance, []
     edge, friction = case.judgement.margin, case.static_friction
     if edge and edge.quiet * distance > 1:
@@ -66,11 +79,15 @@ def thin_margins(case: Case) -> list[str]:
 
 
 def _side(side: int) -> str:
+    """Return "below" or "above"."""
     return "below" if side < 0 else "above"
 
 
 def _way(margin: ParameterMargin, side: int, end: MarginEnd) -> str:
-    """Below or above which multiple of its value a parameter makes hunting begin, or end, rounded to the safe side."""
+    """Say below or above which multiple of a parameter hunting begins or ends.
+
+    The multiple is rounded to the safe side.
+    """
     outward, inward = (rounded_up, rounded_down) if side > 0 else (rounded_down, rounded_up)
     if margin.attracts:
         return f"{_side(side)} {plain_factor(outward(end.other))} times yours"
@@ -80,7 +97,10 @@ def _way(margin: ParameterMargin, side: int, end: MarginEnd) -> str:
 
 
 def _gap(case: Case, margin: ParameterMargin) -> str:
-    """The gap between static and Coulomb friction at the nearest end, of a stage with one friction law."""
+    """Write the gap between static and Coulomb friction [N] at the nearest end.
+
+    It is empty for a stage with several friction laws, or with no single end.
+    """
     flat = case.stage.flat()
     pairs = static_frictions(flat)
     ends = [end for end in (margin.below, margin.above) if end]

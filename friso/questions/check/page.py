@@ -1,4 +1,7 @@
-"""The report of `friso check`: one page that opens offline, prints, and is the same bytes on every run."""
+"""Write the report of `friso check`: one page that opens offline and prints.
+
+Every run of the command gives the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,7 @@ def check_files(
     isolator: Suggestion | None = None,
     laws: VerdictsByLaw | None = None,
 ) -> dict[str, Content]:
-    """The page, as `check_html`."""
+    """Return the report as the only file."""
     return {"report.html": check_html(cases, draws, isolator, laws)}
 
 
@@ -45,9 +48,11 @@ def check_html(
     isolator: Suggestion | None = None,
     laws: VerdictsByLaw | None = None,
 ) -> str:
-    """The whole page for the cases "given" and, with a joint, "locked" and "free"; traces may be missing. `draws`
-    adds what stages drawn from an uncertain one do, `isolator` what an isolator would, `laws` the verdict across
-    friction laws."""
+    """Return the report for the cases "given" and, with a joint, "locked" and "free".
+
+    Traces may be missing. `draws`, `isolator` and `laws` add what drawn stages do, what an isolator would do, and the
+    verdict across friction laws.
+    """
     in_order = shown_cases(cases)
     stage = in_order[0].case.stage if "given" not in cases else cases["given"].stage
     tolerances = sorted({f"{item.case.solver.rtol:g}" for item in in_order})

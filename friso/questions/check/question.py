@@ -1,4 +1,4 @@
-"""Does the stage hunt: as given, and with its joint locked and free."""
+"""Check whether the stage hunts: as given, and with its joint locked and free."""
 
 from __future__ import annotations
 
@@ -41,9 +41,11 @@ if TYPE_CHECKING:
 
 
 class CheckAnswer(Answer):
-    """The verdict on a stage: `result` holds a `Case` each for "given" and, with a joint, "locked" and "free";
-    `draws`, what becomes of stages drawn from its uncertain keys, and `laws`, the verdicts across friction laws, or
-    None."""
+    """The verdict on a stage.
+
+    `result` holds a `Case` for "given" and, with a joint, for "locked" and "free". `draws` holds the fates of stages
+    drawn from uncertain keys, or None. `laws` holds the verdicts across friction laws, or None.
+    """
 
     stage: Stage
     draws: Draws | None
@@ -51,7 +53,7 @@ class CheckAnswer(Answer):
 
     @cached_property
     def isolator(self) -> Suggestion | None:
-        """What an isolator would do for a stage without a joint that hunts; None for any other."""
+        """Return what an isolator would do for a hunting stage without a joint; None for any other."""
         from friso.hunting.criteria import ATTRACTED
 
         case = self.result["given"]
@@ -63,19 +65,22 @@ class CheckAnswer(Answer):
 
     @property
     def verdict(self) -> str:
-        """The verdict on the stage as it is given: "hunts", "bistable", "transient", "settles" or "failed"."""
+        """Return the verdict on the stage as given.
+
+        It is "hunts", "bistable", "transient", "settles" or "failed".
+        """
         return self.result["given"].verdict
 
     @property
     def failure(self) -> str:
-        """Whether the run of a case was not completed."""
+        """Say whether the run of a case failed or ran away; empty if all went well."""
         if any(not case.solver.done and not case.runs_away for case in self.result.values()):
             return "the computation could not be completed; see the status above"
         away = any(case.runs_away for case in self.result.values())
         return "there is no verdict on hunting for a motion that runs away" if away else ""
 
     def sentences(self) -> Sequence[str]:
-        """The verdicts, and the chances where keys are uncertain."""
+        """Return the verdicts, and the probabilities of hunting where keys are uncertain."""
         from friso.questions.check.draws import draws_sentences
         from friso.questions.check.isolator_words import isolator_sentence
         from friso.questions.check.laws import laws_sentences
@@ -86,7 +91,7 @@ class CheckAnswer(Answer):
         return [*answer(self.result), *suggested, *drawn, *(laws_sentences(self.laws) if self.laws else [])]
 
     def tables(self) -> Sequence[AnswerTable]:
-        """The numbers of each case, and of the stages drawn."""
+        """Return the numbers of each case, of the stages drawn, and across friction laws."""
         from friso.questions.check.draws import draws_rows
         from friso.questions.check.laws import laws_columns, laws_rows
         from friso.questions.check.table import rows, rows_behind
@@ -103,8 +108,7 @@ class CheckAnswer(Answer):
         return [*tables, behind]
 
     def details(self) -> Sequence[str]:
-        """What the search for the edge may miss, how far a joint may be from its design, and whether the friction law
-        may give energy back."""
+        """Return what the search for the edge may miss, the joint's margins, and doubts on passivity."""
         from friso.questions.check.margin_words import joint_sentences
         from friso.questions.check.words import between_surveyed
         from friso.questions.convert.words import activity_sentences
@@ -114,7 +118,7 @@ class CheckAnswer(Answer):
         return [*between_surveyed(self.result), *joint_sentences(self.joint_margins), *activity]
 
     def document_of_details(self) -> dict[str, Any]:
-        """How far a joint may be from its design."""
+        """Return the margins in the joint's stroke and stiffness as a document."""
         from friso.questions.check.document import joint_margins_document
 
         case = self.result.get("free", self.result["given"])
@@ -122,7 +126,10 @@ class CheckAnswer(Answer):
 
     @cached_property
     def joint_margins(self) -> Mapping[str, ParameterMargin]:
-        """The margins of the case with a free joint in the joint's stroke and stiffness, by key."""
+        """Return the margins in the joint's stroke and stiffness by key.
+
+        They belong to the case with a free joint.
+        """
         from friso.hunting import joint_margins
 
         case = self.result.get("free", self.result["given"])
@@ -130,23 +137,23 @@ class CheckAnswer(Answer):
 
     @cached_property
     def traced(self) -> Mapping[str, Case]:
-        """The cases with their time responses, which figures show."""
+        """Return the cases with their time responses, which the figures show."""
         return {name: replace(case, trace=simulate(case.stage, case.solver.rtol)) for name, case in self.result.items()}
 
     def figures(self) -> Sequence[Figure]:
-        """The motion and the hunting cycles of each case."""
+        """Return the figures of the motion and of the hunting cycles of each case."""
         from friso.questions.check.figures import check_figures
 
         return check_figures(self.traced)
 
     def document(self) -> dict[str, Any]:
-        """The cases with their verdicts."""
+        """Return the cases with their verdicts as a document."""
         from friso.questions.check.document import check_document
 
         return check_document(self.result, self.draws, self.isolator, self.laws)
 
     def files(self) -> Files:
-        """The report."""
+        """Return the report with its figures."""
         from friso.questions.check.page import check_files
 
         return check_files(self.traced, self.draws, self.isolator, self.laws)
@@ -226,8 +233,10 @@ def check(
 
 
 def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
-    """Mention (to the logger "friso", as information) the verdict on a case of a stage, certain by what was computed so
-    far, while its edge, kicks and other cases are still computed."""
+    """Log the verdict on a case as soon as it is certain, while other parts are still computed.
+
+    The message is information of the logger "friso".
+    """
     from friso.questions.check.words import IN_SHORT
     from friso.shown.cases import case_labels
 
@@ -236,8 +245,10 @@ def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
 
 
 def _drawable(stage: Stage, correlations: Correlations, seed: int) -> Correlations | None:
-    """The correlations of a stage that is uncertain, if stages can be drawn from it; None if hardly any draw is
-    allowed, which is mentioned."""
+    """Return the correlations of an uncertain stage if machines can be drawn from it.
+
+    Returns None, with a warning, if nearly every draw is invalid.
+    """
     settings = StudySettings.current()
 
     try:

@@ -1,4 +1,4 @@
-"""The table of a check: what is named, and its text for each case."""
+"""Write the table of a check: the name of each quantity, and its text for each case."""
 
 from __future__ import annotations
 
@@ -30,22 +30,26 @@ UNKNOWN = "not determined: that takes more work than a check may"
 
 
 def rows(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
-    """The rows of which some case has something to say."""
+    """Return the rows of the table; rows in which no case has an entry are left out."""
     return _rows(_NUMBERS, cases)
 
 
 def rows_behind(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
-    """The same of what those rest on, in terms of the method."""
+    """Return the rows on what the verdict rests on, in terms of the method."""
     return _rows(_BEHIND, cases)
 
 
 def _rows(columns: dict[str, Callable[[Case], str]], cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
+    """Return the rows of some columns; rows in which no case has an entry are left out."""
     texts = [(axis_shown().text(name), [text(item.case) for item in cases]) for name, text in columns.items()]
     return [(name, row) for name, row in texts if set(row) != {NOTHING}]
 
 
 def _of_the_cycle(text: Callable[[Cycle], str]) -> Callable[[Case], str]:
+    """Turn a text about a cycle into a text about a case, empty for a case without a cycle."""
+
     def of_the_case(case: Case) -> str:
+        """Write the text about the cycle of a case, or that there is none."""
         cycle = case.judgement.cycle
         return text(cycle) if cycle else NOTHING
 
@@ -53,20 +57,24 @@ def _of_the_cycle(text: Callable[[Cycle], str]) -> Callable[[Case], str]:
 
 
 def _amplitude(cycle: Cycle) -> str:
+    """Write the amplitude of a cycle, and whether it repels."""
     return f"{plus_minus(cycle.amplitude, 'm', 4)}{'' if cycle.attracts else ' (repels)'}"
 
 
 def _multiplier(cycle: Cycle) -> str:
+    """Write the Floquet multiplier of a cycle, and the growth that a simulation shows."""
     simulated = f" (simulated: {cycle.growth:.4f})" if cycle.growth == cycle.growth else ""
     return f"{cycle.multiplier:.4f}{simulated}"
 
 
 def _decided(cycle: Cycle) -> str:
+    """Say over which part of a period the multiplier was computed, and how."""
     method = "slope of the returns" if cycle.multiplier == cycle.slope else "Floquet"
     return f"{'half a' if cycle.symmetric else 'a whole'} period ({method})"
 
 
 def _further_cycles(case: Case) -> str:
+    """List the cycles beside the one that decides the verdict."""
     judgement = case.judgement
     return (
         "; ".join(_further_cycle(cycle) for cycle in judgement.hunting.cycles if cycle is not judgement.cycle)
@@ -75,11 +83,13 @@ def _further_cycles(case: Case) -> str:
 
 
 def _further_cycle(cycle: Cycle) -> str:
+    """Describe a cycle by symmetry, amplitude and stability."""
     kind = "symmetric" if cycle.symmetric else "asymmetric"
     return f"{kind}, {plus_minus(cycle.amplitude, 'm', 4)}, {'attracts' if cycle.attracts else 'repels'}"
 
 
 def _observed(case: Case) -> str:
+    """List the swings that were observed in simulations."""
     swings = case.judgement.hunting.observed
     return (
         "; ".join(f"{plus_minus(s.amplitude, 'm', 4)} every {with_unit(s.period, 's', 4)}" for s in swings) or NOTHING
@@ -87,12 +97,14 @@ def _observed(case: Case) -> str:
 
 
 def _verdict(case: Case) -> str:
+    """Write the verdict of a case, and whether it is certain."""
     if case.runs_away:
         return f"{case.verdict} (runs away)"
     return case.verdict if case.judgement.hunting.certain else f"{case.verdict} (not certain)"
 
 
 def _edge(case: Case) -> str:
+    """Write the bandwidth at which hunting ends, and whether it is certain."""
     edge = case.judgement.margin
     if edge is None:
         return UNKNOWN if CheckPart.BANDWIDTHS in case.judgement.given_up else NOTHING
@@ -100,6 +112,7 @@ def _edge(case: Case) -> str:
 
 
 def _static_friction(case: Case) -> str:
+    """Write the static friction at which hunting begins or ends."""
     margin = case.static_friction
     if margin is None:
         return NOTHING
@@ -111,6 +124,7 @@ def _static_friction(case: Case) -> str:
 
 
 def _kicks(case: Case, kick: Kick | None, unit: str) -> str:
+    """Write the kicks that start hunting, and the range that was searched."""
     if kick is None:
         return UNKNOWN if CheckPart.STARTS in case.judgement.given_up else NOTHING
     searched = range_with_unit(*kick.searched, unit)
@@ -121,7 +135,7 @@ def _kicks(case: Case, kick: Kick | None, unit: str) -> str:
 
 
 def _windows(kick: Kick, unit: str, searched: str) -> str:
-    """The kicks that start hunting, at least one, of the range `searched`."""
+    """Write the ranges of kicks that start hunting; `searched` is the range tried."""
     if kick.windows == (kick.searched,):
         return f"all that were tried, {searched}"
     texts = [window_with_unit(*window, kick.searched, unit) for window in kick.windows[:_WINDOWS]]
@@ -132,6 +146,7 @@ def _windows(kick: Kick, unit: str, searched: str) -> str:
 
 
 def _moves(case: Case) -> str:
+    """Write the share of the moves tried that end in hunting, with its interval."""
     moves = case.judgement.moves
     if moves is None:
         return UNKNOWN if CheckPart.STARTS in case.judgement.given_up else NOTHING
@@ -140,7 +155,10 @@ def _moves(case: Case) -> str:
 
 
 def _peaks(case: Case) -> str:
-    """The peak count, and why it contradicts the verdict where it does; none where the run ends too early."""
+    """Write the peak count, and why it may contradict the verdict.
+
+    A run that ends too early has no peak count.
+    """
     if case.stage.motion.duration <= COUNTED_AFTER:
         return (
             f"{NOTHING} (counted from {COUNTED_AFTER:g} s on, and the run ends at {case.stage.motion.duration:.4g} s)"
@@ -156,7 +174,10 @@ def _peaks(case: Case) -> str:
 
 
 def _settled_within(band: float) -> Callable[[Case], str]:
+    """Build the text of the settling time into a band [m]."""
+
     def text(case: Case) -> str:
+        """Write the settling time of a case, or why there is none."""
         time = case.settling_time.get(band)
         if time is not None:
             return with_unit(time, "s")

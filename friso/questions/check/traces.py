@@ -1,4 +1,4 @@
-"""What the figures of a check take from its time responses."""
+"""Read from time responses what the figures of a check need."""
 
 from __future__ import annotations
 
@@ -15,18 +15,21 @@ if TYPE_CHECKING:
 
 
 def trace_of(item: ShownCase) -> xr.Dataset:
-    """The time response of a case that has one."""
+    """Return the time response of a case that has one."""
     assert item.case.trace is not None  # check_figures let no other through
     return item.case.trace
 
 
 def samples(trace: xr.Dataset, name: str) -> Array:
-    """The numbers of a variable, in its own unit."""
+    """Return the numbers of a variable in its own unit."""
     return np.asarray(trace[name].values, dtype=float)
 
 
 def common_range(arrays: Sequence[Array], least: float = 0.0) -> tuple[float, float] | None:
-    """A range of at least `least` that holds all finite data with a margin; None where it would be empty."""
+    """Return a range that holds all finite data with a margin, at least `least` wide.
+
+    Returns None if the range would be empty.
+    """
     gathered = np.concatenate([np.empty(0), *arrays])
     finite = gathered[np.isfinite(gathered)]
     if finite.size == 0 or max(np.ptp(finite), least) == 0:
@@ -37,5 +40,5 @@ def common_range(arrays: Sequence[Array], least: float = 0.0) -> tuple[float, fl
 
 
 def subject(cases: Sequence[ShownCase]) -> str:
-    """The stage that the cases are of, as figures name it."""
+    """Return the name of the stage, as figures show it."""
     return str(cases[0].case.stage.name)

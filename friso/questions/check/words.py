@@ -1,4 +1,4 @@
-"""What a check found, in words: the sentence per case, and the conclusion."""
+"""Say in words what a check found: one sentence for each case, and the conclusion."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _AFTERWARDS = {
     "unstable": "grows",
     "unknown": "may last, grow or die out",
 }
-"""What becomes of a swing that was observed beyond a force limit without anti-windup, by the loop at lower gains."""
+"""Later course of a swing beyond a force limit without anti-windup, by the loop's stability at lower gains."""
 
 _UNFINISHED = (
     "could not be judged: its own run was completed, but not the longer one that shows whether it ends in the hunting "
@@ -50,7 +50,7 @@ IN_SHORT: Mapping[Verdict, str] = {
     "transient": "does not hunt",
     "settles": "does not hunt",
 }
-"""What a case does, before its margin is known."""
+"""Words for the verdict on a case before its margin is known."""
 
 ONE_PLACE = 1.01
 """Factor between the ends of a window below which it is told by its middle and its width."""
@@ -60,7 +60,10 @@ ROUGH = 5e-4
 
 
 def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
-    """What a case does, and what to do about it, for the engineer who decides; `cases` are all of the check."""
+    """Say what a case does, and what to do about it.
+
+    `cases` holds all cases of the check, so that advice on one may use the others.
+    """
     case = item.case
     loop = _loop(case)
     says = {"hunts": _hunting, "bistable": _bistable, "transient": _transient, "settles": _settling}
@@ -78,18 +81,21 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
 
 
 def _loop(case: Case) -> list[str]:
-    """That the loop is not stable comes before what friction makes of it."""
+    """Say first of all where the loop is unstable, whatever the friction."""
     return [f"the loop is {unstable_where(case.unstable)}. The stage"] if case.unstable else []
 
 
 def answer(cases: Mapping[str, Case]) -> list[str]:
-    """A sentence for each case that is shown, and what follows from both."""
+    """Return one sentence for each case shown, and the conclusion from all."""
     says = [f"{item.label}: {verdict_sentence(item, cases)}" for item in shown_cases(cases)]
     return [*says, *filter(None, [conclusion(cases)])]
 
 
 def conclusion(cases: Mapping[str, Case]) -> str | None:
-    """What the joint does to the hunting, where both of its cases were run to a verdict that is certain."""
+    """Say what the joint does to the hunting.
+
+    Returns None unless both cases of the joint have a certain verdict.
+    """
     both = [cases[key] for key in ("locked", "free") if key in cases]
     words = [case.verdict for case in both]
     if len(words) < 2 or "failed" in words or not all(case.judgement.hunting.certain for case in both):
@@ -103,7 +109,7 @@ def conclusion(cases: Mapping[str, Case]) -> str | None:
 
 
 def _reserve(case: Case) -> str:
-    """That a case that settles is closer to hunting than advice should lead, if it is."""
+    """Say that a case which settles is close to hunting, if it is."""
     thin = thin_margins(case)
     sure = (case.static_friction is None or case.static_friction.certain) and (
         case.judgement.margin is None or case.judgement.margin.certain
@@ -113,11 +119,12 @@ def _reserve(case: Case) -> str:
 
 
 def at_the_end(case: Case) -> str:
-    """Peak to peak."""
+    """Write the peak-to-peak motion in the last quarter of a run."""
     return length_at_rest(case.peak_to_peak)
 
 
 def _hunting(case: Case) -> str:
+    """Describe a case that hunts, and say whether the verdict rests on simulations alone."""
     if not case.judgement.observed:
         return f"hunts, {_swing(case)}."
     seen = "This rests on long simulations: no attracting orbit could be closed."
@@ -130,6 +137,10 @@ def _hunting(case: Case) -> str:
 
 
 def _bistable(case: Case) -> str:
+    """Describe a case that settles after this move but hunts after others.
+
+    The sentence names the smallest kicks and the share of moves that start hunting.
+    """
     kicks = (("displacement", case.judgement.displacement, "m"), ("push", case.judgement.push, "m/s"))
     starts = [_kick(name, kick, unit) for name, kick, unit in kicks if kick and kick.windows]
     if (moves := case.judgement.moves) and moves.hunting:
@@ -149,17 +160,21 @@ def _bistable(case: Case) -> str:
 
 
 def _too_much(what: str) -> str:
-    """That something was not determined."""
+    """Say that something was not determined because it takes too much work."""
     return f"{what} was not determined, as that takes more work than a check may"
 
 
 def _kick(name: str, kick: Kick, unit: str) -> str:
-    """The smallest kick that starts hunting, or that was tried."""
+    """Write the smallest kick that starts hunting, and whether a smaller one was tried."""
     least = kick.windows[0][0]
     return f"a {name} of {with_unit(least, unit)}{' (the smallest tried)' if least == kick.searched[0] else ''}"
 
 
 def _transient(case: Case) -> str:
+    """Describe a case that has no attracting cycle, but has not settled at the end of its run.
+
+    The sentences say how fast it settles afterwards, or what keeps it from its reference.
+    """
     judgement, end = case.judgement, _end(case)
     if not judgement.hunting.possible:
         cannot = f"cannot hunt, because {judgement.hunting.reason}; but this motion "
@@ -188,7 +203,7 @@ def _transient(case: Case) -> str:
 
 
 def _held(case: Case) -> list[str]:
-    """That the limit of the force is what keeps a case where it stands, if it is."""
+    """Say that the force limit keeps the stage where it stands, if it does."""
     if case.force_limit is None:
         return []
     limit, least = _forces(case.force_limit, case.breakaway)
@@ -197,19 +212,20 @@ def _held(case: Case) -> list[str]:
 
 
 def _forces(*forces: float) -> list[str]:
-    """Forces [N] with as many digits as tell them apart."""
+    """Write forces [N] with as many digits as tell them apart."""
     digits = digits_that_differ(forces)
     return [with_unit(force, "N", digits) for force in forces]
 
 
 def _settling(case: Case) -> str:
+    """Describe a case that settles, and say why it cannot hunt, if that is certain."""
     hunting = case.judgement.hunting
     says = _settling_sentence(case)
     return says if hunting.possible or not hunting.certain else f"{says} It cannot hunt, because {hunting.reason}."
 
 
 def _stuck(case: Case) -> str:
-    """That the motion does not break the stage away, if it does not: only its bristles give way."""
+    """Say that the motion does not break the stage away, if only its bristles yield."""
     if not case.unmoved:
         return ""
     force, least = _forces(case.largest_force, case.breakaway)
@@ -217,6 +233,7 @@ def _stuck(case: Case) -> str:
 
 
 def _settling_sentence(case: Case) -> str:
+    """Say how fast a case settles, and into which band."""
     fine, coarse = case.settling_time.get(_MICRON), case.settling_time.get(_TEN_MICRON)
     stuck = _stuck(case)
     if fine == 0 and stuck:
@@ -235,19 +252,19 @@ def _settling_sentence(case: Case) -> str:
 
 
 def _at_the_far_end(case: Case, band: float) -> str:
-    """That it is at the far end alone that a stage does not settle to within a band [m] in time; "" if it is not."""
+    """Say that only the far end of the motion misses a band [m] in time; empty otherwise."""
     return " at the far end before it returns" if case.in_the_end.get(band) is not None else ""
 
 
 def _small_swing(case: Case) -> str:
-    """How a motion that stays within 10 um swings there at its end; "" if it does not."""
+    """Describe the swing of a motion that stays within 10 um; empty if it does not swing."""
     if not case.period or case.peak_to_peak < _MICRON:
         return ""
     return f": at its end it swings by {at_the_end(case)} peak to peak every {with_unit(case.period, 's')}"
 
 
 def _doubts(case: Case) -> list[str]:
-    """Why the verdict is not certain, if it is not."""
+    """Say why the verdict is not certain, if it is not."""
     hunting = case.judgement.hunting
     if hunting.certain:
         return []
@@ -255,7 +272,7 @@ def _doubts(case: Case) -> list[str]:
 
 
 def _running_away(case: Case) -> list[str]:
-    """That large motions grow without bound, or may, or that this is not known, and what keeps them from it."""
+    """Say that large motions grow without bound, or may do so, and what prevents it."""
     cause = 'set controller.anti_windup, which is "none", to "clamp".'
     if (away := case.judgement.running_away) and away.windows:
         least = with_unit(away.windows[0][0], "m")
@@ -269,12 +286,12 @@ def _running_away(case: Case) -> list[str]:
 
 
 def _or_more(kick: Kick) -> str:
-    """That all larger kicks do the same, as far as was searched, if they do."""
+    """Say that all larger kicks searched do the same, if they do."""
     return " or more" if kick.windows == ((kick.windows[0][0], kick.searched[1]),) else ""
 
 
 def _outlook(case: Case) -> list[str]:
-    """Where hunting begins, of a case that need not hunt."""
+    """Say at which bandwidths hunting begins, for a case that need not hunt."""
     judgement = case.judgement
     says: list[str] = []
     if judgement.margin:
@@ -286,7 +303,7 @@ def _outlook(case: Case) -> list[str]:
 
 
 def _unsearched(case: Case) -> list[str]:
-    """That the search through the bandwidths was given up."""
+    """Say that the search through the bandwidths was given up, if it was."""
     if CheckPart.BANDWIDTHS not in case.judgement.given_up:
         return []
     if case.judgement.margin and case.judgement.margin.certain:
@@ -297,7 +314,10 @@ def _unsearched(case: Case) -> list[str]:
 
 
 def edge_text(case: Case, end: AttractionEnd) -> str:
-    """A bandwidth at which hunting ends; of one that is not certain, where hunting was found and where it was not."""
+    """Write a bandwidth at which hunting ends.
+
+    An uncertain edge is given by where hunting was found and where it was not.
+    """
     if not end.certain:
         ends = sorted((end.inside, end.outside))
         low, high = _bandwidth(case, ends[0], up=False, digits=4), _bandwidth(case, ends[1], digits=4)
@@ -310,13 +330,16 @@ def edge_text(case: Case, end: AttractionEnd) -> str:
 
 
 def _present_bandwidth(case: Case) -> float | None:
-    """The bandwidth of the case [Hz]; None where its controller states none."""
+    """Return the bandwidth of the case [Hz]; None if its controller sets none."""
     edge = case.judgement.margin
     return edge.crossover / edge.factor if edge and edge.crossover else bandwidth(case.stage.flat())
 
 
 def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 3) -> str:
-    """A bandwidth that is a factor of that of the case, rounded upward, downward or (None) to the nearest."""
+    """Write a bandwidth that is a multiple of the case's own.
+
+    It is rounded upward, downward or, with None, to the nearest number.
+    """
     crossover = _present_bandwidth(case)
     value = factor * (crossover or 1.0)
     if up is not None:
@@ -328,19 +351,19 @@ def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 
 
 
 def _elsewhere(case: Case) -> str | None:
-    """The key that states a bandwidth [Hz] which is not where the loop crosses 0 dB; None where it is, or without."""
+    """Return the key of a bandwidth [Hz] at which the loop does not cross 0 dB; None otherwise."""
     controller = case.stage.controller
     return None if controller.bandwidth_name == "crossover" else controller.bandwidth_key
 
 
 def _windows(case: Case, narrow: bool = False) -> list[str]:
-    """Where else in bandwidth something attracts: in windows that are narrow, or not."""
+    """Say where else in bandwidth something attracts, in narrow windows or in others."""
     places = [_window(case, window) for window in case.judgement.windows if window.narrow == narrow]
     return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
 
 
 def _window(case: Case, window: BandwidthWindow) -> str:
-    """Where a window of bandwidths lies."""
+    """Write the range of a window of bandwidths."""
     low, high = window.low, window.high
     if low and high and high.inside < low.inside * ONE_PLACE:
         width = percent(high.inside / low.inside - 1)
@@ -354,8 +377,10 @@ def _window(case: Case, window: BandwidthWindow) -> str:
 
 
 def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
-    """Windows that are so narrow that no machine stays in there, and how far apart the bandwidths are that the search
-    for an edge surveys: others may lie between them."""
+    """Say what the survey of bandwidths may have missed between its steps.
+
+    Windows too narrow for any machine to stay in are listed as well.
+    """
     if all(case.judgement.margin is None for case in cases.values()):
         return []
     low, high = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
@@ -370,7 +395,7 @@ def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
 
 
 def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
-    """What keeps a case from hunting."""
+    """Say what keeps a case from hunting: a faster or slower controller, or a free joint."""
     judgement = item.case.judgement
     grows = judgement.hunting.passing and judgement.hunting.lower_gains == "unstable"  # the faster the loop, the sooner
     ways = [_faster(item.case, judgement.margin)] if judgement.margin and not grows else []
@@ -389,13 +414,16 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
 
 
 def _slower(case: Case, end: AttractionEnd) -> str:
-    """To which lower bandwidth the stage settles."""
+    """Say to which lower bandwidth the stage settles."""
     doubt = "" if end.certain else f" (not certain: hunting was found down to {_bandwidth(case, end.inside, digits=4)})"
     return f"lower the bandwidth to {_bandwidth(case, end.outside, up=False)}{doubt}"
 
 
 def _faster(case: Case, edge: Margin) -> str:
-    """What to do to the controller so that the stage settles: to a bandwidth at a distance from the edge."""
+    """Say how much faster the controller has to be for the stage to settle.
+
+    The bandwidth advised keeps a distance from the edge of hunting.
+    """
     controller, highest = case.stage.controller, _bandwidth(case, edge.factor, up=False, digits=4)
     apart = _distance(case, edge)
     kept = (
@@ -417,7 +445,7 @@ def _faster(case: Case, edge: Margin) -> str:
 
 
 def _with_other_friction(case: Case) -> str:
-    """Whether the bandwidth that advice leads to keeps a margin in static friction."""
+    """Say whether the bandwidth advised keeps a margin in static friction."""
     if case.advice_keeps_friction is None:
         return ""
     distance = SEARCH_LIMITS.edge_distance
@@ -427,12 +455,15 @@ def _with_other_friction(case: Case) -> str:
 
 
 def _distance(case: Case, edge: Margin) -> float:
-    """The factor from the edge that advice keeps; 1 where something attracts again within it, over more than a
-    hundredth of the bandwidth or as close to where the advice leads."""
+    """Return the distance from the edge that advice keeps, as a factor.
+
+    The factor is 1 if something attracts again within that distance, over a range wide or close enough to matter.
+    """
     distance = SEARCH_LIMITS.edge_distance
     to = edge.quiet * distance
 
     def in_the_way(window: BandwidthWindow) -> bool:
+        """Tell whether a window attracts again between the edge and the bandwidth advised."""
         low, high = window.low, window.high
         if low is None or not edge.factor < low.inside <= to * (1 + ROUGH):
             return False
@@ -443,6 +474,7 @@ def _distance(case: Case, edge: Margin) -> float:
 
 
 def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:
+    """Tell whether a locked joint, if freed, surely ends the hunting."""
     joint, free = item.case.stage.joint, cases.get("free")
     if free is None or joint is None or not joint.locked:
         return False
@@ -450,7 +482,7 @@ def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:
 
 
 def _swing(case: Case) -> str:
-    """The size of the hunting cycle, e.g. "±0.52 mm every 1.63 s"."""
+    """Write the size and period of the hunting cycle, such as "±0.52 mm every 1.63 s"."""
     swing = case.judgement.swing
     assert swing  # it attracts, or the verdict were another
     size, turns = plus_minus(swing.amplitude, "m"), swing.swings / 2
@@ -461,7 +493,7 @@ def _swing(case: Case) -> str:
 
 
 def _end(case: Case) -> str:
-    """What is left of the motion in its last quarter."""
+    """Write what is left of the motion in the last quarter of the run."""
     if case.peak_to_peak < _TEN_MICRON:
         return f"at rest, but {length_at_rest(abs(case.offset))} off its reference"
     if not case.period:

@@ -1,4 +1,4 @@
-"""Isolator or firmware: the JSON document."""
+"""Build the JSON document of `friso compare`: isolator or firmware."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ from friso.studies.compare.study import Comparison, OptionResult
 
 
 def compare_document(comparison: Comparison) -> dict[str, Any]:
-    """The JSON document: SI units, the unit in the key's suffix; an infinite time (never) is null."""
+    """Return the JSON document in SI, with the unit as suffix of each key.
+
+    A time that is infinite, because a machine never settles, becomes null.
+    """
     machines = comparison.machines
     conclusion, *details = sentences(comparison)
     return plain_json(
@@ -44,6 +47,7 @@ def compare_document(comparison: Comparison) -> dict[str, Any]:
 
 
 def _option(comparison: Comparison, result: OptionResult) -> dict[str, Any]:
+    """Return the results of one option, alone and against option a."""
     pair = comparison.paired(result)
     crossover = bandwidth(result.option.stage.flat())
     return {

@@ -1,4 +1,4 @@
-"""Isolator or firmware, drawn: which machines swing on, when they settle, how still they stand."""
+"""Draw which machines swing on, when they settle, and how still they stand, for each option."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MOST = (5, 95)
 
 
 def compare_figures(comparison: Comparison) -> list[Figure]:
-    """Probabilities, settling times and standstill in one figure."""
+    """Return one figure of probabilities, settling times and standstill."""
     within = with_unit(comparison.within, "m")
     caption = (
         f"{comparison.machines.count} machines drawn with seed {comparison.seed}, the same in all options; in position "
@@ -52,12 +52,13 @@ def compare_figures(comparison: Comparison) -> list[Figure]:
 
 
 def _names(comparison: Comparison) -> Axis:
-    """The options side by side, by the letters that the curves of settling times name; names would not fit a phone."""
+    """Return the axis of options, by letter, since full names would not fit a phone."""
     letters = tuple(result.letter for result in comparison.results)
     return Axis("Option", "", (-0.5, len(letters) - 0.5), words=letters)
 
 
 def _probabilities(comparison: Comparison) -> Panel:
+    """Return the panel of machines that swing, miss their position, or do not stay there."""
     kinds = (
         ("swings at the end", VERMILLION, [result.swinging for result in comparison.results]),
         ("not in position at the end", BLUE, [_other(result.settled) for result in comparison.results]),
@@ -78,20 +79,21 @@ def _probabilities(comparison: Comparison) -> Panel:
 
 
 def _other(share: Share) -> Share:
-    """The probability of the contrary."""
+    """Return the probability of the contrary, with its interval."""
     return Share(1 - share.probability, 1 - share.high, 1 - share.low)
 
 
 def _bars(
     x: np.ndarray, ends: list[tuple[float, float]], colour: str, factor: float = 1.0, width: float = 1.4
 ) -> Series:
-    """Upright bars as one line with gaps."""
+    """Return upright bars as one line with gaps."""
     places = np.repeat(x, 3)
     heights = np.array([value for low, high in ends for value in (factor * low, factor * high, np.nan)])
     return Series(places, heights, "", colour, width=width)
 
 
 def _settling(comparison: Comparison, within: str) -> Panel:
+    """Return the panel of the share of machines in position over the time since the move."""
     flat, count = comparison.stage.flat(), comparison.machines.count
     end = flat["motion.duration"] - float(last_corner(flat))
     times = [np.sort(result.measures.settling[np.isfinite(result.measures.settling)]) for result in comparison.results]
@@ -108,6 +110,7 @@ def _settling(comparison: Comparison, within: str) -> Panel:
 
 
 def _standstill(comparison: Comparison) -> Panel:
+    """Return the panel of the in-position RMS [m] of each option, with its spread."""
     x, medians = (
         np.arange(len(comparison.results), dtype=np.float64),
         [result.in_position for result in comparison.results],
@@ -125,6 +128,7 @@ def _standstill(comparison: Comparison) -> Panel:
 
 
 def _most(result: OptionResult) -> tuple[float, float]:
+    """Return the percentiles between which most machines' in-position RMS [m] lies."""
     finite = result.measures.in_position[np.isfinite(result.measures.in_position)]
     if not finite.size:
         return np.nan, np.nan

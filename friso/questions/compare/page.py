@@ -1,4 +1,7 @@
-"""The page of `friso compare`: one file that opens offline, prints, and is the same bytes on every run."""
+"""Write the page of `friso compare`: one file that opens offline and prints.
+
+Every run of the command gives the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -24,14 +27,14 @@ from friso.studies.compare.study import LONGER, Comparison
 
 
 def compare_files(comparison: Comparison) -> dict[str, Content]:
-    """The page, and every figure in all formats."""
+    """Return the page, and every figure in all formats."""
     figures = compare_figures(comparison)
     images = pictures(figures)
     return {"compare.html": page(comparison, figures), **images}
 
 
 def page(comparison: Comparison, figures: Sequence[Figure]) -> str:
-    """The page with its figures."""
+    """Return the page with its figures."""
     return Report.of_stage(
         "compare",
         comparison.stage,

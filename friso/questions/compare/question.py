@@ -22,22 +22,22 @@ from friso.quantities import Quantity, positive
 
 
 class CompareAnswer(Answer):
-    """Seven options on the same machines: `result` is a `Comparison`."""
+    """Several options on the same machines; `result` is a `Comparison`."""
 
     @property
     def failure(self) -> str:
-        """Whether runs stopped early."""
+        """Say how many runs stopped early; empty if none did."""
         stopped = sum(result.failed for result in self.result.results)
         return f"{stopped} runs stopped early" if stopped else ""
 
     def sentences(self) -> Sequence[str]:
-        """Whether to buy a joint, then which options bring the machines to rest at what cost."""
+        """Say whether to buy a joint, then which options bring the machines to rest, at what cost."""
         from friso.questions.compare.words import answer
 
         return answer(self.result)
 
     def tables(self) -> Sequence[AnswerTable]:
-        """The options, and each beside the first on the same machines."""
+        """Return the options, and each compared with the first on the same machines."""
         from friso.questions.compare.words import COLUMNS, PAIRED, paired_rows, table_rows
 
         return [
@@ -46,7 +46,7 @@ class CompareAnswer(Answer):
         ]
 
     def details(self) -> Sequence[str]:
-        """What each option is and does, how machines were drawn, and notes."""
+        """Return what each option is and does, how machines were drawn, and notes."""
         from friso.questions.compare.words import details, options_rows, population
 
         options = [f"{label}: {text}" for label, text in options_rows(self.result)]

@@ -1,4 +1,4 @@
-"""Isolator or firmware, in words: what the options are, the tables, and what follows from them."""
+"""Describe the options, write their tables, and say which to choose: isolator or firmware."""
 
 from __future__ import annotations
 
@@ -55,17 +55,18 @@ PairedRow = tuple[str, list[str]]
 
 
 def label(result: OptionResult) -> str:
+    """Return the label of an option, with its letter."""
     return result.option.label
 
 
 def in_prose(result: OptionResult) -> str:
-    """An option within a sentence."""
+    """Name an option within a sentence."""
     kind = result.option.kind
     return f"{kind.prose or f'the {kind.title}'} ({kind.letter})"
 
 
 def options_rows(comparison: Comparison) -> list[tuple[str, str]]:
-    """What each option is."""
+    """Return what each option is, by its label."""
     return [(label(result), _about(result.option, comparison)) for result in comparison.results]
 
 
@@ -84,6 +85,7 @@ def _about(option: Option, comparison: Comparison) -> str:
 
 
 def _bandwidth(option: Option, comparison: Comparison) -> str:
+    """Say how much faster the controller of an option is, and why no faster."""
     present = bandwidth(comparison.stage.flat())
     faster = f"a controller {plain_factor(option.factor)} times as fast"
     if present is not None:
@@ -93,7 +95,10 @@ def _bandwidth(option: Option, comparison: Comparison) -> str:
 
 
 def table_rows(comparison: Comparison) -> list[PairedRow]:
-    """A row for each option, its texts under `COLUMNS`; 95 % intervals in brackets."""
+    """Return one row for each option, with its texts under `COLUMNS`.
+
+    Brackets hold 95 % intervals.
+    """
     return [
         (
             label(result),
@@ -113,7 +118,10 @@ def table_rows(comparison: Comparison) -> list[PairedRow]:
 
 
 def paired_rows(comparison: Comparison) -> list[PairedRow]:
-    """A row for each option but a, its texts under `PAIRED`."""
+    """Return one row for each option except a, with its texts under `PAIRED`.
+
+    Each machine is compared with itself under option a.
+    """
     rows = []
     for result in comparison.results[1:]:
         pair = comparison.paired(result)
@@ -126,7 +134,7 @@ def paired_rows(comparison: Comparison) -> list[PairedRow]:
 
 
 def _time(median: EstimatedValue) -> str:
-    """A median of settling times, of which more than half may never come."""
+    """Write a median settling time with its interval; "never" if most machines do not settle."""
     if math.isfinite(median.high):
         return f"{with_unit(median.value, 's')} ({range_with_unit(median.low, median.high, 's')})"
     middle, low = ("never" if value == math.inf else with_unit(value, "s") for value in (median.value, median.low))
@@ -134,6 +142,7 @@ def _time(median: EstimatedValue) -> str:
 
 
 def _at_rest(median: EstimatedValue) -> str:
+    """Write a median length [m] at standstill with its interval."""
     if not _is_known(median):
         return NOTHING
     middle, low, high = map(length_at_rest, (median.value, median.low, median.high))
@@ -141,22 +150,26 @@ def _at_rest(median: EstimatedValue) -> str:
 
 
 def _force(median: EstimatedValue) -> str:
+    """Write a median force [N] with its interval."""
     if not _is_known(median):
         return NOTHING
     return f"{with_unit(median.value, 'N')} ({range_with_unit(median.low, median.high, 'N')})"
 
 
 def _is_known(median: EstimatedValue) -> bool:
+    """Tell whether a median and its interval are finite."""
     return all(map(math.isfinite, (median.value, median.low, median.high)))
 
 
 def _ratio(median: EstimatedValue) -> str:
+    """Write a median ratio with its interval."""
     if not _is_known(median):
         return NOTHING
     return f"{median.value:.3g} ({median.low:.3g} to {median.high:.3g})"
 
 
 def _margin(result: OptionResult, comparison: Comparison) -> str:
+    """Write the modulus margin of an option, and the least one or the number of unstable machines."""
     least = f"least {result.loops.margin.min():.2f}"
     if result.unstable:
         least = f"{result.unstable} of {comparison.machines.count} not stable"
@@ -164,17 +177,17 @@ def _margin(result: OptionResult, comparison: Comparison) -> str:
 
 
 def sentences(comparison: Comparison) -> list[str]:
-    """What follows for the one who has to choose between a joint and settings, the answer first."""
+    """Return all sentences for the choice between a joint and settings, the answer first."""
     return [*answer(comparison), *details(comparison)]
 
 
 def answer(comparison: Comparison) -> list[str]:
-    """Whether to buy a joint, then which options bring the machines to rest at what cost."""
+    """Say whether to buy a joint, then which options bring the machines to rest, at what cost."""
     return [*_unstable(comparison), *_recommendation(comparison), conclusion(comparison)]
 
 
 def _unstable(comparison: Comparison) -> list[str]:
-    """That the loop of the stage as it is is not stable, on how many of the machines: friction aside."""
+    """Say on how many machines the loop is unstable as it is, whatever the friction."""
     base, count = comparison.results[0], comparison.machines.count
     if not base.unstable:
         return []
@@ -185,12 +198,12 @@ def _unstable(comparison: Comparison) -> list[str]:
 
 
 def details(comparison: Comparison) -> list[str]:
-    """How well each option does, and what is not compared."""
+    """Say how well each option does, and what is not compared."""
     return [*_performance(comparison), *_failing(comparison), *_standstill(comparison)]
 
 
 def conclusion(comparison: Comparison) -> str:
-    """Which options bring the machines to rest, how many of them, and at what cost."""
+    """Say which options bring the machines to rest, how many of them, and at what cost."""
     resting, base = _resting(comparison), comparison.results[0]
     within, count = with_unit(comparison.within, "m"), comparison.machines.count
     if not resting:
@@ -210,11 +223,12 @@ def conclusion(comparison: Comparison) -> str:
 
 
 def _number(result: OptionResult, count: int) -> str:
+    """Write how many of the machines are in position at the end."""
     return f"all {count}" if result.in_position_count == count else f"{result.in_position_count} of {count}"
 
 
 def _cost(result: OptionResult, comparison: Comparison) -> str:
-    """What an option takes and leaves, against a."""
+    """Write the force and the modulus margin of an option, compared with option a."""
     if result is comparison.results[0]:
         return ""
     loops = f"modulus margin {result.margin.value:.2f}, least {result.loops.margin.min():.2f}"
@@ -224,7 +238,7 @@ def _cost(result: OptionResult, comparison: Comparison) -> str:
 
 
 def _as_is(comparison: Comparison) -> str:
-    """What the machines do as they are, where that is not at rest."""
+    """Say what the machines do as they are, unless they rest."""
     base, count = comparison.results[0], comparison.machines.count
     if base.rests:
         return ""
@@ -233,7 +247,7 @@ def _as_is(comparison: Comparison) -> str:
 
 
 def _recommendation(comparison: Comparison) -> list[str]:
-    """Whether to buy a joint."""
+    """Say whether to buy a joint."""
     resting = _resting(comparison)
     joint = [result for result in resting if result.option.kind.joint]
     settings = [result for result in resting if not result.option.kind.joint]
@@ -253,7 +267,7 @@ def _recommendation(comparison: Comparison) -> list[str]:
 
 
 def _performance(comparison: Comparison) -> list[str]:
-    """How fast the options that bring the machines to rest do so, how still these are then, and how sure that is."""
+    """Say how fast each successful option is, how still machines stand then, and how sure that is."""
     resting, followed = _resting(comparison), min(FOLLOWED, comparison.machines.count)
     lines = [
         f"{label(result)}: in position in {with_unit(result.settling.value, 's')} "
@@ -266,11 +280,12 @@ def _performance(comparison: Comparison) -> list[str]:
 
 
 def _still(result: OptionResult, comparison: Comparison) -> str:
+    """Write the standstill RMS [m], if the floor shakes."""
     return f", stands still to {with_unit(result.in_position.value, 'm')} RMS" if comparison.shaken else ""
 
 
 def _failing(comparison: Comparison) -> list[str]:
-    """What the machines do at the end with the other options."""
+    """Say what the machines do at the end with the options that fail."""
     return [
         f"{label(result)}: not enough. {share_with_interval(result.swinging)} of the machines swing at the end and "
         f"{share_with_interval(result.settled)} are in position; {share_with_interval(result.stays)} stay in position "
@@ -281,7 +296,7 @@ def _failing(comparison: Comparison) -> list[str]:
 
 
 def _standstill(comparison: Comparison) -> list[str]:
-    """Why standstill is no part of the conclusions."""
+    """Say why standstill plays no part in the conclusions, if the floor is still."""
     if comparison.shaken:
         return []
     joint = (
@@ -294,15 +309,17 @@ def _standstill(comparison: Comparison) -> list[str]:
 
 
 def _names(results: Sequence[OptionResult]) -> str:
+    """Join the names of options by "or"."""
     return listed([in_prose(result) for result in results], "or")
 
 
 def _resting(comparison: Comparison) -> list[OptionResult]:
+    """Return the options that bring enough machines to rest."""
     return [result for result in comparison.results if result.rests]
 
 
 def population(comparison: Comparison) -> list[str]:
-    """How the machines were drawn."""
+    """Say how the machines were drawn."""
     machines = comparison.machines
     lines = [
         f"{machines.count} machines were drawn with seed {comparison.seed}; each has the same parameters, rail and "

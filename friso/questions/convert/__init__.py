@@ -4,7 +4,7 @@ from friso.interface.question import WHY, Choices, Question
 
 
 def listed_laws() -> list[tuple[str, str]]:
-    """The friction laws that can be converted to, each in one line."""
+    """Return the friction laws that a stage can be converted to, with one line on each."""
     from friso.stage.tables import friction_law
     from friso.studies.laws.conversion import convertible
 

@@ -1,4 +1,4 @@
-"""The JSON document of `friso convert`."""
+"""Build the JSON document of `friso convert`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SUFFIXES = {"N": "n", "N/m": "n_per_m", "N*s/m": "n_s_per_m"}
 
 
 def convert_document(conversion: LawConversion) -> dict[str, Any]:
-    """What is kept and what is not, what is left open, and the keys of the law."""
+    """Return what is kept, what is not, what stays open, and the keys of the new law."""
     flat = conversion.stage.flat()
     return plain_json(
         {

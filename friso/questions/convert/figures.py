@@ -1,4 +1,4 @@
-"""The figure of a conversion: both laws as measurements show them."""
+"""Draw both friction laws as measurements would show them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ DRAWN = 40
 
 
 def convert_figures(conversion: LawConversion) -> list[Figure]:
-    """Virgin curves and steady friction over speed, before and after."""
+    """Return virgin curves and steady friction over speed, before and after the conversion.
+
+    Measured points are drawn if the virgin curve comes from a file.
+    """
     levels, before = conversion.before.levels, conversion.before
     stages = (
         (conversion.source, before, VERMILLION, "solid"),

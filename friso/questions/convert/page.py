@@ -1,4 +1,4 @@
-"""The files of `friso convert`: the stage file, and the figure."""
+"""Write the files of `friso convert`: the stage file and the figure."""
 
 from __future__ import annotations
 
@@ -12,6 +12,6 @@ if TYPE_CHECKING:
 
 
 def convert_files(conversion: LawConversion, stem: str) -> dict[str, Content]:
-    """The stage file with the law, and the figure."""
+    """Return the stage file with the new law, and the figure."""
     (figure,) = convert_figures(conversion)
     return {f"{stem}.toml": conversion.stage.to_toml(), **image_files(figure, stem, ["png"])}

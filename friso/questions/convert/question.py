@@ -1,4 +1,4 @@
-"""The same stage under another friction law, and what could not be kept."""
+"""Put a stage under another friction law, and say what could not be kept."""
 
 from __future__ import annotations
 
@@ -18,19 +18,22 @@ MOST = 12
 
 
 class ConvertAnswer(Answer):
-    """A stage under another friction law: `result` is the `LawConversion`, ``answer.stage`` the stage."""
+    """A stage under another friction law.
+
+    `result` is the `LawConversion`, and ``answer.stage`` is the converted stage.
+    """
 
     title: str
     name: str
 
     def tables(self) -> Sequence[AnswerTable]:
-        """What measurements show of both laws."""
+        """Return a table of what measurements show of both laws."""
         from friso.questions.convert.words import COLUMNS, conversion_rows
 
         return [AnswerTable(self.title, COLUMNS, conversion_rows(self.result))]
 
     def files(self) -> Files:
-        """The stage file and the figure."""
+        """Return the stage file and the figure."""
         from friso.questions.convert.page import convert_files
 
         return convert_files(self.result, self.name)

@@ -1,4 +1,7 @@
-"""A conversion to another friction law in words: what is kept, what is not, and what is left open."""
+"""Describe a conversion to another friction law in words.
+
+It is said what is kept, what is not, and what the measurements leave open.
+"""
 
 from __future__ import annotations
 
@@ -23,14 +26,14 @@ SHOWN: Mapping[MeasuredKind, str] = {
     "damping": "damping at rest",
     "viscous": "viscous damping",
 }
-"""What measurements show."""
+"""Names of the properties of friction that measurements show."""
 
 COLUMNS = ("before", "after", "off by", "kept")
-"""Of the table of what is compared."""
+"""Columns of the table that compares both laws."""
 
 
 def sentences(conversion: LawConversion) -> list[str]:
-    """What could not be kept comes first; then what is left open, and whether the law may give energy back."""
+    """Say what could not be kept, then what stays open, and whether the law is passive."""
     law, lost = conversion.law, conversion.lost
     name = conversion.stage.name or "the stage"
     if lost:
@@ -44,6 +47,10 @@ def sentences(conversion: LawConversion) -> list[str]:
 
 
 def _stiffness(ends: tuple[float, float], stiffness: float) -> str:
+    """Say which stiffness before sliding measured points allow, from `ends` [N/m].
+
+    `stiffness` [N/m] is the value taken.
+    """
     low, high, value = (with_unit(x, "N/m") for x in (*ends, stiffness))
     if np.isinf(ends[1]):
         return (
@@ -58,16 +65,21 @@ def _stiffness(ends: tuple[float, float], stiffness: float) -> str:
 
 
 def activity_sentences(condition: str) -> list[str]:
-    """That a law may give energy back, with the `condition` of passivity that it does not meet; "": it is passive."""
+    """Say that a law may give energy back, with the `condition` under which it is passive.
+
+    An empty condition means that the law is passive, and nothing is said.
+    """
     return [f"The law may give energy back, which no friction does. It is passive where {condition}."] * bool(condition)
 
 
 def _change(item: MeasuredChange) -> str:
+    """Say by how much a measured effect changes in the conversion."""
     before, after = (with_unit(value, item.unit) for value in (item.before, item.after))
     return f"{SHOWN[item.kind]} is not kept ({before} becomes {after})"
 
 
 def _open(key: str, ends: tuple[float, float], conversion: LawConversion) -> str:
+    """Say between which values the measurements leave a key open."""
     flat = conversion.stage.flat()
     unit = getattr(declared_keys(flat)[key], "unit", "")
     low, high, value = (with_unit(x, unit) if unit else f"{x:.3g}" for x in (*ends, flat[key]))
@@ -75,7 +87,7 @@ def _open(key: str, ends: tuple[float, float], conversion: LawConversion) -> str
 
 
 def conversion_rows(conversion: LawConversion) -> list[tuple[str, list[str]]]:
-    """The rows of the table: before, after, by how much it is off, whether it is kept."""
+    """Return the rows of the table: before, after, difference, and whether it is kept."""
     return [
         (
             SHOWN[item.kind],
@@ -91,7 +103,7 @@ def conversion_rows(conversion: LawConversion) -> list[tuple[str, list[str]]]:
 
 
 def blocks(conversion: LawConversion) -> list[str]:
-    """The table [friction] of the stage file."""
+    """Return the table [friction] of the new stage file."""
     text = conversion.stage.to_toml()
     begin = text.index("[friction]")
     end = text.find("\n[", begin + 1)

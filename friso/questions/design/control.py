@@ -1,4 +1,4 @@
-"""The controller of a design and its simulated moves in words."""
+"""Describe the controller of a design and its simulated moves in words."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LITTLE = 0.1
 
 
 def controller_step(design: Design) -> DesignStep:
-    """The crossover, why it is no other, and the gains."""
+    """Return the step that chooses the crossover and the gains, with reasons."""
     controller = design.controller
     gains = f"Gains of a PID (kp, ki, kd): {_parallel(design)}."
     faster = [_faster(design)] if design.damped else []
@@ -37,6 +37,7 @@ def controller_step(design: Design) -> DesignStep:
 
 
 def _gains(design: Design) -> tuple[tuple[str, str], ...]:
+    """Return the numbers of the controller by name."""
     controller, gains, flat = design.controller, design.controller.gains, design.stage.flat()
     window = " to ".join(map(hertz, comfortable(design)))
     return (
@@ -52,7 +53,7 @@ def _gains(design: Design) -> tuple[tuple[str, str], ...]:
 
 
 def _faster(design: Design) -> str:
-    """What would let the crossover be higher."""
+    """Say how much more joint damping would allow a higher crossover."""
     assert design.damped
     return (
         f"With {trimmed(design.damped.needed, 'N*s/m')} of joint damping instead of "
@@ -61,13 +62,14 @@ def _faster(design: Design) -> str:
 
 
 def _parallel(design: Design) -> str:
-    """The gains of Eq. 6 that act on the error low-passed with tau_p."""
+    """Write the gains of Eq. 6 as a PID that acts on the error, low-passed with tau_p."""
     kp, ki, kd, tau = design.controller.gains.parallel.values()
     gains = f"{trimmed(kp, 'N/m')}, {trimmed(ki, 'N/(m*s)')}, {trimmed(kd, 'N*s/m')}"
     return f"{gains}, with a low-pass filter of time constant τ_p = {trimmed(tau, 's')}"
 
 
 def _not_higher(design: Design) -> str:
+    """Say what limits the crossover from above."""
     bounds, crossover = upper(design), design.controller.crossover
     text = f"Upper limits: {_bounds(bounds)}."
     short = 1 - crossover / bounds[0].value
@@ -80,6 +82,7 @@ def _not_higher(design: Design) -> str:
 
 
 def _not_lower(design: Design) -> str:
+    """Say what limits the crossover from below."""
     bounds = lower(design)
     if not bounds:
         return "Nothing limits it from below, but a higher crossover settles faster."
@@ -87,10 +90,12 @@ def _not_lower(design: Design) -> str:
 
 
 def _bounds(bounds: list[CrossoverBound]) -> str:
+    """List bounds of the crossover with their reasons."""
     return listed([f"{hertz(bound.value)} ({bound.reason})" for bound in bounds], "and")
 
 
 def _margin(design: Design) -> str:
+    """Write the least modulus margin, as designed and over the corners."""
     controller = design.controller
     return (
         f"The smallest modulus margin of the settled states is {controller.margin:.3g} as designed and "
@@ -99,6 +104,7 @@ def _margin(design: Design) -> str:
 
 
 def _damping(design: Design) -> str:
+    """Say whether more damping in the joint would raise the modulus margin enough."""
     damping = design.controller.damping
     as_designed, best, worth = float(damping.margins[0]), float(damping.margins.max()), damping.worth
     now = f"with its own damping of {trimmed(damping.tried[0], 'N*s/m')} the least modulus margin is {as_designed:.3g}"
@@ -114,7 +120,7 @@ def _damping(design: Design) -> str:
 
 
 def moves_step(design: Design) -> DesignStep:
-    """What the simulated moves show."""
+    """Return the step that verifies the design in simulated moves."""
     free, locked = design.verification.free, design.verification.locked
     sentences = [f"Of {free.tried} moves over all ranges and tolerances {restless(free)}: {probability(free)}."]
     other = settling(locked)
@@ -132,6 +138,7 @@ def moves_step(design: Design) -> DesignStep:
 
 
 def _met(design: Design) -> str:
+    """Say whether the settling time meets the specification; empty if none is specified."""
     limit, time = design.spec.position.settling_time, design.verification.free.slower_than(0.05)
     if limit is None:
         return ""
@@ -139,6 +146,7 @@ def _met(design: Design) -> str:
 
 
 def _worst(outcome: MachineOutcomes) -> str:
+    """Describe the worst simulated move."""
     k = outcome.worst
     if outcome.restless[k]:
         return f"The worst move, which {outcome.words[k]} over {trimmed(outcome.swing[k], 'm')}"
@@ -146,7 +154,7 @@ def _worst(outcome: MachineOutcomes) -> str:
 
 
 def _outcome(name: str, outcome: MachineOutcomes) -> tuple[tuple[str, str], ...]:
-    """The rows of one state of the joint."""
+    """Return the rows on the moves with the joint in one state."""
     low, high = outcome.interval
     return (
         (

@@ -1,4 +1,7 @@
-"""The JSON document of a design: SI, the unit in the key's suffix; what is not known or not finite is null."""
+"""Build the JSON document of a design, in SI with the unit as suffix of each key.
+
+Numbers that are unknown or not finite become null.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ from friso.shown.documents import plain_json, unit_suffix
 
 
 def design_document(design: Design) -> dict[str, Any]:
-    """All but the files."""
+    """Return the whole design except its files."""
     document = {
         "conclusion": need_words(design.need),
         "stage": design.original.name,
@@ -43,6 +46,7 @@ def design_document(design: Design) -> dict[str, Any]:
 
 
 def _by_law(design: Design) -> dict[str, Any]:
+    """Return the edges of hunting without and with the joint, for each friction law."""
     return {
         law: {"without_highest_edge_hz": without.highest, "joint_highest_edge_hz": isolated.highest}
         for law, (without, isolated) in design.by_law.items()
@@ -50,13 +54,14 @@ def _by_law(design: Design) -> dict[str, Any]:
 
 
 def refused_document(stage: str, spec: str, failure: NoDesign) -> dict[str, Any]:
-    """What there is to say where no design meets the specification."""
+    """Return the reason why no design meets the specification, and what to relax."""
     document = {"conclusion": refusal(failure), "stage": stage, "spec": spec, "feasible": False}
     document["reason"] = failure.reason
     return plain_json(document | {"relax": _relax(failure.relaxed)})
 
 
 def _relax(relaxed: Sequence[Relaxation]) -> list[dict[str, Any]]:
+    """Return the requirements to relax, from which value to which."""
     return [
         {
             "key": relaxation.key,
@@ -70,6 +75,7 @@ def _relax(relaxed: Sequence[Relaxation]) -> list[dict[str, Any]]:
 
 
 def _corners(corners: Corners, design: Design) -> dict[str, Any]:
+    """Return the edge of hunting over the corners of friction and masses, and the worst corner."""
     units = {key: field.unit for key, field in design.stage.numeric_keys().items()}
     worst = corners.population.of(corners.worst)
     return {
@@ -84,6 +90,7 @@ def _corners(corners: Corners, design: Design) -> dict[str, Any]:
 
 
 def _joint(design: Design) -> dict[str, Any]:
+    """Return the joint's stiffness, stroke and force, and the edge of hunting with it."""
     beams = design.fitted.choice.beams
     edges = _corners(design.edges, design)
     return {
@@ -96,6 +103,7 @@ def _joint(design: Design) -> dict[str, Any]:
 
 
 def _leaves(design: Design) -> dict[str, Any]:
+    """Return the sizes, stiffness, stresses and margins of the leaf springs."""
     choice, beams = design.fitted.choice, design.fitted.choice.beams
     requirements = [{"name": requirement.name, "key": requirement.keys[0].key} for requirement in choice.requirements]
     return {
@@ -116,6 +124,7 @@ def _leaves(design: Design) -> dict[str, Any]:
 
 
 def _sizes(geometry: Geometry) -> dict[str, Any]:
+    """Return the dimensions and material of leaf springs."""
     return {
         "count": int(geometry.sheet.leaves),
         "length_m": geometry.length,
@@ -127,12 +136,13 @@ def _sizes(geometry: Geometry) -> dict[str, Any]:
 
 
 def _front(design: Design) -> list[dict[str, Any]]:
-    """Every candidate, with what beams say of it where they were asked."""
+    """Return every candidate of the Pareto front, with the beam model's results where computed."""
     confirmed = {confirmation.candidate: confirmation for confirmation in design.confirmed}
     return [_candidate(candidate, confirmed.get(candidate)) for candidate in design.candidates]
 
 
 def _candidate(candidate: Candidate, beams: Confirmed | None) -> dict[str, Any]:
+    """Return one candidate by closed forms and, if computed, by the beam model."""
     return {
         **_sizes(candidate.geometry),
         "drive_stiffness_n_per_m": candidate.stiffness,
@@ -144,6 +154,7 @@ def _candidate(candidate: Candidate, beams: Confirmed | None) -> dict[str, Any]:
 
 
 def _controller(design: Design) -> dict[str, Any]:
+    """Return crossover, bounds, gains and modulus margins of the controller."""
     controller, gains = design.controller, design.controller.gains
     kp, ki, kd, _ = gains.parallel.values()
     return {
@@ -166,6 +177,7 @@ def _controller(design: Design) -> dict[str, Any]:
 
 
 def _verification(design: Design) -> dict[str, Any]:
+    """Return the outcome of the simulated moves with the joint free and locked."""
     settings = DesignSettings.current()
     verification, limit = design.verification, design.spec.position.settling_time
     met = None if limit is None else verification.free.slower_than(settings.slow_share) <= limit
@@ -173,6 +185,7 @@ def _verification(design: Design) -> dict[str, Any]:
 
 
 def _outcome(outcome: MachineOutcomes) -> dict[str, Any]:
+    """Return how many moves fail to rest, with the probability and the settling times."""
     low, high = outcome.interval
     return {
         "moves": outcome.tried,

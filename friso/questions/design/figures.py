@@ -1,4 +1,4 @@
-"""The figures of a design: Pareto front, modes, map of moves, margins over damping, settling times."""
+"""Draw a design: Pareto front, modes, map of moves, margins over damping, and settling times."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ CATEGORIES = (Category("rests in all corners", QUIET), Category("run failed", IN
 
 
 def design_figures(design: Design) -> tuple[Figure, ...]:
-    """All figures, in the order in which they are read."""
+    """Return all figures in the order in which they are read."""
     modes = replace(modes_figure(design.fitted.choice.beams), name="design_modes")
     figures = (_map(design), _front(design), modes, window_figure(design), _damping(design), _settling(design))
     return tuple(replace(figure, subject=design.stage.name) for figure in figures)
 
 
 def _front(design: Design) -> Figure:
-    """Drive stiffness against first interfering frequency."""
+    """Draw the first interfering frequency of leaf springs over their drive stiffness."""
     choice, task, safety = design.fitted.choice, design.fitted.task, design.spec.safety
     multiple, stiffest = safety.parasitic, task.friction / (safety.breakaway * task.stroke)
     good = [confirmation for confirmation in design.confirmed if not confirmation.failure]
@@ -92,13 +92,13 @@ def _front(design: Design) -> Figure:
 
 
 def _points(several: Sequence[Candidate | Confirmed]) -> tuple[Array, Array]:
-    """Stiffness [N/mm] and frequency [Hz] of candidates, by closed forms or beams."""
+    """Return stiffness [N/mm] and frequency [Hz] of candidates, by closed forms or by beams."""
     stiffness = np.array([candidate.stiffness / 1e3 for candidate in several])
     return stiffness, np.array([candidate.frequency for candidate in several])
 
 
 def _map(design: Design) -> Figure:
-    """Whether moves come to rest, over crossover and stroke."""
+    """Draw over crossover and stroke in which share of the corners moves do not come to rest."""
     hunting_map, crossover, stroke = design.map, design.controller.crossover, design.fitted.task.stroke
     codes = np.where(np.isnan(hunting_map.share), 1.0, np.where(hunting_map.share == 0, 0.0, np.nan))
     percents = np.where(np.isnan(codes), 100 * hunting_map.share, np.nan)
@@ -127,13 +127,13 @@ def _map(design: Design) -> Figure:
 
 
 def _reach(centres: Array) -> tuple[float, float]:
-    """The outer edges of cells around logarithmic centres."""
+    """Return the outer edges of cells around logarithmic centres."""
     edges = cell_edges(centres, log=True)
     return float(edges[0]), float(edges[-1])
 
 
 def _damping(design: Design) -> Figure:
-    """The least modulus margin over joint damping."""
+    """Draw the least modulus margin over joint damping."""
     damping = design.controller.damping
     line = Series(damping.tried, damping.margins, "least modulus margin", BLUE)
     points = (
@@ -152,7 +152,7 @@ def _damping(design: Design) -> Figure:
 
 
 def _settling(design: Design) -> Figure:
-    """Cumulative distributions of the settling time."""
+    """Draw the cumulative distributions of the settling time, with the joint free and locked."""
     free, locked = design.verification.free, design.verification.locked
     cases = ((free, "joint free", BLUE), (locked, "joint locked", ORANGE))
     lines = [Series(*_distribution(outcome), name, colour, width=1.8) for outcome, name, colour in cases]
@@ -175,7 +175,7 @@ def _settling(design: Design) -> Figure:
 
 
 def _distribution(outcome: MachineOutcomes) -> tuple[Array, Array]:
-    """Settling times [s] and the shares of the moves [%] that have settled by then."""
+    """Return settling times [s] and the share of moves [%] that have settled by then."""
     times = np.sort(np.maximum(outcome.settling[outcome.completed & np.isfinite(outcome.settling)], 1e-6))
     if not times.size:
         return np.array([1e-6]), np.array([np.nan])

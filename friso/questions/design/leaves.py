@@ -1,4 +1,7 @@
-"""The leaf springs of a design in words: their numbers, what binds them, and how beams confirm the closed forms."""
+"""Describe the leaf springs of a design in words.
+
+These are their numbers, the requirements that limit them, and how the beam model confirms the closed forms.
+"""
 
 from __future__ import annotations
 
@@ -20,14 +23,14 @@ BINDS = 0.95
 
 
 def leaves_step(design: Design) -> DesignStep:
-    """Which leaf springs, and why these."""
+    """Return the step that chooses the leaf springs, with reasons."""
     sentences = (_interfering(design), _strength(design), _why(design), _confirmed(design), *assumptions(design.stage))
     figures = ("design_front", "design_modes")
     return DesignStep(f"Leaf springs: {leaves(design)}", sentences, (*_sizes(design), *_numbers(design)), figures)
 
 
 def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
-    """The requirements: name, keys of the specification that relax it, their values, and how much of it is used."""
+    """Return the requirements: name, the keys that relax it, their values, and how much is used."""
     choice = design.fitted.choice
     return [
         (
@@ -41,10 +44,12 @@ def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
 
 
 def _keys(requirement: Requirement, text: Callable[[RelaxableKey], str]) -> str:
+    """Join a text for each key that relaxes a requirement."""
     return ", ".join(map(text, requirement.keys))
 
 
 def _sizes(design: Design) -> tuple[tuple[str, str], ...]:
+    """Return the dimensions of the leaf springs by name."""
     geometry = design.fitted.choice.geometry
     return (
         ("Leaves", f"{geometry.sheet.leaves:g} of {geometry.sheet.material}"),
@@ -57,6 +62,7 @@ def _sizes(design: Design) -> tuple[tuple[str, str], ...]:
 
 
 def _numbers(design: Design) -> tuple[tuple[str, str], ...]:
+    """Return stiffness, frequency, stress and margins of the leaf springs by name."""
     choice, beams = design.fitted.choice, design.fitted.choice.beams
     return (
         ("Drive stiffness, by beams", newtons_per(beams.drive[0], "mm")),
@@ -74,6 +80,7 @@ def _numbers(design: Design) -> tuple[tuple[str, str], ...]:
 
 
 def _interfering(design: Design) -> str:
+    """Name the first mode that interferes with control, and its distance from the crossover."""
     choice, multiple = design.fitted.choice, design.spec.safety.parasitic
     mode = choice.beams.interfering
     if mode is None:
@@ -85,6 +92,7 @@ def _interfering(design: Design) -> str:
 
 
 def _strength(design: Design) -> str:
+    """Write stress, strength margins and buckling load, with what is required."""
     beams, load, safety = design.fitted.choice.beams, design.fitted.task.load, design.spec.safety
     fatigue = "" if math.isnan(beams.fatigue_margin) else f" and {_factor(beams.fatigue_margin)} below fatigue"
     required = "" if math.isnan(beams.fatigue_margin) else f" and {safety.fatigue:g}"
@@ -100,7 +108,7 @@ def _strength(design: Design) -> str:
 
 
 def _why(design: Design) -> str:
-    """What made these leaves and no others."""
+    """Say which requirements led to these leaves."""
     choice = design.fitted.choice
     binding = [
         requirement.name for requirement, share in zip(choice.requirements, choice.excess, strict=True) if share > BINDS
@@ -112,7 +120,7 @@ def _why(design: Design) -> str:
 
 
 def _confirmed(design: Design) -> str:
-    """How beams see the front."""
+    """Say how many candidates the beam model confirms, and how close the closed forms are."""
     tried = design.confirmed
     failed = sum(bool(confirmation.failure) for confirmation in tried)
     confirmed = [confirmation for confirmation in tried if not confirmation.failure]
@@ -134,4 +142,5 @@ def _confirmed(design: Design) -> str:
 
 
 def _factor(value: float) -> str:
+    """Write a margin as a factor; "unknown" if it is not finite."""
     return f"{plain_factor(value)} times" if np.isfinite(value) else "unknown"

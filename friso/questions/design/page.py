@@ -1,4 +1,7 @@
-"""The page of `friso design`: one file that opens offline, prints, and is the same bytes on every run."""
+"""Write the page of `friso design`: one file that opens offline and prints.
+
+Every run of the command gives the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +25,10 @@ LEAVES = 2
 
 
 def design_files(design: Design) -> dict[str, Content]:
-    """The stages (the design, and the worst machine tried with it), the page, the drawing, and every figure in all
-    formats."""
+    """Return the stage files, the page, the drawing, and every figure in all formats.
+
+    The stage files are the design and the worst machine that was tried with it.
+    """
     figures = design_figures(design)
     images = pictures(figures)
     return {
@@ -36,7 +41,7 @@ def design_files(design: Design) -> dict[str, Content]:
 
 
 def design_html(design: Design, figures: Sequence[Figure]) -> str:
-    """The whole page of a design and its figures."""
+    """Return the page of a design with its figures."""
     return Report.of_stage(
         "design",
         design.stage,
@@ -51,7 +56,7 @@ def design_html(design: Design, figures: Sequence[Figure]) -> str:
 
 
 def drawing(design: Design) -> str:
-    """The dimensioned drawing of the leaf springs, SVG."""
+    """Return the dimensioned drawing of the leaf springs as SVG."""
     choice = design.fitted.choice
     data = materials()[choice.geometry.sheet.material]
     material = f"{data.name}, {data.grade}"

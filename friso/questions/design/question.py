@@ -1,4 +1,7 @@
-"""What stops it: leaf springs, stroke, crossover and gains from a specification, tried in simulated moves."""
+"""Design an isolator that stops hunting, and try it in simulated moves.
+
+Leaf springs, stroke, crossover and gains follow from a specification.
+"""
 
 from __future__ import annotations
 
@@ -17,19 +20,19 @@ from friso.stage import Stage, numeric_keys
 
 
 class DesignAnswer(Answer):
-    """A design: `result` is a `Design`, ``answer.stage`` the designed stage."""
+    """A design; `result` is a `Design`, and ``answer.stage`` is the designed stage."""
 
     status = 2
 
     @property
     def failure(self) -> str:
-        """What of the specification is not met."""
+        """Say which requirements are not met; empty if all are."""
         from friso.questions.design.words import shortfall
 
         return "" if self.result.meets else f"the design does not meet the specification: {shortfall(self.result)}"
 
     def details(self) -> Sequence[str]:
-        """The steps of the method."""
+        """Return the steps of the method with their reasons."""
         from friso.questions.design.steps import steps
 
         return [
@@ -90,14 +93,17 @@ def design(
 
 
 def specification_of(stage: Stage, spec: Spec | str | os.PathLike[str] | None) -> Spec:
-    """The specification that is meant; without any, one made from the stage. Raises InputError."""
+    """Return the specification from a file or an object; without one, make it from the stage.
+
+    Raises InputError for a file that is no specification.
+    """
     if spec is None:
         return read_spec(outline(stage))
     return spec if isinstance(spec, Spec) else load_spec(Path(spec))
 
 
 def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
-    """Say what neither the stage file nor a specification tells."""
+    """Warn about everything that neither stage file nor specification states."""
     from friso.equations.bandwidth import bandwidth
     from friso.shown.drawing.prefixes import with_unit
 

@@ -1,4 +1,4 @@
-"""A design step by step: what was decided, with which numbers, and why."""
+"""Explain a design step by step: what was decided, with which numbers, and why."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ GAP = 1.0
 
 
 def steps(design: Design) -> tuple[DesignStep, ...]:
-    """All steps of the method, in order."""
+    """Return all steps of the method in order."""
     return isolator_step(design), joint_step(design), leaves_step(design), controller_step(design), moves_step(design)
 
 
 def isolator_step(design: Design) -> DesignStep:
-    """Whether an isolator is needed."""
+    """Return the step that decides whether an isolator is needed."""
     corners, flat = design.without, design.original.flat()
     sentences = [f"Without an isolator the machine {edge(corners)}.", *_worst(corners, design), *_gap(design)]
     if not design.needed:
@@ -41,7 +41,7 @@ def isolator_step(design: Design) -> DesignStep:
 
 
 def joint_step(design: Design) -> DesignStep:
-    """How soft, and with which stroke."""
+    """Return the step that chooses stiffness and stroke of the joint."""
     task, beams, safety = design.fitted.task, design.fitted.choice.beams, design.spec.safety
     allowed = task.friction / safety.breakaway / (1 + safety.stiffness_tolerance)
     stiffness, force = newtons_per(beams.drive[0], "mm"), trimmed(beams.forces[-1], "N")
@@ -74,7 +74,7 @@ def joint_step(design: Design) -> DesignStep:
 
 
 def _edge(corners: Corners, factor: float = 1.0) -> str:
-    """An edge of hunting, times a factor, as a number."""
+    """Write an edge of hunting, multiplied by a factor, as a frequency [Hz]."""
     if not corners.hunts:
         return "none found"
     beyond = f"beyond {hertz(corners.searched[1])}"
@@ -82,6 +82,7 @@ def _edge(corners: Corners, factor: float = 1.0) -> str:
 
 
 def _stroke(design: Design) -> str:
+    """Say why the joint has this stroke."""
     stroke, allowed = design.fitted.task.stroke, design.spec.leaves.stroke
     if allowed.low == allowed.high:
         return f"The stroke of {size(stroke)} mm is as specified."
@@ -97,7 +98,7 @@ def _stroke(design: Design) -> str:
 
 
 def _worst(corners: Corners, design: Design) -> list[str]:
-    """The corner that decides, and how many have an edge that is not certain."""
+    """Name the corner that decides, and how many corners have an uncertain edge."""
     sentences = []
     if corners.hunts:
         count = corners.population.count
@@ -112,7 +113,7 @@ def _worst(corners: Corners, design: Design) -> list[str]:
 
 
 def _gap(design: Design) -> list[str]:
-    """The friction that is lost in sliding, against what the thesis says of it."""
+    """Compare the friction lost at break-away with what hunting needs according to the thesis."""
     losses = gaps(design.without, design.original.flat())
     if losses is None:
         return []

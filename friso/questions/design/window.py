@@ -1,4 +1,4 @@
-"""Where the crossover of a design may be: what bounds it from below and above, and which bound decided."""
+"""Compute the range of allowed crossovers of a design, and which bounds limit it."""
 
 from __future__ import annotations
 
@@ -20,18 +20,21 @@ class CrossoverBound:
 
 
 def comfortable(design: Design) -> Range:
-    """The range of crossovers [Hz] with a modulus margin above 0.5 that holds the one chosen."""
+    """Return the range of crossovers [Hz] around the chosen one with a modulus margin above 0.5."""
     below = [window for window in design.fitted.comfortable if window[0] <= 1.01 * design.controller.crossover]
     return below[-1]
 
 
 def stiffest(design: Design) -> float:
-    """The crossover [Hz] that the front allows: a share of the highest first interfering frequency on it."""
+    """Return the highest crossover [Hz] that the Pareto front allows.
+
+    It is a fraction of the highest first interfering frequency on the front.
+    """
     return max(candidate.frequency for candidate in design.candidates) / design.spec.safety.parasitic
 
 
 def upper(design: Design) -> list[CrossoverBound]:
-    """What bounds the crossover from above, the lowest first."""
+    """Return the upper bounds of the crossover, the lowest first."""
     multiple = design.spec.safety.parasitic
     front = f"the highest first interfering frequency of the front over {multiple:g}"
     bounds = [
@@ -43,7 +46,7 @@ def upper(design: Design) -> list[CrossoverBound]:
 
 
 def lower(design: Design) -> list[CrossoverBound]:
-    """What bounds the crossover from below, the highest first."""
+    """Return the lower bounds of the crossover, the highest first."""
     factor, edges = design.spec.safety.hunting, design.edges
     low = comfortable(design)[0]
     bounds = (
@@ -57,7 +60,7 @@ def lower(design: Design) -> list[CrossoverBound]:
 
 
 def view(design: Design) -> Range:
-    """The crossovers [Hz] that a figure of the window shows."""
+    """Return the range of crossovers [Hz] that the figure of the window shows."""
     crossover = design.controller.crossover
     edges = np.concatenate([design.without.edges, design.edges.edges])
     edges = edges[np.isfinite(edges) & (edges > 0)]

@@ -1,4 +1,4 @@
-"""The window for the crossover as a figure: where the machine hunts, and what allows how much."""
+"""Draw the window for the crossover: where the machine hunts, and what allows how much."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CHOSEN, EDGES = "#e3001b", "#7a3300"
 
 
 def window_figure(design: Design) -> Figure:
-    """Rows of bars over the crossover, from the machine's limit down to hunting."""
+    """Draw bars over the crossover, from the machine's limit in the top row down to hunting."""
     visible = view(design)
     factor, multiple = design.spec.safety.hunting, design.spec.safety.parasitic
     allowed = [
@@ -55,7 +55,7 @@ def window_figure(design: Design) -> Figure:
 
 
 def _bars(ranges: list[Range], visible: Range, row: int, label: str, colour: str) -> list[Band]:
-    """The parts of ranges that are in view."""
+    """Return bars of the parts of ranges that are in view."""
     clipped = [(max(low, visible[0]), min(high, visible[1])) for low, high in ranges]
     return [
         Band(np.array(ends), np.full(2, row - HALF), np.full(2, row + HALF), label, colour)
@@ -65,7 +65,7 @@ def _bars(ranges: list[Range], visible: Range, row: int, label: str, colour: str
 
 
 def _named_once(bands: list[Band]) -> tuple[Band, ...]:
-    """Only the first of several bars with a name stands in the legend."""
+    """Keep the label of only the first bar of each name, for the legend."""
     labels: set[str] = set()
     named = []
     for band in bands:
@@ -75,7 +75,7 @@ def _named_once(bands: list[Band]) -> tuple[Band, ...]:
 
 
 def _corners(rows: list[tuple[int, Corners]], visible: Range) -> Markers:
-    """The edge of each corner that is known and in view."""
+    """Return marks at the edge of hunting of each corner in view."""
     edges_of_rows = [
         (row, corners.edges[(corners.edges > visible[0]) & (corners.edges < visible[1])]) for row, corners in rows
     ]

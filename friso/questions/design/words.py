@@ -1,4 +1,4 @@
-"""What a design is called and how it ends, in words that the terminal, the page and messages share."""
+"""Describe a design and its outcome in words that terminal, page and messages share."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ SHOWN = 5
 
 @dataclass(frozen=True)
 class DesignStep:
-    """A step of the method: its result as a title, the reasons, its numbers by name, and the names of its figures."""
+    """A step of the method, with its result as title.
+
+    It has the reasons in sentences, its numbers by name, and the names of its figures.
+    """
 
     title: str
     sentences: tuple[str, ...]
@@ -37,7 +40,7 @@ class DesignStep:
 
 
 def headline(design: Design) -> list[tuple[str, str]]:
-    """The verdicts, each with its colour: isolator or not, what it is, whether it holds."""
+    """Return the verdicts with their colours: isolator or not, which one, and whether it holds."""
     return [
         (ORANGE if design.needed else GREEN, need_words(design.need)),
         (
@@ -52,7 +55,7 @@ def headline(design: Design) -> list[tuple[str, str]]:
 
 
 def across_laws(design: Design) -> str:
-    """Between what the edges lie under all laws that were asked, and which law is the worst."""
+    """Say between which crossovers the edges lie under all friction laws, and which law is worst."""
     ends = []
     for place, name in enumerate(("without isolator", "with it")):
         edges = {law: corners[place].highest for law, corners in design.by_law.items()}
@@ -63,7 +66,7 @@ def across_laws(design: Design) -> str:
 
 
 def lost_laws(design: Design) -> str:
-    """Which laws were not tried, and in which corners they do not keep what is measured."""
+    """Name the friction laws that were not tried, and the corners that they do not reproduce."""
     corners, flat = design.without, design.stage.flat()
     laws = "; ".join(
         f"{law}, not in {len(where)} of {corners.population.count} corners (such as {corner(corners, flat, where[0])})"
@@ -73,7 +76,7 @@ def lost_laws(design: Design) -> str:
 
 
 def need_words(need: Need) -> str:
-    """Whether the machine needs an isolator, and why."""
+    """Say whether the machine needs an isolator, and why."""
     limit, factor, without = hertz(need.spec.limit), need.spec.safety.hunting, need.without
     if not without.hunts:
         return f"No isolator is needed: without one the machine {edge(without)}."
@@ -92,7 +95,7 @@ def need_words(need: Need) -> str:
 
 
 def brings(design: Design) -> str:
-    """What an isolator brings and costs where none is needed."""
+    """Say what an isolator brings and costs where none is needed."""
     moves, crossover, limit = design.verification, design.controller.crossover, design.spec.limit
     costs = f" This costs bandwidth: a crossover of {hertz(crossover)} instead of {hertz(limit)}."
     slower = costs if crossover < 0.97 * limit else ""
@@ -105,12 +108,12 @@ def brings(design: Design) -> str:
 
 
 def leaves(design: Design) -> str:
-    """The leaf springs chosen."""
+    """Describe the leaf springs chosen."""
     return leaf_words(design.fitted.choice.geometry)
 
 
 def leaf_words(geometry: Geometry) -> str:
-    """Leaf springs in words."""
+    """Describe leaf springs by number, dimensions and material."""
     edges = f"{size(geometry.length)} x {size(geometry.width)} x {size(geometry.sheet.thickness)}"
     return (
         f"{geometry.sheet.leaves:g} leaves of {edges} mm, {size(geometry.spacing)} mm apart, of "
@@ -119,6 +122,7 @@ def leaf_words(geometry: Geometry) -> str:
 
 
 def _verified(design: Design) -> tuple[str, str]:
+    """Say how many simulated moves come to rest, with the colour of the verdict."""
     free, locked, limit = design.verification.free, design.verification.locked, design.spec.position.settling_time
     held = f" With the joint locked, {restless(locked)}." if locked.missed else ""
     if design.needed and not locked.missed:
@@ -135,7 +139,7 @@ def _verified(design: Design) -> tuple[str, str]:
 
 
 def restless(outcome: MachineOutcomes) -> str:
-    """How many moves do not come to rest in the window, and how many of these swing."""
+    """Say how many moves do not come to rest in position, and how many of these swing."""
     if not outcome.missed:
         return "all come to rest in position"
     count, swinging = outcome.missed, outcome.swinging
@@ -144,14 +148,14 @@ def restless(outcome: MachineOutcomes) -> str:
 
 
 def probability(outcome: MachineOutcomes) -> str:
-    """The interval of the probability that a move does not come to rest in position."""
+    """Write the interval of the probability that a move does not come to rest in position."""
     low, high = outcome.interval
     within = f"below {percent(high)}" if not outcome.missed else f"{percent(low)} to {percent(high)}"
     return f"the probability that a move does not is {within} (with 95 % confidence)"
 
 
 def settling(outcome: MachineOutcomes) -> str:
-    """Within what time moves settle."""
+    """Say within which time half of the moves settle, and 95 % of them."""
     half, most = outcome.slower_than(0.5), outcome.slower_than(0.05)
     if not math.isfinite(half):
         return "Fewer than half of them settle"
@@ -160,7 +164,7 @@ def settling(outcome: MachineOutcomes) -> str:
 
 
 def edge(corners: Corners) -> str:
-    """Up to where the machine hunts, as what it does."""
+    """Say up to which crossover the machine hunts in its worst corner."""
     low, high = corners.searched
     if not corners.hunts:
         return f"hunts in no corner at any crossover from {hertz(low)} to {hertz(high)}"
@@ -170,7 +174,7 @@ def edge(corners: Corners) -> str:
 
 
 def corner(corners: Corners, flat: Mapping[str, Any], number: int) -> str:
-    """The corner with a number."""
+    """Describe a corner by its friction and masses."""
     keys = corners.population.of(number)
     units = {key: item.unit for key, item in numeric_keys(flat).items()}
     order = sorted(keys, key=lambda key: (not key.startswith("friction."), key != "friction.static"))
@@ -178,7 +182,10 @@ def corner(corners: Corners, flat: Mapping[str, Any], number: int) -> str:
 
 
 def gaps(corners: Corners, flat: Mapping[str, Any]) -> np.ndarray | None:
-    """Static less Coulomb friction in the corners [N], shape (n,); None of a friction law that has not both."""
+    """Return static minus Coulomb friction in the corners [N], shape (n,).
+
+    Returns None for a friction law that does not have both.
+    """
     if not {"friction.static", "friction.coulomb"} <= flat.keys():
         return None
     static, coulomb = (corners.population.over(flat)[f"friction.{name}"] for name in ("static", "coulomb"))
@@ -186,13 +193,17 @@ def gaps(corners: Corners, flat: Mapping[str, Any]) -> np.ndarray | None:
 
 
 def refusal(failure: NoDesign) -> str:
-    """That no isolator is needed, where that is so; why no design meets a specification, and what to relax."""
+    """Say why no design meets the specification, and what to relax.
+
+    If no isolator is needed, that is said first.
+    """
     if failure.need and not failure.need.isolator:
         return f"{need_words(failure.need)}\nNor is there a design of one that meets the specification: {_why(failure)}"
     return f"no design: {_why(failure)}"
 
 
 def _why(failure: NoDesign) -> str:
+    """Give the reason of a failure, and the single requirements whose relaxation is enough."""
     if not failure.relaxed:
         tail = "no single requirement was found whose relaxation alone is enough: relax several"
         return f"{failure.reason}\n  {tail}"
@@ -202,13 +213,14 @@ def _why(failure: NoDesign) -> str:
 
 
 def shortfall(design: Design) -> str:
-    """What of the specification the design does not meet."""
+    """Say which requirements the design does not meet."""
     free = design.verification.free
     missed = [f"of {free.tried} moves {restless(free)}"] if free.missed else []
     return "; ".join([*missed, *map(relaxation, design.unmet)])
 
 
 def relaxation(change: Relaxation) -> str:
+    """Say how far to relax one requirement."""
     needed = outwards(change.needed, change.needed > change.value)
     values = f"{trimmed(change.value, change.unit)} to {trimmed(needed, change.unit)}"
     text = f"relax {change.key} from {values} ({change.requirement})"
@@ -218,7 +230,7 @@ def relaxation(change: Relaxation) -> str:
 
 
 def trimmed(value: float, unit: str) -> str:
-    """A value with its unit, without zeros that say nothing: "70 mm", "0.3 N"."""
+    """Write a value with its unit, without meaningless zeros: "70 mm", "0.3 N"."""
     if unit.startswith("N") and abs(value) < 1000:
         return f"{value:.4g} {pretty(unit)}"
     factor, text = choose(np.array([value]), unit)
@@ -226,24 +238,25 @@ def trimmed(value: float, unit: str) -> str:
 
 
 def size(length: float) -> str:
-    """A length [m] in mm as it stands on a drawing."""
+    """Write a length [m] in mm as it stands on a drawing."""
     return f"{1e3 * length:.{4 if length >= 0.1 else 3}g}"
 
 
 def hertz(frequency: float) -> str:
+    """Write a frequency [Hz]; "not found" if it is not finite."""
     return with_unit(frequency, "Hz") if math.isfinite(frequency) else "not found"
 
 
 def seconds(time: float) -> str:
-    """A settling time."""
+    """Write a settling time [s]; "never" if it is not finite."""
     return with_unit(time, "s") if math.isfinite(time) else "never"
 
 
 def sentences(design: Design) -> list[str]:
-    """The design in short."""
+    """Return the verdicts on the design."""
     return [sentence for _, sentence in headline(design)]
 
 
 def next_steps(design: Design, files: Sequence[Path]) -> list[str]:
-    """The check of the design."""
+    """Return the command that checks the design."""
     return [f"friso check {shell_word(str(files[0]))}"] if files else []

@@ -1,4 +1,4 @@
-"""What `friso doctor` says in JSON."""
+"""Build the JSON document of `friso doctor`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from friso.studies.doctor import DoctorCheck
 
 
 def doctor_document(checks: Sequence[DoctorCheck]) -> dict[str, Any]:
-    """The conclusion and all that was looked at, for JSON."""
+    """Return the conclusion and every check."""
     return {
         "conclusion": sentences(checks)[0],
         "works": all(check.works for check in checks),

@@ -1,4 +1,4 @@
-"""Does friso work on this machine."""
+"""Check whether friso works on this machine."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from friso.progress import Progress, silent
 
 
 class DoctorAnswer(Answer):
-    """What was looked at: `result` has a check each."""
+    """Checks of whether friso works; `result` holds one `DoctorCheck` each."""
 
     @property
     def failure(self) -> str:
-        """Whether something does not work."""
+        """Say that something does not work; empty if everything does."""
         return "" if all(check.works for check in self.result) else "friso does not work on this machine"
 
 

@@ -1,4 +1,4 @@
-"""What `friso doctor` says."""
+"""Say what `friso doctor` found."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from friso.studies.doctor import DoctorCheck
 
 
 def sentences(checks: Sequence[DoctorCheck]) -> list[str]:
-    """Whether friso works, in one sentence."""
+    """Say in one sentence whether friso works."""
     broken = [check.subject for check in checks if not check.works]
     if not broken:
         return ["friso works on this machine."]
@@ -17,7 +17,7 @@ def sentences(checks: Sequence[DoctorCheck]) -> list[str]:
 
 
 def tables(checks: Sequence[DoctorCheck]) -> list[AnswerTable]:
-    """What was looked at, with remedies where something does not work."""
+    """Return the table of checks, with remedies if something does not work."""
     if all(check.works for check in checks):
         return [AnswerTable("", ["Result"], [(check.subject, [check.text]) for check in checks])]
     rows = [(check.subject, [check.text, "" if check.works else check.remedy]) for check in checks]

@@ -4,7 +4,7 @@ from friso.interface.question import STOPS, Choices, Question
 
 
 def listed_formats() -> list[tuple[str, str]]:
-    """The kinds of parameter files, each in one line."""
+    """Return the kinds of parameter files, with one line on each."""
     from friso.drives.format import FORMATS
 
     return [(name, FORMATS.one_line(name)) for name in FORMATS]

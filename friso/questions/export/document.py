@@ -1,4 +1,4 @@
-"""The JSON document of `friso export`."""
+"""Build the JSON document of `friso export`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from friso.shown.documents import plain_json
 
 
 def export_document(gains: Gains) -> dict[str, Any]:
-    """The gains of a stage in all units, and the parameters of a drive (None: none was asked for)."""
+    """Return the gains of a stage in all units, and the parameters of a drive.
+
+    Without a kind of drive, parameters and firmware are None.
+    """
     return plain_json(
         {
             "stage": gains.stage.name,

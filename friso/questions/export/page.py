@@ -1,4 +1,4 @@
-"""The files of `friso export`: a page, and the parameters as a drive's file holds them."""
+"""Write the files of `friso export`: a page, and the parameter file of the drive."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from friso.shown.pages import Report
 
 
 def export_files(gains: Gains) -> dict[str, Content]:
-    """The page, and the parameters where a kind of drive was asked for."""
+    """Return the page, and the parameter file if a kind of drive was named."""
     files: dict[str, Content] = {"gains.html": export_html(gains)}
     if gains.kind is not None:
         files[f"parameters{gains.kind.suffix}"] = gains.text
@@ -17,7 +17,7 @@ def export_files(gains: Gains) -> dict[str, Content]:
 
 
 def export_html(gains: Gains) -> str:
-    """The whole page."""
+    """Return the page with loop, gains and parameters."""
     values = {
         "sentences": sentences(gains),
         "columns": COLUMNS,

@@ -1,4 +1,7 @@
-"""What to type into the drive: the gains of a stage file in the units of drives, and as a drive's parameters."""
+"""Give the gains of a stage file as they are typed into a drive.
+
+They come in the units of drives, and as the parameters of a kind of drive.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from friso.progress import Progress, silent
 
 
 class ExportAnswer(Answer):
-    """Gains in the terms of drives: `result` is a `Gains`."""
+    """Gains in the terms of drives; `result` is a `Gains`."""
 
 
 @question

@@ -1,4 +1,4 @@
-"""The gains of a controller, in words and numbers that the terminal and the page share."""
+"""Write the gains of a controller in words and numbers that terminal and page share."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ DIGITS = 4
 
 
 def title(gains: Gains) -> str:
-    """The stage."""
+    """Return the title, which names the stage."""
     return f"Gains of {gains.stage.name or 'the stage'}"
 
 
 def sentences(gains: Gains) -> list[str]:
-    """The gains as they are typed into a drive, each in one of its units, and what to know of them."""
+    """Write the gains as they are typed into a drive, and what to know of them."""
     typed = [f"{row.symbol} = {_with_unit(row.values[min(1, len(row.values) - 1)])}" for row in gains.conversions]
     return [f"{title(gains)}, in units of drives: {', '.join(typed)}.", *(f"{note}." for note in notes(gains))]
 
 
 def rows(gains: Gains) -> list[tuple[str, list[str]]]:
-    """Each gain with its symbol and its values."""
+    """Return each gain with its symbol and its values."""
     return [
         (row.name, [row.symbol, _with_unit(row.values[0]), "; ".join(map(_with_unit, row.values[1:]))])
         for row in gains.conversions
@@ -31,7 +31,7 @@ def rows(gains: Gains) -> list[tuple[str, list[str]]]:
 
 
 def notes(gains: Gains) -> list[str]:
-    """What to know of the numbers."""
+    """Return what to know of the numbers: missing units, formulas used, and keys left out."""
     texts = []
     if not any("at the motor" in unit or "turn" in unit for row in gains.conversions for _, unit in row.values):
         texts.append('Units of a motor are added by --set travel_per_turn="10 mm" (or a [transmission])')
@@ -43,16 +43,17 @@ def notes(gains: Gains) -> list[str]:
 
 
 def _with_unit(value: tuple[float, str]) -> str:
+    """Write a value with its unit, rounded for people."""
     number, unit = value
     rounded = float(f"{number:.{DIGITS}g}")
     return f"{rounded:.10g} {unit}".rstrip()
 
 
 def tables(gains: Gains) -> list[AnswerTable]:
-    """Each gain with its symbol and its values."""
+    """Return the table of gains with symbols and values."""
     return [AnswerTable(title(gains), COLUMNS, rows(gains))]
 
 
 def blocks(gains: Gains) -> list[str]:
-    """The loop drawn, and the parameters of a drive."""
+    """Return the drawing of the loop, and the parameters of a drive."""
     return [text for text in (gains.diagram, gains.text) if text]

@@ -1,4 +1,7 @@
-"""The JSON document of a leaf-spring mechanism: SI, the unit in the key's suffix; what is not known is null."""
+"""Build the JSON document of leaf springs, in SI with the unit as suffix of each key.
+
+Numbers that are unknown become null.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +14,13 @@ from friso.shown.documents import plain_json
 
 
 def flexure_document(flexure: BothModels) -> dict[str, Any]:
-    """The main results, and those of the closed forms for comparison."""
+    """Return the results of the best model, and of the closed forms for comparison."""
     head = {"conclusion": sentences(flexure)[0], "stage": flexure.stage.name, "failure": flexure.failure or None}
     return {**head, **_evaluation(flexure.best), "closed_forms": _evaluation(flexure.closed)}
 
 
 def _evaluation(evaluation: Evaluation) -> dict[str, Any]:
+    """Return stiffness, modes, stresses and margins by one model."""
     first = evaluation.interfering
     plain = {
         "model": evaluation.model,

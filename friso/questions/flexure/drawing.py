@@ -35,7 +35,10 @@ CLOSE = 1e-6
 
 
 def drawing_svg(mechanism: Mechanism, stroke: float, *, title: str = "", material: str = "") -> str:
-    """The drawing of a mechanism with its stroke [m], which is the gap to the limiter on each side."""
+    """Return the drawing of a mechanism as SVG, at the largest scale that fits the sheet.
+
+    `stroke` [m] is the gap to the limiter on each side.
+    """
     fitting = next(
         (candidate for candidate in (PaperDrawing(mechanism, stroke, scale) for scale in SCALES) if candidate.fits),
         None,
@@ -53,6 +56,7 @@ def drawing_svg(mechanism: Mechanism, stroke: float, *, title: str = "", materia
 
 
 def _side_view(drawing: PaperDrawing) -> list[str]:
+    """Return the view from the side: leaves, clamps, stops and dimensions."""
     mechanism = drawing.mechanism
     start, end = drawing.x0, drawing.x0 + drawing.size(mechanism.length)
     row = drawing.size(mechanism.depth) / 2
@@ -71,7 +75,7 @@ def _side_view(drawing: PaperDrawing) -> list[str]:
 
 
 def _bent(drawing: PaperDrawing, height: float, side: int) -> list[SheetPoint]:
-    """A leaf at the stroke, its ends parallel."""
+    """Return the line of a leaf deflected by the stroke, with parallel ends."""
     s = np.linspace(0, 1, 33)
     x, z = (
         drawing.x0 + s * drawing.size(drawing.mechanism.length),
@@ -81,12 +85,16 @@ def _bent(drawing: PaperDrawing, height: float, side: int) -> list[SheetPoint]:
 
 
 def _stop(drawing: PaperDrawing, end: float, edge: float, side: int) -> list[str]:
-    """A stop of the limiter, the travel away from the stage's clamp; it belongs to the cart."""
+    """Return a stop of the limiter, which belongs to the cart.
+
+    It lies one stroke away from the stage's clamp.
+    """
     near, far = edge + side * drawing.travel, edge + side * (drawing.travel + STOP)
     return [box((end, near), (end + CLAMP, far), fill="url(#leaf-hatch)")]
 
 
 def _side_dimensions(drawing: PaperDrawing, start: float, end: float, row: float) -> list[str]:
+    """Return the dimensions and notes of the view from the side."""
     mechanism, left = drawing.mechanism, drawing.x0 + drawing.spans[0][0]
     below = drawing.z0 - drawing.spans[1][0]
     top = drawing.z0 - row
@@ -110,7 +118,7 @@ def _side_dimensions(drawing: PaperDrawing, start: float, end: float, row: float
 
 
 def _stage_note(drawing: PaperDrawing) -> list[str]:
-    """Which part is the stage."""
+    """Return the note that names the stage, with its mass and size."""
     (_, right), (low, high) = drawing.block[0], drawing.block[1]
     tip = (
         drawing.x0 + min(right, drawing.spans[0][1]),
@@ -124,7 +132,10 @@ def _stage_note(drawing: PaperDrawing) -> list[str]:
 
 
 def _block(drawing: PaperDrawing, view: int, middle: float) -> list[str]:
-    """The stage as a block in the view from the side (1) or from above (2); what has no room is cut off."""
+    """Return the stage as a block in the view from the side (1) or from above (2).
+
+    Parts without room on the sheet are cut off.
+    """
     (x1, x2), (low, high) = drawing.block[0], drawing.block[view]
     (left, right), (bottom, top) = drawing.spans[0], drawing.spans[view]
     cut = max(x1, left), min(x2, right), max(low, bottom), min(high, top)
@@ -140,6 +151,7 @@ def _block(drawing: PaperDrawing, view: int, middle: float) -> list[str]:
 
 
 def _top_view(drawing: PaperDrawing) -> list[str]:
+    """Return the view from above: the outline of the leaves, clamps and dimensions."""
     mechanism = drawing.mechanism
     start, end, half = drawing.x0, drawing.x0 + drawing.size(mechanism.length), drawing.size(mechanism.width) / 2
     left = drawing.x0 + drawing.spans[0][0]
@@ -159,14 +171,14 @@ def _top_view(drawing: PaperDrawing) -> list[str]:
 
 
 def _axes(y: float, up: str) -> list[str]:
-    """The two directions of a view, at its lower left."""
+    """Return the two axes of a view, at its lower left."""
     corner = (9.0, y)
     parts = [path([(9.0, y - 8), corner, (17.0, y)], "thin"), arrow((17.0, y), (1, 0)), arrow((9.0, y - 8), (0, -1))]
     return [*parts, words((18.2, y + 1), "x"), words((8.0, y - 9.2), up)]
 
 
 def _marks(drawing: PaperDrawing) -> list[str]:
-    """Where the actuator pushes, the sensor looks and the centre of mass is, in both views."""
+    """Return the marks of actuator, sensor and centre of mass in both views."""
     parts = []
     for view, up in ((drawing.side, 2), (drawing.top, 1)):
         places = {letter: view(point[0], point[up]) for letter, point in drawing.points.items()}
@@ -181,7 +193,7 @@ def _marks(drawing: PaperDrawing) -> list[str]:
 
 
 def _together(places: dict[str, SheetPoint]) -> dict[SheetPoint, list[str]]:
-    """Letters by place, those that would cover each other at one."""
+    """Group letters by place, so that marks close together share one place."""
     groups: dict[SheetPoint, list[str]] = {}
     for letter, place in places.items():
         near = next((group for group in groups if math.dist(group, place) < 2 * TEXT), place)
@@ -190,13 +202,14 @@ def _together(places: dict[str, SheetPoint]) -> dict[SheetPoint, list[str]]:
 
 
 def _centre_mark(at: SheetPoint) -> list[str]:
+    """Return the symbol of a centre of mass."""
     x, y = at
     quarters = [f"M {x:.2f} {y:.2f} h {s * 1.7} a 1.7 1.7 0 0 1 {-s * 1.7} {s * 1.7} Z" for s in (1, -1)]
     return [circle(at, 1.7, "#ffffff"), f'<path d="{" ".join(quarters)}" fill="#222222"/>']
 
 
 def _push_mark(at: SheetPoint, sideways: bool) -> list[str]:
-    """Arrows along the motion; in the view along it, the tip of one."""
+    """Return the symbol of the actuator: arrows along the motion, or a tip seen end-on."""
     if not sideways:
         return [circle(at, 2.2), circle(at, 0.4, "#222222")]
     x, y = at
@@ -205,7 +218,7 @@ def _push_mark(at: SheetPoint, sideways: bool) -> list[str]:
 
 
 def _legend(drawing: PaperDrawing) -> list[str]:
-    """What the letters mean and what is not to scale."""
+    """Return what the letters mean, and what is not to scale."""
     names = {"A": "actuation along z", "S": "sensor", "C": "centre of mass"}
     texts = [
         f"{k} {names[k]} ({', '.join(_mm(coordinate) for coordinate in point)})" for k, point in drawing.points.items()
@@ -224,6 +237,7 @@ def _legend(drawing: PaperDrawing) -> list[str]:
 
 
 def _title_block(drawing: PaperDrawing, title: str, material: str) -> list[str]:
+    """Return the title block: material, sizes and scale."""
     mechanism, top, split = drawing.mechanism, drawing.height - FOOT - 5, 138.0
     material_line = f"E {mechanism.young / 1e9:.4g} GPa, ν {mechanism.poisson:g}, {mechanism.density:.4g} kg/m³"
     strength = f"yield {mechanism.yield_strength / 1e6:.4g} MPa"
@@ -246,7 +260,7 @@ def _title_block(drawing: PaperDrawing, title: str, material: str) -> list[str]:
 
 
 def _scale_bar(drawing: PaperDrawing, at: SheetPoint) -> list[str]:
-    """A bar of a round length, in halves; it stays true where the sheet is printed at another size."""
+    """Return a bar of a round length, which stays true if the sheet is printed at another size."""
     length = max(
         nice
         for power in range(-3, 4)
@@ -259,5 +273,5 @@ def _scale_bar(drawing: PaperDrawing, at: SheetPoint) -> list[str]:
 
 
 def _mm(length: float) -> str:
-    """A length [m] as a number on the drawing."""
+    """Write a length [m] in millimetres."""
     return f"{1e3 * float(length):.4g}"

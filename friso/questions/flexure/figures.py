@@ -1,4 +1,4 @@
-"""The figures of a leaf-spring mechanism: its force and supports over the deflection, and its modes."""
+"""Draw leaf springs: force and support stiffness over the deflection, and the modes."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ FINE = 101
 
 
 def flexure_figures(flexure: BothModels) -> tuple[Figure, ...]:
-    """All figures, in the order in which they are read."""
+    """Return all figures in the order in which they are read."""
     figures = (_force(flexure), _support(flexure), modes_figure(flexure.best))
     return tuple(replace(figure, subject=flexure.stage.name) for figure in figures)
 
 
 def _force(flexure: BothModels) -> Figure:
-    """Force over deflection, odd about the middle."""
+    """Draw the force over the deflection, by both models."""
     reach, steepness = flexure.best.stroke, float(flexure.best.drive[0])
     ends = np.array([0.0, reach])
     straight = Series(ends, steepness * ends, "initial stiffness", GREY, "dotted", 1.2)
@@ -45,7 +45,7 @@ def _force(flexure: BothModels) -> Figure:
 
 
 def _support(flexure: BothModels) -> Figure:
-    """Support stiffness along the leaves and along their width."""
+    """Draw the support stiffness along the leaves and along their width."""
     panels = (
         _supports(flexure, "Along the leaves (x)", lambda evaluation: evaluation.support_x / 1e6),
         _supports(flexure, "Along their width (y)", lambda evaluation: evaluation.support_y / 1e6),
@@ -58,7 +58,7 @@ def _support(flexure: BothModels) -> Figure:
 
 
 def _supports(flexure: BothModels, title: str, of: Callable[[Evaluation], Array]) -> Panel:
-    """One support stiffness [N/µm], the same to both sides."""
+    """Return the panel of one support stiffness [N/µm], which is equal on both sides."""
     lines, points = _lines(flexure, of, _even_falling)
     top = 1.1 * max(float(line.y.max()) for line in lines)
     axis = Axis("Stiffness", "N/µm", (0.0, top), prefixed=False)
@@ -68,7 +68,7 @@ def _supports(flexure: BothModels, title: str, of: Callable[[Evaluation], Array]
 def _lines(
     flexure: BothModels, of: Callable[[Evaluation], Array], smooth: Smooth
 ) -> tuple[tuple[Series, ...], Markers]:
-    """The same quantity by each model, drawn smoothly, and where the model that counts was computed."""
+    """Return one quantity by each model as smooth lines, and the points of the best model."""
     fine = np.linspace(0.0, flexure.best.stroke, FINE)
     lines = tuple(
         Series(
@@ -86,14 +86,18 @@ def _lines(
 
 
 def _odd(x: Array, y: Array, at: Array) -> Array:
-    """y over x between the known places, the opposite on the other side of 0."""
+    """Interpolate an odd function y(x) at other places by a cubic spline."""
     return CubicSpline(np.concatenate([-x[:0:-1], x]), np.concatenate([-y[:0:-1], y]))(at)
 
 
 def _even_falling(x: Array, y: Array, at: Array) -> Array:
-    """The same for a stiffness that is even about the middle: its inverse grows about as the square of x."""
+    """Interpolate a stiffness that is even in x.
+
+    Its inverse grows about as the square of x and is therefore interpolated instead.
+    """
     return 1 / CubicSpline(np.concatenate([-x[:0:-1], x]), 1 / np.concatenate([y[:0:-1], y]))(at)
 
 
 def _deflection(flexure: BothModels) -> Axis:
+    """Return the axis of the deflection up to the stroke."""
     return Axis("Deflection", "m", (0.0, flexure.best.stroke))

@@ -1,4 +1,4 @@
-"""Where the parts of a leaf-spring drawing stand on paper, at which scale."""
+"""Place the parts of a leaf-spring drawing on paper, at a scale."""
 
 from __future__ import annotations
 
@@ -35,14 +35,20 @@ FOOT = 26.0
 
 
 def block_size(mechanism: Mechanism) -> tuple[float, float, float]:
-    """Edges [m] along x, y, z of the block of the stage's mass and moments of inertia; 0 where there is none."""
+    """Return the edges [m] along x, y, z of the block with the stage's mass and inertia.
+
+    An edge that the moments of inertia do not allow is 0.
+    """
     x, y, z = (6 * float(moment) / float(mechanism.body.mass) for moment in mechanism.body.inertia)
     return math.sqrt(max(0.0, y + z - x)), math.sqrt(max(0.0, x + z - y)), math.sqrt(max(0.0, x + y - z))
 
 
 @dataclass(frozen=True)
 class PaperDrawing:
-    """A mechanism on paper at a scale: places in paper millimetres, y downwards."""
+    """A mechanism on paper at a scale.
+
+    Places are in paper millimetres, with y downwards. `stroke` is in metres [m].
+    """
 
     mechanism: Mechanism
     stroke: float
@@ -50,41 +56,45 @@ class PaperDrawing:
 
     @property
     def fits(self) -> bool:
+        """Tell whether the drawing fits the sheet at this scale."""
         (left, right), tall = self.core, sum(high - low for low, high in self.spans[1:])
         return LEFT + right - left + RIGHT <= WIDTH - 10 and tall + 2 * (ABOVE + BELOW) <= ROOM
 
     @property
     def travel(self) -> float:
-        """The stroke as drawn."""
+        """Return the stroke as drawn [mm]."""
         return max(LEAST_STROKE, self.size(self.stroke))
 
     @property
     def leaf(self) -> float:
-        """The thickness of a leaf as drawn."""
+        """Return the thickness of a leaf as drawn [mm]."""
         return max(LEAST_LEAF, self.size(self.mechanism.thickness))
 
     @property
     def points(self) -> dict[str, tuple[float, float, float]]:
-        """Marked points [m] by their letter."""
+        """Return the marked points [m] by their letters."""
         mechanism = self.mechanism
         places = {"A": mechanism.actuation, "S": mechanism.sensor, "C": mechanism.body.centre}
         return {letter: tuple(float(coordinate) for coordinate in place) for letter, place in places.items()}  # type: ignore[misc]
 
     @cached_property
     def block(self) -> tuple[tuple[float, float], ...]:
-        """From where to where the block of the stage goes along x, z and y, from the origin, in paper millimetres."""
+        """Return the extent of the stage's block along x, z and y from the origin [mm on paper]."""
         centre, edges = self.mechanism.body.centre, block_size(self.mechanism)
         return tuple((self.size(centre[k] - edges[k] / 2), self.size(centre[k] + edges[k] / 2)) for k in (0, 2, 1))
 
     @property
     def core(self) -> tuple[float, float]:
-        """What must be seen along x: leaves, clamps and marked points."""
+        """Return the extent along x of what must be seen: leaves, clamps and marked points."""
         marked = [self.size(point[0]) for point in self.points.values()]
         return min(-CLAMP, *marked), max(self.size(self.mechanism.length) + CLAMP, *marked)
 
     @cached_property
     def spans(self) -> tuple[tuple[float, float], ...]:
-        """What the views take along x, z and y: all that must be seen, and as much of the block as has room."""
+        """Return the extents of the views along x, z and y.
+
+        They hold all that must be seen, and as much of the stage's block as there is room for.
+        """
         low, high = self.core
         room = WIDTH - 10 - LEFT - RIGHT - (high - low)
         left = max(0.0, min(low - self.block[0][0], room / 3))
@@ -94,42 +104,49 @@ class PaperDrawing:
         return (low - left, high + right), self._upwards(row, 2), self._upwards(across, 1)
 
     def _upwards(self, half: float, axis: int) -> tuple[float, float]:
-        """What a view takes along its axis upwards: `half` to both sides, the marked points, a bit of the block."""
+        """Return the extent of a view along its upward axis.
+
+        It holds `half` to both sides, the marked points, and a part of the block.
+        """
         marked = [self.size(point[axis]) for point in self.points.values()]
         low, high = min(-half, *marked), max(half, *marked)
         bottom, top = self.block[3 - axis]
         return min(low, max(bottom, low - BEYOND)), max(high, min(top, high + BEYOND))
 
     def size(self, length: float) -> float:
+        """Convert a length [m] to paper millimetres."""
         return 1e3 * float(length) * self.scale
 
     @property
     def x0(self) -> float:
-        """Where x = 0 is on paper; the views stand in the middle of what notes leave free."""
+        """Return the place of x = 0 on paper; the views stand centred between the notes."""
         left, right = self.spans[0]
         return LEFT + 5 - left + max(0.0, (WIDTH - 10 - LEFT - RIGHT - (right - left)) / 2)
 
     @property
     def z0(self) -> float:
+        """Return the place of z = 0 on paper, in the view from the side."""
         return 5 + ABOVE + self.spans[1][1]
 
     @property
     def y0(self) -> float:
+        """Return the place of y = 0 on paper, in the view from above."""
         return self.z0 - self.spans[1][0] + BELOW + ABOVE + self.spans[2][1]
 
     @property
     def foot(self) -> float:
-        """Where the legend begins."""
+        """Return the place on paper where the legend begins."""
         return self.y0 - self.spans[2][0] + BELOW
 
     @property
     def height(self) -> float:
+        """Return the height of the sheet [mm]."""
         return self.foot + 23 + FOOT
 
     def side(self, x: float, z: float) -> SheetPoint:
-        """A place [m] in the view from the side."""
+        """Return a place [m] as it stands in the view from the side."""
         return self.x0 + self.size(x), self.z0 - self.size(z)
 
     def top(self, x: float, y: float) -> SheetPoint:
-        """A place [m] in the view from above."""
+        """Return a place [m] as it stands in the view from above."""
         return self.x0 + self.size(x), self.y0 - self.size(y)

@@ -1,4 +1,7 @@
-"""Pictures of the modes of a leaf-spring mechanism: leaves and stage at rest and deformed, seen where most moves."""
+"""Draw the modes of leaf springs: leaves and stage at rest and deformed.
+
+Each mode is seen from where most of it moves.
+"""
 
 from __future__ import annotations
 
@@ -37,14 +40,14 @@ VIEWS = {"from the side": (0, 2), "from above": (0, 1), "along the leaves": (1, 
 
 @dataclass(frozen=True)
 class Shape:
-    """Lines on the mechanism: their points [m] at rest, shape (n, 3), and how far a mode moves them."""
+    """Lines on the mechanism: their points [m] at rest, shape (n, 3), and how a mode moves them."""
 
     rest: Array
     moved: Array
 
 
 def modes_figure(evaluation: Evaluation) -> Figure:
-    """The first modes, a panel each."""
+    """Draw the first modes, one panel each."""
     modes = [mode for mode in evaluation.modes if mode.interferes or drawable_share(evaluation.mechanism, mode) > HALF][
         :SHOWN
     ]
@@ -59,6 +62,7 @@ def modes_figure(evaluation: Evaluation) -> Figure:
 
 
 def _panel(mechanism: Mechanism, mode: Mode, visible: bool) -> Panel:
+    """Return the panel of one mode, enlarged to be visible."""
     view = best_view(mechanism, mode)
     axes = VIEWS[view]
     shapes = [*_leaves(mechanism, mode, axes), _block(mechanism, mode, axes)]
@@ -77,7 +81,7 @@ def _panel(mechanism: Mechanism, mode: Mode, visible: bool) -> Panel:
 
 
 def best_view(mechanism: Mechanism, mode: Mode) -> str:
-    """The first view in which nearly all motion takes place, or the one with most of it."""
+    """Return the first view that shows nearly all of a mode's motion, or else the best view."""
     everything = np.concatenate([mode.leaves.reshape(-1, 3), _corners_moved(mechanism, mode)])
     shares = np.sum(everything**2, axis=0) / max(float(np.sum(everything**2)), np.finfo(float).tiny)
     spans = {view: float(sum(shares[axis] for axis in axes)) for view, axes in VIEWS.items()}
@@ -85,7 +89,10 @@ def best_view(mechanism: Mechanism, mode: Mode) -> str:
 
 
 def drawable_share(mechanism: Mechanism, mode: Mode) -> float:
-    """Share of the kinetic energy that is in the stage and the middle lines: the rest is torsion of the leaves."""
+    """Return the share of a mode's kinetic energy that its picture shows.
+
+    This is the energy of the stage and of the middle lines of the leaves. The rest is torsion of the leaves.
+    """
     speed = _rigid(mechanism, mode, _centre(mechanism)[None, :])[0]
     stage = mechanism.body.mass * np.sum(speed**2) + np.sum(
         np.array(mechanism.body.inertia, dtype=float) * mode.stage[3:] ** 2
@@ -95,22 +102,24 @@ def drawable_share(mechanism: Mechanism, mode: Mode) -> float:
 
 
 def _corners_moved(mechanism: Mechanism, mode: Mode) -> Array:
+    """Return how a mode moves the corners of the stage's block."""
     signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
     return _rigid(mechanism, mode, _centre(mechanism) + signs * np.array(block_size(mechanism)) / 2)
 
 
 def _centre(mechanism: Mechanism) -> Array:
+    """Return the stage's centre of mass [m]."""
     return np.array([float(coordinate) for coordinate in mechanism.body.centre])
 
 
 def _rigid(mechanism: Mechanism, mode: Mode, points: Array) -> Array:
-    """How points of the stage, (n, 3), move with it."""
+    """Return how points of the stage, shape (n, 3), move with it."""
     arm = points - np.array([float(mechanism.length), 0.0, 0.0])
     return mode.stage[:3] + np.cross(mode.stage[3:], arm)
 
 
 def _block(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> Shape:
-    """The outline of the stage, halfway through it."""
+    """Return the outline of the stage in a plane through its centre."""
     half = np.array(block_size(mechanism)) / 2
     rest = np.tile(_centre(mechanism), (5, 1))
     for axis, signs in zip(axes, ((-1, 1, 1, -1, -1), (-1, -1, 1, 1, -1)), strict=True):
@@ -119,7 +128,10 @@ def _block(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> Shape:
 
 
 def _leaves(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> list[Shape]:
-    """Middle lines from the side, outlines from above, cross-sections along the leaves."""
+    """Return the lines of the leaves in a view.
+
+    They are middle lines from the side, outlines from above, and cross-sections along the leaves.
+    """
     draw = {(0, 2): _middle, (0, 1): _outline, (1, 2): _sections}[axes]
     return [
         shape
@@ -129,12 +141,16 @@ def _leaves(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> list[Sha
 
 
 def _middle(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
+    """Return the middle line of a leaf."""
     x, leaf = _smooth(mechanism, leaf)
     return [Shape(np.stack([x, np.zeros_like(x), np.full_like(x, offset)], axis=1), leaf)]
 
 
 def _outline(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
-    """Both long edges and both ends: cross-sections turn as the middle line does."""
+    """Return the outline of a leaf from above: both long edges and both ends.
+
+    Cross-sections turn as the middle line does.
+    """
     x, leaf = _smooth(mechanism, leaf)
     turn = np.gradient(leaf[:, 1], x)
     turn -= turn[0]  # what is left at the clamp is shear, of nearly the same size all along the leaf
@@ -147,13 +163,16 @@ def _outline(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> li
 
 
 def _smooth(mechanism: Mechanism, leaf: Array) -> tuple[Array, Array]:
-    """More places along a leaf [m] and the displacement there, by a cubic spline."""
+    """Interpolate places along a leaf [m] and the displacement there by a cubic spline."""
     reported, fine = (np.linspace(0.0, float(mechanism.length), count) for count in (len(leaf), FINE))
     return fine, CubicSpline(reported, leaf)(fine)
 
 
 def _sections(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
-    """A few cross-sections between cart and stage: they turn evenly more, up to the stage's own turn."""
+    """Return a few cross-sections between cart and stage.
+
+    Their turn grows evenly up to the turn of the stage.
+    """
     shapes = []
     for k in np.linspace(0, len(leaf) - 1, 5).astype(int):
         share = k / (len(leaf) - 1)
@@ -166,14 +185,14 @@ def _sections(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> l
 
 
 def _polyline(lines: list[Array]) -> tuple[Array, Array]:
-    """All lines as one, with gaps between them, shapes (n,)."""
+    """Join lines into one with gaps between them, each coordinate of shape (n,)."""
     gap = np.full((1, 2), np.nan)
     points = np.concatenate([part for line in lines for part in (line, gap)])
     return points[:, 0], points[:, 1]
 
 
 def _limits(low: Array, high: Array) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Limits of both axes about what is drawn, wider than high by the usual aspect."""
+    """Return the limits of both axes around a drawing, with the usual aspect ratio."""
     width, height = high - low
     middle = (low + high) / 2
     half = np.array([max(width, ASPECT * height), max(height, width / ASPECT)]) / 2

@@ -1,4 +1,7 @@
-"""The page of `friso flexure`: one file that opens offline, prints, and is the same bytes on every run."""
+"""Write the page of `friso flexure`: one file that opens offline and prints.
+
+Every run of the command gives the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ from friso.shown.pages import Report
 
 
 class Column(NamedTuple):
-    """A model at the head of the table."""
+    """A model at the head of the table, with its colour."""
 
     label: str
     colour: str
@@ -34,7 +37,7 @@ BASIS = (
 
 
 def flexure_files(flexure: BothModels) -> dict[str, Content]:
-    """The page, the drawing, and every figure in all formats."""
+    """Return the page, the drawing, and every figure in all formats."""
     figures = flexure_figures(flexure)
     images = pictures(figures)
     return {
@@ -45,7 +48,7 @@ def flexure_files(flexure: BothModels) -> dict[str, Content]:
 
 
 def flexure_html(flexure: BothModels, figures: Sequence[Figure]) -> str:
-    """The whole page of a mechanism and its figures."""
+    """Return the page of a mechanism with its figures."""
     joint, *further = findings(flexure)
     return Report.of_stage(
         "flexure",
@@ -61,7 +64,7 @@ def flexure_html(flexure: BothModels, figures: Sequence[Figure]) -> str:
 
 
 def drawing(flexure: BothModels) -> str:
-    """The dimensioned drawing of the mechanism, SVG."""
+    """Return the dimensioned drawing of the mechanism as SVG."""
     data = materials().get(str(flexure.stage.flat().get("flexure.material")))
     material = f"{data.name}, {data.grade}" if data else ""
     return drawing_svg(flexure.mechanism, flexure.best.stroke, title=flexure.stage.name, material=material)

@@ -1,4 +1,4 @@
-"""How good the leaf springs of a joint are: stiffness, modes, stress."""
+"""Evaluate the leaf springs of a joint: stiffness, modes and stress."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ EXAMPLE = """[flexure]
 
 
 class FlexureAnswer(Answer):
-    """The leaf springs of a joint: `result` has the evaluations by beams and by closed forms."""
+    """The leaf springs of a joint; `result` holds the evaluations by beams and by closed forms."""
 
     @property
     def failure(self) -> str:
-        """Why the beam model found no solution."""
+        """Say why the beam model found no solution; empty if it found one."""
         return f"the beam model found no solution: {self.result.failure}" if self.result.failure else ""
 
     def sentences(self) -> Sequence[str]:
-        """What the joint is worth."""
+        """Return what the joint allows and what endangers it."""
         from friso.questions.flexure.words import sentences
 
         return sentences(self.result)
 
     def tables(self) -> Sequence[AnswerTable]:
-        """Stiffness, modes, stress and buckling by both models."""
+        """Return the table of stiffness, modes, stress and buckling by both models."""
         from friso.questions.flexure.table import rows
 
         return [AnswerTable(self.result.stage.name, list(self.result.models), rows(self.result))]
@@ -81,7 +81,7 @@ def flexure(
 
 
 def _mechanism(stage: Stage, origin: str) -> Mechanism:
-    """The leaf springs of the stage. Raises InputError without [flexure]."""
+    """Return the leaf springs of the stage. Raises InputError for a stage without [flexure]."""
     if stage.flexure is None:
         expected = "a table of leaf springs, from which joint.stiffness and [parasitic] follow (leave these out)"
         raise InputError("flexure", "no [flexure]", expected, EXAMPLE, origin)
@@ -89,7 +89,10 @@ def _mechanism(stage: Stage, origin: str) -> Mechanism:
 
 
 def _stroke(entry: str | float | None, stage: Stage, mechanism: Mechanism) -> float:
-    """The stroke [m], of the option or else of the joint, which leaves can bend by. Raises InputError."""
+    """Return the stroke [m] of the option, or of the joint.
+
+    Raises InputError for a missing stroke, or one of more than half the leaves' length.
+    """
     if entry is None:
         stroke = stage.joint and stage.joint.stroke
         if stroke is None:

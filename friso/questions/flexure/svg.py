@@ -1,4 +1,7 @@
-"""Strokes of a technical drawing as SVG elements: lines, texts, dimensions, leaders. Paper millimetres, y downwards."""
+"""Write the strokes of a technical drawing as SVG: lines, texts, dimensions, leaders.
+
+All lengths are paper millimetres, with y downwards.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +47,7 @@ HATCH = (
 
 
 def sheet(width: float, height: float, label: str, parts: Iterable[str]) -> str:
-    """The whole drawing [mm] with its title for readers that see no pictures."""
+    """Return the whole drawing [mm], with a title for readers that cannot see pictures."""
     size = f'width="{_n(width)}mm" height="{_n(height)}mm" viewBox="0 0 {_n(width)} {_n(height)}"'
     paper = f'<rect width="{_n(width)}" height="{_n(height)}" fill="#ffffff"/>'
     body = "\n".join([f"<title>{escape(label)}</title>", HATCH, paper, *parts])
@@ -53,32 +56,33 @@ def sheet(width: float, height: float, label: str, parts: Iterable[str]) -> str:
 
 
 def path(points: Iterable[SheetPoint], kind: str = "outline", fill: str = "none", closed: bool = False) -> str:
-    """A line through points; filled if it is closed."""
+    """Return a line through points, which is filled if it is closed."""
     corners = " L ".join(f"{_n(x)} {_n(y)}" for x, y in points)
     return f'<path d="M {corners}{" Z" if closed else ""}" fill={quoteattr(fill)} {LINES[kind]}/>'
 
 
 def box(corner: SheetPoint, other: SheetPoint, kind: str = "outline", fill: str = "none") -> str:
-    """A rectangle between opposite corners."""
+    """Return a rectangle between opposite corners."""
     (x1, y1), (x2, y2) = corner, other
     return path([(x1, y1), (x2, y1), (x2, y2), (x1, y2)], kind, fill, closed=True)
 
 
 def area(corner: SheetPoint, other: SheetPoint, fill: str, opacity: float = 1.0) -> str:
-    """A rectangle between opposite corners without a line around it."""
+    """Return a filled rectangle between opposite corners, without a line around it."""
     (x1, y1), (x2, y2) = corner, other
     corners = " L ".join(f"{_n(x)} {_n(y)}" for x, y in ((x1, y1), (x2, y1), (x2, y2), (x1, y2)))
     return f'<path d="M {corners} Z" fill="{fill}" fill-opacity="{_n(opacity)}"/>'
 
 
 def circle(centre: SheetPoint, radius: float, fill: str = "none") -> str:
+    """Return a circle with a thin line."""
     return f'<circle cx="{_n(centre[0])}" cy="{_n(centre[1])}" r="{_n(radius)}" fill="{fill}" {LINES["thin"]}/>'
 
 
 def words(
     at: SheetPoint, text: str, anchor: str = "start", size: float = TEXT, bold: bool = False, upright: bool = False
 ) -> str:
-    """A text on its baseline; `upright` ones are read from the right."""
+    """Return a text on its baseline; an `upright` text is read from the right."""
     x, y = _n(at[0]), _n(at[1])
     turn = f' transform="rotate(-90 {x} {y})"' if upright else ""
     weight = ' font-weight="bold"' if bold else ""
@@ -87,25 +91,25 @@ def words(
 
 
 def words_over(at: SheetPoint, text: str, bold: bool = False) -> str:
-    """A text over lines, which it keeps off."""
+    """Return a text with a white margin, to be read over lines."""
     plain = words(at, text, bold=bold)
     around = 'aria-hidden="true" stroke="#ffffff" stroke-width="0.8" stroke-linejoin="round"'
     return plain.replace("<text ", f"<text {around} ", 1) + plain
 
 
 def fits(text: str, room: float) -> bool:
-    """Whether a text has room within a length [mm]."""
+    """Tell whether a text fits into a length [mm]."""
     return LETTER * TEXT * len(text) + 1 < room
 
 
 def clipped(text: str, width: float, size: float = TEXT) -> str:
-    """The text, or its beginning, as far as it fits into the width [mm]."""
+    """Return a text, shortened if it does not fit into the width [mm]."""
     most = int(width / (LETTER * size))
     return text if len(text) <= most else f"{text[: most - 1].rstrip()}…"
 
 
 def arrow(tip: SheetPoint, towards: SheetPoint, fill: str = "#222222") -> str:
-    """An arrowhead at `tip`, pointing the way `towards`, of any length."""
+    """Return an arrowhead at `tip` that points in the direction `towards`."""
     size = math.hypot(*towards)
     dx, dy = towards[0] / size * ARROW, towards[1] / size * ARROW
     (x, y), slim = tip, 0.17
@@ -114,7 +118,10 @@ def arrow(tip: SheetPoint, towards: SheetPoint, fill: str = "#222222") -> str:
 
 
 def across(x1: float, x2: float, y: float, edge: float, text: str) -> list[str]:
-    """A horizontal dimension at the height y between x1 < x2, with extension lines from `edge`."""
+    """Return a horizontal dimension at height y from x1 to x2, with extension lines from `edge`.
+
+    A text too long to stand between the arrows is placed beside them.
+    """
     parts = [_extension((x, edge), (x, y)) for x in (x1, x2)]
     parts += _arrows((x1, y), (x2, y), (1.0, 0.0))
     if fits(text, x2 - x1):
@@ -123,7 +130,10 @@ def across(x1: float, x2: float, y: float, edge: float, text: str) -> list[str]:
 
 
 def upwards(y1: float, y2: float, x: float, edge: float, text: str) -> list[str]:
-    """A vertical dimension at the place x between y1 < y2, with extension lines from `edge`, read from the right."""
+    """Return a vertical dimension at place x from y1 to y2, with extension lines from `edge`.
+
+    Its text is read from the right.
+    """
     parts = [_extension((edge, y), (x, y)) for y in (y1, y2)]
     parts += _arrows((x, y1), (x, y2), (0.0, 1.0))
     if fits(text, y2 - y1):
@@ -132,14 +142,20 @@ def upwards(y1: float, y2: float, x: float, edge: float, text: str) -> list[str]
 
 
 def leader(tip: SheetPoint, knee: SheetPoint, lines: list[str]) -> list[str]:
-    """A note with a line that ends in an arrow at `tip`: from the knee it goes on level, to the right."""
+    """Return a note whose line ends in an arrow at `tip`.
+
+    From the knee the line continues level to the right.
+    """
     end = (knee[0] + REACH, knee[1])
     parts = [path([tip, knee, end], "thin"), arrow(tip, (tip[0] - knee[0], tip[1] - knee[1]))]
     return parts + [words((end[0] + 0.8, end[1] + TEXT * (0.35 + 1.35 * k)), line) for k, line in enumerate(lines)]
 
 
 def _arrows(start: SheetPoint, end: SheetPoint, direction: SheetPoint) -> list[str]:
-    """A line with arrows at both ends; from outside, where there is no room between them."""
+    """Return a line with arrows at both ends.
+
+    The arrows point inwards from outside if there is no room between the ends.
+    """
     back = (-direction[0], -direction[1])
     if math.dist(start, end) > 3 * ARROW:
         return [path([start, end], "thin"), arrow(start, back), arrow(end, direction)]
@@ -152,12 +168,12 @@ def _arrows(start: SheetPoint, end: SheetPoint, direction: SheetPoint) -> list[s
 
 
 def _extension(edge: SheetPoint, at: SheetPoint) -> str:
-    """From near the edge to a little beyond the dimension line."""
+    """Return a line from near an edge to slightly beyond the dimension line."""
     size = math.dist(edge, at) or 1.0
     dx, dy = (at[0] - edge[0]) / size, (at[1] - edge[1]) / size
     return path([(edge[0] + 0.8 * dx, edge[1] + 0.8 * dy), (at[0] + OVER * dx, at[1] + OVER * dy)], "thin")
 
 
 def _n(value: float) -> str:
-    """A coordinate to a hundredth of a millimetre."""
+    """Write a coordinate to a hundredth of a millimetre."""
     return f"{value:.2f}".rstrip("0").rstrip(".")

@@ -1,4 +1,4 @@
-"""The table of a leaf-spring mechanism: what is named, and its text for each model."""
+"""Write the table of leaf springs: the name of each quantity, and its text for each model."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UNKNOWN = "unknown"
 
 
 def rows(flexure: BothModels) -> list[tuple[str, list[str]]]:
-    """The rows: stiffnesses, eigenfrequencies, and what the leaves bear."""
+    """Return the rows: stiffnesses, eigenfrequencies, and what the leaves bear."""
     models = list(flexure.models.values())
     above, below = (
         [(name, [text(evaluation) for evaluation in models]) for name, text in part.items()]
@@ -28,27 +28,30 @@ def rows(flexure: BothModels) -> list[tuple[str, list[str]]]:
 
 
 def newtons_per(value: float, length: str) -> str:
-    """A stiffness [N/m] per "mm" or "µm", as the drive and the supports are read."""
+    """Write a stiffness [N/m] per "mm" or "µm", as is usual for drives and for supports."""
     return f"{_plain(value / {'mm': 1e3, 'µm': 1e6}[length])} N/{length}"
 
 
 def megapascals(value: float) -> str:
-    """A stress [Pa]."""
+    """Write a stress [Pa] in MPa."""
     return f"{_plain(value / 1e6)} MPa" if math.isfinite(value) else UNKNOWN
 
 
 def margin_factor(value: float) -> str:
-    """A margin as a factor."""
+    """Write a margin as a factor."""
     return f"{_plain(value)} times" if math.isfinite(value) else UNKNOWN
 
 
 def _plain(value: float) -> str:
-    """Three digits without a unit."""
+    """Write a number to three digits without a unit."""
     return with_unit(value, "").strip()
 
 
 def _modes(flexure: BothModels) -> list[tuple[str, list[str]]]:
-    """A row for each mode that some model knows, by name and in the order of frequency, the drive mode first."""
+    """Return a row for each mode that a model knows, in the order of frequency.
+
+    The drive mode comes first.
+    """
     named = [(evaluation, evaluation.named_modes) for evaluation in flexure.models.values()]
     frequencies: dict[str, float] = {}
     for _, modes in named:
@@ -59,6 +62,7 @@ def _modes(flexure: BothModels) -> list[tuple[str, list[str]]]:
 
 
 def _mode(evaluation: Evaluation, mode: Mode | None) -> str:
+    """Write the frequency of a mode, and whether it interferes with control."""
     if mode is None:
         return NOTHING
     return with_unit(mode.frequency, "Hz") + (f" ({INTERFERES})" if evaluation.interferes(mode) else "")

@@ -1,4 +1,4 @@
-"""What a leaf-spring mechanism is, allows and endangers, in sentences."""
+"""Say what leaf springs are, allow and endanger."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ AGREE = 0.1
 
 
 def sentences(flexure: BothModels) -> list[str]:
-    """All that is said, in order."""
+    """Return all sentences in order."""
     joint, *further = findings(flexure)
     return [joint, *warnings(flexure), *further, *assumptions(flexure.stage)]
 
 
 def findings(flexure: BothModels) -> list[str]:
-    """What the joint is, and what it allows."""
+    """Say what the joint is, which crossover it allows, and which stroke fatigue allows."""
     return [_joint(flexure.best), _control(flexure.best), _endurance(flexure.best)]
 
 
 def warnings(flexure: BothModels) -> list[str]:
-    """What is wrong with it."""
+    """Return everything that is wrong with the leaf springs."""
     failed = f"The beam model found no solution: {flexure.failure.rstrip('.')}. All results are from the closed forms."
     return [
         *([failed] if flexure.beams is None else []),
@@ -45,7 +45,7 @@ def warnings(flexure: BothModels) -> list[str]:
 
 
 def assumptions(stage: Stage) -> list[str]:
-    """What stands in for keys that the stage file leaves out."""
+    """Say what is assumed for keys that the stage file leaves out."""
     flat = stage.flat()
     parts = []
     if "flexure.centre_x" not in flat:
@@ -64,6 +64,7 @@ def assumptions(stage: Stage) -> list[str]:
 
 
 def _joint(evaluation: Evaluation) -> str:
+    """Describe the leaves, their stiffness, their drive mode and the force at full stroke."""
     mechanism, drive = evaluation.mechanism, evaluation.modes[0]
     return (
         f"The joint: {mechanism.leaves:g} leaves of {_size(mechanism.length)} x {_size(mechanism.width)} x "
@@ -75,6 +76,7 @@ def _joint(evaluation: Evaluation) -> str:
 
 
 def _control(evaluation: Evaluation) -> str:
+    """Name the first mode that interferes with control, and the crossover that it allows."""
     first = evaluation.interfering
     if first is None:
         return (
@@ -90,6 +92,7 @@ def _control(evaluation: Evaluation) -> str:
 
 
 def _endurance(evaluation: Evaluation) -> str:
+    """Write the stress at the clamp, and the stroke that fatigue allows."""
     bent = f"The stress at the clamp is {megapascals(evaluation.clamp_stress)} at full stroke"
     if math.isnan(evaluation.fatigue_margin):
         return f"{bent}; the fatigue limit is not known (flexure.fatigue), so neither is the largest stroke."
@@ -104,7 +107,7 @@ def _endurance(evaluation: Evaluation) -> str:
 
 
 def _borne(evaluation: Evaluation) -> list[str]:
-    """Stresses and loads beyond what the leaves bear."""
+    """Warn of stresses and loads beyond what the leaves bear."""
     lines, mechanism = [], evaluation.mechanism
     if evaluation.yield_margin < 1:
         lines.append(
@@ -127,7 +130,7 @@ def _borne(evaluation: Evaluation) -> list[str]:
 
 
 def _loaded(evaluation: Evaluation) -> list[str]:
-    """What a load along the leaves does."""
+    """Say how a load along the leaves changes stiffness and drive mode."""
     load = float(evaluation.mechanism.load)
     if not load:
         return []
@@ -145,6 +148,10 @@ def _loaded(evaluation: Evaluation) -> list[str]:
 
 
 def _breaks_away(flexure: BothModels) -> list[str]:
+    """Warn that the cart breaks away inside the stroke.
+
+    It does so if the leaves push harder than static friction holds.
+    """
     static, force = flexure.stage.flat().get("friction.static"), float(flexure.best.forces[-1])
     if static is None or force <= static:
         return []
@@ -156,7 +163,7 @@ def _breaks_away(flexure: BothModels) -> list[str]:
 
 
 def _against(evaluation: Evaluation) -> list[str]:
-    """Modes in which the sensor sees the opposite of what the actuator does."""
+    """Warn of modes in which the sensor moves opposite to the actuator."""
     modes = [mode for mode in evaluation.modes if evaluation.interferes(mode) and mode.actuator * mode.sensor < 0]
     if not modes:
         return []
@@ -169,7 +176,7 @@ def _against(evaluation: Evaluation) -> list[str]:
 
 
 def _differences(flexure: BothModels) -> list[str]:
-    """Where the two models differ so much that one of them is beyond its range."""
+    """Say where the two models differ so much that the closed forms do not apply."""
     if flexure.beams is None:
         return []
     shares = {name: get(flexure.closed) / get(flexure.beams) - 1 for name, get in _COMPARED.items()}
@@ -199,9 +206,10 @@ _COMPARED: Mapping[str, Callable[[Evaluation], float]] = {
 
 
 def _stroke(evaluation: Evaluation) -> str:
+    """Write the stroke in words."""
     return f"a stroke of {with_unit(evaluation.stroke, 'm')}"
 
 
 def _size(length: float) -> str:
-    """A length [m] in mm as it stands on a drawing."""
+    """Write a length [m] in mm as it stands on a drawing."""
     return f"{1e3 * length:.4g}"

@@ -4,7 +4,7 @@ from friso.interface.question import MACHINE, Choices, Question
 
 
 def listed_kinds() -> list[tuple[str, str]]:
-    """The kinds of experiment that `--as` takes, each in one line."""
+    """Return the kinds of experiment that `--as` takes, with one line on each."""
     from friso.identification.kinds import KINDS
 
     return [(name, KINDS.one_line(name)) for name in KINDS]

@@ -1,4 +1,7 @@
-"""The JSON document of an identification: SI, the unit in the key's suffix or beside; what is not known is null."""
+"""Build the JSON document of an identification, in SI with the unit in the key or beside it.
+
+Numbers that are unknown become null.
+"""
 
 from __future__ import annotations
 

@@ -18,8 +18,9 @@ def ends_document(estimate: Estimate) -> dict[str, Any]:
 
 
 def estimate_document(estimate: Estimate) -> dict[str, Any]:
-    """Return an estimate with its interval, or with the reason why there is no value, for the
-    document.
+    """Return an estimate with its interval, for the document.
+
+    If there is no value, the reason is given.
     """
     about = {
         "unit": unit_shown(estimate.unit),

@@ -1,4 +1,4 @@
-"""The figures of an identification: of all intervals, of each experiment, and of the logs predicted."""
+"""Draw an identification: all intervals, each experiment, and the logs predicted."""
 
 from __future__ import annotations
 

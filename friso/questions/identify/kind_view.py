@@ -1,4 +1,7 @@
-"""How kinds of experiment are shown: what a kind may declare of it, the registry of these, what their figures share."""
+"""Declare how results of each kind of experiment are shown, and register these views.
+
+Parts that their figures share stand here, too.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +29,10 @@ TIME = Axis("Time", "s")
 
 @dataclass(frozen=True)
 class PredictionView(Generic[Result]):
-    """How another log that a kind of experiment predicts is shown.
+    """The view of another log that a kind of experiment predicts.
 
-    It has the `worst` of its relative errors, a sentence of them, its numbers as in the JSON document, and its figures,
-    of which the number is that of the log.
+    `worst` is the largest of its relative errors, and `sentence` describes them. `numbers` go into the JSON document.
+    Figures are numbered by log.
     """
 
     worst: Callable[[Result], float]
@@ -40,13 +43,14 @@ class PredictionView(Generic[Result]):
 
 @dataclass(frozen=True)
 class KindView(Generic[Result]):
-    """How results of a kind of experiment are shown.
+    """The view of the results of one kind of experiment.
 
-    It has a `title`; `facts` and `sentences` for terminal and page, with `warnings`; `numbers` for the JSON document,
-    SI, the unit in the key's suffix or beside; and `figures`, whose names begin with the text given. `headline` is a
-    sentence for the head of the page beside the estimates of keys, "" for none. `longest`: of a log with gaps, the
-    longest stretch without any is all that is used. `opening` is the last part of the name of the figure that opens the
-    page, "" for none.
+    It has a `title`. Terminal and page show `facts` and `sentences` with `warnings`. `numbers` go into the JSON
+    document, in SI with the unit in the key or beside it. Names of `figures` begin with the text given.
+
+    `headline` is a sentence at the head of the page, beside the estimates of keys; it may be empty. `longest` tells
+    that the analysis uses only the longest stretch of a log without gaps. `opening` is the last part of the name of the
+    figure that opens the page, or empty.
     """
 
     title: str
@@ -66,27 +70,29 @@ VIEWS: Registry[KindView[Any]] = Registry("friso.questions.identify.kinds", "VIE
 
 
 def view_of(kind: str) -> KindView[Any]:
-    """Return how results of a kind are shown: as its view declares, or else by its estimates and
-    its logs.
+    """Return the view of a kind of experiment.
+
+    A kind without a view of its own is shown by its estimates and its logs.
     """
     return VIEWS[kind] if kind in VIEWS else _by_estimates(kind)
 
 
 def _by_estimates(kind: str) -> KindView[Any]:
-    """Return a view that shows the estimates of a result and its logs, for a kind that declares
-    none.
-    """
+    """Return a view of estimates and logs, for a kind that declares no view."""
 
     def facts(result: Any) -> Facts:
+        """List the estimates with their intervals."""
         return tuple(
             (name_of(estimate.name), with_interval(estimate)) for estimate in KINDS[kind].estimates(result, None)
         )
 
     def figures(result: Any, logs: Sequence[Source], name: str) -> list[Figure]:
+        """Draw the signals that the kind needs of each log."""
         records = [log for log in logs if isinstance(log, Log)]
         return [log_figure(log, KINDS[kind].needed(log.signals), f"{name}_{i}") for i, log in enumerate(records, 1)]
 
     def warnings(result: Any) -> tuple[str, ...]:
+        """Return the warnings of a result that has some."""
         return getattr(result, "warnings", ())
 
     return KindView(kind.replace("-", " ").capitalize(), facts, lambda result: {}, figures, warnings=warnings)

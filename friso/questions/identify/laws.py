@@ -1,4 +1,4 @@
-"""What a comparison of friction laws says: which of them the record supports."""
+"""Say which friction laws a record supports."""
 
 from __future__ import annotations
 
@@ -41,8 +41,9 @@ def _predict(laws: Sequence[LawPrediction]) -> str:
 
 
 def law_facts(comparison: LawComparison) -> tuple[tuple[str, str], ...]:
-    """List each law by name: by how much it is off, and what was fitted; and the logs left out,
-    with the reason.
+    """List for each law its error and its fitted keys.
+
+    Logs that were left out follow, with the reason.
     """
     laws = tuple((prediction.law, _errors_and_keys(prediction)) for prediction in comparison.predictions)
     return laws + tuple((f"{name}, left out", why) for name, why in comparison.left_out.items())

@@ -42,7 +42,7 @@ WIDE = 8.0
 """Ratio of the ends from which a profile has a logarithmic axis."""
 
 LONG = 40.0
-"""Of the force, as much is drawn at the head of the page: so many periods of the motion's bandwidth."""
+"""Length of the force record at the head of the page, in periods of the motion's bandwidth."""
 
 PALE = "#dbe9f4"
 

@@ -1,4 +1,4 @@
-"""Numbers of an identification with their uncertainty, in words: as many digits as the interval allows."""
+"""Write numbers of an identification with as many digits as their uncertainty allows."""
 
 from __future__ import annotations
 
@@ -52,8 +52,9 @@ def within(key: str) -> str:
 
 
 def unit_of(unit: str) -> str:
-    """Write a unit as prefixes know it: "N s/m" is "N*s/m", and ones are left out, "1 s^2/1" is
-    "s^2".
+    """Write a unit in the form that prefixes know: "N s/m" becomes "N*s/m".
+
+    Ones are left out: "1 s^2/1" becomes "s^2".
     """
     top, *below = unit.split("/")
     factors = [part for part in top.replace("*", " ").split() if part != "1"]
@@ -70,8 +71,9 @@ def value_text(estimate: Estimate) -> str:
 
 
 def interval_text(estimate: Estimate) -> str:
-    """Write the interval, e.g. "94.84 to 95.72 kg"; of what the logs do not show, the range that
-    they allow.
+    """Write an interval, e.g. "94.84 to 95.72 kg".
+
+    For a value that the logs do not show, it is the range that they allow.
     """
     low, high = math.isfinite(estimate.low), math.isfinite(estimate.high)
     if not (low or high):
@@ -108,8 +110,9 @@ def digits(value: float, unit: str) -> str:
 
 
 def _scale(estimate: Estimate) -> tuple[float, str]:
-    """Return factor and unit with prefix that suit the value, or else the range that is
-    possible.
+    """Return factor and prefixed unit that suit the value.
+
+    Without a value, they suit the range that is possible.
     """
     finite = [estimate.low, estimate.high]
     if math.isfinite(estimate.value):  # of a value next to 0, its interval tells the size

@@ -1,4 +1,7 @@
-"""What `friso identify` writes: the stage, the correlations beside it, a page that opens offline, and every figure."""
+"""Write the files of `friso identify`.
+
+They are the stage, the correlations beside it, a page that opens offline, and every figure.
+"""
 
 from __future__ import annotations
 

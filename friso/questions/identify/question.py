@@ -1,4 +1,4 @@
-"""What is my machine: a stage file with uncertainties from measured logs."""
+"""Identify a machine from measured logs: a stage file with uncertainties."""
 
 from __future__ import annotations
 
@@ -47,61 +47,64 @@ if TYPE_CHECKING:
 _HERTZ, _SECONDS = Quantity("Hz", positive, "20 Hz"), Quantity("s", positive, "5 s")
 
 MappingKeeper = Callable[[dict[Path, Mapping]], object]
-"""What keeps for the next time what was said of logs."""
+"""A function that stores what the user said of logs for the next time."""
 
 
 class IdentifyAnswer(Answer):
-    """What logs show of a machine: `result` is an `Identification` with the estimates and, where the logs describe a
-    whole machine, the `stage`; `inputs` are the files read, `predictions` those of other logs."""
+    """The machine that logs show.
+
+    `result` is an `Identification` with the estimates. It holds a `stage` if the logs describe a whole machine.
+    `inputs` are the files read, and `predictions` the predictions of other logs.
+    """
 
     inputs: Sequence[LogFile]
     predictions: Sequence[Prediction]
 
     @property
     def failure(self) -> str:
-        """Whether a model does not describe its log."""
+        """Say that a model does not describe its log; empty if all do."""
         return "a model does not describe its log" if self.result.failed else ""
 
     def sentences(self) -> Sequence[str]:
-        """What was identified, how well other logs are predicted, and notes."""
+        """Return what was identified, how well other logs are predicted, and notes."""
         from friso.questions.identify.words import sentences
 
         return sentences(self.result, self.predictions)
 
     def tables(self) -> Sequence[AnswerTable]:
-        """The estimates with their intervals."""
+        """Return the table of estimates with their intervals."""
         from friso.questions.identify.words import COLUMNS, estimate_rows
 
         rows = [(first, rest) for first, *rest in (row.texts for row in estimate_rows(self.result))]
         return [AnswerTable("", COLUMNS[1:], rows)] if rows else []
 
     def details(self) -> Sequence[str]:
-        """The experiments behind the estimates, and what was read."""
+        """Return the experiments behind the estimates, and what was read."""
         from friso.questions.identify.words import details
 
         return details(self.result, self.inputs)
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """The check of the stage that was identified."""
+        """Return the command that checks the identified stage."""
         if self.result.stage is None or not files:
             return []
         draws = " --draws 1000" if self.result.stage.uncertain() else ""
         return [f"friso check {shell_word(str(files[0]))}{draws}"]
 
     def figures(self) -> Sequence[Figure]:
-        """Logs beside what the models say of them."""
+        """Return the figures of logs beside what the models predict."""
         from friso.questions.identify.figures import identify_figures
 
         return identify_figures(self.result, self.predictions)
 
     def document(self) -> dict[str, Any]:
-        """Estimates, experiments, logs."""
+        """Return estimates, experiments and logs as a document."""
         from friso.questions.identify.document import identify_document
 
         return identify_document(self.result, self.inputs, self.predictions)
 
     def files(self) -> Files:
-        """The stage file, correlations, the page, the figures."""
+        """Return the stage file, the correlations, the page and the figures."""
         from friso.questions.identify.page import identify_files
 
         return identify_files(self.result, self.inputs, self.predictions)
@@ -223,8 +226,9 @@ def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Cha
 
 
 def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]:
-    """List the keys of tables that a stage file lacks, of a stage `made` up around a log, but
-    for those that are set.
+    """List the keys that a stage file lacks and a stage `made` up around a log supplies.
+
+    Keys that the user sets are left out.
     """
     keys_set = changes_of(changes)
     keys = [f"{name}.{key}" for name in lacking for key in made.as_written()[name]]

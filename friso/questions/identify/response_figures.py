@@ -1,4 +1,4 @@
-"""The figures of a frequency response: Bode plot with bands and fits, noise and distortion, friction at its low end."""
+"""Draw a frequency response: Bode plot with fits, noise and distortion, and low-end friction."""
 
 from __future__ import annotations
 

@@ -222,8 +222,9 @@ def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
 
 
 def _used(logs: Sequence[Source]) -> Facts:
-    """Say how much is used of logs with gaps, where an analysis takes the longest stretch
-    without any.
+    """Say how much of logs with gaps is used.
+
+    The analysis takes the longest stretch without a gap.
     """
     gapped = [log for log in logs if isinstance(log, Log) and len(log.segments) > 1]
     if not gapped:
@@ -246,9 +247,7 @@ def labels(identification: Identification) -> list[str]:
 
 
 def read_rows(files: Sequence[LogFile]) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
-    """Say of every file what it counts as and why, what was read, and what to know before
-    believing it.
-    """
+    """Return for each file its kind with the reason, what was read, and warnings."""
     rows = []
     for file in files:
         read = file.source.read
@@ -259,9 +258,7 @@ def read_rows(files: Sequence[LogFile]) -> list[tuple[str, tuple[str, ...], tupl
 
 
 def answer(identification: Identification, files: Sequence[LogFile], predictions: Sequence[Prediction]) -> list[str]:
-    """Return all lines: the answer, the estimates, the experiments behind them, and what was
-    read.
-    """
+    """Return all lines: the answer, the estimates, the experiments, and what was read."""
     rows = estimate_rows(identification)
     estimates = ["", *_aligned(rows)] if rows else []
     return [*sentences(identification, predictions), *estimates, *details(identification, files)]
@@ -277,9 +274,7 @@ def sentences(identification: Identification, predictions: Sequence[Prediction])
 
 
 def _chosen(identification: Identification) -> list[str]:
-    """Say that a verdict on the stage rests on a controller that is none of the user's, if it
-    does.
-    """
+    """Say that a verdict would rest on a controller that friso chose, if it does."""
     table = "controller"
     sources = {source for key, source in identification.origins.items() if key.startswith(f"{table}.")}
     if identification.stage is None or sources != {CHOSEN}:

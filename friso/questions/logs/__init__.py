@@ -4,7 +4,7 @@ from friso.interface.question import MACHINE, Choices, Question
 
 
 def listed_formats() -> list[tuple[str, str]]:
-    """The formats of logs that friso reads, each in one line."""
+    """Return the formats of logs that friso reads, with one line on each."""
     from friso.identification.logs.format import FORMATS
 
     return [(FORMATS[name].title, FORMATS.one_line(name)) for name in FORMATS]

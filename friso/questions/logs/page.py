@@ -1,4 +1,7 @@
-"""The page of `friso logs`: one file that opens offline, prints, and is the same bytes on every run."""
+"""Write the page of `friso logs`: one file that opens offline and prints.
+
+Every run of the command gives the same bytes.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What files of logs hold, before anything is identified."""
+"""Show what log files hold, before anything is identified."""
 
 from __future__ import annotations
 
@@ -22,18 +22,21 @@ LogFiles = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 
 
 class LogsAnswer(Answer):
-    """What files hold: `result` has a `LogContent` for each that could be read, `wrong` what is wrong with others."""
+    """Contents of log files.
+
+    `result` has a `LogContent` for each file that could be read. `errors` says what is wrong with the others.
+    """
 
     status = 2
     errors: Sequence[InputError]
 
     @property
     def failure(self) -> str:
-        """What is wrong with the files that cannot be read."""
+        """Say what is wrong with the files that cannot be read; empty if all can."""
         return str(unreadable(self.errors)) if self.errors else ""
 
     def sentences(self) -> Sequence[str]:
-        """What each file is, and what is open."""
+        """Return what each file is, and what is still open about it."""
         from friso.questions.logs.words import conclusions, open_questions
 
         lines = []
@@ -44,19 +47,19 @@ class LogsAnswer(Answer):
         return lines
 
     def tables(self) -> Sequence[AnswerTable]:
-        """The channels of each file."""
+        """Return the channels of each file."""
         from friso.questions.logs.words import COLUMNS, channel_rows
 
         return [AnswerTable(item.path.name, COLUMNS, channel_rows(item)) for item in self.result if item.channels]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """How each file is identified that can be."""
+        """Return the command that identifies a machine from each file that allows it."""
         from friso.questions.logs.words import next_command
 
         return [command for content in self.result if (command := next_command(content))]
 
     def files(self) -> Files:
-        """The page."""
+        """Return the page with its figures."""
         from friso.questions.logs.page import logs_files
 
         return logs_files(self.result) if self.result else {}
@@ -70,7 +73,10 @@ def options_of(
     kind: str | None = None,
     axis: str | None = None,
 ) -> Any:
-    """What is said of channels, from dictionaries or texts. Raises LogError."""
+    """Return what the user said of channels, from dictionaries or texts.
+
+    `dt` is the sample time, a text or a number [s]. Raises LogError for a text that cannot be read.
+    """
     roles, units, scales = (
         [f"{key}={text}" for key, text in item.items()] if isinstance(item, Mapping) else item or ()
         for item in (map, unit, scale)
@@ -79,7 +85,7 @@ def options_of(
 
 
 def paths_of(logs: LogFiles) -> list[Path]:
-    """The files that are meant."""
+    """Return the paths of one file or of several."""
     return [Path(logs)] if isinstance(logs, str | os.PathLike) else [Path(log) for log in logs]
 
 
@@ -136,5 +142,5 @@ def logs(
 
 
 def unreadable(errors: Sequence[InputError]) -> InputError:
-    """One error for all files that cannot be read."""
+    """Join the errors of all unreadable files into one error."""
     return errors[0] if len(errors) == 1 else InputError("", "\n\n".join(map(str, errors)), "files that can be read")

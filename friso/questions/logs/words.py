@@ -1,4 +1,4 @@
-"""What a file of logs holds, in words that the terminal and the page share."""
+"""Describe a file of logs in words that terminal and page share."""
 
 from __future__ import annotations
 
@@ -24,9 +24,7 @@ def title(content: LogContent) -> str:
 
 
 def conclusions(content: LogContent) -> list[tuple[str, str]]:
-    """Say what the file holds and what it counts as, or what is open; each sentence with its
-    colour.
-    """
+    """Say what the file holds, and its kind or what is open; each sentence has a colour."""
     holds = f"{title(content)} holds {_holds(content)}"
     if content.kind:
         return [(GREEN, f"{holds}. friso identify takes it as {content.kind}: {content.reason}.")]
@@ -43,10 +41,9 @@ def open_questions(content: LogContent) -> list[str]:
 
 
 def next_command(content: LogContent) -> str | None:
-    """Return the command that identifies the file, with the options given and those still
-    needed.
+    """Return the command that identifies a machine from the file.
 
-    None where no option tells what the file lacks.
+    It holds the options given and those still needed. Returns None if no option supplies what the file lacks.
     """
     options = dict.fromkeys([*content.options, *(gap.example for gap in content.gaps)])
     if "" in options:
@@ -87,10 +84,9 @@ def _samples(channel: ChannelContent) -> str:
 
 
 def sparkline(values: np.ndarray) -> str:
-    """Return a line of blocks as high as the values, shape (n,), between the least and the
-    greatest.
+    """Return a line of blocks as high as the values, shape (n,).
 
-    NaN is a space.
+    Blocks reach from the least to the greatest value. NaN is a space.
     """
     values = values / max(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)), np.finfo(float).tiny)
     finite = values[np.isfinite(values)]

@@ -4,7 +4,7 @@ from friso.interface.question import WHERE, Choices, Question
 
 
 def listed_metrics() -> list[tuple[str, str]]:
-    """List what `--metric` takes, each in one line."""
+    """Return what `--metric` takes, with one line on each."""
     from friso.studies.metric import METRICS
 
     return [(name, METRICS.one_line(name)) for name in METRICS]

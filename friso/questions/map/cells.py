@@ -1,4 +1,7 @@
-"""The cells of a map for drawing: axes in order, numbers, and the reasons why some cells have none."""
+"""Prepare the cells of a map for drawing.
+
+Axes are put in order, numbers are scaled, and cells without a number get the reason.
+"""
 
 from __future__ import annotations
 
@@ -38,9 +41,10 @@ SAMPLE = "sample"  # the dimension of maps that are sampled, not gridded
 
 @dataclass(frozen=True)
 class CellAxis:
-    """A swept key: where its cells lie, shape (n,), ascending, and which index of the runs each of them is.
+    """A swept key with the places of its cells, in ascending order, shape (n,).
 
-    `positions` are SI values, or 0, 1, 2, ... where the cells are named by `words`.
+    `positions` are values in SI, or 0, 1, 2, ... if the cells are named by `words`. `places` gives the index in the
+    runs of each cell.
     """
 
     key: str
@@ -52,19 +56,19 @@ class CellAxis:
     places: np.ndarray
 
     def axis(self, limits: tuple[float, float] | None) -> Axis:
-        """The axis of a panel."""
+        """Return the axis of a panel."""
         return Axis(self.quantity, self.unit, limits, self.log, self.words)
 
     def text(self, position: int) -> str:
-        """The value of one cell, e.g. "Crossover 8 Hz"."""
+        """Write the quantity and value of one cell, e.g. "Crossover 8 Hz"."""
         return f"{self.quantity} {self.value(position)}"
 
     def value(self, position: int) -> str:
-        """The same without the quantity."""
+        """Write the value of one cell, e.g. "8 Hz"."""
         return self.words[position] if self.words else _value(self.positions[position], self.unit)
 
     def span(self) -> str:
-        """All values in a few words, e.g. "1 to 16 Hz, 41 values"."""
+        """Describe all values in a few words, e.g. "1 to 16 Hz, 41 values"."""
         if self.words:
             return ", ".join(self.words) if len(self.words) <= 8 else f"{len(self.words)} values"
         factor, unit = choose(self.positions, self.unit)
@@ -73,7 +77,10 @@ class CellAxis:
         return f"{low:.4g} to {high:.4g} {unit}".rstrip() + f", {len(self.positions)} values{spacing}"
 
     def position(self, value: object) -> float:
-        """Where a value [SI] or word lies. Raises ValueError for a word that is not on the axis."""
+        """Return the place of a value [SI] or word on the axis.
+
+        Raises ValueError for a word that is not on the axis.
+        """
         if not self.words:
             return float(value)  # type: ignore[arg-type]
         word = _word(self.key, value) if not isinstance(value, float | int) or isinstance(value, bool) else None
@@ -85,9 +92,10 @@ class CellAxis:
 
 @dataclass(frozen=True)
 class Look:
-    """How a variable is coloured wherever it is shown: quantity and unit, range, scale, and its cells' categories.
+    """The colouring of a variable wherever it is shown: quantity, range, scale and categories.
 
-    `numbers` and `codes` have the dimensions of the runs; codes count in `categories`, NaN where a number counts.
+    `numbers` and `codes` have the dimensions of the runs. Codes are indices of `categories`, and NaN where a number
+    counts.
     """
 
     quantity: str
@@ -101,12 +109,15 @@ class Look:
 
     @property
     def scale(self) -> tuple[str, str, tuple[float, float] | None, bool, tuple[str, ...], tuple[Category, ...]]:
-        """What a map or a cloud of these cells is coloured by."""
+        """Return what a map or a cloud of these cells needs for its colours."""
         return self.quantity, self.unit, self.limits, self.log, self.colours, self.categories
 
 
 def axes_of(runs: xr.Dataset) -> tuple[CellAxis, ...]:
-    """The swept axes in the order of the runs; of sampled runs the sampled keys. ValueError where there are none."""
+    """Return the swept axes in the order of the runs, or the keys of sampled runs.
+
+    Raises ValueError for runs without axes.
+    """
     if SAMPLE in runs.dims:
         order = json.loads(runs.attrs.get("axes", "[]"))  # a store forgets the order of its coordinates
         keys = [key for key in runs.coords if runs[key].dims == (SAMPLE,) and key != SAMPLE]
@@ -119,17 +130,24 @@ def axes_of(runs: xr.Dataset) -> tuple[CellAxis, ...]:
 
 
 def cuts(runs: xr.Dataset) -> list[str]:
-    """The values at which a larger map was cut, e.g. "Crossover 8 Hz"."""
+    """Return the values at which a larger map was cut, e.g. "Crossover 8 Hz"."""
     fixed = runs.coords.to_dataset()
     return [_gridded(fixed.expand_dims(key), key).text(0) for key in fixed.coords if fixed[key].ndim == 0]
 
 
 def dims_of(runs: xr.Dataset) -> tuple[Hashable, ...]:
-    """The dimensions in the order of the variables; that of a dataset's own list may differ."""
+    """Return the dimensions in the order of the variables.
+
+    A dataset's own list may have another order.
+    """
     return max((variable.dims for variable in runs.data_vars.values()), key=len, default=())
 
 
 def _gridded(runs: xr.Dataset, key: Hashable) -> CellAxis:
+    """Return the axis of a swept key.
+
+    A logarithmic axis that includes 0 gets cells of equal width, each named by its value.
+    """
     coordinate = runs[key]
     unit, log = unit_of(coordinate), coordinate.attrs.get("scale") == "log"
     if coordinate.dtype.kind not in "iuf":
@@ -142,10 +160,12 @@ def _gridded(runs: xr.Dataset, key: Hashable) -> CellAxis:
 
 
 def _axis_of_words(key: Hashable, words: tuple[str, ...], places: np.ndarray) -> CellAxis:
+    """Return an axis whose cells are named by words."""
     return CellAxis(str(key), quantity(key), "", False, np.arange(float(len(words))), words, places)
 
 
 def _sampled(runs: xr.Dataset, key: Hashable) -> CellAxis:
+    """Return the axis of a sampled key, with one place for each sample."""
     coordinate = runs[key]
     places = np.arange(coordinate.size)
     if coordinate.dtype.kind in "iuf":
@@ -157,25 +177,32 @@ def _sampled(runs: xr.Dataset, key: Hashable) -> CellAxis:
 
 
 def _word(key: str, value: object) -> str:
-    """A word or boolean as it is shown: a joint is locked or free, anything else as in the stage file."""
+    """Write a word or boolean as it is shown: a joint is "locked" or "free"."""
     if isinstance(value, bool | np.bool_):
         return ("locked" if value else "free") if key == "joint.locked" else ("true" if value else "false")
     return str(value)
 
 
 def _value(value: float, unit: str) -> str:
+    """Write a value with its unit and a suitable prefix."""
     factor, text = choose(np.array([value]), unit)
     return f"{value * factor:.4g} {text}".rstrip()
 
 
 def plane_first(axes: Sequence[CellAxis]) -> list[CellAxis]:
-    """The two axes that span a map of many, then the further ones: numbers with more than one value come first."""
+    """Return the axes with the two that span the map first.
+
+    Numbers with more than one value go before words and single values.
+    """
     x, y, *_ = sorted(axes, key=lambda axis: (len(axis.places) == 1, bool(axis.words)))
     return [x, y, *(axis for axis in axes if axis is not x and axis is not y)]
 
 
 def look(runs: xr.Dataset, metric: str) -> Look:
-    """Return how a metric is coloured, be it of words or of numbers. Raises ValueError for what the runs lack."""
+    """Return how a metric of words or of numbers is coloured.
+
+    Raises ValueError for a metric that the runs do not hold.
+    """
     if metric not in coloured(runs):
         raise ValueError(f"metric: got {metric!r}, expected one of {', '.join(coloured(runs))}")
     if metric in worded():
@@ -201,10 +228,10 @@ def coloured(runs: xr.Dataset) -> list[str]:
 
 
 def _range(name: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, bool, tuple[str, ...]]:
-    """Return the limits of a scale, whether it is logarithmic, and the colours of counts (0 in the colour of rest).
+    """Return the limits of a colour scale, whether it is logarithmic, and the colours of counts.
 
-    Positive numbers over more than three decades show on a logarithmic scale, of at most six decades: what a stage
-    at rest still moves is the noise of the solver.
+    A count of 0 has the colour of rest. Positive numbers over more than three decades get a logarithmic scale of at
+    most six decades. Below that, the motion of a stage at rest is only solver noise.
     """
     finite, metric = numbers[np.isfinite(numbers)], metrics().get(name)
     if not finite.size:
@@ -221,7 +248,10 @@ def _range(name: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, 
 
 
 def _without_number(runs: xr.Dataset, metric: str, values: np.ndarray) -> tuple[tuple[Category, ...], np.ndarray]:
-    """The categories of the cells that have no number to show, and their codes; NaN where a number counts."""
+    """Return the categories of cells that have no number, and their codes.
+
+    Codes are NaN where a number counts.
+    """
     shape, dims = runs[metric].shape, runs[metric].dims
     outcome = _texts(runs, "outcome", dims)
     status = _texts(runs, "status", dims)
@@ -236,14 +266,14 @@ def _without_number(runs: xr.Dataset, metric: str, values: np.ndarray) -> tuple[
 
 
 def _texts(runs: xr.Dataset, name: str, dims: tuple[Hashable, ...]) -> tuple[np.ndarray, Sequence[str | None]]:
-    """Codes and texts of a variable; a single unknown text where the runs do not have it."""
+    """Return codes and texts of a variable; one unknown text if the runs do not have it."""
     if name not in runs:
         return np.zeros((), dtype=int), [None]
     return words_of(runs.transpose(*dims), name)
 
 
 def _state(outcome: str | None, status: str | None) -> Category | None:
-    """Why a cell has no numbers of its own; None where it was run to its end."""
+    """Return why a cell has no numbers of its own; None if it was run to its end."""
     reason = status or ""
     if reason.startswith(INFERRED):
         return categories_of("outcome", True).get(outcome or "") or Category("inferred", "#eeeeee")
@@ -257,8 +287,10 @@ def _state(outcome: str | None, status: str | None) -> Category | None:
 
 
 def pick(sizes: Sequence[int], most: int) -> tuple[np.ndarray, ...]:
-    """Evenly spread indices along dimensions of these sizes, of at most `most` combinations; the longest dimension
-    gives way first."""
+    """Return evenly spread indices along dimensions, of at most `most` combinations.
+
+    The longest dimension is thinned first.
+    """
     counts = list(sizes)
     while math.prod(counts) > most and max(counts) > 1:
         counts[counts.index(max(counts))] -= 1

@@ -1,4 +1,7 @@
-"""What a map page knows of its runs: axes, variables and colours, as the page's script reads them."""
+"""Collect what a map page knows of its runs: axes, variables and colours.
+
+The page's script reads it as JSON.
+"""
 
 from __future__ import annotations
 
@@ -35,9 +38,11 @@ NONE = 255  # in bytes of codes: no category, the number counts
 
 
 def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None) -> dict[str, Any]:
-    """Everything the page's script reads, ready for JSON; arrays are base64 of little-endian numbers, cell by cell in
-    the order of the axes, the last one fastest. `drawn`: the runs of all cells. Raises ValueError as `look` and
-    `axes_of` do."""
+    """Return everything that the page's script reads, ready for JSON.
+
+    Arrays are base64 of little-endian numbers. They run cell by cell in the order of the axes, the last axis fastest.
+    `drawn` holds the runs of all cells. Raises ValueError as `look` and `axes_of` do.
+    """
     axes = axes_of(runs)
     sampled = SAMPLE in runs.dims
     chosen = picked(runs)
@@ -59,7 +64,10 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
 
 
 def machine_of(runs: xr.Dataset) -> Stage | None:
-    """The machine that was swept, if it is one of the stages swept over: not where keys are tied to others."""
+    """Return the machine around which keys were swept.
+
+    Returns None if keys are tied to others, or if the runs are no study of friso.
+    """
     if json.loads(runs.attrs.get("links", "{}")):
         return None
     try:
@@ -69,30 +77,33 @@ def machine_of(runs: xr.Dataset) -> Stage | None:
 
 
 def picked(runs: xr.Dataset) -> tuple[np.ndarray, ...]:
-    """Which positions along each axis (of samples: which samples) are in the page: all, or evenly picked ones."""
+    """Return which positions along each axis the page holds, or which samples.
+
+    A map that is too large is thinned evenly.
+    """
     if SAMPLE in runs.dims:
         return pick([runs.sizes[SAMPLE]], MOST)
     return pick([len(axis.places) for axis in axes_of(runs)], MOST)
 
 
 class _Cells:
-    """The picked cells: takes them out of arrays of the runs."""
+    """The picked cells of a map, which can be taken out of arrays of the runs."""
 
     def __init__(self, axes: tuple[CellAxis, ...], chosen: tuple[np.ndarray, ...], sampled: bool) -> None:
         self.axes, self.chosen, self.sampled = axes, chosen, sampled
 
     def indices(self) -> list[np.ndarray]:
-        """Per dimension of the runs, the index of each picked cell."""
+        """Return the index of each picked cell along each dimension of the runs."""
         if self.sampled:
             return list(self.chosen)
         return [axis.places[at] for axis, at in zip(self.axes, self.chosen, strict=True)]
 
     def positions(self) -> list[np.ndarray]:
-        """Per axis, the places (in the axis) of what the page needs: one per cell along it, or one per sample."""
+        """Return the picked places along each axis: one for each cell along it, or for each sample."""
         return [self.chosen[0]] * len(self.axes) if self.sampled else list(self.chosen)
 
     def take(self, array: xr.DataArray) -> np.ndarray:
-        """The values of the picked cells, shape (cells,)."""
+        """Return the values of the picked cells, shape (cells,)."""
         dims = (SAMPLE,) if self.sampled else tuple(axis.key for axis in self.axes)
         return np.asarray(array.transpose(*dims).values)[np.ix_(*self.indices())].ravel()
 
@@ -105,8 +116,11 @@ HIGHEST = 250
 
 
 def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
-    """The runs as lines: for each the range that shows what it does at its end, and heights in bytes, 0 to HIGHEST from
-    half a range below it to half a range above it, where lines are cut."""
+    """Return the runs as lines, for each cell.
+
+    Each run has the range that shows its final behaviour. Heights are bytes from 0 to HIGHEST, from half a range below
+    it to half a range above it; lines are cut there.
+    """
     outcome = runs["outcome"]
     of_cell = cells.take(outcome.copy(data=np.arange(outcome.size).reshape(outcome.shape)))
     deviations, late = drawn.deviations[of_cell], drawn.late[of_cell]
@@ -120,7 +134,10 @@ def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
 
 
 def _axis(axis: CellAxis, positions: np.ndarray, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """An axis; where the machine with the keys `flat` stands on it is null where that is beyond its ends."""
+    """Return an axis with its values, and where the machine with the keys `flat` stands.
+
+    The machine's place is null beyond the ends of the axis.
+    """
     values = axis.positions[positions]
     factor, unit = choose(axis.positions, axis.unit, log=axis.log)
     own = None if axis.words else flat.get(axis.key)
@@ -137,7 +154,7 @@ def _axis(axis: CellAxis, positions: np.ndarray, flat: Mapping[str, Any]) -> dic
 
 
 def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
-    """A variable that the page can colour: its numbers, its categories, and its scale."""
+    """Return a variable that the page can colour: its numbers, categories and scale."""
     colouring = look(runs, name)
     numbers = colouring.numbers.values.ravel().astype(float)
     none = np.zeros(numbers.size)
@@ -169,14 +186,14 @@ def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
 
 
 def _text(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
-    """A variable of texts: each text once, and their numbers."""
+    """Return a variable of texts: each text once, and their numbers by cell."""
     codes, words = words_of(runs, name)
     numbers = cells.take(runs[name].copy(data=codes)).astype("<u4")
     return {"name": name, "label": variable(name), "words": words, "codes": _base64(numbers)}
 
 
 def _short(values: Array) -> np.ndarray:
-    """Six significant digits, as float32 (which holds seven)."""
+    """Round values to six significant digits, as float32, which holds seven."""
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.floor(np.log10(np.abs(values)))
     scaled = 10.0 ** (5 - np.where(np.isfinite(size), size, 0.0))
@@ -184,8 +201,10 @@ def _short(values: Array) -> np.ndarray:
 
 
 def _shortened(value: float) -> float:
+    """Round a value to six significant digits."""
     return float(f"{value:.6g}")
 
 
 def _base64(array: np.ndarray) -> str:
+    """Write the bytes of an array in base64."""
     return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

@@ -1,4 +1,4 @@
-"""The JSON document of `friso map`."""
+"""Build the JSON document of `friso map`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def map_document(runs: xr.Dataset, study: Study, store: Path | None, metric: str) -> dict[str, Any]:
-    """The axes, what came out, and how much of it survives a tighter tolerance."""
+    """Return the axes, the results, and how many of them survive a tighter tolerance."""
     criteria = {name: text for name in map(str, runs.data_vars) if (text := runs[name].attrs.get("criterion"))}
     names = ("cells", "surviving", "rtol")
     verified = {name: runs.attrs[f"verified_{name}"] for name in names if "verified_cells" in runs.attrs}

@@ -1,4 +1,4 @@
-"""The figures of a map: one variable over the swept axes, from the runs of a sweep to plain data."""
+"""Draw a map: one variable over the swept axes of a sweep."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ _LISTED = 12  # left-out values named one by one
 
 
 def map_figure(runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, float] | None = None) -> Figure:
-    """One variable of a map: over one axis as a line, over two as cells, over more as slices; samples as points.
+    """Draw a variable over one axis as a line, over two as cells, over more as slices.
 
-    `runs`: what friso.sweep returns; `metric`: a numeric variable, "outcome" or "verdict"; `marker`: the evaluation
-    point, SI values (or words) by key. Raises ValueError for a metric that is not there, runs without dimensions, or a
+    Samples are drawn as points. `runs` is what friso.sweep returns, and `metric` a variable of it. `marker` is the
+    evaluation point: SI values or words by key. Raises ValueError for a missing metric, runs without dimensions, or a
     marker that lacks an axis.
     """
     axes, colouring = axes_of(runs), look(runs, metric)
@@ -64,10 +64,11 @@ def _subject(metric: str) -> str:
 def map_panel(
     runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, float] | None = None, title: str | None = None
 ) -> Panel:
-    """One variable over the two axes of a map, the first one to the right; for figures of several maps.
+    """Return the panel of a variable over the two axes of a map, for figures of several maps.
 
-    Arguments as for `map_figure`; the title is, unless given, the variable and the values at which a larger map was
-    cut. Raises ValueError for another number of axes than two, and as `map_figure` does.
+    The first axis points to the right. Arguments are as for `map_figure`. By default, the title is the variable with
+    the values at which a larger map was cut. Raises ValueError for runs without exactly two axes, and as `map_figure`
+    does.
     """
     axes = axes_of(runs)
     if len(axes) != 2 or SAMPLE in runs.dims:
@@ -81,7 +82,7 @@ def map_panel(
 
 
 def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float] | None, title: str) -> Panel:
-    """A map panel of arrays that have just the dimensions of x and y."""
+    """Return the panel of a map over two axes x and y, the only dimensions of its arrays."""
     z, codes = (
         np.asarray(array.transpose(y.key, x.key).values)[np.ix_(y.places, x.places)]
         for array in (colouring.numbers, colouring.codes)
@@ -98,8 +99,10 @@ def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float
 
 
 def _edges(x: CellAxis, y: CellAxis, colouring: Look, codes: np.ndarray) -> tuple[Series, ...]:
-    """The curve on which hunting begins and ends, half-way between cells of a map of verdicts in which something
-    attracts and those in which nothing does."""
+    """Return the curve that separates cells in which hunting attracts from the others.
+
+    It runs half-way between cells of a map of verdicts. Maps with words on an axis have no such curve.
+    """
     attracted = [k for k, kind in enumerate(colouring.categories) if kind.label in ATTRACTED]
     if min(codes.shape) < 2 or x.words or y.words or not attracted:
         return ()
@@ -117,12 +120,13 @@ def _edges(x: CellAxis, y: CellAxis, colouring: Look, codes: np.ndarray) -> tupl
 
 
 def _limits(axis: CellAxis, points: Sequence[np.ndarray]) -> tuple[float, float]:
-    """From the first to the last edge of the cells, and on to a marker outside of them."""
+    """Return the outer edges of the cells along an axis, widened to markers outside."""
     values = np.concatenate([cell_edges(axis.positions, log=axis.log), *points])
     return float(values.min()), float(values.max())
 
 
 def _marked(marker: Mapping[str, float] | None, x: CellAxis, y: CellAxis) -> tuple[Markers, ...]:
+    """Return the marker of the evaluation point. Raises ValueError if it lacks an axis."""
     if marker is None:
         return ()
     lacking = [axis.key for axis in (x, y) if axis.key not in marker]
@@ -135,8 +139,7 @@ def _marked(marker: Mapping[str, float] | None, x: CellAxis, y: CellAxis) -> tup
 
 
 def _slices(axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, float] | None) -> tuple[list[Panel], str]:
-    """Panels over the first two axes of numbers with more than one value, for values of the further ones; and which
-    of these values are left out."""
+    """Return panels over two axes for values of the further ones, and which values are left out."""
     x, y, *further = plane_first(axes)
     picked = pick([len(axis.places) for axis in further], SLICES)
     panels = []
@@ -154,7 +157,7 @@ def _slices(axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, fl
 
 
 def _left_out(axis: CellAxis, indices: np.ndarray) -> str:
-    """Which values of an axis have no panel."""
+    """Say which values of an axis have no panel."""
     missing = [i for i in range(len(axis.places)) if i not in indices]
     if not missing:
         return ""
@@ -164,7 +167,7 @@ def _left_out(axis: CellAxis, indices: np.ndarray) -> str:
 
 
 def _line(x: CellAxis, colouring: Look, marker: Mapping[str, float] | None) -> Panel:
-    """One variable over a single axis: a line with its points, and patches under it where there is no number."""
+    """Return a variable over a single axis as a line, with patches where it has no number."""
     numbers, codes = (np.asarray(array.values)[x.places] for array in (colouring.numbers, colouring.codes))
     occurring = [i for i in range(len(colouring.categories)) if np.any(codes == i)]
     if not np.isfinite(numbers).any():
@@ -194,7 +197,7 @@ def _line(x: CellAxis, colouring: Look, marker: Mapping[str, float] | None) -> P
 
 
 def _rows(x: CellAxis, colouring: Look, codes: np.ndarray, occurring: list[int]) -> Panel:
-    """Words over a single axis: a row of points for each word."""
+    """Return words over a single axis as a row of points for each word."""
     names = tuple(colouring.categories[i].label for i in occurring)
     markers = tuple(
         Markers(
@@ -212,7 +215,7 @@ def _rows(x: CellAxis, colouring: Look, codes: np.ndarray, occurring: list[int])
 def _samples(
     axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, float] | None
 ) -> tuple[list[Panel], str]:
-    """Samples over the first two of their keys; and what else was sampled."""
+    """Return samples over the first two of their keys, and which other keys were sampled."""
     if len(axes) < 2:
         raise ValueError(f"map: got samples of {len(axes)} key, expected at least two")
     x, y, *further = axes

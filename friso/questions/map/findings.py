@@ -1,4 +1,4 @@
-"""A map in sentences: what share of it swings or hunts and where, how far that can be trusted, what words mean."""
+"""Say what share of a map swings or hunts and where, and how far that can be trusted."""
 
 from __future__ import annotations
 
@@ -40,8 +40,11 @@ _QUIET = ("transient", "settles")
 
 
 def headline(runs: xr.Dataset, name: str) -> str:
-    """Return what a map of a metric is asked first (`Metric.findings`): in what share of it, and in which ranges of the
-    axes, that holds; and what is in doubt. Empty where the runs do not say."""
+    """Return the first statement of a map: where, and in which share of it, its finding holds.
+
+    The finding is what the metric is asked for (`Metric.findings`). Doubts follow. It is empty if the runs have no
+    outcome.
+    """
     every = metrics()
     asked = name if name in runs and name in every and every[name].findings else ""
     asked = asked or (every[name].answered_by if name in every else "outcome")
@@ -83,9 +86,9 @@ def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
 
 
 def _flags(runs: xr.Dataset, name: str, words: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a metric has one of the words (a count: is more than 0), and where it has a result.
+    """Return where a metric has one of some words, and where it has a result.
 
-    Both have the shape of the runs; a large store is read in parts.
+    A count holds if it is more than 0. Both arrays have the shape of the runs; a large store is read in parts.
     """
     values = runs[name]
     holds, completed = np.zeros(values.shape, bool), np.zeros(values.shape, bool)
@@ -100,7 +103,10 @@ def _flags(runs: xr.Dataset, name: str, words: tuple[str, ...]) -> tuple[np.ndar
 
 
 def _box(axis: CellAxis, cells: np.ndarray) -> np.ndarray:
-    """Which positions of an axis lie between the first and the last at which it holds (of words: at which it does)."""
+    """Mark the positions between the first and the last at which a finding holds.
+
+    On an axis of words, only the words at which it holds are marked.
+    """
     held = axis.positions[cells]
     if axis.words:
         return np.isin(axis.positions, held)
@@ -108,7 +114,7 @@ def _box(axis: CellAxis, cells: np.ndarray) -> np.ndarray:
 
 
 def _range(axis: CellAxis, box: np.ndarray) -> str:
-    """The positions of a box along an axis in words."""
+    """Write the positions of a box along an axis in words."""
     name, inside = in_sentence(axis.key), axis.positions[box]
     if axis.words:
         return f"{name} {listed([axis.words[int(k)] for k in np.unique(inside)], 'or')}"
@@ -121,7 +127,7 @@ def _range(axis: CellAxis, box: np.ndarray) -> str:
 
 
 def _percent(part: int, total: int) -> str:
-    """A share, which looks like 0 or 100 % only where it is."""
+    """Write a share; only an exact one is shown as 0 or 100 %."""
     share = 100 * part / total
     if 1 <= share <= 99:
         return f"{share:.0f} %"
@@ -129,7 +135,10 @@ def _percent(part: int, total: int) -> str:
 
 
 def verification(runs: xr.Dataset) -> str:
-    """How many of the outcomes checked survive a tighter tolerance, with its 95 % interval (Clopper, Pearson)."""
+    """Say how many checked outcomes survive a tighter tolerance, with the 95 % interval.
+
+    The interval is that of Clopper and Pearson.
+    """
     checked = int(runs.attrs.get("verified_cells", 0))
     if not checked:
         return "Not verified: no outcome was checked at a tighter tolerance."
@@ -147,13 +156,13 @@ def verification(runs: xr.Dataset) -> str:
 
 
 def statement(runs: xr.Dataset, metric: str) -> str:
-    """What stands on every figure of a map: what it says first, its verification, its tolerance and number of runs."""
+    """Return the note on every figure of a map: its headline, verification, and number of runs."""
     caveat = " ".join(caveats(runs, metric))
     return "\n".join(text for text in (headline(runs, metric), verification(runs), _extent(runs), caveat) if text)
 
 
 def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
-    """List what the words that stand in a map mean."""
+    """Return the meaning of each word that occurs in a map."""
     texts = {name: {word.text: word.meaning for word in metrics()[name].words} for name in tallied()}
     return [
         (word, axis_shown().text(text))
@@ -175,6 +184,7 @@ def caveats(runs: xr.Dataset, name: str) -> list[str]:
 
 
 def _extent(runs: xr.Dataset) -> str:
+    """Say how many runs were made at which tolerance, and with which results."""
     cells = int(np.prod(list(runs.sizes.values())))
     status = text_counts(runs, "status")
     inferred = sum(number for reason, number in status.items() if reason.startswith("inferred"))
@@ -188,8 +198,10 @@ def _extent(runs: xr.Dataset) -> str:
 
 
 def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
-    """All that is said on the terminal: first whether the loop is unstable, then what share of the map swings, and
-    where."""
+    """Return all sentences for the terminal.
+
+    An unstable loop comes first, then the share of the map that swings or hunts.
+    """
     words = "; ".join(filter(None, (tally(runs, name) for name in tallied())))
     size = " x ".join(map(str, study.shape))
     reasons = [f"{count} cells without a result: {reason}" for reason, count in failures(runs).items()]
@@ -199,8 +211,10 @@ def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
 
 
 def own_place(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
-    """How far, along each axis of a map of verdicts, the stage as its file gives it is from the next edge of hunting;
-    none where it is not on the map."""
+    """Say how far the stage as given is from the next edge of hunting along each axis.
+
+    Nothing is said for a stage that is not on the map, or a map without verdicts.
+    """
     if (
         metric == "outcome"
         or metric not in worded(verdicts=True)
@@ -231,13 +245,15 @@ def own_place(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
 
 
 def _spans(axis: CellAxis, value: float) -> bool:
-    """Whether a value is within the range of an axis of numbers."""
+    """Tell whether a value lies within an axis of numbers."""
     return bool(not axis.words and 0 < axis.positions.min() <= value <= axis.positions.max())
 
 
 def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
-    """Between which cells along an axis, of verdicts in words, it changes whether something attracts, next to a cell on
-    either side; on a side on which a cell without a verdict lies nearer, nowhere."""
+    """Return between which cells along an axis hunting begins or ends, next to a cell.
+
+    A side on which a cell without a verdict lies nearer gives no result.
+    """
     attracted = np.isin(words, ATTRACTED)
     differ = np.flatnonzero((attracted != attracted[at]) | ~np.isin(words, (*ATTRACTED, *_QUIET)))
     ends = [(k, k + 1) for k in differ[differ < at][-1:] if words[k] in (*ATTRACTED, *_QUIET)]
@@ -246,7 +262,7 @@ def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
 
 
 def loop_first(stage: Stage) -> list[str]:
-    """That the loop of the stage as its file gives it is unstable, if it is."""
+    """Say that the loop of the stage as given is unstable, if it is."""
     from friso.hunting import unstable  # looking at a map needs no engine
 
     return unstable_loop(unstable(stage))

@@ -1,4 +1,7 @@
-"""The page of a map: one file that opens offline, where a click on a cell shows its run and how to repeat it."""
+"""Write the page of a map, which opens offline.
+
+A click on a cell shows its run and the command that repeats it.
+"""
 
 from __future__ import annotations
 
@@ -28,12 +31,14 @@ FORMS = (*FORMATS, "html")
 """Suffixes of the files of a map."""
 
 PRINTED = ON_PAGE._replace(noted=False)
-"""What the page shows where it is printed."""
+"""Image that the page shows when it is printed."""
 
 
 def map_files(runs: xr.Dataset, metric: str, rerun: str, draw: Callable[[], Traces | None]) -> dict[str, Content]:
-    """The figure in all formats and the page of a map, by their suffixes in the order of `FORMS`; `rerun` as in
-    `map_html`, and `draw` makes the runs that are `drawn` there, beside which the figure is."""
+    """Return the figure in all formats and the page of a map, by suffix in the order of `FORMS`.
+
+    `rerun` is as in `map_html`. `draw` makes the runs that the page draws, while the figure is drawn.
+    """
     figure = marked_figure(runs, metric)
     draw_beforehand([figure], [*map(Image, FORMATS), PRINTED])
     files: dict[str, Content] = {form: partial(save, figure) for form in FORMS[:-1]}
@@ -43,12 +48,11 @@ def map_files(runs: xr.Dataset, metric: str, rerun: str, draw: Callable[[], Trac
 def map_html(
     runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None, figure: Figure | None = None
 ) -> str:
-    """The whole page of the runs of a sweep, which opens with the variable `metric`; `figure`: that of it, if there is
-    one already.
+    """Return the page of a sweep, which opens with the variable `metric`.
 
-    `drawn`: the runs of all cells, in C order; the page draws that of a cell that is chosen. `rerun`: the command that
-    repeats one run, with {indices} where the indices of its cell go, in the order of the axes: "friso simulate --cell
-    map.zarr {indices}". Raises ValueError where that is missing, and as `map_figure`.
+    `drawn` holds the runs of all cells, of which the page draws the chosen one. `rerun` is the command that repeats a
+    run, with {indices} for the indices of its cell: "friso simulate --cell map.zarr {indices}". `figure` is the figure
+    of the variable, if it is already drawn. Raises ValueError if {indices} is missing, and as `map_figure` does.
     """
     if "{indices}" not in rerun:
         raise ValueError(
@@ -77,14 +81,14 @@ def map_html(
 
 
 def marked_figure(runs: xr.Dataset, metric: str) -> Figure:
-    """The figure of a map, over two axes with the place of the machine that was swept."""
+    """Return the figure of a map; over two axes, with the place of the swept machine."""
     figure, stage = map_figure(runs, metric), machine_of(runs)
     keys = [] if SAMPLE in runs.dims else [axis.key for axis in axes_of(runs)]
     return with_places(figure, [(SHOWN, stage)], keys) if stage and len(keys) == 2 else figure
 
 
 def _facts(runs: xr.Dataset, metric: str) -> list[tuple[str, str]]:
-    """The table under the map: what was varied, how well it was computed, and what came out."""
+    """Return the table under the map: what was varied, how accurately, and the results."""
     facts = [("Stage", name)] if (name := str(runs.attrs.get("name", ""))) else []
     facts += [(axis.quantity, f"{axis.span()} ({axis.key})") for axis in axes_of(runs)]
     facts.append(("Relative tolerance", f"{float(runs.attrs['rtol']):g}"))
@@ -101,7 +105,7 @@ def _facts(runs: xr.Dataset, metric: str) -> list[tuple[str, str]]:
 
 
 def _thinned(runs: xr.Dataset) -> str:
-    """Which part of a map too large for a page is in it."""
+    """Say which part of a map too large for a page the page holds; empty if it holds all."""
     sizes = [runs.sizes[SAMPLE]] if SAMPLE in runs.dims else [len(axis.places) for axis in axes_of(runs)]
     names = ["samples"] if SAMPLE in runs.dims else [axis.quantity for axis in axes_of(runs)]
     parts = [

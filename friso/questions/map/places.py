@@ -1,4 +1,4 @@
-"""Where machines stand in a figure over two keys."""
+"""Mark where machines stand in a figure over two keys."""
 
 from __future__ import annotations
 
@@ -15,11 +15,14 @@ if TYPE_CHECKING:
     from friso.stage import Stage
 
 SHOWN = "this machine"
-"""What the machine is called that a figure is about; any other one is grey."""
+"""Label of the machine that a figure is about; any other machine is grey."""
 
 
 def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Sequence[str]) -> Figure:
-    """A figure over two keys with the places of some stages, by label, that have both, where they lie inside of it."""
+    """Add to a figure over two keys the places of stages that have both keys.
+
+    `stands` gives label and stage. Places outside the axes are left out.
+    """
     places = []
     for label, stage in stands:
         right, up = ({**dict.fromkeys(SCALINGS, 1.0), **stage.flat()}.get(key) for key in keys)
@@ -28,6 +31,7 @@ def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Seque
             places.append(Markers(np.array([right]), np.array([up]), label, colour, "target"))
 
     def marked(panel: Panel) -> Panel:
+        """Add the places that lie within a panel."""
         inside = [one for one in places if _is_on(panel.x, one.x[0]) and _is_on(panel.y, one.y[0])]
         return replace(panel, markers=(*panel.markers, *inside))
 
@@ -35,4 +39,5 @@ def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Seque
 
 
 def _is_on(axis: Axis, value: float) -> bool:
+    """Tell whether a value lies within the limits of an axis."""
     return axis.limits is None or axis.limits[0] <= value <= axis.limits[1]

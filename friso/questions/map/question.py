@@ -1,4 +1,7 @@
-"""Where does it hunt: keys swept over ranges, in memory or in a store that an interrupted study resumes from."""
+"""Sweep keys over ranges and map where a stage hunts.
+
+Results stay in memory, or go into a store from which an interrupted study is resumed.
+"""
 
 from __future__ import annotations
 
@@ -69,8 +72,10 @@ LARGE = 10_000_000
 
 
 class SweepAnswer(Answer):
-    """What the runs of a sweep do: `result` is an xarray.Dataset with a dimension per axis; `metric` colours its map,
-    `store` is the folder that it is in, or None."""
+    """The runs of a sweep; `result` is an xarray.Dataset with a dimension for each axis.
+
+    `metric` colours its map. `store` is the folder that holds it, or None.
+    """
 
     study: Study
     metric: str
@@ -79,28 +84,31 @@ class SweepAnswer(Answer):
 
     @property
     def data(self) -> xr.Dataset:
-        """Outcome, peaks, amplitude, status, ... over the axes, whose coordinates are in SI."""
+        """Return outcome, peaks, amplitude, status and more over the axes, with coordinates in SI."""
         return self.result
 
     @property
     def drawable(self) -> bool:
-        """Whether there are few enough cells for a figure and a page."""
+        """Tell whether there are few enough cells for a figure and a page."""
         return self.study.cells <= LARGE
 
     def cell(self, *numbers: int | str) -> Stage:
-        """The stage of a cell, by its numbers along the axes: ``answer.cell(3, 4)`` or ``answer.cell("3 4")``."""
+        """Return the stage of a cell, by its numbers along the axes.
+
+        Both ``answer.cell(3, 4)`` and ``answer.cell("3 4")`` are understood.
+        """
         parts = [int(part) for number in numbers for part in str(number).split()]
         return self.study.cell_stage(parts)
 
     def sentences(self) -> Sequence[str]:
-        """Which share of the runs swings at its end, and where."""
+        """Return which share of the map swings or hunts, and where."""
         from friso.questions.map.findings import sentences
 
         texts = sentences(self.result, self.study, self.metric)
         return texts if self.store is None else [*texts, f"store: {self.store}"]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """How a cell is run by itself: that which swings farthest at its end."""
+        """Return the command that runs the cell with the largest swing at its end."""
         if self.store is None:
             return []
         swings = np.nan_to_num(self.result["peak_to_peak"].to_numpy(), nan=-np.inf)
@@ -108,30 +116,33 @@ class SweepAnswer(Answer):
         return [f"friso simulate --cell {shell_word(str(self.store))} {cell}"]
 
     def figures(self) -> Sequence[Figure]:
-        """The map."""
+        """Return the map, unless it has too many cells."""
         from friso.questions.map.figures import map_figure
 
         return [map_figure(self.result, self.metric)] if self.drawable else []
 
     def document(self) -> dict[str, Any]:
-        """The axes, what came out, and how much of it survives a tighter tolerance."""
+        """Return the axes, the results, and how many of them survive a tighter tolerance."""
         from friso.questions.map.document import map_document
 
         return map_document(self.result, self.study, self.store, self.metric)
 
     def files(self, progress: Progress = silent) -> Files:
-        """The figure in all formats and the page, by name."""
+        """Return the figure in all formats and the page, by name."""
         return {f"map.{form}": content for form, content in self._views(progress).items()}
 
     def files_beside(self, progress: Progress = silent) -> Mapping[Path, Content]:
-        """The figure and the page beside the store, unless there are too many cells for them, and the exports. The runs
-        that the page draws are made here, which `progress` is told."""
+        """Return the figure and the page beside the store, and the exports.
+
+        A map of too many cells has no figure or page. The runs that the page draws are computed here, and reported to
+        `progress`.
+        """
         views = {} if self.store is None else self._views(progress)
         beside = {path_beside(self.store, form): content for form, content in views.items() if self.store is not None}
         return {**beside, **export_files(self.result, [*self.exports])}
 
     def _views(self, progress: Progress) -> Files:
-        """The figure in all formats and the page, by the format; none of too many cells."""
+        """Return the figure in all formats and the page, by format; nothing for too many cells."""
         from friso.questions.map.page import map_files
 
         if not self.drawable:
@@ -143,18 +154,18 @@ class SweepAnswer(Answer):
 
 
 class StoreAnswer(Answer):
-    """Whether a store is whole: `result` is a `StoreState`, with its blocks, those done, and those damaged."""
+    """The state of a store; `result` is a `StoreState` with blocks done and damaged."""
 
     store: Path
 
     @property
     def failure(self) -> str:
-        """Whether anything in it is damaged or may not be read."""
+        """Say that the store is damaged or cannot be read; empty if it is whole."""
         state = self.result
         return "the store is not whole" if state.damaged or state.files or state.unreadable else ""
 
     def sentences(self) -> Sequence[str]:
-        """How many blocks are done, and which are damaged."""
+        """Return how many blocks are done, and which are damaged."""
         state, damaged = self.result, ", ".join([*self.result.damaged, *self.result.files])
         again = f"friso map {shell_word(str(self.store))} recomputes the damaged blocks"
         unread = f"; may not be read: {', '.join(state.unreadable)}" if state.unreadable else ""
@@ -162,7 +173,7 @@ class StoreAnswer(Answer):
         return [f"{self.store}: blocks done: {state.done} of {state.blocks}; {damage}{unread}"]
 
     def document(self) -> dict[str, Any]:
-        """Blocks, how many are done, which are damaged or may not be read."""
+        """Return the number of blocks, those done, and those damaged or unreadable."""
         state = self.result
         damage = {"damaged": state.damaged, "damaged_files": state.files, "unreadable": state.unreadable}
         return {"store": str(self.store), "blocks": state.blocks, "done": state.done, **damage}
@@ -319,7 +330,10 @@ def sweep(
 
 
 def _whole(store: Any) -> StoreAnswer:
-    """Whether a store is whole. Raises InputError for what is no store, StoreError where it cannot be read at all."""
+    """Check whether a store is complete and undamaged.
+
+    Raises InputError for anything but a store, and StoreError for an unreadable one.
+    """
     if not isinstance(store, str | os.PathLike) or Path(store).is_file():
         stem = Path(store).stem if isinstance(store, str | os.PathLike) else "rig"
         raise InputError("check", f"{store}, a file", "the store of a study", f"friso map {stem}_map.zarr --check")
@@ -327,13 +341,17 @@ def _whole(store: Any) -> StoreAnswer:
 
 
 def _another_study(store: Path) -> InputError:
+    """Build the refusal of options that would turn a stored study into another one."""
     problem = "a store together with options that would make it another study"
     resumed = f"friso map {shell_word(str(store))}"
     return InputError(str(store), problem, "the store alone: it contains its study", resumed)
 
 
 def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
-    """The tolerance asked for; "auto" is chosen on a sample of the cells, and said."""
+    """Return the relative tolerance asked for.
+
+    With "auto", it is chosen on a sample of the cells, and logged.
+    """
     settings = StudySettings.current()
     if entry != "auto":
         return tolerance_of(entry)
@@ -351,6 +369,10 @@ def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
 
 @contextmanager
 def _crew(workers: int | None, scheduler: Address | None) -> Iterator[Crew]:
+    """Provide the workers that run the cells: threads, processes or a Dask cluster.
+
+    Raises InputError for a number of workers that cannot be had.
+    """
     if workers is not None and scheduler is not None:
         raise InputError("workers", "--workers and --scheduler", "one of the two", "workers=4")
     most = min(usable_cores(), MOST_PROCESSES)
@@ -375,12 +397,15 @@ def _crew(workers: int | None, scheduler: Address | None) -> Iterator[Crew]:
 def _filled(
     study: Study, store: Path, crew: Crew, share: float, overwrite: bool, metric: str, beside: bool, progress: Progress
 ) -> tuple[xr.Dataset, bool]:
-    """Run what the store lacks, and note there what is drawn of it; the runs, and whether anything can be noted there.
-    Whatever ends it early, the message says where the rest is. One in which nothing can be written is read, if it lacks
-    nothing, and unless figures are to be written `beside` it, which it has to note."""
+    """Run what the store lacks, and return the runs and whether the store can take notes.
+
+    If the run ends early, a message says how much is stored and how to resume. A complete store that cannot be written
+    is read instead, unless figures `beside` it have to be noted in it.
+    """
     stored = 0
 
     def counted(done: int, total: int, what: str, /) -> None:
+        """Report progress, and count the cells that are stored."""
         nonlocal stored
         stored = done
         progress(done, total, store.name)
@@ -413,6 +438,7 @@ def _filled(
 
 
 def _checked_exports(export: Iterable[str | os.PathLike[str]]) -> list[Path]:
+    """Return the paths of exports. Raises InputError for a path that cannot be written."""
     files = [Path(os.path.realpath(path) if os.path.islink(path) else path) for path in export]  # a link stays one
     for path in files:
         refuse_place("export", path)

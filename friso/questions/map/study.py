@@ -1,4 +1,7 @@
-"""What a sweep is asked for and writes: the study, what it would cost, the files beside its store."""
+"""Build the study that a sweep asks for, and write the files beside its store.
+
+A study that is too large is refused with an estimate of its cost.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +50,7 @@ BYTES = 8
 
 @dataclass(frozen=True)
 class Varied:
-    """The options that say what is varied, as they were given."""
+    """The options that say what is varied, as the user gave them."""
 
     axes: Mapping[str, AxisValues] = field(default_factory=dict)
     links: Mapping[str, str] = field(default_factory=dict)
@@ -67,7 +70,10 @@ class Varied:
         latin: bool,
         log: bool,
     ) -> Varied:
-        """The axes of a dictionary and those of texts KEY=RANGE, each once. Raises InputError."""
+        """Collect axes from a dictionary and from texts KEY=RANGE, each key once.
+
+        Raises InputError.
+        """
         named = {"x": x, "y": y} | {f"axis {k + 1}": text for k, text in enumerate(more)}
         return cls(
             axes_of(axes, named, AXIS_EXAMPLE), pairs_of(link, "link", 'masses.cart="0.7 * mass"'), samples, latin, log
@@ -75,7 +81,11 @@ class Varied:
 
 
 def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int | None, crew: Crew) -> Study:
-    """The study asked for. Raises InputError, also if it has more than `most` cells: then with what it would cost."""
+    """Return the study asked for.
+
+    Raises InputError for unusable options, or for a study of more than `most` cells; the message then gives its
+    cost.
+    """
     settings = StudySettings.current()
     axes, links, samples = varied.axes, varied.links, varied.samples
     if not axes and not isinstance(samples, Samples):
@@ -96,8 +106,11 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
 
 
 def stored_study(store: Path, metric: str | None, most: int | None) -> tuple[Study, str]:
-    """The study of a store that is gone on with, and what colours its map: the `metric`, or what the store was made
-    for. Raises InputError, also where runs of a study of more than `most` cells are left."""
+    """Return the study of a store that is resumed, and the metric that colours its map.
+
+    Without a `metric`, the store's own is used. Raises InputError for a metric that the store does not hold, or if more
+    than `most` cells are unfinished.
+    """
     from friso.studies.metadata import checked_metadata
     from friso.studies.store import Store, read_store
 
@@ -118,8 +131,10 @@ def stored_study(store: Path, metric: str | None, most: int | None) -> tuple[Stu
 
 
 def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
-    """The study with all that the store holds, where that is the same but for measures beyond those asked for. Raises
-    InputError where the store lacks just some of them and is not to be replaced."""
+    """Return the study with all metrics of its store, if the store differs in nothing else.
+
+    Raises InputError if the store lacks some of the metrics asked for and must not be replaced.
+    """
     from friso.studies.store import read_store
     from friso.studies.store_folder import remove_leftovers
 
@@ -141,13 +156,13 @@ def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
 
 
 def coloured_by(study: Study, metric: str) -> str:
-    """Return the variable that colours the map: the metric, or what it is shown as where the study has that."""
+    """Return the variable that colours the map: the metric, or the variable that it is shown as."""
     other = metrics()[metric].shown_as
     return other if other in study.metrics else metric
 
 
 def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
-    """What a study of so many runs would cost, by a trial of a few of its cells."""
+    """Build the refusal of a large study, with its time and disk space estimated by a trial."""
     from friso.studies.execute import run_scattered
 
     run_scattered(trial, np.arange(crew.size), crew)  # has the kernels compiled
@@ -160,7 +175,10 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
 
 
 def drawn_runs(study: Study, runs: xr.Dataset, progress: Progress = silent) -> Traces | None:
-    """The runs of the cells that were not inferred, for the page to draw; None of more than DRAWN cells."""
+    """Return the runs of all cells that were not inferred, for the page to draw.
+
+    Returns None for more than DRAWN cells.
+    """
     from friso.studies.traces import traces
 
     if study.cells > DRAWN:
@@ -170,8 +188,10 @@ def drawn_runs(study: Study, runs: xr.Dataset, progress: Progress = silent) -> T
 
 
 def place_of_store(folder: str | os.PathLike[str]) -> Path:
-    """The folder of a store, by a name of its own also where it is "." or "..". Raises InputError where it can have
-    none."""
+    """Return the folder of a store, with a name of its own even for "." or "..".
+
+    Raises InputError for a folder without a name, such as the root.
+    """
     path = Path(folder)
     path = path if path.name not in ("", "..") else Path(os.path.abspath(path))
     if not path.name:
@@ -181,15 +201,18 @@ def place_of_store(folder: str | os.PathLike[str]) -> Path:
 
 
 def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
-    """The study as NetCDF or CSV, by the suffix."""
+    """Return the study as NetCDF or CSV, by the suffix of each path."""
     from friso.studies.export import export
 
     return dict.fromkeys(paths, partial(export, runs))
 
 
 def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite: bool, beside: str = "") -> None:
-    """Refuse to write over what is no earlier result of this study, nor, where figure and page are written `beside` the
-    store, over such of others: with this example. Raises InputError, StoreError where another study is in its store."""
+    """Refuse to write over anything but earlier results of this study.
+
+    `beside` is the example of the refusal if figure and page are written beside the store. Raises InputError for
+    foreign files, and StoreError for a store with another study.
+    """
     from friso.studies.metadata import is_store
     from friso.studies.store import refuse_other
 
@@ -208,11 +231,13 @@ def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite
 def write_beside(
     files: Mapping[Path, Content], store: Path, overwrite: bool, progress: Progress, can_note: bool = True
 ) -> list[Path]:
-    """Write figure, page and exports of a store, all of them or none; their paths. Of what is there by then, only what
-    the store wrote gives way, unless `overwrite`; that it writes these, it notes first, if it can.
+    """Write figure, page and exports of a store, all of them or none, and return their paths.
 
-    Raises StoreError where another process holds the store, or nothing can be noted after all, OSError where a file
-    cannot be written.
+    Files that the store wrote earlier are replaced; other files only with `overwrite`. The store notes the new files
+    first, if it can.
+
+    Raises StoreError if another process holds the store or nothing can be noted. Raises OSError if a file cannot be
+    written.
     """
     from friso.studies.metadata import annotate_metadata
     from friso.studies.store_folder import lock_store
@@ -235,22 +260,24 @@ PATIENCE = 10.0
 
 
 def _views(store: Path) -> list[Path]:
-    """The figure in all formats and the page beside a store."""
+    """Return the paths of the figure in all formats and of the page beside a store."""
     from friso.questions.map.page import FORMS
 
     return [path_beside(store, form) for form in FORMS]
 
 
 def _own_files(store: Path, exports: Iterable[Path]) -> list[Path]:
-    """Those among the figure and the page beside a store, and its exports, that are as it wrote files of these names,
-    by the digests that it notes."""
+    """Return the files beside a store that are still as the store wrote them.
+
+    They are recognised by the digests that the store notes.
+    """
     noted = _noted_digests(store)
     named = {path: noted[path.name] for path in (*_views(store), *exports) if path.name in noted}
     return [path for path, earlier in named.items() if (digest := _digest(path)) is not None and digest in earlier]
 
 
 def _noted_digests(store: Path) -> dict[str, list[object]]:
-    """The digests that a store notes, which may be of others, by the names of the files."""
+    """Return the digests that a store notes, by file name; they may be of other files."""
     from friso.studies.metadata import checked_metadata
 
     try:
@@ -262,6 +289,7 @@ def _noted_digests(store: Path) -> dict[str, list[object]]:
 
 
 def _digest(file: Path) -> str | None:
+    """Return the digest of a file, or None if it cannot be read."""
     from friso.studies.store_files import digest_of
 
     try:
@@ -275,6 +303,6 @@ _MOST_OF_A_FILE = 1 << 30
 
 
 def path_beside(store: Path, form: str) -> Path:
-    """The path of the figure or the page of a store, by its format."""
+    """Return the path of a store's figure or page by its format."""
     stem = store.with_suffix("") if store.suffix == ".zarr" else store
     return stem.with_name(f"{stem.name}.{form}")

@@ -1,4 +1,4 @@
-"""What the axes, variables and cells of a map are called, and how many cells have which word."""
+"""Name the axes, variables and cells of a map, and count the cells with each word."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ PALETTE = {"vermillion": VERMILLION, "orange": ORANGE, "pink": PINK, "quiet": QU
 
 
 def quantity(key: Hashable) -> str:
-    """An axis in words: "joint.stroke" is "Joint stroke", a free name is itself."""
+    """Return a key in words: "joint.stroke" is "Joint stroke"; a free name stays as it is."""
     name = str(key)
     of_laws = {f"friction.{key}": word for law in friction_laws().values() for key, word in law.words.items()}
     scalings = {name: scaling.words for name, scaling in SCALINGS.items()}
@@ -54,7 +54,7 @@ def quantity(key: Hashable) -> str:
 
 
 def in_sentence(key: Hashable) -> str:
-    """An axis within a sentence: "joint stroke"; names of people keep their capital."""
+    """Return a key in words within a sentence: "joint stroke"; names of people keep their capital."""
     name = quantity(key)
     return name if name.startswith(("Coulomb", "Stribeck")) else name[0].lower() + name[1:]
 
@@ -66,7 +66,10 @@ def variable(name: Hashable) -> str:
 
 
 def categories_of(name: str, inferred: bool = False) -> dict[str, Category]:
-    """Return label and colour of each word of a metric, the worst first; with `inferred`, of cells said to have it."""
+    """Return label and colour of each word of a metric, the worst first.
+
+    With `inferred`, they are those of cells whose word was inferred from neighbours.
+    """
     words = (metrics()[name] if name in metrics() else metrics()["outcome"]).words
     if inferred:
         return {word.text: Category(f"{word.text} (inferred)", word.inferred) for word in words if word.inferred}
@@ -75,12 +78,18 @@ def categories_of(name: str, inferred: bool = False) -> dict[str, Category]:
 
 
 def word_category(name: str, word: str) -> Category:
-    """Return label and colour of a word of a metric; a word that the metric does not declare is grey."""
+    """Return label and colour of a word of a metric.
+
+    A word that the metric does not declare is grey.
+    """
     return (categories_of(name) | _NO_RESULT).get(word) or Category(word, GREY)
 
 
 def no_number(name: str, reason: str | None = None) -> Category:
-    """Return what it means that a cell that was run has no such number; `reason`: the word of `Metric.reasons`."""
+    """Return the category of a cell that was run but has no number.
+
+    `reason` is the word of `Metric.reasons` for that cell.
+    """
     metric = metrics().get(name)
     reasons = categories_of(metric.reasons) if metric and metric.reasons else {}
     return reasons.get(reason or "") or Category(
@@ -89,12 +98,15 @@ def no_number(name: str, reason: str | None = None) -> Category:
 
 
 def grouped(number: int) -> str:
-    """A count in groups of three digits: 1 000 000."""
+    """Write a count in groups of three digits: 1 000 000."""
     return f"{number:,}".replace(",", " ")
 
 
 def in_order(categories: Iterable[Category]) -> tuple[Category, ...]:
-    """Return each category once, in the order of every legend: words, the worst first, then what has none."""
+    """Return each category once, in the order of every legend.
+
+    Words come first, the worst at the beginning, then cells without a word.
+    """
     words = [category for name in worded() for category in categories_of(name).values()]
     order = [*words, *_NO_RESULT.values(), *(one for name in worded() for one in categories_of(name, True).values())]
     places = {category: place for place, category in reversed([*enumerate(order)])}
@@ -102,13 +114,13 @@ def in_order(categories: Iterable[Category]) -> tuple[Category, ...]:
 
 
 def unit_of(array: xr.DataArray) -> str:
-    """SI unit of a variable or coordinate; none for counts and words."""
+    """Return the SI unit of a variable or coordinate; empty for counts and words."""
     unit = str(array.attrs.get("units", ""))
     return "" if unit == "1" else unit
 
 
 def words_of(runs: xr.Dataset, name: str) -> tuple[np.ndarray, list[str]]:
-    """The texts of a variable: their numbers, of its shape, and each text once (by its first place)."""
+    """Return the texts of a variable as codes of its shape, and each text once by first place."""
     import pandas as pd
 
     values = runs[name].values
@@ -117,7 +129,10 @@ def words_of(runs: xr.Dataset, name: str) -> tuple[np.ndarray, list[str]]:
 
 
 def text_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
-    """How many cells have each text of a variable, the most frequent first; none where there is no such variable."""
+    """Count the cells with each text of a variable, the most frequent first.
+
+    A missing variable gives no counts.
+    """
     if name not in runs:
         return {}
     cells: Counter[str] = Counter()
@@ -130,7 +145,7 @@ def text_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
 
 
 def failures(runs: xr.Dataset) -> dict[str, int]:
-    """How many cells have no result, by the reason in their status."""
+    """Count the cells without a result by the reason in their status."""
     return {
         reason: number
         for reason, number in text_counts(runs, "status").items()
@@ -139,13 +154,19 @@ def failures(runs: xr.Dataset) -> dict[str, int]:
 
 
 def word_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
-    """How many cells have each word of the metric `name`, in the order of the legend; none without that variable."""
+    """Count the cells with each word of a metric, in the order of the legend.
+
+    A missing metric gives no counts.
+    """
     cells = {word_category(name, word): number for word, number in text_counts(runs, name).items()}
     return {category.label: cells[category] for category in in_order(cells)}
 
 
 def tally(runs: xr.Dataset, name: str) -> str:
-    """Count the cells with each word of a metric in a sentence: "1 swings, 3 creep"; empty without the metric."""
+    """Count the cells with each word of a metric in a sentence: "1 swings, 3 creep".
+
+    The sentence is empty without the metric.
+    """
     return ", ".join(f"{grouped(number)} {_verb(word, number)}" for word, number in word_counts(runs, name).items())
 
 

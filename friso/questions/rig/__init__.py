@@ -4,7 +4,7 @@ from friso.interface.question import MACHINE, Choices, Question
 
 
 def listed_experiments() -> list[tuple[str, str]]:
-    """The experiments of the rig, each in one line."""
+    """Return the experiments of the rig, with one line on each."""
     from friso.studies.rig.experiments import RIG_EXPERIMENTS
 
     return [(name, RIG_EXPERIMENTS.one_line(name)) for name in RIG_EXPERIMENTS]

@@ -1,4 +1,4 @@
-"""The JSON document of `friso rig`: SI units, the unit in the key's suffix."""
+"""Build the JSON document of `friso rig`, in SI with the unit as suffix of each key."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from friso.studies.rig.outcome import Outcome
 
 
 def rig_document(outcome: Outcome) -> dict[str, Any]:
-    """The results of the experiment, and the logs with the seeds of their noise."""
+    """Return the results of the experiment, and its logs with the seeds of their noise."""
     logs = [
         {"name": log.name, "seed": log.seed, "interval_s": log.interval, "failure": log.failure or None}
         for log in outcome.logs

@@ -1,4 +1,4 @@
-"""The figures of an experiment of the rig."""
+"""Draw the figures of an experiment of the rig."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ from friso.studies.rig.outcome import Outcome
 
 
 def rig_figures(outcome: Outcome) -> list[Figure]:
-    """The figures, in the arrangement of the thesis."""
+    """Return the figures of an experiment, arranged as in the thesis."""
     return view_of(outcome.experiment).figures(outcome)

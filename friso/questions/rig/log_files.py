@@ -1,4 +1,4 @@
-"""The files of a log of the rig: as its drive writes it, how it is to be read, and the truth behind it."""
+"""Write the files of a rig's log: the drive's log, how to read it, and the truth behind it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ UNITS = {"force": "N", "disturbance": "N", "velocity": "m/s", "cart_velocity": "
 
 
 def log_files(log: RigLog, stage: Stage) -> dict[str, Content]:
-    """The log as the drive writes it, how to read it beside it, and the truth behind it in a folder of its own."""
+    """Return a log as the drive writes it, and how to read it.
+
+    The true signals and the stage of the log go into a folder of their own.
+    """
     heading, name = f"friso rig, seed {log.seed}", f"{log.name}.csv"
     csv = partial(write_csv, interval=log.interval)
     files: dict[str, Content] = {name: partial(csv, signals=log.logged, heading=heading)}
@@ -33,7 +36,10 @@ def log_files(log: RigLog, stage: Stage) -> dict[str, Content]:
 
 
 def _setup(machine: Stage, stage: Stage) -> dict[str, str]:
-    """What of joint and controller was set otherwise for a log than in the stage file, as texts with units."""
+    """Return the keys of joint and controller that a log set otherwise than the stage file.
+
+    Values are texts with units.
+    """
     before, after = stage.as_written(), machine.as_written()
     return {
         f"{table}.{key}": text
@@ -44,13 +50,15 @@ def _setup(machine: Stage, stage: Stage) -> dict[str, str]:
 
 
 def stage_text(stage: Stage, seed: int) -> str:
-    """The stage file that a log or the truth is of, its seed above it."""
+    """Return the stage file behind a log, with the seed of its noise as comment."""
     return f"# friso rig, seed {seed}\n{stage.to_toml()}"
 
 
 def write_csv(path: Path, interval: float, signals: abc.Mapping[str, np.ndarray], heading: str) -> None:
-    """Write signals of shape (n,) by role, every `interval` [s], below a line of comment (OSError where that is
-    impossible). Twelve digits: a nanometre in a kilometre."""
+    """Write signals of shape (n,) by role, every `interval` [s], below a line of comment.
+
+    Numbers have twelve digits, which is a nanometre in a kilometre. Raises OSError if the file cannot be written.
+    """
     names = ["time [s]", *(f"{role} [{unit_shown(UNITS.get(role, 'm'))}]" for role in signals)]
     count = len(next(iter(signals.values())))
     columns = np.column_stack([np.arange(count) * interval, *signals.values()])

@@ -1,4 +1,4 @@
-"""How outcomes of the rig's experiments are shown: what an experiment may declare of it, and the registry of these."""
+"""Declare how outcomes of the rig's experiments are shown, and register these views."""
 
 from __future__ import annotations
 
@@ -17,8 +17,11 @@ from friso.studies.rig.outcome import Outcome
 
 @dataclass(frozen=True)
 class OutcomeView:
-    """How an outcome is shown: sentences for the engineer who has to decide with it, figures in the arrangement of the
-    thesis, numbers for the JSON document."""
+    """The view of an experiment's outcome.
+
+    It has sentences for the engineer who decides, figures arranged as in the thesis, and numbers for the JSON
+    document.
+    """
 
     sentences: Callable[[Outcome], list[str]]
     figures: Callable[[Outcome], list[Figure]]
@@ -31,9 +34,9 @@ under the name of its experiment."""
 
 
 def view_of(experiment: str) -> OutcomeView:
-    """How outcomes of an experiment are shown: as its view declares, or else by its logs.
+    """Return the view of an experiment, or one that shows only its logs.
 
-    A view of another package that cannot be used is told and left out: the experiment has been run by then.
+    A view of another package that cannot be used is reported and left out, because the experiment has run by then.
     """
     try:
         if experiment in OUTCOME_VIEWS:
@@ -44,9 +47,11 @@ def view_of(experiment: str) -> OutcomeView:
 
 
 def _lengths(outcome: Outcome) -> list[str]:
+    """Name the logs of an experiment with their durations."""
     logs = [f"{log.name}, {with_unit(len(log.log.time) * log.interval, 's')}" for log in outcome.logs]
     return [f"Logs of {outcome.experiment}: {'; '.join(logs)}."]
 
 
 def _records(outcome: Outcome) -> list[Figure]:
+    """Draw the signals of each log."""
     return [log_figure(log.log, [*log.logged], f"rig_{log.name}") for log in outcome.logs]

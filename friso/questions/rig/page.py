@@ -1,4 +1,4 @@
-"""What an experiment of the rig shows: a page and logs."""
+"""Write the page and the logs of an experiment of the rig."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from friso.studies.rig.outcome import Outcome
 
 
 def rig_files(outcome: Outcome) -> dict[str, Content]:
-    """The page, the logs with how they are to be read, the truth in a folder of its own, and every figure in all
-    formats."""
+    """Return the page, the logs and how to read them, and every figure in all formats.
+
+    The truth behind the logs goes into a folder of its own.
+    """
     drawn = rig_figures(outcome)
     images = pictures(drawn)
     logs = {name: content for log in outcome.logs for name, content in log_files(log, outcome.stage).items()}
@@ -28,7 +30,7 @@ def rig_files(outcome: Outcome) -> dict[str, Content]:
 
 
 def page(outcome: Outcome, figures: Sequence[Figure]) -> str:
-    """The page with its figures."""
+    """Return the page with its figures."""
     return Report.of_stage(
         f"rig {outcome.experiment}",
         outcome.stage,

@@ -1,4 +1,4 @@
-"""A rehearsal: an experiment on the machine as built, its logs, and the truth behind them."""
+"""Rehearse an experiment on the machine as built, with its logs and the truth behind them."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ MANY = 4
 
 
 class RigAnswer(Answer):
-    """An experiment on the machine as built: `result` is its `Outcome`, with logs and the truth behind them."""
+    """An experiment on the machine as built; `result` is its `Outcome` with logs and their truth."""
 
     @property
     def failure(self) -> str:
-        """How many logs end early."""
+        """Say how many logs end early; empty if none does."""
         failed = sum(bool(log.failure) for log in self.result.logs)
         return f"{failed} of {len(self.result.logs)} logs end where the run stopped" if failed else ""
 
@@ -65,7 +65,7 @@ def rig(
 
 
 def _announce(stage: Stage) -> None:
-    """What to know of the drive before it runs."""
+    """Warn before the run of assumptions about the drive and of uncertain keys."""
     if stage.drive is None or stage.drive.sample_time is None:
         LOGGER.warning(f"drive.sample_time is not given: {SAMPLE_TIME * 1e6:g} us, as in the thesis")
     samples = whole_samples(as_built_keys(stage))

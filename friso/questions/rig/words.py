@@ -1,4 +1,4 @@
-"""What an experiment of the rig shows, in words."""
+"""Say what an experiment of the rig shows."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from friso.studies.rig.outcome import Outcome
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """The results, the answer first, for the engineer who has to decide with them; before it, what failed."""
+    """Return the results for the engineer who decides, the answer first.
+
+    Logs that stopped early are reported before.
+    """
     return [*_failures(outcome), *view_of(outcome.experiment).sentences(outcome)]
 
 
 def _failures(outcome: Outcome) -> list[str]:
-    """The logs that stopped early, in a sentence for each reason: they end where the run stopped."""
+    """Say which logs stopped early, in one sentence for each reason."""
     by_reason: dict[str, list[str]] = {}
     for log in outcome.logs:
         if log.failure:
@@ -25,5 +28,5 @@ def _failures(outcome: Outcome) -> list[str]:
 
 
 def details(outcome: Outcome) -> list[str]:
-    """What to know of the experiment."""
+    """Return the seed of the noise, and notes on the experiment."""
     return [f"seed of the noise: {outcome.seed}", *(f"note: {note}" for note in outcome.notes)]

@@ -1,4 +1,4 @@
-"""The JSON document of `friso simulate`."""
+"""Build the JSON document of `friso simulate`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def simulate_document(response: xr.Dataset, measures: Measures, name: str, conclusion: str) -> dict[str, Any]:
-    """What the run of the stage of that name does, and how the solver fared."""
+    """Return what a run does, and how the solver fared; `name` is that of the stage."""
     into_1um, into_10um = measures.settling_time
     return plain_json(
         {

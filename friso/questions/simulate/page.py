@@ -1,4 +1,4 @@
-"""The files of `friso simulate`: a time response."""
+"""Write the files of `friso simulate`: a time response."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def simulate_files(response: xr.Dataset, stem: str) -> dict[str, Content]:
-    """NetCDF with everything, CSV with the samples, PNG with the plot."""
+    """Return NetCDF with everything, CSV with the samples, and PNG with the plot."""
     return {
         f"{stem}.nc": lambda path: response.to_netcdf(path, engine="scipy"),
         f"{stem}.csv": partial(_write_samples, response),
@@ -23,6 +23,7 @@ def simulate_files(response: xr.Dataset, stem: str) -> dict[str, Content]:
 
 
 def _write_samples(response: xr.Dataset, path: Path) -> None:
+    """Write the samples of a response as CSV, with units in the header."""
     samples = response.drop_dims("turning_point").to_dataframe()
     units = {name: f"{name} [{response[name].attrs['units']}]" for name in samples}
     samples.rename(columns=units).to_csv(path, index_label="time [s]")

@@ -1,4 +1,4 @@
-"""What a run does: the time response of a stage to its motion, or of a cell of a study."""
+"""Simulate one run: the response of a stage to its motion, or a cell of a study."""
 
 from __future__ import annotations
 
@@ -37,7 +37,10 @@ if TYPE_CHECKING:
 
 
 class SimulateAnswer(Answer):
-    """A time response: `result` is the Dataset over `time` [s], ``answer["position"]`` a variable of it."""
+    """A time response; `result` is the Dataset over `time` [s].
+
+    A variable is read as ``answer["position"]``.
+    """
 
     stage: Stage
     name: str
@@ -45,45 +48,45 @@ class SimulateAnswer(Answer):
 
     @property
     def data(self) -> xr.Dataset:
-        """The response: position, error, force, friction, ... over time."""
+        """Return the response over time: position, error, force, friction and more."""
         return self.result
 
     @cached_property
     def measures(self) -> Measures:
-        """What the run does at its end."""
+        """Return measures of the run's end, such as outcome, swing and settling time."""
         return measured_run(self.stage, self.result.attrs["rtol"])
 
     @property
     def failure(self) -> str:
-        """Whether the run stopped early."""
+        """Say that the run stopped early; empty if it did not."""
         done = self.result.attrs["status"] == Status.DONE.text
         return "" if done else "the computation could not be completed; see the status above"
 
     def sentences(self) -> Sequence[str]:
-        """What the run does."""
+        """Return what the run does, in one sentence."""
         from friso.questions.simulate.words import conclusion
 
         deviation = (self.result["position"] - self.result["reference"]).to_numpy()
         return [conclusion(self.name if self.of_cell else self.stage.name or self.name, self.measures, deviation)]
 
     def details(self) -> Sequence[str]:
-        """How the solver fared."""
+        """Return how many steps the solver took."""
         return [f"{self.result.attrs['steps']} steps of the solver, {self.result.attrs['rejected']} rejected"]
 
     def figures(self) -> Sequence[Figure]:
-        """The response."""
+        """Return the figure of the response."""
         from friso.questions.check.figures import response_figure
 
         return [response_figure(self.result)]
 
     def document(self) -> dict[str, Any]:
-        """What the run does, and how the solver fared."""
+        """Return what the run does, and how the solver fared, as a document."""
         from friso.questions.simulate.document import simulate_document
 
         return simulate_document(self.result, self.measures, self.stage.name, self.sentences()[0])
 
     def files(self) -> Files:
-        """NetCDF, CSV and the figure; of a cell, its stage file too."""
+        """Return NetCDF, CSV and the figure; for a cell, its stage file as well."""
         from friso.questions.simulate.page import simulate_files
 
         files = simulate_files(self.result, f"{self.name}_response")
@@ -156,7 +159,10 @@ def simulate(
 
 
 def _cell(store: Path, numbers: list[str], changes: Changes) -> tuple[Stage, str, float]:
-    """The stage of a cell, a name for it, and the tolerance it was run at. Raises InputError."""
+    """Return the stage of a cell, a name for it, and the tolerance of its study.
+
+    Raises InputError for numbers that name no cell of the study.
+    """
     from friso.studies.store import read_store
     from friso.studies.study import study_of
 

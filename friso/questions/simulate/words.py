@@ -1,4 +1,4 @@
-"""A time response in one sentence: what the run does."""
+"""Say in one sentence what a run does."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ GROWN = 1.1
 
 
 def conclusion(name: str, measures: Measures, deviation: np.ndarray) -> str:
-    """What the run of the stage of that name does, with samples of its deviation [m], evenly over time, shape (n,)."""
+    """Say what the run of a stage does.
+
+    `deviation` holds samples of its deviation [m], evenly over time, shape (n,).
+    """
     before, late = np.split(np.abs(deviation), [int(WINDOW * len(deviation))])
     grows = bool(late.max() > GROWN * before.max(initial=0.0))
     clauses = {
@@ -32,8 +35,10 @@ def conclusion(name: str, measures: Measures, deviation: np.ndarray) -> str:
 
 
 def _restless(farthest: float, final: float, moved: float, grows: bool) -> str:
-    """A run that is off its reference at the end, by so much [m], and did not swing: in its last quarter it `moved`
-    by so much [m], and was off by the `farthest` [m]."""
+    """Describe a run that is off its reference at the end but does not swing.
+
+    In its last quarter it `moved` [m] and was off by at most `farthest` [m]. At the end it is off by `final` [m].
+    """
     if grows:
         return (
             f"goes ever farther off its reference, by up to {with_unit(farthest, 'm')} in the last quarter of the run"
@@ -43,7 +48,10 @@ def _restless(farthest: float, final: float, moved: float, grows: bool) -> str:
 
 
 def _settling(measures: Measures) -> str:
-    """How long after the corners of the reference at which it comes to stand the stage stays within the bands."""
+    """Write how long after the last corner of the reference the stage stays within the bands.
+
+    Settling at the far end of a move there and back is named if it takes longer.
+    """
     (fine, coarse), (last_fine, last_coarse) = (
         tuple(map(_value, times)) for times in (measures.settling_time, measures.in_the_end)
     )
@@ -59,4 +67,5 @@ def _settling(measures: Measures) -> str:
 
 
 def _value(array: np.ndarray) -> float:
+    """Return the only number of an array."""
     return float(array[0])

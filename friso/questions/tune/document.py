@@ -1,4 +1,4 @@
-"""Remedies as a JSON document."""
+"""Build the JSON document of `friso tune`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ from friso.shown.documents import plain_json
 
 
 def tune_document(tuning: Advice) -> dict[str, Any]:
-    """The JSON document: SI units, the unit in the key's suffix; a time is null that is never, and the upper
-    end of its interval also where the machines are too few to bound it."""
+    """Return the JSON document in SI, with the unit as suffix of each key.
+
+    A settling time is null if it is never reached. The upper end of its interval is also null if the machines are too
+    few to bound it.
+    """
     goal = tuning.goal
     first, *further = answer(tuning)
     return plain_json(
@@ -51,6 +54,7 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
 
 
 def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:
+    """Return one remedy: whether it works, what it changes, and how machines perform with it."""
     if outcome.stage is None or outcome.measured is None:
         why = unsure_why(outcome) if outcome.interrupted else why_unmet(outcome, tuning)
         return {"works": outcome.certainty, "why": why}
@@ -71,6 +75,7 @@ def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:
 
 
 def _performance(measured: Performance, tuning: Advice) -> dict[str, Any]:
+    """Return shares, settling times, force and margin of machines."""
     goal = tuning.goal
     return {
         "meets_goal": asdict(measured.share(goal)),

@@ -1,4 +1,4 @@
-"""Remedies, drawn: the same move before and after, settling times of the machines, and loops."""
+"""Draw remedies: the same move before and after, settling times of machines, and loops."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from friso.stage.controllers import CONTROLLER
 from friso.studies.compare.options import linear_flat
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)
-"""Of the remedies that have settings, in their order; more than these begin again, dashed."""
+"""Colours of remedies that have settings, in order; further ones begin again, dashed."""
 
 SAMPLES = 4000
 """Samples of a time response."""
@@ -49,7 +49,7 @@ RTOL = 1e-7
 
 
 def tune_figures(tuning: Advice) -> list[Figure]:
-    """The response, the settling times and the sensitivities."""
+    """Return one figure of the response, the settling times, the sensitivities and the windows."""
     lines = drawn_stages(tuning)
     panels = (_response(tuning, lines), _settling(tuning, lines), _sensitivity(tuning, lines), *_windows(tuning))
     caption = (
@@ -63,7 +63,7 @@ def tune_figures(tuning: Advice) -> list[Figure]:
 
 
 class RemedyLine(NamedTuple):
-    """How what is drawn of a stage is named and drawn."""
+    """Label, colour and dashes of the lines of one stage."""
 
     label: str
     colour: str
@@ -75,8 +75,11 @@ Lines = Sequence[ShownRemedy]
 
 
 def drawn_stages(tuning: Advice) -> list[ShownRemedy]:
-    """The stages that are drawn: as it is, and those that change least and settle soonest with the controller alone,
-    and with a joint; where none works, those that are not sure to."""
+    """Return the stages that are drawn, with their lines.
+
+    These are the stage as it is, the least change and the fastest remedy, with the controller alone and with a joint.
+    If none works, remedies that are not sure to work are drawn.
+    """
     lines: list[ShownRemedy] = [(tuning.stage, None, RemedyLine("as it is", INK, "solid"))]
     for outcome in _shown(tuning):
         assert outcome.stage is not None
@@ -87,7 +90,7 @@ def drawn_stages(tuning: Advice) -> list[ShownRemedy]:
 
 
 def _shown(tuning: Advice) -> list[RemedyOutcome]:
-    """The remedies that are drawn."""
+    """Return the remedies that are drawn."""
     if not tuning.working:
         return [outcome for outcome in tuning.outcomes if outcome.stage is not None]
     listed: list[RemedyOutcome] = []
@@ -100,10 +103,15 @@ def _shown(tuning: Advice) -> list[RemedyOutcome]:
 
 
 def _name(outcome: RemedyOutcome) -> str:
+    """Return the name of a remedy, marked if it is not sure to work."""
     return outcome.remedy.name if outcome.certainty == "works" else f"{outcome.remedy.name} (not sure)"
 
 
 def _response(tuning: Advice, lines: Lines) -> Panel:
+    """Return the panel of the deviation after the move, for each stage drawn.
+
+    The range shows what the stage as it is does in the end.
+    """
     flat = tuning.stage.flat()
     corner, series, shown_to = float(last_corner(flat)), [], 20 * tuning.goal.within
     for stage, outcome, line in lines:
@@ -122,6 +130,7 @@ def _response(tuning: Advice, lines: Lines) -> Panel:
 
 
 def _settling(tuning: Advice, lines: Lines) -> Panel:
+    """Return the panel of the share of machines in position over the time since the move."""
     flat = tuning.stage.flat()
     drawn = [(outcome.measured if outcome else tuning.present, line) for _, outcome, line in lines]
     longest = max(
@@ -143,7 +152,10 @@ def _settling(tuning: Advice, lines: Lines) -> Panel:
 
 
 def _windows(tuning: Advice) -> list[Panel]:
-    """The window of each number of the least change, as factors of what it is tuned to."""
+    """Return the panel of the windows of the least change's numbers.
+
+    Windows are given as factors of the tuned numbers.
+    """
     least = tuning.least
     if least is None or not least.windows:
         return []
@@ -161,7 +173,10 @@ def _windows(tuning: Advice) -> list[Panel]:
 
 
 def _sensitivity(tuning: Advice, lines: Lines) -> Panel:
-    """Of the loops behind the drive as built, up to half its sampling rate, as the margins are computed."""
+    """Return the panel of the largest sensitivity of the limit cases.
+
+    The loops include the drive as built, up to half its sampling rate, just as the margins do.
+    """
     omega, series = np.geomspace(1.0, 2e4, 600), []
     for stage, _, line in lines:
         built = tuning.complete(stage)

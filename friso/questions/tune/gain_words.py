@@ -1,4 +1,4 @@
-"""The gains of the remedies that work, in the terms of drives."""
+"""Write the gains of the remedies that work in the terms of drives."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from friso.remedies.verified import RemedyOutcome
 
 
 def gain_lines(tuning: Advice) -> list[str]:
-    """The gains to type in for the least change, and for the remedy that settles soonest."""
+    """Return the gains to type in for the least change, and for the fastest remedy."""
     listed = [outcome for outcome in (tuning.least, tuning.fastest) if outcome]
     return [
         f'The gains to type in for "{outcome.remedy.name}" are {gains} (friso export gains).'
@@ -19,11 +19,11 @@ def gain_lines(tuning: Advice) -> list[str]:
 
 
 def gain_facts(tuning: Advice) -> list[tuple[str, str]]:
-    """Every remedy that works, with its gains."""
+    """Return every remedy that works with its gains."""
     return [(outcome.remedy.name, gains) for outcome in tuning.working if (gains := gains_to_type_in(outcome, tuning))]
 
 
 def gains_to_type_in(outcome: RemedyOutcome, tuning: Advice) -> str:
-    """Symbols and values, in all units that the drive of the machine as built has for them."""
+    """Write symbols and values of a remedy's gains in all units that the drive uses."""
     table = rows(gains_of(tuning.complete(outcome.stage), {})) if outcome.stage else []
     return ", ".join(f"{symbol} = {value}{f' ({others})' if others else ''}" for _, (symbol, value, others) in table)

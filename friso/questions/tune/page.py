@@ -1,4 +1,4 @@
-"""The page of `friso tune`, its figures, and a stage file for every remedy."""
+"""Write the page of `friso tune`, its figures, and a stage file for every remedy."""
 
 from __future__ import annotations
 
@@ -25,14 +25,17 @@ OF_LEAVES = "-of-leaf-springs"
 
 
 def tune_files(tuning: Advice) -> dict[str, Content]:
-    """The stage files, the page, and every figure in all formats; `tuned.toml` is the least change that works."""
+    """Return the stage files, the page, and every figure in all formats.
+
+    `tuned.toml` is the least change that works.
+    """
     figures = tune_figures(tuning)
     images = pictures(figures)
     return {**stage_files(tuning), "tune.html": page(tuning, figures), **images}
 
 
 def stage_files(tuning: Advice) -> dict[str, Content]:
-    """A stage file for every remedy for which there are settings; one that is not sure to work is named so."""
+    """Return a stage file for every remedy with settings; unsure ones have names that say so."""
     files: dict[str, Content] = {}
     for outcome in tuning.outcomes:
         if outcome.stage is None:
@@ -45,7 +48,7 @@ def stage_files(tuning: Advice) -> dict[str, Content]:
 
 
 def _stage_file(tuning: Advice, name: str, stage: Stage | None) -> dict[str, Content]:
-    """A stage file, and beside it how its uncertain keys hang together; what there is not is None."""
+    """Return a stage file and the correlations of its uncertain keys; None removes an old file."""
     beside = correlations_file(Path(name)).name
     if stage is None:
         return {name: None, beside: None}
@@ -57,7 +60,7 @@ def _stage_file(tuning: Advice, name: str, stage: Stage | None) -> dict[str, Con
 
 
 class Behind(NamedTuple):
-    """What stands behind a title: sentences, and facts by name; `open` where it is seen at once."""
+    """A part of the page behind a title: sentences and facts; `open` if it is seen at once."""
 
     title: str
     sentences: Sequence[str]
@@ -66,7 +69,7 @@ class Behind(NamedTuple):
 
 
 def page(tuning: Advice, figures: Sequence[Figure]) -> str:
-    """The page with its figures."""
+    """Return the page with its figures."""
     behind = [
         Behind("What does not work, and why", failing(tuning), open=True),
         Behind("The numbers to type in, in the terms of drives (friso export gains)", (), gain_facts(tuning)),

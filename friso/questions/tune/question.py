@@ -1,4 +1,4 @@
-"""What stops it: the least change of controller or joint that settles machines like this one."""
+"""Find what stops hunting: the least change of controller or joint that settles such machines."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ _IN_POSITION = Bound("greater than 0 and at most 1", lambda value: (value > 0) &
 
 
 class TuneAnswer(Answer):
-    """The remedies, the least change first: `result` is the `Advice`."""
+    """The remedies, the least change first; `result` is the `Advice`."""
 
     status = 2
 
     @property
     def failure(self) -> str:
-        """Whether a change is needed and none works."""
+        """Say that a change is needed and none surely works; empty otherwise."""
         if not self.result.needed or self.result.working:
             return ""
         so_far = "before it was interrupted, " if self.result.interrupted else ""
@@ -55,11 +55,11 @@ class TuneAnswer(Answer):
 
     @property
     def interrupted(self) -> bool:
-        """Whether the search was."""
+        """Tell whether the search was interrupted."""
         return self.result.interrupted
 
     def details(self) -> Sequence[str]:
-        """Gains in the terms of drives, how far the numbers may be off, and what is assumed."""
+        """Return gains for drives, windows of the numbers, what matters most, and assumptions."""
         from friso.questions.tune.gain_words import gain_lines
         from friso.questions.tune.sensitivity_words import sensitivity_sentences
         from friso.questions.tune.words import assumptions, window_lines
@@ -68,7 +68,10 @@ class TuneAnswer(Answer):
         return [*gain_lines(advice), *window_lines(advice), *sensitivity_sentences(advice), *assumptions(advice)]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """What leaf springs do, and their design for an isolator, where `friso design` knows the controller."""
+        """Return the commands that design or check the leaf springs of an isolator.
+
+        There are none if `friso design` does not know the controller.
+        """
         from friso.design_method.prepare import check_designable
         from friso.questions.tune.page import NOT_SURE, OF_LEAVES
 
@@ -155,7 +158,7 @@ def _goal(
     only: Changeable | None,
     keep: Changeable | None,
 ) -> Goal:
-    """The goal of the options. Raises InputError."""
+    """Build the goal from the options. Raises InputError for values that cannot be used."""
     for name, part in (("only", only), ("keep", keep)):
         if part is not None:
             choice(part, name, get_args(Changeable), f"{name}=controller")
@@ -163,6 +166,7 @@ def _goal(
         raise InputError("keep", str(keep), f"something else than --only {only}, or nothing is left to change", "")
 
     def read(name: str, value: float | str | None, unit: str, example: str, bound: Bound = positive) -> float | None:
+        """Read an option as a number in SI; None if it is not given."""
         quantity = Quantity(unit, bound, example).on(stage.axis_kind)
         text = None if value is None else text_of(value, quantity.unit)
         try:
@@ -182,7 +186,7 @@ def _goal(
 
 
 def _margin(number: float | str) -> float:
-    """A modulus margin. Raises InputError."""
+    """Read a modulus margin. Raises InputError unless it lies between 0 and 1."""
     try:
         margin = float(number)
     except ValueError:

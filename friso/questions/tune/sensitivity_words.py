@@ -1,4 +1,4 @@
-"""What matters most, in words."""
+"""Say which keys matter most for the edge of hunting."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ MOST, LEAST = 4, 0.02
 
 
 def sensitivity_sentences(tuning: Advice) -> list[str]:
-    """How far 1 % of each key moves the edge of hunting of the stage as it is."""
+    """Say how far 1 % of each key moves the edge of hunting of the stage as it is."""
     return ranked_sentences(tuning.sensitivities) if tuning.sensitivities else []
 
 
 def ranked_sentences(sensitivities: Sensitivities) -> list[str]:
-    """The same of sensitivities, what matters most first; none where there are none."""
+    """Rank keys by how far 1 % of each moves the edge of hunting, the most important first."""
     ranked = sensitivities.ranked()
     if not ranked or ranked[0][1] == 0:
         return []
@@ -29,7 +29,7 @@ def ranked_sentences(sensitivities: Sensitivities) -> list[str]:
 
 
 def _signed(move: float, unit: str) -> str:
-    """By how much, upward or downward; of a controller that states no bandwidth in percent of that."""
+    """Write by how much the edge moves, in hertz or in percent of the bandwidth."""
     if not unit:
         return f"{percent(move, signed=True)} of the bandwidth"
     return f"{'+' if move > 0 else '-'}{with_unit(abs(move), unit, 2)}"

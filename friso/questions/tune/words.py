@@ -1,4 +1,7 @@
-"""The remedies in words: what to change, what it brings and costs, what else would do, and what cannot work and why."""
+"""Describe the remedies in words.
+
+It is said what to change, what that brings and costs, and what cannot work and why.
+"""
 
 from __future__ import annotations
 
@@ -81,18 +84,18 @@ OPTIONS = {
 ABSENT = "never"
 
 NONE_FOUND = "none was found that surely works"
-"""What is said of a remedy some of whose settings meet the goal on the machines of the search, and were not taken."""
+"""Said of a remedy whose settings meet the goal on the machines of the search, but not surely on others."""
 
 LOCKED = "joint.locked"
 
 
 def time(seconds: float) -> str:
-    """A settling time, which may never come."""
+    """Write a settling time [s]; "never" if it is not finite."""
     return with_unit(seconds, "s") if math.isfinite(seconds) else ABSENT
 
 
 def slowest_time(measured: Performance, goal: Goal) -> str:
-    """The settling time of the slowest twentieth, with its interval."""
+    """Write the time within which 95 % of the machines are in position, with its interval."""
     low, high = measured.slowest_interval(goal)
     alone = time(measured.slowest(goal))
     if not math.isfinite(low):
@@ -104,7 +107,10 @@ def slowest_time(measured: Performance, goal: Goal) -> str:
 
 
 def changes(before: Stage, after: Stage) -> list[str]:
-    """The keys that differ, with their values before and after; words and keys that go are those of the controller."""
+    """List the keys that differ, with their values before and after.
+
+    Texts and removed keys are listed for the controller only.
+    """
     old, new = before.flat(), after.flat()
     keys = numeric_keys(new)
     numbers = [_change(key, old.get(key), new[key], keys[key].unit) for key in new if _changes(key, old, new, keys)]
@@ -116,23 +122,25 @@ def changes(before: Stage, after: Stage) -> list[str]:
 
 
 def _changes(key: str, old: Mapping[str, Any], new: Mapping[str, Any], keys: Mapping[str, Any]) -> bool:
+    """Tell whether a numeric key is new or has another value."""
     if key not in keys:
         return False
     return key not in old or not math.isclose(old[key], new[key], rel_tol=1e-9)
 
 
 def _change(key: str, old: Any, new: float, unit: str) -> str:
+    """Write a key with its new value and, if it had one, its old value."""
     text = f"{key} = {number(new, unit)}"
     return text if old is None else f"{text} (was {number(old, unit)})"
 
 
 def number(value: float, unit: str) -> str:
-    """A value of a key with its unit, if it has one."""
+    """Write the value of a key with its unit, if it has one."""
     return with_unit(value, unit, 4) if unit else f"{value:.4g}"
 
 
 def answer(tuning: Advice) -> list[str]:
-    """The answer, first of all that is said: the least change that works, what it brings and costs; the next best."""
+    """Return the answer: the least change that works, what it brings and costs, and the next best."""
     lines = [*unstable_loop(tuning.case.unstable), *_interrupted(tuning)]
     if not tuning.needed:
         return [
@@ -152,8 +160,10 @@ def answer(tuning: Advice) -> list[str]:
 
 
 def _least_words(tuning: Advice) -> str:
-    """What the least change of those that work is: where the search for it was not reached, or did not end, settings
-    that were tuned to settle soonest."""
+    """Introduce the least change that works.
+
+    The words say if the search for a smaller change was cut short or not reached.
+    """
     sought = [outcome for outcome in tuning.outcomes if outcome.remedy.name.endswith(LEAST)]
     if not tuning.interrupted:
         given_up = any(outcome.certainty == "given up" for outcome in sought)
@@ -165,13 +175,13 @@ def _least_words(tuning: Advice) -> str:
 
 
 def _of_the_drive(tuning: Advice) -> str:
-    """For what the drive of the file counts."""
+    """Say that the table [drive] affects the margin alone, if the file has one."""
     has = {"sample_time", "delay", "current_bandwidth"} & {*tuning.as_built.get("drive", ())}
     return " The [drive] of the file counts for the margin alone, not for moves and hunting." if has else ""
 
 
 def unknown(tuning: Advice) -> list[str]:
-    """What limits a machine that neither the stage file nor an option tells, and what is assumed instead."""
+    """Say which limits of the machine are unknown, and what is assumed instead."""
     stage, goal, flat = tuning.stage, tuning.goal, tuning.stage.flat()
     lines = []
     if stage.parasitic is None and not stage.flexure and goal.bandwidth_limit is None:
@@ -188,7 +198,7 @@ def unknown(tuning: Advice) -> list[str]:
 
 
 def goal_words(goal: Goal) -> str:
-    """The goal in words."""
+    """Describe the goal in words."""
     late = "" if goal.settle is None else f", in {with_unit(goal.settle, 's')}"
     force = "" if goal.force_limit is None else f" with at most {with_unit(goal.force_limit, 'N')}"
     most = goal.bandwidth_limit
@@ -201,6 +211,7 @@ def goal_words(goal: Goal) -> str:
 
 
 def _interrupted(tuning: Advice) -> list[str]:
+    """Say that the search was interrupted and the answer is the best so far."""
     if not tuning.interrupted:
         return []
     return [
@@ -209,7 +220,7 @@ def _interrupted(tuning: Advice) -> list[str]:
 
 
 def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> list[str]:
-    """What to set, and what that brings and costs."""
+    """Say what to set for a remedy, and what that brings and costs."""
     assert outcome.stage is not None
     assert outcome.measured is not None
     return [
@@ -236,7 +247,10 @@ UNMADE = {
 
 
 def _made_of_leaves(outcome: RemedyOutcome, tuning: Advice) -> Iterator[str]:
-    """Of what leaf springs the joint of a remedy can be made, and whether that works; or why there are none."""
+    """Yield which leaf springs make the joint of a remedy, and whether they work.
+
+    If there are none, the reason is given.
+    """
     made = tuning.made_of_leaves(outcome)
     if made is not None:
         flat = made.remedy.stage.flat()
@@ -255,14 +269,17 @@ def _made_of_leaves(outcome: RemedyOutcome, tuning: Advice) -> Iterator[str]:
 
 
 def _replaced(stage: Stage) -> str:
-    """Of what mode the leaf springs of a remedy take the place: that of the joint which the stage file has."""
+    """Say that the leaf springs' mode replaces the parasitic mode of the stage file.
+
+    Nothing is said for a stage file without such a mode.
+    """
     if stage.parasitic is None or stage.flexure is not None:
         return ""
     return f", in place of the parasitic mode of the file ({with_unit(stage.flat()['parasitic.frequency'], 'Hz')})"
 
 
 def _verified(made: RemedyOutcome, tuning: Advice) -> str:
-    """Whether the stage still meets the goal with leaf springs and their parasitic mode."""
+    """Say whether the stage still meets the goal with leaf springs and their parasitic mode."""
     if made.certainty == "works":
         assert made.measured is not None
         return f"With them, {share_with_interval(made.measured.share(tuning.goal))} of the machines meet the goal."
@@ -273,7 +290,7 @@ def _verified(made: RemedyOutcome, tuning: Advice) -> str:
 
 
 def size_words(size: ChangeSize) -> str:
-    """How large a change is."""
+    """Write how large a change is: parts bought, keys changed, and by which factor."""
     keys = [f"{size.keys} key{'s' * (size.keys != 1)} of the controller"] if size.keys else []
     some = "" if size.scaled == size.keys else f"{'one' if size.scaled == 1 else size.scaled} of them "
     average = f"{' each' * (not some)} on average" if size.scaled > 1 else ""
@@ -282,6 +299,7 @@ def size_words(size: ChangeSize) -> str:
 
 
 def _brings(measured: Performance, tuning: Advice) -> str:
+    """Say how many machines meet the goal and how fast, beside the stage as it is."""
     before = slowest_time(tuning.present, tuning.goal)
     present = percent(tuning.present.share(tuning.goal).probability)
     met = f" ({present} of the machines meet the goal)" * (before == ABSENT)
@@ -297,7 +315,7 @@ def _brings(measured: Performance, tuning: Advice) -> str:
 
 
 def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
-    """What a remedy costs against the stage as it is."""
+    """Say what a remedy costs against the stage as it is: force, margin and stiffness."""
     goal, before = tuning.goal, tuning.present
     force = _against(measured.force(goal), before.force(goal), "force", "N")
     resists = "stiffness against a load before the integral acts"
@@ -313,7 +331,7 @@ def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
 
 
 def _against(now: float, before: float, what: str, unit: str) -> str:
-    """What there is now of something, against what there was before."""
+    """Compare a quantity now with its value before, as a factor and with its unit."""
     if not before > 0 or not math.isfinite(now / before):
         return f"a {what} of {with_unit(now, unit)}"
     factor = factor_text(now / before)
@@ -323,12 +341,12 @@ def _against(now: float, before: float, what: str, unit: str) -> str:
 
 
 def factor_text(factor: float) -> str:
-    """A factor with three digits, without an exponent."""
+    """Write a factor to three digits, without an exponent."""
     return f"{float(f'{factor:.3g}'):.15g}"
 
 
 def _nothing(tuning: Advice) -> list[str]:
-    """That nothing is sure to work, what is not sure to, and what to relax."""
+    """Say that no remedy surely works, which ones might, and what to relax."""
     unsure = [outcome for outcome in tuning.outcomes if outcome.certainty == "unsure"]
     lines = [f"No option was found that certainly meets the goal: {goal_words(tuning.goal)}."]
     lines += [
@@ -346,7 +364,7 @@ def _nothing(tuning: Advice) -> list[str]:
 
 
 def _no_relaxation(tuning: Advice) -> str:
-    """That no relaxation was found, or that none was sought."""
+    """Say that no relaxation was found, or that none was sought."""
     settings = RemedySettings.current()
     if tuning.outcomes and not any(outcome.remedy.verifiable for outcome in tuning.outcomes):
         return "Relaxations of the goal were not sought: no cycle verifies a stage with dither."
@@ -358,7 +376,7 @@ def _no_relaxation(tuning: Advice) -> str:
 
 
 def _relax(relaxed: RelaxedGoal, before: Stage) -> str:
-    """What of the goal to relax, and what would then be set."""
+    """Say which parts of the goal to relax, and what would then be set."""
     crossing = {"bandwidth_limit": ", at which the loop last crosses 0 dB,"}
     parts = [
         f"{OPTIONS.get(part.key, part.requirement)} of {number(part.needed, part.unit)}{crossing.get(part.key, '')} "
@@ -372,7 +390,7 @@ def _relax(relaxed: RelaxedGoal, before: Stage) -> str:
 
 
 def unsure_why(outcome: RemedyOutcome) -> str:
-    """Why a remedy is not sure to work."""
+    """Say why a remedy is not sure to work."""
     if outcome.interrupted and not outcome.doubts:
         return "it was not verified: the search was interrupted"
     if not outcome.remedy.verifiable:
@@ -381,7 +399,7 @@ def unsure_why(outcome: RemedyOutcome) -> str:
 
 
 def failing(tuning: Advice) -> list[str]:
-    """What cannot work, and why; and what is not sure to."""
+    """List the remedies that cannot work or are not sure to, with reasons."""
     lines = []
     for outcome in tuning.outcomes:
         if outcome.stage is None and not outcome.interrupted:
@@ -392,8 +410,10 @@ def failing(tuning: Advice) -> list[str]:
 
 
 def _met_by_another(outcome: RemedyOutcome, tuning: Advice) -> bool:
-    """Whether no setting of the bandwidth was found that works, although another remedy that works changes nothing
-    else."""
+    """Tell whether another working remedy changes the bandwidth alone.
+
+    The search for a bandwidth then found no setting although one exists.
+    """
     key = tuning.stage.controller.bandwidth_key
     if outcome.stage is not None or key is None or [v.name for v in outcome.remedy.variables] != [BANDWIDTH]:
         return False
@@ -402,7 +422,7 @@ def _met_by_another(outcome: RemedyOutcome, tuning: Advice) -> bool:
 
 
 def _verdict(outcome: RemedyOutcome, tuning: Advice) -> str:
-    """Whether a remedy works, in a few words."""
+    """Say in a few words whether a remedy works."""
     if _met_by_another(outcome, tuning):
         return "see the others"
     some = outcome.points is not None and bool(outcome.points.meets(tuning.goal).any())
@@ -410,11 +430,12 @@ def _verdict(outcome: RemedyOutcome, tuning: Advice) -> str:
 
 
 def _differing(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
+    """Return the keys whose values differ."""
     return [key for key, value in before.items() if not np.array_equal(after[key], value)]
 
 
 def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
-    """Why no setting of a remedy meets the goal."""
+    """Say why no setting of a remedy meets the goal."""
     if _met_by_another(outcome, tuning):
         return "Its own search found no setting, but that of another option did, which changes the bandwidth alone."
     if outcome.points is None:
@@ -427,7 +448,10 @@ def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
 
 
 def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterator[str]:
-    """The first constraint that leaves nothing of the settings that meet those before."""
+    """Yield the first constraint that leaves no setting.
+
+    Only settings that meet the constraints before it count.
+    """
     broken, left = points.broken(goal), np.ones(len(points.margin), bool)
     margin, best = f"a modulus margin of {goal.margin:g}", float(points.margin.max(initial=0.0))
     some = bool(broken["margin"].any())  # lack the margin: nothing is said of these
@@ -460,7 +484,7 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
 
 
 def _lowest(points: TriedPoints, goal: Goal) -> str:
-    """The lowest bandwidth of the settings that meet all else."""
+    """Write the lowest bandwidth of the settings that meet all else."""
     others = np.all([~broken for name, broken in points.broken(goal).items() if name != "bandwidth"], axis=0)
     lowest = np.nanmin(points.bandwidth[others], initial=np.inf)
     return (
@@ -469,7 +493,7 @@ def _lowest(points: TriedPoints, goal: Goal) -> str:
 
 
 def _edges(tuning: Advice) -> str:
-    """Where hunting ends in bandwidth, and up to where there is margin."""
+    """Say at which bandwidth hunting ends, and up to which one there is enough margin."""
     edge, comfortable, stage = tuning.case.judgement.margin, tuning.limits.highest_comfortable, tuning.stage
     parts = []
     if edge is not None:
@@ -489,7 +513,7 @@ def _edges(tuning: Advice) -> str:
 
 
 def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
-    """The remedies side by side, the stage as it is first."""
+    """Return the remedies side by side, the stage as it is first."""
     shown = [("as it is", tuning.present, "no" if tuning.needed else "yes")]
     words = {"works": "yes", "unsure": "not sure", NONE_FOUND: "none found", "does not work": "no"}
     table = [(name, _row(measured, tuning, works)) for name, measured, works in shown]
@@ -504,6 +528,7 @@ def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
 
 
 def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
+    """Return the texts of one row under `COLUMNS`."""
     goal = tuning.goal
     return [
         works,
@@ -517,8 +542,10 @@ def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
 
 
 def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
-    """Where a number may lie, all else being as tuned: of the bandwidth the key that states it, or else where the loop
-    last crosses 0 dB."""
+    """Write the range of a number in which the remedy still works, all else as tuned.
+
+    The bandwidth is given by its key, or by where the loop last crosses 0 dB.
+    """
     stage, name, ends = outcome.stage, window.name, np.array([window.low, window.high])
     assert stage is not None
     if name == BANDWIDTH:
@@ -536,7 +563,7 @@ def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
 
 
 def window_lines(tuning: Advice) -> list[str]:
-    """The windows of the least change that works."""
+    """Say where each number of the least change may lie."""
     least = tuning.least
     if least is None or not least.remedy.variables:
         return []
@@ -552,16 +579,17 @@ def window_lines(tuning: Advice) -> list[str]:
 
 
 def window_facts(tuning: Advice) -> list[tuple[str, str]]:
-    """The windows of every remedy that works."""
+    """Return the windows of every remedy that works."""
     return [(outcome.remedy.name, "; ".join(_windows(outcome))) for outcome in tuning.working if outcome.windows]
 
 
 def _windows(outcome: RemedyOutcome) -> list[str]:
+    """Write the windows of a remedy's numbers."""
     return [window_words(window, outcome) for window in outcome.windows]
 
 
 def _without_friction(flat: Mapping[str, Any], goal: Goal) -> Iterator[str]:
-    """What was not tried on a stage with friction because its laws declare too little of it."""
+    """Yield what was not tried because the friction laws declare too little friction."""
     if leading_friction(flat)["friction.model"] == "none":
         return
     if breakaway(flat) <= 0:
@@ -574,7 +602,7 @@ def _without_friction(flat: Mapping[str, Any], goal: Goal) -> Iterator[str]:
 
 
 def assumptions(tuning: Advice) -> list[str]:
-    """What is not known of the machine, what is assumed instead, and how the machines were drawn."""
+    """Say what is assumed of the machine, and how the machines were drawn."""
     lines, stage, machines = [], tuning.stage, tuning.machines
     lines += _without_friction(stage.flat(), tuning.goal)
     if any(outcome.remedy.of_setting for outcome in tuning.outcomes) and any(
@@ -596,10 +624,10 @@ def assumptions(tuning: Advice) -> list[str]:
 
 
 def sentences(tuning: Advice) -> list[str]:
-    """What to change, what it brings and costs, and why the other remedies do not work."""
+    """Return what to change, what it brings and costs, and why other remedies do not work."""
     return [*answer(tuning), *failing(tuning)]
 
 
 def tables(tuning: Advice) -> list[AnswerTable]:
-    """The remedies beside each other."""
+    """Return the table of remedies side by side."""
     return [AnswerTable(tuning.stage.name, COLUMNS, rows(tuning))]

@@ -1,1 +1,1 @@
-"""Figures as plain data, and what draws them: on paper with matplotlib, on pages with plotly."""
+"""Hold figures as plain data, and draw them: on paper with matplotlib, on pages with plotly."""

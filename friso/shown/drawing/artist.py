@@ -1,5 +1,7 @@
-"""The program that draws figures beside a command (`friso.shown.drawing.images`): ``python -m
-friso.shown.drawing.artist``. It is asked for images of a figure, and answers their bytes."""
+"""Draw figures in a process beside a command: ``python -m friso.shown.drawing.artist``.
+
+The process is asked for images of a figure by `friso.shown.drawing.images`, and answers with their bytes.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ from friso.shown.drawing.matplotlib_renderer import image
 
 
 def drawn(asked: tuple[Figure, AxisKind, Sequence[Image]]) -> dict[Image, bytes]:
-    """The images of a figure, in the units of an axis of that kind."""
+    """Return the images of a figure, in the units of a kind of axis."""
     figure, axis, images = asked
     with speaking_of(axis):
         return {wanted: image(figure, *wanted) for wanted in images}

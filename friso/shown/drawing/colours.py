@@ -1,4 +1,4 @@
-"""From numbers to colours: one scale for both renderers and the map page."""
+"""Map numbers to colours, with one scale for both renderers and the map page."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class ColourScale:
 
     @property
     def stops(self) -> list[tuple[float, str]]:
-        """The colours with their places between 0 and 1; steps have two places each."""
+        """Return the colours with their places between 0 and 1; a step has two places."""
         count = len(self.colours)
         if self.steps:
             return [((i + end) / count, colour) for i, colour in enumerate(self.colours) for end in (0, 1)]
@@ -51,7 +51,7 @@ class ColourScale:
 
 
 def painted(field: Coloured) -> Array:
-    """The numbers as drawn: z, or on a logarithmic scale its logarithm, from the lower limit on."""
+    """Return the numbers as drawn: z, or its logarithm from the lower limit on."""
     if not field.log:
         return field.z
     low, _ = _limits(field)
@@ -59,7 +59,7 @@ def painted(field: Coloured) -> Array:
 
 
 def scale(field: Coloured) -> ColourScale:
-    """The scale of a map or cloud."""
+    """Return the colour scale of a map or cloud."""
     if field.colours:
         count = len(field.colours)
         ticks = tuple(range(0, count, -(-count // 12)))
@@ -75,7 +75,7 @@ def scale(field: Coloured) -> ColourScale:
 
 
 def ramp(count: int) -> tuple[str, ...]:
-    """`count` colours evenly spaced along viridis, without its darkest and lightest parts."""
+    """Return `count` colours evenly spaced along viridis, without its darkest and lightest parts."""
     table = np.array([[int(colour[i : i + 2], 16) for i in (1, 3, 5)] for colour in VIRIDIS])
     places = np.linspace(0.5, len(VIRIDIS) - 1.2, count)
     mixed = [np.interp(places, np.arange(len(VIRIDIS)), table[:, i]).round().astype(int) for i in range(3)]
@@ -83,7 +83,7 @@ def ramp(count: int) -> tuple[str, ...]:
 
 
 def _limits(field: Coloured) -> tuple[float, float]:
-    """Range of the colours [unit], never empty."""
+    """Return the range of the colours [unit], which is never empty."""
     if field.limits is not None:
         low, high = field.limits
     else:

@@ -1,6 +1,7 @@
-"""From a figure in SI units to the arrays that are drawn: prefixed, thinned, limits laid out.
+"""Turn a figure in SI units into the arrays that are drawn.
 
-Both renderers start here, so that they draw the same arrays.
+Units get prefixes, lines are thinned, and limits are laid out. Both renderers start here, so that they draw the same
+arrays.
 """
 
 from __future__ import annotations
@@ -24,12 +25,15 @@ LONGEST_TEXT = 1000
 
 
 def drawable(figure: Figure) -> Figure:
-    """The figure with prefixed units, thinned series, limits as series, and markers that can be drawn."""
+    """Return a figure with prefixed units, thinned series, limits as series, and drawable markers."""
     return _escaped_part(replace(figure, panels=tuple(_panel(panel) for panel in figure.panels)))
 
 
 def _escaped_part(part: Any) -> Any:
-    """A part of a figure whose texts are escaped, and no longer than can be drawn: they may come from a file."""
+    """Return a part of a figure with its texts escaped and shortened.
+
+    Such texts may come from a file that others wrote.
+    """
     if isinstance(part, str):
         text = escaped(part)
         return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}..."
@@ -41,8 +45,11 @@ def _escaped_part(part: Any) -> Any:
 
 
 def cell_edges(centres: Array, *, log: bool = False) -> Array:
-    """Edges, shape (n + 1,), of the cells around ascending centres, shape (n,): halfway, on a logarithmic axis by
-    ratio. A single cell reaches half its value (or 0.5) to both sides, a logarithmic one a factor of two."""
+    """Return the edges, shape (n + 1,), of the cells around ascending centres, shape (n,).
+
+    Edges lie half-way between centres, on a logarithmic axis by ratio. A single cell reaches half its value, or 0.5, to
+    both sides; a single logarithmic one reaches a factor of two.
+    """
     if log:
         return np.exp(cell_edges(np.log(centres))) if len(centres) > 1 else np.array([centres[0] / 2, centres[0] * 2])
     if len(centres) == 1:
@@ -53,12 +60,18 @@ def cell_edges(centres: Array, *, log: bool = False) -> Array:
 
 
 def colour_prefix(field: Coloured) -> tuple[float, str]:
-    """Factor and unit with prefix for the numbers of a map or cloud: its limits decide, or all its numbers."""
+    """Return factor and prefixed unit for the numbers of a map or cloud.
+
+    Its limits decide, or else all its numbers.
+    """
     return choose(field.z if field.limits is None else np.array(field.limits), field.unit, log=field.log)
 
 
 def colour_key(figure: Figure) -> tuple[list[Category], list[Markers]]:
-    """The categories that occur, and the markers, of all panels with maps or clouds: each once, in one legend."""
+    """Return the categories and markers of all panels with maps or clouds, for one legend.
+
+    Only categories that occur are included, each once.
+    """
     panels = [panel for panel in figure.panels if panel.coloured]
     categories = [
         field.categories[int(code)]
@@ -72,7 +85,7 @@ def colour_key(figure: Figure) -> tuple[list[Category], list[Markers]]:
 
 
 def line_key(figure: Figure) -> list[Series]:
-    """The lines of these panels that have a label, each once, for the same legend."""
+    """Return the labelled lines of panels, each once, for the common legend."""
     lines = [line for panel in figure.panels if panel.coloured for line in panel.series if line.label]
     return list({(line.label, line.colour, line.dash): line for line in lines}.values())
 
@@ -82,12 +95,16 @@ WORDS = 12
 
 
 def word_ticks(axis: Axis) -> tuple[list[int], list[str]]:
-    """Positions and words written at an axis of words: all, or every second, third, ... so that `WORDS` do at most."""
+    """Return positions and words at an axis of words.
+
+    Only every second, third, ... word is written if there are more than `WORDS`.
+    """
     positions = list(range(0, len(axis.words), -(-len(axis.words) // WORDS)))
     return positions, [axis.words[position] for position in positions]
 
 
 def _panel(panel: Panel) -> Panel:
+    """Return a panel with prefixed axes, thinned lines, and limits as lines."""
     limits = _finite([value for limit in panel.limits for value in limit.values])
     points = (*panel.series, *panel.markers, *panel.coloured)
     xs = _gather(panel.x, [item.x for item in (*points, *panel.bands)])
@@ -114,7 +131,7 @@ def _panel(panel: Panel) -> Panel:
 
 
 def _gather(axis: Axis, arrays: Iterable[Array]) -> Array:
-    """The values that decide the prefix of an axis: its limits when given, else all finite data."""
+    """Return the values that decide the prefix of an axis: its limits, or else all finite data."""
     if axis.limits is not None:
         return np.array(axis.limits)
     values = _finite(np.concatenate([np.empty(0), *(np.asarray(array, dtype=float) for array in arrays)]))
@@ -122,23 +139,25 @@ def _gather(axis: Axis, arrays: Iterable[Array]) -> Array:
 
 
 def _prefix(axis: Axis, values: Array) -> tuple[float, str]:
-    """Factor and unit with prefix."""
+    """Return factor and unit with prefix."""
     return choose(values, axis.unit, log=axis.log) if axis.prefixed else (1.0, pretty(axis.unit))
 
 
 def _finite(values: Iterable[float] | Array) -> Array:
+    """Return all finite values as one array."""
     array = np.asarray(values, dtype=float)
     return array[np.isfinite(array)]
 
 
 def _axis(axis: Axis, factor: float, unit: str) -> Axis:
+    """Return an axis with its limits and its unit prefixed."""
     limits = None if axis.limits is None else (axis.limits[0] * factor, axis.limits[1] * factor)
     step = None if axis.step is None else axis.step * factor
     return replace(axis, unit=unit, limits=limits, step=step)
 
 
 def _thinned(line: Series) -> Series:
-    """A broken or infinite sample becomes a gap in both directions; then the line is thinned."""
+    """Return a line with gaps at broken or infinite samples, thinned."""
     broken = ~(np.isfinite(line.x) & np.isfinite(line.y))
     x, y = np.where(broken, np.nan, line.x), np.where(broken, np.nan, line.y)
     x, y = thin(x, y)
@@ -146,18 +165,20 @@ def _thinned(line: Series) -> Series:
 
 
 def _limit(limit: Limit, extent: tuple[float, float]) -> Series:
-    """All lines of a limit as one series, with gaps between them."""
+    """Return all lines of a limit as one series, with gaps between them."""
     x = np.array([*extent, np.nan] * len(limit.values))
     y = np.array([entry for value in limit.values for entry in (value, value, np.nan)])
     return Series(x, y, limit.label, limit.colour, limit.dash, width=1.0)
 
 
 def _markers(markers: Markers, x_factor: float, y_factor: float) -> Markers:
+    """Return markers with prefixed coordinates."""
     finite = np.isfinite(markers.x) & np.isfinite(markers.y)
     return replace(markers, x=markers.x[finite] * x_factor, y=markers.y[finite] * y_factor)
 
 
 def _coloured(field: Field, x_factor: float, y_factor: float) -> Field:
+    """Return a map or cloud with prefixed axes and numbers; infinite numbers become gaps."""
     z = np.where(np.isfinite(field.z), field.z, np.nan)
     factor, unit = colour_prefix(field)
     limits = None if field.limits is None else (field.limits[0] * factor, field.limits[1] * factor)

@@ -1,7 +1,7 @@
-"""A figure as plain data, before anybody draws it.
+"""Describe a figure as plain data, before it is drawn.
 
-An analysis answers with a `Figure`; a renderer draws it. All data stand in the unit named on their axis, an
-SI unit when the figure is made; `friso.shown.drawing.drawable` picks the prefix and thins the lines, once for both
+An analysis answers with a `Figure`, and a renderer draws it. All data stand in the unit of their axis, which is an SI
+unit when the figure is made. `friso.shown.drawing.drawable` picks the prefix and thins the lines, once for both
 renderers.
 """
 
@@ -42,12 +42,12 @@ class Axis:
 
     @classmethod
     def of_frequency(cls, hertz: Array) -> Axis:
-        """A logarithmic axis over increasing frequencies [Hz], from the first to the last."""
+        """Return a logarithmic axis over increasing frequencies [Hz], from the first to the last."""
         return cls("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)
 
     @property
     def label(self) -> str:
-        """What is written at the axis, e.g. "Time [s]"."""
+        """Return the text at the axis, e.g. "Time [s]"."""
         return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
 
 
@@ -82,7 +82,10 @@ class Markers:
 
 @dataclass(frozen=True)
 class Band:
-    """What lies between `low` and `high` over x, all finite and of shape (n,), filled and never thinned."""
+    """The area between `low` and `high` over x, filled and never thinned.
+
+    All arrays are finite and of shape (n,).
+    """
 
     x: Array
     low: Array
@@ -91,6 +94,7 @@ class Band:
     colour: str
 
     def __post_init__(self) -> None:
+        """Check that all arrays are finite and of equal length. Raises ValueError."""
         _same_length(self.label, self.x, self.low)
         _same_length(self.label, self.x, self.high)
         if not np.isfinite([self.x, self.low, self.high]).all():
@@ -98,7 +102,10 @@ class Band:
 
     @property
     def outline(self) -> tuple[Array, Array]:
-        """The closed line around it, each of shape (2 n + 1,): there along the top, back along the bottom."""
+        """Return the closed line around the band, each coordinate of shape (2 n + 1,).
+
+        It runs along the top, and back along the bottom.
+        """
         there_and_back = np.concatenate([self.x, self.x[::-1], self.x[:1]])
         return there_and_back, np.concatenate([self.high, self.low[::-1], self.high[:1]])
 
@@ -115,7 +122,10 @@ class Limit:
 
 @dataclass(frozen=True)
 class Category:
-    """What has a word instead of a number (a verdict, or the reason why there is no number): one flat colour."""
+    """A word in place of a number, with one flat colour.
+
+    It is a verdict, or the reason why there is no number.
+    """
 
     label: str
     colour: str
@@ -142,6 +152,7 @@ class Coloured:
     codes: Array | None = None
 
     def __post_init__(self) -> None:
+        """Check that codes have the shape of the numbers. Raises ValueError."""
         if self.codes is not None and np.shape(self.codes) != np.shape(self.z):
             raise ValueError(
                 f"map of {self.quantity}: codes have the shape {np.shape(self.codes)}, expected that of z, "
@@ -150,12 +161,12 @@ class Coloured:
 
     @property
     def label(self) -> str:
-        """What is written at the colour bar."""
+        """Return the text at the colour bar."""
         return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
 
     @property
     def has_numbers(self) -> bool:
-        """Whether colour encodes a number anywhere; without that there is no colour bar."""
+        """Tell whether colour stands for a number anywhere; otherwise there is no colour bar."""
         return bool(np.isfinite(self.z).any())
 
 
@@ -223,10 +234,11 @@ class Figure:
 
     @property
     def rows(self) -> int:
-        """Number of rows of panels."""
+        """Return the number of rows of panels."""
         return -(-len(self.panels) // self.columns)
 
 
 def _same_length(label: str, x: Sequence[float] | Array, y: Sequence[float] | Array) -> None:
+    """Check that x and y have one length. Raises ValueError."""
     if np.ndim(x) != 1 or np.shape(x) != np.shape(y):
         raise ValueError(f"{label}: x has the shape {np.shape(x)}, y {np.shape(y)}; expected one length")

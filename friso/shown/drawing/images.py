@@ -1,6 +1,8 @@
-"""The images of figures, for files and pages. A command that writes files has them drawn in processes of their own
-(`friso.shown.drawing.artist`), beside what it does meanwhile: a figure takes up to half a second, and matplotlib as
-long to load."""
+"""Make images of figures for files and pages.
+
+A command that writes files has its figures drawn in other processes (`friso.shown.drawing.artist`) while it works. A
+figure takes up to half a second, and matplotlib as long to load.
+"""
 
 from __future__ import annotations
 
@@ -20,12 +22,14 @@ from friso.shown.drawing.figure import Figure
 FORMATS = ("png", "svg", "pdf")
 
 PROGRAM, MOST = "friso.shown.drawing.artist", 2
-"""What a process runs that draws, and how many do at a time."""
+"""Module that a drawing process runs, and the largest number of such processes."""
 
 
 class Image(NamedTuple):
-    """A form of a figure: its format, one of FORMATS, and whether it has its heading and its note, or is cut off below
-    and above them."""
+    """A form of a figure: its format, one of FORMATS, and whether it has heading and note.
+
+    Without them, the image is cut off below the heading and above the note.
+    """
 
     form: str
     headed: bool = True
@@ -33,11 +37,14 @@ class Image(NamedTuple):
 
 
 ON_PAGE = Image("svg", headed=False)
-"""What a page shows of most figures where it is printed, or no script runs."""
+"""Image of most figures when a page is printed, or when no script runs."""
 
 
 def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:
-    """An image of a figure, as `Image`. Raises ValueError for a format that is none of FORMATS."""
+    """Return an image of a figure, as `Image` describes it.
+
+    Raises ValueError for an unknown format.
+    """
     if artists := _ARTISTS.get():
         drawn = artists.drawn(figure, Image(form, headed, noted))
         if drawn is not None:
@@ -48,20 +55,25 @@ def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) ->
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure to a path, in the format of its suffix (ValueError for others than FORMATS)."""
+    """Write a figure to a path in the format of its suffix.
+
+    Raises ValueError for an unknown format.
+    """
     path.write_bytes(image(figure, path.suffix.removeprefix(".").lower()))
 
 
 def draw_beforehand(figures: Iterable[Figure], images: Iterable[Image]) -> None:
-    """Begin to draw images of figures that will be asked for, where that is done beside."""
+    """Begin to draw images that will be asked for, if other processes draw."""
     if artists := _ARTISTS.get():
         artists.begin(figures, tuple(images))
 
 
 @contextmanager
 def drawing_beside() -> Iterator[Artists | None]:
-    """Within, figures that are known beforehand are drawn in other processes, the first of which loads what it needs
-    from now on; without a second core nothing is."""
+    """Let other processes draw figures in the `with` block.
+
+    The first process loads what it needs at once. Without a second core, no process is started.
+    """
     if usable_cores() < 2:
         yield None
         return
@@ -78,9 +90,10 @@ _Job = Future[dict[Image, bytes]]
 
 
 class Artists:
-    """Processes that draw, and what they are drawing."""
+    """Processes that draw, and the images that they are drawing."""
 
     def __init__(self) -> None:
+        """Start the first process; others follow when they are needed."""
         self.processes = [_artist()]
         self._free = [*self.processes]
         self._threads = ThreadPoolExecutor(MOST, thread_name_prefix="friso-artist")
@@ -88,7 +101,7 @@ class Artists:
         self._ended = False
 
     def begin(self, figures: Iterable[Figure], images: tuple[Image, ...]) -> None:
-        """Begin to draw images of figures, but for those that were begun."""
+        """Begin to draw images of figures, except those already begun."""
         for figure in figures:
             new = [wanted for wanted in images if (id(figure), wanted) not in self._begun]
             if new:
@@ -96,12 +109,15 @@ class Artists:
                 self._begun |= {(id(figure), wanted): (figure, job) for wanted in new}
 
     def drawn(self, figure: Figure, wanted: Image) -> bytes | None:
-        """An image that was begun, once it is there; None for any other, and where the process that drew it ended."""
+        """Return an image that was begun, once it is ready.
+
+        Returns None for any other image, or if the process that drew it has ended.
+        """
         begun = self._begun.get((id(figure), wanted))
         return begun[1].result().get(wanted) if begun else None
 
     def end(self) -> None:
-        """End everything: what is being drawn is not begun again by another process."""
+        """End all processes; no other process takes over their images."""
         self._ended = True
         self._threads.shutdown(wait=False, cancel_futures=True)
         for artist in self.processes:
@@ -111,6 +127,7 @@ class Artists:
             artist.end()
 
     def _draw(self, figure: Figure, axis: AxisKind, images: Sequence[Image]) -> dict[Image, bytes]:
+        """Draw images of a figure in a free process; return nothing if every process has ended."""
         for artist in self._candidates():
             with suppress(EOFError):
                 drawn = artist.ask((figure, axis, images))
@@ -119,7 +136,7 @@ class Artists:
         return {}
 
     def _candidates(self) -> Iterator[HelperProcess]:
-        """Those that are free, which may have waited for too long, and ended; then a new one."""
+        """Yield the free processes, some of which may have ended by themselves, then a new one."""
         with suppress(IndexError):
             while True:
                 yield self._free.pop()
@@ -129,6 +146,7 @@ class Artists:
 
 
 def _artist() -> HelperProcess:
+    """Start a process that draws."""
     return HelperProcess(PROGRAM, paths=sys.path)
 
 

@@ -1,4 +1,4 @@
-"""Maps and clouds on paper: their cells, colour bars, and the legend and note beneath a figure."""
+"""Draw maps and clouds on paper: cells, colour bars, and the legend and note beneath a figure."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _VECTORS = 1000  # more cells than these become a picture inside an SVG or PDF, 
 
 
 def draw_coloured(axes: Axes, panel: Panel) -> None:
-    """The maps and clouds of a panel: first what shows a number, then what shows a category."""
+    """Draw the maps and clouds of a panel: numbers first, then categories."""
     for field in panel.coloured:
         colour_scale = scale(field)
         _add(axes, panel, field, painted(field), _colour_map(colour_scale), (colour_scale.low, colour_scale.high))
@@ -39,7 +39,7 @@ def draw_coloured(axes: Axes, panel: Panel) -> None:
 def _add(
     axes: Axes, panel: Panel, field: Coloured, values: Array, colours: Colormap, limits: tuple[float, float]
 ) -> QuadMesh | PathCollection:
-    """One layer of a map or cloud; places without a value stay empty."""
+    """Draw one layer of a map or cloud; places without a value stay empty."""
     style = {"cmap": colours, "norm": Normalize(*limits), "rasterized": np.size(values) > _VECTORS}
     if isinstance(field, Map):
         x, y = cell_edges(field.x, log=panel.x.log), cell_edges(field.y, log=panel.y.log)
@@ -51,7 +51,7 @@ def _add(
 
 
 def add_colour_bars(canvas: Canvas, axes: Sequence[Axes], panels: Sequence[Panel]) -> None:
-    """A colour bar for every panel that shows numbers; a single one where all of them share one scale."""
+    """Add a colour bar to every panel that shows numbers, or one bar if all share one scale."""
     fields = {i: field for i, panel in enumerate(panels) for field in panel.coloured if field.has_numbers}
     bars = {i: (scale(field), field.label) for i, field in fields.items()}
     if len(set(bars.values())) == 1:
@@ -63,6 +63,7 @@ def add_colour_bars(canvas: Canvas, axes: Sequence[Axes], panels: Sequence[Panel
 
 
 def _bar(canvas: Canvas, axes: list[Axes], colour_scale: ColourScale, label: str) -> None:
+    """Add a colour bar with its ticks and label."""
     mappable = ScalarMappable(Normalize(colour_scale.low, colour_scale.high), _colour_map(colour_scale))
     bar = canvas.colorbar(
         mappable, ax=axes, ticks=list(colour_scale.ticks) or None, fraction=0.05, pad=0.015, aspect=28
@@ -74,18 +75,19 @@ def _bar(canvas: Canvas, axes: list[Axes], colour_scale: ColourScale, label: str
 
 
 def _colour_map(colour_scale: ColourScale) -> Colormap:
+    """Return the colours of a scale as matplotlib takes them."""
     if colour_scale.steps:
         return ListedColormap(list(colour_scale.colours))
     return LinearSegmentedColormap.from_list("friso", list(colour_scale.colours))
 
 
 def note_lines(figure: Figure, width: float) -> list[str]:
-    """The note of a figure in lines that fit into `width` [inch]."""
+    """Return the note of a figure in lines that fit into `width` [inch]."""
     return [line for part in figure.note.splitlines() for line in textwrap.wrap(part, int(LETTERS * (width - 0.3)))]
 
 
 def footer_height(figure: Figure, width: float) -> float:
-    """Height [inch] that legend and note take beneath the panels."""
+    """Return the height [inch] that legend and note take beneath the panels."""
     rows = _key_rows(figure, width) + len(note_lines(figure, width))
     return LINE * rows + 0.08 if rows else 0.0
 
@@ -93,7 +95,10 @@ def footer_height(figure: Figure, width: float) -> float:
 def add_footer(
     canvas: Canvas, figure: Figure, symbols: dict[str, dict[str, Any]], dashes: dict[str, Any], width: float
 ) -> None:
-    """Legend of all maps and clouds, and under it the note, in the strip that `footer_height` asked for."""
+    """Draw the legend of all maps and clouds, and the note below it.
+
+    Both stand in the strip that `footer_height` reserved.
+    """
     height = float(canvas.get_figheight())
     categories, markers = colour_key(figure)
     lines = note_lines(figure, width)
@@ -129,7 +134,7 @@ def add_footer(
 
 
 def _key_rows(figure: Figure, width: float) -> int:
-    """Rows of the legend: columns are as wide as the longest text and its patch."""
+    """Return the rows of the legend, with columns as wide as the longest text and its patch."""
     labels = [item.label for group in (*colour_key(figure), line_key(figure)) for item in group]
     if not labels:
         return 0

@@ -1,7 +1,7 @@
-"""Figures on paper: PNG, SVG and PDF through matplotlib, the same bytes on every run.
+"""Draw figures on paper with matplotlib: PNG, SVG and PDF, with equal bytes on every run.
 
-The user's matplotlibrc does not matter: everything is drawn under matplotlib's defaults and the style below.
-Texts are drawn as they stand: a dollar sign in a stage's name starts no formula.
+The user's matplotlibrc does not matter: everything is drawn under matplotlib's defaults and the style below. Texts are
+drawn as they stand: a dollar sign in a stage's name starts no formula.
 """
 
 from __future__ import annotations
@@ -92,7 +92,10 @@ _SYMBOLS: dict[str, dict[str, Any]] = {
 
 
 def render(figure: Figure) -> Canvas:
-    """The figure on a matplotlib canvas; its lines carry the arrays of `drawable(figure)`, in its order."""
+    """Draw a figure on a matplotlib canvas.
+
+    Its lines carry the arrays of `drawable(figure)`, in that order.
+    """
     with _style():
         prepared = drawable(figure)
         heading = ": ".join(text for text in (prepared.subject, prepared.title) if text)
@@ -112,8 +115,10 @@ def render(figure: Figure) -> Canvas:
 
 
 def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
-    """Draw the panels on the axes of somebody's figure, one each, or on a figure of pyplot that is made for them; their
-    axes. Raises InputError for other than one axes per panel."""
+    """Draw the panels on given axes, one each, or on a new figure of pyplot; return the axes.
+
+    Raises InputError unless there is one axes for each panel.
+    """
     prepared = drawable(figure)
     if axes is None:
         from matplotlib import pyplot
@@ -133,8 +138,10 @@ def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
 
 
 def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:
-    """The figure as the bytes of a file, with its heading or cut off below it, with its note or cut off above it;
-    `form` is one of FORMATS (ValueError otherwise)."""
+    """Return the figure as the bytes of a file, with or without heading and note.
+
+    `form` is one of FORMATS. Raises ValueError for any other.
+    """
     if form not in FORMATS:
         raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(FORMATS)}, e.g. 'png'")
     with _style():
@@ -145,6 +152,7 @@ class _LaidOut:
     """A figure on a canvas whose parts have their places."""
 
     def __init__(self, figure: Figure) -> None:
+        """Draw the figure once, and fix the places of its parts."""
         self.figure, self.canvas = figure, render(figure)
         if engine := self.canvas.get_layout_engine():
             engine.execute(self.canvas)
@@ -153,7 +161,10 @@ class _LaidOut:
         self.notes = [text for text in self.canvas.texts if text is not self.heading]
 
     def image(self, form: str, headed: bool, noted: bool) -> bytes:
-        """As `image`. The page and the file show one drawing of the same lines and letters."""
+        """Return the figure as the bytes of a file.
+
+        Page and file show one drawing of the same lines and letters.
+        """
         height = self.canvas.get_figheight()
         low = 0.0 if noted else LINE * len(self.notes)
         high = height - (HEADER_HEIGHT if self.heading and not headed else 0.0)
@@ -165,12 +176,13 @@ class _LaidOut:
 
     @cached_property
     def lines(self) -> bytes:
-        """The whole figure as SVG."""
+        """Return the whole figure as SVG."""
         for text in self.canvas.texts:
             text.set_visible(True)
         return _LINE.sub(_rounded, self._printed("svg", None))
 
     def _printed(self, form: str, area: Bbox | None) -> bytes:
+        """Return an area of the canvas, or all of it, as the bytes of a file."""
         stream = io.BytesIO()
         with _letters_alone() if form == "pdf" else nullcontext():
             dots = DOTS if form == "png" else FINER * DOTS  # of pictures inside
@@ -186,12 +198,12 @@ _LINE, _LONG, _FRAME = (
 
 
 def _rounded(line: re.Match[bytes]) -> bytes:
-    """A line of an SVG, or where a part of it stands, to a hundredth of a point."""
+    """Round the coordinates in a line of an SVG to a hundredth of a point."""
     return _LONG.sub(lambda place: f"{float(place[0]):.2f}".rstrip("0").rstrip(".").encode(), line[0])
 
 
 def _cut(lines: bytes, height: float, low: float, high: float) -> bytes:
-    """What lies from `low` to `high` of an SVG of this height, all [inch] from below."""
+    """Cut an SVG of some height to the part from `low` to `high`, all [inch] from below."""
     if (low, high) == (0.0, height):
         return lines
     seen = 72 * (high - low)
@@ -201,8 +213,11 @@ def _cut(lines: bytes, height: float, low: float, high: float) -> bytes:
 
 @contextmanager
 def _letters_alone() -> Iterator[None]:
-    """Fonts are embedded without the tables by which letters find their places, as they have them: to cut these down to
-    the letters that occur takes two thirds of the time of a PDF. Matplotlib makes the options of FontTools."""
+    """Embed fonts without the tables for placing letters.
+
+    To cut these tables down to the letters that occur would take two thirds of the time of a PDF. Matplotlib sets the
+    options of FontTools, so they are replaced in the `with` block.
+    """
     from fontTools import subset
 
     usual = subset.Options
@@ -220,7 +235,10 @@ def _letters_alone() -> Iterator[None]:
 
 
 def _laid_out(figure: Figure) -> _LaidOut:
-    """The last figures are kept for their next format: a page shows them, and they are files as well."""
+    """Lay a figure out, and keep the last figures for their next format.
+
+    A page shows a figure that is written as a file, too.
+    """
     for kept in tuple(_last):
         if kept.figure is figure:
             return kept
@@ -237,6 +255,7 @@ _one_at_a_time = RLock()
 
 @contextmanager
 def _style() -> Iterator[None]:
+    """Use friso's style of matplotlib in the `with` block, one thread at a time."""
     with _one_at_a_time, mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
@@ -244,6 +263,7 @@ def _style() -> Iterator[None]:
 
 
 def _row_height(figure: Figure) -> float:
+    """Return the height of a row of panels [inch], with room for their legends."""
     if any(panel.equal for panel in figure.panels):
         return EQUAL_HEIGHTS.get(figure.columns, ROW_HEIGHT)
     mapped = any(panel.coloured for panel in figure.panels)
@@ -253,7 +273,7 @@ def _row_height(figure: Figure) -> float:
 
 
 def _draw(axes: Axes, panel: Panel, width: float) -> None:
-    """Everything of one panel, which is `width` [inch] wide."""
+    """Draw everything of one panel, which is `width` [inch] wide."""
     _scale(axes, panel)
     draw_coloured(axes, panel)
     handles: list[Artist] = []
@@ -276,6 +296,7 @@ def _draw(axes: Axes, panel: Panel, width: float) -> None:
 
 
 def _scale(axes: Axes, panel: Panel) -> None:
+    """Set both axes of a panel linear or logarithmic."""
     axes.set_xscale("log" if panel.x.log else "linear")
     axes.set_yscale("log" if panel.y.log else "linear")
     if panel.markers and panel.x.limits is None:
@@ -283,7 +304,7 @@ def _scale(axes: Axes, panel: Panel) -> None:
 
 
 def _ticks(axes: Axes, panel: Panel, width: float) -> None:
-    """Ticks of what is drawn: plain numbers, never a factor or an offset beside the axis."""
+    """Set the ticks of a panel: plain numbers, never a factor or an offset beside the axis."""
     bins = (min(9, int(2 * width)), [1, 2, 5, 10]), (6, [1, 2, 2.5, 5, 10])
     for axis, declared, (most, steps) in zip((axes.xaxis, axes.yaxis), (panel.x, panel.y), bins, strict=True):
         if declared.words:
@@ -300,7 +321,10 @@ def _ticks(axes: Axes, panel: Panel, width: float) -> None:
 
 
 def _decades(axis: Any, even: Locator) -> None:
-    """Ticks of a logarithmic axis: at powers of ten, also at 2 and 5 over a few decades, even ones within a decade."""
+    """Set the ticks of a logarithmic axis.
+
+    They stand at powers of ten, also at 2 and 5 over a few decades, and evenly within one decade.
+    """
     low, high = axis.get_view_interval()
     few = high < 1000 * low
     fine = even if high < 10 * low else LogLocator(subs=(1.0, 2.0, 5.0))
@@ -310,12 +334,15 @@ def _decades(axis: Any, even: Locator) -> None:
 
 
 def _power_of_ten(value: float, _: int | None = None) -> str:
-    """The label of a tick at a power of ten, in letters: formulas take a tenth of the time of a figure."""
+    """Return the label of a tick at a power of ten, in letters.
+
+    Formulas would take a tenth of the time of a figure.
+    """
     return "10" + str(round(math.log10(value))).translate(_RAISED)
 
 
 def _annotate(axes: Axes, panel: Panel, handles: list[Artist], width: float) -> None:
-    """Labels, and title over legend above the axes, where the legend covers no data."""
+    """Write the labels, and the title over the legend above the axes, where no data are covered."""
     axes.set_xlabel(panel.x.label, parse_math=False)
     axes.set_ylabel(panel.y.label, parse_math=False)
     labels = [item.label for item in _items(panel)]
@@ -332,23 +359,26 @@ def _annotate(axes: Axes, panel: Panel, handles: list[Artist], width: float) -> 
 
 
 def _items(panel: Panel) -> list[Band | Series | Markers]:
-    """What the legend of a panel names, in its order."""
+    """Return what the legend of a panel names, in order."""
     return [*panel.bands, *panel.series, *panel.markers]
 
 
 def _labels(panel: Panel) -> list[str]:
-    """The labels in the legend of a panel; none where there is no legend."""
+    """Return the labels in the legend of a panel; none if there is no legend."""
     labels = [item.label for item in _items(panel) if item.label]
     return labels if len(labels) > 1 and not panel.coloured else []
 
 
 def _legend_rows(labels: list[str], width: float) -> int:
-    """How many rows the legend with these labels has in `width` [inch]."""
+    """Return how many rows the legend with these labels has in `width` [inch]."""
     return -(-len(labels) // _legend_columns(labels, width)) if labels else 0
 
 
 def _legend_columns(labels: list[str], width: float) -> int:
-    """As many columns as fit into `width` [inch]: 12 letters to the inch, 7 of them for line and gap."""
+    """Return how many columns of a legend fit into `width` [inch].
+
+    An inch holds 12 letters; line and gap take 7 of them.
+    """
     room = 12 * (width - 0.9)
     for columns in range(len(labels), 1, -1):
         rows = -(-len(labels) // columns)

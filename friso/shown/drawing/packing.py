@@ -1,4 +1,4 @@
-"""What a page carries compressed, and a browser unpacks."""
+"""Compress what a page carries; a browser unpacks it."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import gzip
 import json
 
 LEVEL = 6
-"""Of gzip: the tightest takes half as long again for two thousandths of the size."""
+"""Level of gzip: the tightest takes half as long again and saves two thousandths of the size."""
 
 
 def packed(text: str) -> str:
-    """The text compressed by gzip, in base64: the same bytes for the same text."""
+    """Return a text compressed by gzip, in base64; equal texts give equal bytes."""
     return base64.b64encode(gzip.compress(text.encode(), LEVEL, mtime=0)).decode("ascii")
 
 
 def packed_json(value: object) -> str:
-    """A value as packed JSON. Raises ValueError where it holds a number that is not finite."""
+    """Return a value as packed JSON. Raises ValueError for a number that is not finite."""
     return packed(json.dumps(value, separators=(",", ":"), allow_nan=False))

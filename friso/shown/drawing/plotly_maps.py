@@ -1,4 +1,7 @@
-"""Maps and clouds on a page: their traces, colour bars, and the legend and note beneath a figure."""
+"""Draw maps and clouds on a page.
+
+This includes traces, colour bars, and the legend and note beneath a figure.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ SYMBOLS: dict[str, dict[str, Any]] = {
 
 
 def bar_panels(panels: Sequence[Panel]) -> tuple[set[int], bool]:
-    """The panels that have a colour bar, and whether it is a single one, for all of them."""
+    """Return the panels that have a colour bar, and whether one bar serves all of them."""
     bars = {
         number: (scale(field), field.label)
         for number, panel in enumerate(panels)
@@ -43,7 +46,10 @@ def bar_panels(panels: Sequence[Panel]) -> tuple[set[int], bool]:
 
 
 def coloured_traces(panel: Panel, place: dict[str, Any], bar: dict[str, Any] | None) -> list[Any]:
-    """The maps and clouds of a panel: first what shows a number (with the colour bar `bar`), then the categories."""
+    """Return the traces of a panel's maps and clouds.
+
+    Numbers with their colour bar come first, then categories.
+    """
     traces: list[Any] = []
     for field in panel.coloured:
         colouring = _colouring(scale(field), bar if field.has_numbers else None, field.label)
@@ -57,7 +63,7 @@ def coloured_traces(panel: Panel, place: dict[str, Any], bar: dict[str, Any] | N
 
 
 def _layer(panel: Panel, field: Coloured, values: Array, colouring: dict[str, Any], place: dict[str, Any]) -> Any:
-    """One layer of a map or cloud; places without a value stay empty."""
+    """Return one layer of a map or cloud; places without a value stay empty."""
     where = f"{_hover('x', panel.x)}, {_hover('y', panel.y)}"
     if values is not field.codes:
         where += f": %{{customdata:.4~g}} {html.escape(field.unit)}"
@@ -76,15 +82,20 @@ def _layer(panel: Panel, field: Coloured, values: Array, colouring: dict[str, An
 
 
 def _cells(centres: Array, axis: Axis) -> Array:
-    """plotly finds the edges between centres as `cell_edges` does, but knows nothing of a single cell's."""
+    """Return the centres or edges of cells along an axis, as plotly needs them.
+
+    Plotly finds edges between centres as `cell_edges` does, but not those of a single cell.
+    """
     return cell_edges(centres, log=axis.log) if len(centres) == 1 else centres
 
 
 def _hover(name: str, axis: Axis) -> str:
+    """Return the text of a coordinate while the mouse is over a cell."""
     return f"%{{{name}}}" if axis.words else f"%{{{name}:.5~g}} {html.escape(axis.unit)}"
 
 
 def _colouring(colour_scale: ColourScale, bar: dict[str, Any] | None, label: str) -> dict[str, Any]:
+    """Return the colours of a trace as plotly takes them, with its colour bar if it has one."""
     colouring = {
         "colorscale": colour_scale.stops,
         "zmin": colour_scale.low,
@@ -103,7 +114,7 @@ def _colouring(colour_scale: ColourScale, bar: dict[str, Any] | None, label: str
 
 
 def key_traces(figure: Figure, legend: str) -> list[dict[str, Any]]:
-    """Traces without points that fill the common legend of all maps and clouds."""
+    """Return traces without points, which fill the common legend of all maps and clouds."""
     categories, markers = colour_key(figure)
     square = {"symbol": "square", "size": 11, "line": {"color": GREY, "width": 1}}
     entries = [(category.label, square | {"color": category.colour}) for category in categories]
@@ -117,14 +128,19 @@ def key_traces(figure: Figure, legend: str) -> list[dict[str, Any]]:
 
 
 def key_rows(labels: Sequence[str], width: int) -> int:
-    """Rows of a legend of these entries that is so wide [px]: they stand in columns as wide as the longest."""
+    """Return the rows of a legend of some width [px].
+
+    Entries stand in columns as wide as the longest.
+    """
     entry = KEY_MARK + KEY_LETTER * max(map(len, labels), default=0)
     return math.ceil(len(labels) / max(1, int(width / entry)))
 
 
 def footer(figure: Figure, legend: str, width: int) -> tuple[int, dict[str, Any], list[dict[str, Any]]]:
-    """Height [px] of the area below the panels, its legend by name, and the note, broken at a width [px], as
-    annotations."""
+    """Return the area below the panels: its height [px], its legend by name, and its note.
+
+    The note is broken at a width [px] and given as annotations.
+    """
     lines = [line for part in figure.note.splitlines() for line in textwrap.wrap(part, int(width / _LETTER))]
     note = LINE * len(lines) + 6 if lines else 0
     below = {"x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "xref": "paper", "yref": "paper"}

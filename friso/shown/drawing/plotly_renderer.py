@@ -1,8 +1,8 @@
-"""Figures on a page: interactive HTML through plotly, readable without a network.
+"""Draw figures on a page: interactive HTML through plotly, readable without a network.
 
-A page holds plotly's script once (`script()`) and any number of fragments (`fragment(figure)`), whose
-elements are named after the figure, so that the same figures give the same bytes. Both are compressed; `page.js`
-unpacks and draws them in the browser.
+A page holds plotly's script once (`script()`) and any number of fragments (`fragment(figure)`). Their elements are
+named after the figure, so that equal figures give equal bytes. Both are compressed; `page.js` unpacks and draws them in
+the browser.
 """
 
 from __future__ import annotations
@@ -57,13 +57,15 @@ _CONFIG = {
 
 @cache
 def script() -> str:
-    """plotly.js of the installed package, packed, to stand once in a page."""
+    """Return plotly.js of the installed package, packed, to stand once in a page."""
     return packed(get_plotlyjs())
 
 
 def fragment(figure: Figure) -> str:
-    """The figure as an HTML element of its height, and beside it, packed, what plotly draws into it, and the layout on
-    a narrow screen with the places of the colour bars there."""
+    """Return the figure as an HTML element with its packed data.
+
+    The data hold what plotly draws, and the layout and places of colour bars on a narrow screen.
+    """
     narrow = narrow_parts(figure)  # its traces are those of the wide one but for their colour bars' places
     narrow["layout"] = _checked([], narrow["layout"]).to_plotly_json()["layout"]
     drawn = _on_both(render(figure).to_plotly_json(), narrow)
@@ -74,24 +76,28 @@ def fragment(figure: Figure) -> str:
 
 
 def parts_of_both(figure: Figure) -> dict[str, Any]:
-    """`parts`, and beside them what is otherwise on a narrow screen: the layout, and the places of the colour bars."""
+    """Return `parts` with what differs on a narrow screen: layout, and places of colour bars."""
     prepared = drawable(figure)
     return _on_both(_laid_out(prepared, WIDE), _laid_out(replace(prepared, columns=1), NARROW))
 
 
 def _on_both(wide: dict[str, Any], narrow: dict[str, Any]) -> dict[str, Any]:
+    """Return the wide figure with what differs on a narrow screen."""
     return {**wide, "narrow": narrow["layout"], "bars": [_bar(trace) for trace in narrow["data"]]}
 
 
 def _bar(trace: dict[str, Any]) -> dict[str, Any] | None:
-    """Where the colour bar of a trace stands; None where it has none."""
+    """Return where the colour bar of a trace stands; None without one."""
     bar = trace.get("colorbar") or trace.get("marker", {}).get("colorbar")
     return {name: bar[name] for name in ("x", "y", "len")} if bar else None
 
 
 def _single(part: Any) -> Any:
-    """Arrays with the precision of a screen: half as long as those with the engine's, and the first bytes of all their
-    numbers before the second, which packs better (`page.js` puts them together). What is not finite is null."""
+    """Return arrays with the precision of a screen, half as long as those of the engine.
+
+    The first bytes of all numbers stand before the second ones, which packs better; `page.js` puts them together.
+    Numbers that are not finite become null.
+    """
     if isinstance(part, dict) and part.get("dtype") == "f8":
         numbers = np.frombuffer(base64.b64decode(part["bdata"]), "<f8").astype("<f4")
         planes = base64.b64encode(numbers.view(np.uint8).reshape(-1, 4).T.tobytes()).decode("ascii")
@@ -104,28 +110,32 @@ def _single(part: Any) -> Any:
 
 
 def render(figure: Figure) -> go.Figure:
-    """The figure for plotly; its traces carry the arrays of `drawable(figure)`, in the same order."""
+    """Return the figure for plotly, with the arrays of `drawable(figure)` in order."""
     plain = parts(figure)
     return _checked(plain["data"], plain["layout"])
 
 
 def _checked(traces: list[Any], layout: dict[str, Any]) -> go.Figure:
-    """What plotly draws as a figure of its own, which has checked it."""
+    """Build a plotly figure, which validates the traces."""
     return go.Figure(traces, {"template": "none", **layout})
 
 
 def narrow_parts(figure: Figure) -> dict[str, Any]:
-    """The same for a narrow screen: panels one below the other."""
+    """Return traces and layout for a narrow screen, with panels one below the other."""
     return parts(replace(figure, columns=1), NARROW)
 
 
 def parts(figure: Figure, width: int = WIDE) -> dict[str, Any]:
-    """What plotly draws, traces and layout, as plain dictionaries that hold NumPy arrays; not checked by plotly, which
-    takes ten times as long as to make them. `width`: the least [px] that there is for the axes of all columns."""
+    """Return traces and layout as plain dictionaries that hold NumPy arrays.
+
+    Plotly does not validate them, which would take ten times as long as making them. `width` is the least width [px]
+    for the axes of all columns.
+    """
     return _laid_out(drawable(figure), width)
 
 
 def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
+    """Lay out the panels of a figure, with legends, colour bars and note."""
     plot = _plot_height(prepared, width)
     heads = [_Head.of(panel, width, prepared.columns) for panel in prepared.panels]
     header = max(head.height for head in heads)
@@ -165,8 +175,10 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Head:
-    """What stands above the axes of a panel: the lines of its title, and below them the rows of its legend, whose
-    entries stand one below the other where they are `stacked`."""
+    """The part above the axes of a panel: the lines of its title, and the rows of its legend.
+
+    Entries of the legend stand one below the other if they are `stacked`.
+    """
 
     lines: tuple[str, ...]
     rows: int
@@ -174,9 +186,11 @@ class _Head:
 
     @classmethod
     def of(cls, panel: Panel, width: int, panels: int) -> _Head:
-        """As title and legend are broken where so many panels share this width [px]: entries stand in columns as wide
-        as the longest. Plotly breaks a row at the width of the figure alone, so beside other panels entries of more
-        than a row are stacked."""
+        """Break title and legend of a panel where so many panels share a width [px].
+
+        Entries stand in columns as wide as the longest. Plotly breaks a row at the width of the whole figure. Beside
+        other panels, entries that need several rows are therefore stacked.
+        """
         labels, own = _labels(panel), width // panels
         rows = key_rows(labels, own)
         stacked = panels > 1 and rows > 1
@@ -185,34 +199,43 @@ class _Head:
 
     @property
     def height(self) -> int:
-        """Of all of it [px]."""
+        """Return the height of title and legend [px]."""
         return TITLE * len(self.lines) + KEY_ROW * self.rows + SPACE
 
     def over(self, left: float, top: float) -> dict[str, Any]:
-        """The legend as plotly takes it, above axes that begin and end there, in shares of the figure, with the title
-        above its entries: those take fewer rows where there is more room."""
+        """Return the legend as plotly takes it, above axes at a place in shares of the figure.
+
+        The title stands above the entries, which take fewer rows if there is more room.
+        """
         place = {"x": left, "xanchor": "left", "y": top, "yanchor": "bottom", "bgcolor": "rgba(0,0,0,0)"}
         kind = {"orientation": "v", "maxheight": 1} if self.stacked else {"orientation": "h"}
         return {**kind, **place, **({"title": {**self._text, "side": "top"}} if self.lines else {})}
 
     def alone(self, left: float, top: float) -> dict[str, Any]:
-        """The title as plotly takes it where there is no legend, above axes that begin and end there, in shares of the
-        figure."""
+        """Return the title as plotly takes it without a legend.
+
+        It stands above axes at a place in shares of the figure.
+        """
         place = {"x": left, "xref": "paper", "xanchor": "left", "y": top, "yref": "paper", "yanchor": "bottom"}
         return {**self._text, "showarrow": False, **place, "yshift": SPACE - 4, "align": "left"}
 
     @property
     def _text(self) -> dict[str, Any]:
+        """Return the title in bold as plotly takes it."""
         return {"text": f"<b>{'<br>'.join(map(html.escape, self.lines))}</b>", "font": {"size": 13}}
 
 
 def _labels(panel: Panel) -> list[str]:
-    """The entries of the legend of a panel: none where there is a single one, or where colours tell numbers."""
+    """Return the entries of a panel's legend.
+
+    There are none for a single line, or where colours stand for numbers.
+    """
     labels = [item.label for item in (*panel.bands, *panel.series, *panel.markers) if item.label]
     return labels if len(labels) > 1 and not panel.coloured else []
 
 
 def _plot_height(figure: Figure, width: int) -> int:
+    """Return the height of the axes of a panel [px]."""
     if any(panel.equal for panel in figure.panels):
         return min(EQUAL_PLOTS.get(figure.columns, PLOT), max(width, PLOT))
     mapped = any(panel.coloured for panel in figure.panels)
@@ -220,7 +243,7 @@ def _plot_height(figure: Figure, width: int) -> int:
 
 
 def _columns(column: int, columns: int) -> tuple[float, float]:
-    """Left and right end of a column, as fractions of the width."""
+    """Return the left and right end of a column as fractions of the width."""
     width = (1 - GAP * (columns - 1)) / columns
     left = column * (width + GAP)
     return left, min(1.0, left + width)
@@ -234,7 +257,7 @@ def _add_panel(
     y_domain: tuple[float, float],
     links: dict[Axis, str],
 ) -> None:
-    """The axes of a panel; panels with equal x axes are zoomed together."""
+    """Add the axes of a panel; panels with equal x axes are zoomed together."""
     suffix = _suffix(number)
     shape = {"constrain": "domain"} if panel.equal else {}
     x_axis = _axis(panel.x) | {"domain": x_domain, "anchor": f"y{suffix}"} | shape
@@ -247,6 +270,7 @@ def _add_panel(
 
 
 def _axis(axis: Axis) -> dict[str, Any]:
+    """Return the settings of an axis as plotly takes them: scale, ticks, words and range."""
     settings: dict[str, Any] = {
         "title": {"text": html.escape(axis.label), "standoff": 8},
         "type": "log" if axis.log else "linear",
@@ -272,8 +296,11 @@ def _axis(axis: Axis) -> dict[str, Any]:
 
 
 def _log_ticks(limits: tuple[float, float] | None) -> dict[str, Any]:
-    """Decades; between them 2 and 5, or more, where they are too few: plotly alone writes 0.5 as "5". Where even these
-    are too few, about five round numbers."""
+    """Return the ticks of a logarithmic axis.
+
+    They are decades, with 2 and 5 or more between them if decades are too few; plotly alone would write 0.5 as "5". If
+    even these are too few, there are about five round numbers.
+    """
     decades = math.log10(limits[1] / limits[0]) if limits else math.inf
     if limits is None or decades >= 2:
         return {"dtick": 1}
@@ -289,7 +316,7 @@ def _log_ticks(limits: tuple[float, float] | None) -> dict[str, Any]:
 
 
 def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
-    """What is drawn in a panel, maps first, in the order of `drawable`."""
+    """Return what is drawn in a panel in the order of `drawable`, maps first."""
     suffix = _suffix(number)
     place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
     key = bool(_labels(panel))
@@ -303,30 +330,33 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
 
 
 def _area(band: Band, place: dict[str, Any]) -> dict[str, Any]:
+    """Return the trace of a filled band."""
     x, y = band.outline
     style = {"mode": "lines", "line": {"width": 0}, "fill": "toself", "fillcolor": band.colour, "hoverinfo": "skip"}
     return {"type": "scatter", "x": x, "y": y, "name": html.escape(band.label), **style, **place}
 
 
 def _line(line: Series, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
+    """Return the trace of a line."""
     style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash], "simplify": False}
     drawn = {"type": "scatter", "x": line.x, "y": line.y, "mode": "lines", "line": style, "connectgaps": False}
     return {**drawn, **_text(line.label, panel), **place}
 
 
 def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
+    """Return the trace of single points."""
     style = {"color": marker.colour, **SYMBOLS[marker.symbol]}
     drawn = {"type": "scatter", "x": marker.x, "y": marker.y, "mode": "markers", "marker": style}
     return {**drawn, **_text(marker.label, panel), **place}
 
 
 def _text(label: str, panel: Panel) -> dict[str, Any]:
-    """Name and hover text; plotly reads both as HTML."""
+    """Return name and hover text of a line; plotly reads both as HTML."""
     x_unit, y_unit = html.escape(panel.x.unit), html.escape(panel.y.unit)
     hover = f"%{{x:.5~g}} {x_unit}, %{{y:.5~g}} {y_unit}"
     return {"name": html.escape(label), "hovertemplate": hover}
 
 
 def _suffix(number: int) -> str:
-    """plotly counts axes x, x2, x3, ..."""
+    """Return the number that plotly adds to an axis: x, x2, x3, ..."""
     return "" if number == 0 else str(number + 1)

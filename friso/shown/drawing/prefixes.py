@@ -1,4 +1,4 @@
-"""Numbers as they are read: the SI prefix that suits them, ranges, shares in percent."""
+"""Write numbers as they are read: with the SI prefix that suits them, as ranges, in percent."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ SOLVED = 1e-9
 
 
 def choose(values: Array, unit: str, *, log: bool = False) -> tuple[float, str]:
-    """Factor and unit with prefix for `values` [unit]: prefixed value = factor * value.
+    """Return factor and unit with prefix for `values` [unit]: prefixed value = factor * value.
 
-    The unit is shown as it is on the axis that is spoken of: "m" as "rad" on a rotary one. The largest magnitude falls
-    between 1 and 1000 where a prefix allows it; on a logarithmic axis the middle of the range does. Units without
-    prefix (kg, m^2) keep the factor 1. Only finite values count.
+    The unit follows the kind of axis: "m" is "rad" on a rotary one. The largest magnitude falls between 1 and 1000 if a
+    prefix allows it. On a logarithmic axis, the middle of the range does. Units without prefix (kg, m^2) keep the
+    factor 1. Only finite values count.
     """
     unit = unit_shown(unit)
     symbol = unit.replace("**", "^").replace("/", "*").split("*")[0]
@@ -50,7 +50,7 @@ def choose(values: Array, unit: str, *, log: bool = False) -> tuple[float, str]:
 
 
 def pretty(unit: str) -> str:
-    """A unit as it is printed: "N*s/m^2" becomes "N·s/m²", and as it is on the axis that is spoken of."""
+    """Return a unit as it is printed: "N*s/m^2" becomes "N·s/m²". It follows the kind of axis."""
     unit = unit_shown(unit)
     for plain, raised in _POWERS.items():
         unit = unit.replace(plain, raised)
@@ -58,7 +58,7 @@ def pretty(unit: str) -> str:
 
 
 def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
-    """A value [unit] for a table or a sentence, e.g. "0.52 mm"; a dash where there is none."""
+    """Write a value [unit] for a table or a sentence, e.g. "0.52 mm"; a dash without a value."""
     if value is None or not math.isfinite(value):
         return NOTHING
     factor, text = choose(np.array([value]), unit)
@@ -69,30 +69,35 @@ def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
 
 
 def length_at_rest(value: float) -> str:
-    """How far [m] something still moves; below a nanometre the digits would be those of the solver."""
+    """Write how far [m] something still moves.
+
+    Below a nanometre, digits would be the solver's.
+    """
     return axis_shown().text("< 1 nm") if value < SOLVED else with_unit(value, "m")
 
 
 def digits_that_differ(values: Sequence[float]) -> int:
-    """Significant digits with which numbers that differ look different: three, or as many as that takes."""
+    """Return how many significant digits make different numbers look different, at least three."""
     return next(digits for digits in range(3, 18) if len({f"{x:.{digits - 1}e}" for x in values}) == len({*values}))
 
 
 def rounded_up(value: float, digits: int = 3) -> float:
-    """A positive value rounded to so many significant digits, never downward."""
+    """Round a positive value to so many significant digits, never downward."""
     unit = 10.0 ** (math.floor(math.log10(value) + 1e-12) - digits + 1)
     return math.ceil(value / unit - 1e-9) * unit
 
 
 def rounded_down(value: float, digits: int = 3) -> float:
-    """A positive value rounded to so many significant digits, never upward."""
+    """Round a positive value to so many significant digits, never upward."""
     unit = 10.0 ** (math.floor(math.log10(value) + 1e-12) - digits + 1)
     return math.floor(value / unit + 1e-9) * unit
 
 
 def range_with_unit(low: float, high: float, unit: str, digits: int = 3) -> str:
-    """A range [unit] for a table or a sentence, e.g. "1.72 to 10.8 mm"; a wide one has two prefixes, and one whose ends
-    have the same digits is a single number."""
+    """Write a range [unit] for a table or a sentence, e.g. "1.72 to 10.8 mm".
+
+    A wide range has two prefixes. A range whose ends have equal digits is a single number.
+    """
     factor, text = choose(np.array([low, high]), unit)
     if 0 < low * factor < 0.01:
         return f"{with_unit(low, unit, digits)} to {with_unit(high, unit, digits)}"
@@ -101,7 +106,10 @@ def range_with_unit(low: float, high: float, unit: str, digits: int = 3) -> str:
 
 
 def window_with_unit(low: float, high: float, searched: tuple[float, float], unit: str) -> str:
-    """Part of a range [unit] that was searched, in words; a part that ends with what was searched is open there."""
+    """Write the part of a searched range [unit] in words.
+
+    The part is open at an end that is an end of the search.
+    """
     if (low, high) == searched:
         return f"all from {range_with_unit(low, high, unit)}"
     if low == searched[0]:
@@ -110,34 +118,34 @@ def window_with_unit(low: float, high: float, searched: tuple[float, float], uni
 
 
 def plus_minus(half: float, unit: str, digits: int = 3) -> str:
-    """Half a range [unit] with the prefix that suits the whole of it, e.g. "±0.52 mm"."""
+    """Write half a range [unit] with the prefix that suits it, e.g. "±0.52 mm"."""
     factor, text = choose(np.array([2 * half]), unit)
     return f"±{half * factor:.{digits}g} {text}"
 
 
 def share_with_interval(share: Share) -> str:
-    """A share and its interval in percent; what is not 0 or 100 % does not look like that."""
+    """Write a share and its interval in percent; only exact shares look like 0 or 100 %."""
     middle = f"{percentage(share.probability)} %" if math.isfinite(share.probability) else "unknown"
     return f"{middle} ({percentage(share.low)} to {percentage(share.high)} %)"
 
 
 def percent_range(low: float, high: float) -> str:
-    """Two shares in percent, with one sign."""
+    """Write two shares in percent with one sign."""
     return f"{percent(low).removesuffix(' %')} to {percent(high)}"
 
 
 def percentage(part: float) -> str:
-    """A part of one in percent, without the sign, to a tenth; to a hundredth next to 0 and 100."""
+    """Write a part of one in percent without the sign, to a tenth; to a hundredth near 0 and 100."""
     return f"{100 * part:.{1 if part in (0, 1) or 0.001 <= part <= 0.999 else 2}f}"
 
 
 def listed(parts: Sequence[str], word: str) -> str:
-    """ "a", "a or b", "a, b or c" with the word "or"."""
+    """Join parts by commas and a word: "a", "a or b", "a, b or c"."""
     return f" {word} ".join(part for part in (", ".join(parts[:-1]), *parts[-1:]) if part)
 
 
 def _significant(number: float, digits: int) -> str:
-    """`digits` significant digits without an exponent: 1234.5 stays 1234 rather than become 1.23e+03."""
+    """Write `digits` significant digits without an exponent: 1234.5 becomes 1234, not 1.23e+03."""
     if number == 0:
         return "0"
     decimals = max(0, digits - 1 - math.floor(math.log10(abs(number)) + 1e-12))

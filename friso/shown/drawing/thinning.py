@@ -1,4 +1,4 @@
-"""Thinning of long lines by minimum and maximum, so that a spike of one sample survives."""
+"""Thin long lines by minimum and maximum, so that a spike of one sample survives."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ KEPT = 5  # at most this many samples of a bucket are kept: the extremes of x an
 
 
 def thin(x: Array, y: Array, buckets: int = BUCKETS) -> tuple[Array, Array]:
-    """Samples of the line (x, y), in order, that look like all of it.
+    """Return samples of the line (x, y), in order, that look like all of it.
 
-    x, y: shape (n,), any unit, NaN where the line is broken. Lines of up to KEPT * buckets samples come back as they
-    are. Of a longer one are kept: its first and last sample and, in each bucket of neighbouring samples, those with the
-    smallest and largest y and x (the first of equal ones) and the first gap. Buckets hold equally many samples; where x
-    runs to and fro (a loop) they are equally long pieces of the path instead, so that a state that rests for seconds
-    takes no samples from one that moves.
+    x and y have shape (n,) and any unit; NaN breaks the line. Lines of up to KEPT * buckets samples are returned as
+    they are. Of a longer line, the first and last sample are kept. In each bucket of neighbouring samples, the ones
+    with the smallest and largest y and x are kept, and the first gap. Of equal samples, the first counts.
+
+    Buckets hold equally many samples. If x runs to and fro, as in a loop, they are equally long pieces of the path
+    instead. A state that rests for seconds then takes no samples from one that moves.
     """
     if len(x) <= KEPT * buckets:
         return x, y
@@ -38,7 +39,7 @@ def thin(x: Array, y: Array, buckets: int = BUCKETS) -> tuple[Array, Array]:
 
 
 def _starts(x: Array, y: Array, buckets: int) -> np.ndarray:
-    """The first sample of every bucket: strictly rising."""
+    """Return the first sample of every bucket, strictly rising."""
     count = len(x)
     if not np.any(np.diff(x) < 0):
         return count * np.arange(buckets) // buckets
@@ -48,7 +49,10 @@ def _starts(x: Array, y: Array, buckets: int) -> np.ndarray:
 
 
 def _steps(values: Array) -> Array:
-    """Length of each step along one axis, as a fraction of the axis; gaps count as no way. Shape (n,)."""
+    """Return the length of each step along one axis as a fraction of the axis, shape (n,).
+
+    Gaps have no length.
+    """
     finite = values[np.isfinite(values)]
     span = float(np.ptp(finite)) if finite.size else 0.0
     if span == 0.0:

@@ -1,1 +1,1 @@
-"""How results are shown, one file a kind of experiment: each declares its `VIEW`, under the name of the kind."""
+"""Show results of experiments; each module declares the `VIEW` of the kind that it is named after."""

@@ -1,4 +1,4 @@
-"""How break-away ramps are shown."""
+"""Show the results of break-away ramps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How constant speeds are shown."""
+"""Show the results of motion at constant speeds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How frequency responses are shown."""
+"""Show the results of frequency responses."""
 
 from __future__ import annotations
 
@@ -82,8 +82,9 @@ def _headline(bench: Bench) -> str:
 
 
 def _without_units(force: str, motion: str) -> str:
-    """Say what units, "1" where the log states none, keep masses and stiffness out of the stage
-    file.
+    """Say which units keep masses and stiffness out of the stage file.
+
+    A unit "1" means that the log states none.
     """
     wanted = "masses and stiffness need N and m to enter the stage file"
     silent = " and the ".join(name for name, unit in (("force", force), ("motion", motion)) if unit == "1")

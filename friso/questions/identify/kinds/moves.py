@@ -1,4 +1,4 @@
-"""How moves are shown."""
+"""Show the results of moves."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from friso.shown.drawing.figure import Figure
 from friso.shown.drawing.prefixes import range_with_unit
 
 FALLING = "viscous friction below zero: friction falls as the speed rises (Stribeck effect), which this model lacks"
-"""What a negative viscous friction of the inverse model means."""
+"""Meaning of a negative viscous friction of the inverse model."""
 
 
 def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:
@@ -144,8 +144,9 @@ def _profile_numbers(profile: Profile) -> dict[str, Any]:
 
 
 def _headline(moves: IdentifiedMoves) -> str:
-    """Say what is identified per unit of a force that is not in newtons, which no stage file
-    takes.
+    """Say what is identified if the force is not in newtons, which no stage file takes.
+
+    Values are then per unit of that force.
     """
     if moves.force_unit == "N":
         return ""
@@ -157,8 +158,9 @@ def _headline(moves: IdentifiedMoves) -> str:
 
 
 def _prediction_sentence(simulated: SimulatedLog) -> str:
-    """Say how well another log is predicted, and how far machines drawn from the estimates go
-    from it.
+    """Say how well another log is predicted.
+
+    The sentence also says how far machines drawn from the estimates differ from it.
     """
     settings = OutputErrorSettings.current()
     errors, apart = simulated.errors, simulated.apart

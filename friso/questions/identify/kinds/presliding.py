@@ -1,4 +1,4 @@
-"""How motion before sliding is shown."""
+"""Show the results of motion before sliding."""
 
 from __future__ import annotations
 

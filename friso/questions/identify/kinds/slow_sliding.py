@@ -1,4 +1,4 @@
-"""How slow sliding is shown."""
+"""Show the results of slow sliding."""
 
 from __future__ import annotations
 
@@ -36,9 +36,7 @@ def _numbers(result: SlowSliding) -> dict[str, Any]:
 
 
 def _figures(result: SlowSliding, logs: Sequence[Source], name: str) -> list[Figure]:
-    """Draw friction over velocity as it was and as the model has it, and both over time at its
-    end.
-    """
+    """Draw measured and modelled friction, over velocity and over time."""
     if not len(result.model):
         return []
     caption, panels = slow_sliding_caption(result), slow_sliding_panels(result)
@@ -62,6 +60,7 @@ def slow_sliding_panels(result: SlowSliding) -> tuple[Panel, ...]:
     thinned = slice(None, None, max(len(result.time) // POINTS, 1))
 
     def both(x: np.ndarray) -> tuple[Series, ...]:
+        """Draw measured and modelled friction over a signal."""
         return (
             Series(x[thinned], result.friction[thinned], "force less inertia", INK, width=1.4),
             Series(x[thinned], result.model[thinned], "LuGre's bristles", ORANGE, "dashed", 1.0),

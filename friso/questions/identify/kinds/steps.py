@@ -1,4 +1,4 @@
-"""How position steps are shown."""
+"""Show the results of position steps."""
 
 from __future__ import annotations
 

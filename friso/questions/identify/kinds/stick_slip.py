@@ -1,4 +1,4 @@
-"""How stick-slip is shown."""
+"""Show the results of stick-slip."""
 
 from __future__ import annotations
 
@@ -74,8 +74,9 @@ def _figures(result: StickSlip, logs: Sequence[Source], name: str) -> list[Figur
 
 
 def _broken(values: np.ndarray, log: Log) -> np.ndarray:
-    """Break the line of a signal of shape (n,) at the gaps of a log: without the last sample
-    before each.
+    """Break the line of a signal of shape (n,) at the gaps of a log.
+
+    The last sample before each gap becomes NaN.
     """
     broken = values.astype(float)
     broken[[part.stop - 1 for part in log.segments[:-1]]] = np.nan

@@ -1,1 +1,1 @@
-"""How outcomes of the rig's experiments are shown, one file each: each declares its `VIEW`."""
+"""Show the outcomes of the rig's experiments; each module declares the `VIEW` of one."""

@@ -1,4 +1,4 @@
-"""What constant speed on the rig shows of dynamic friction, and what it does not (thesis, Fig. 21)."""
+"""Show how much of the dynamic friction constant speed on the rig reveals (thesis, Fig. 21)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """Friction along the rail, its truth, and what many speeds and slow sliding show."""
+    """Say what the experiment shows of friction along the rail and over speed, beside the truth."""
     result: ConstantSpeedResult = outcome.result
     lines = [f"Joint {case.name}: {case.place.verdict}" for case in result.cases]
     for case in result.cases:
@@ -41,7 +41,7 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def _slow(result: ConstantSpeedResult) -> list[str]:
-    """What slow sliding shows."""
+    """Say what slow sliding shows of friction."""
     if not result.slow:
         return []
     head = "Slow sliding, joint locked, at the edge of steady motion, with the true mass and bristles:"
@@ -49,6 +49,7 @@ def _slow(result: ConstantSpeedResult) -> list[str]:
 
 
 def _slow_place(sliding: Slow) -> str:
+    """Write the friction identified at one place, beside its true values."""
     names = ("Coulomb friction", "static friction", "the Stribeck velocity")
     flat = sliding.log.stage.flat()
     true = [*sliding.true, flat["friction.stribeck_velocity"]]
@@ -64,19 +65,20 @@ def _slow_place(sliding: Slow) -> str:
 
 
 def _start(log: RigLog) -> str:
-    """The place where a log begins."""
+    """Write the position at which a log begins."""
     places = log.true.get("cart_position", log.true["position"])
     return with_unit(float(places[0]), "m") if len(places) else "nowhere"
 
 
 def _many(result: ConstantSpeedResult) -> list[str]:
-    """What the many speeds show, at each place."""
+    """Say what many speeds show of friction at each place."""
     crossover = with_unit(result.many.crossover, "Hz")
     head = f"Many speeds, joint locked, crossover {crossover}:"
     return [head, *(_place(number, place) for number, place in enumerate(result.many.places, start=1))]
 
 
 def _place(number: int, place: PlaceOnRail) -> str:
+    """Write the friction identified at one place, with the speeds reached and what stays unknown."""
     both, reached = place.velocity.both, np.abs(place.velocity.velocities)
     named = (("Coulomb friction", both.coulomb), ("viscous friction", both.viscous))
     named += (("static friction", both.static), ("the Stribeck velocity", both.stribeck_velocity))
@@ -94,7 +96,7 @@ def _place(number: int, place: PlaceOnRail) -> str:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Force against position at both speeds, a column for each state of the joint."""
+    """Draw force over position at both speeds, friction over velocity, and slow sliding."""
     result: ConstantSpeedResult = outcome.result
     panels = tuple(
         Panel(
@@ -115,7 +117,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def _in_slow_sliding(outcome: Outcome) -> list[Figure]:
-    """The friction at the first place."""
+    """Draw the friction in slow sliding at the first place that shows it."""
     result: ConstantSpeedResult = outcome.result
     places = [sliding.result for sliding in result.slow if len(sliding.result.model)]
     if not places:
@@ -125,7 +127,7 @@ def _in_slow_sliding(outcome: Outcome) -> list[Figure]:
 
 
 def _over_velocity(outcome: Outcome) -> Figure:
-    """Friction of the many speeds against the speed, and as it truly is, for each place."""
+    """Draw friction over speed, as measured and as it truly is, for each place."""
     many: ManySpeeds = outcome.result.many
     lines, points = [], []
     for number, (place, colour) in enumerate(zip(many.places, COLOURS, strict=False), start=1):
@@ -144,7 +146,7 @@ def _over_velocity(outcome: Outcome) -> Figure:
 
 
 def _lines(passes: Passes, speeds: tuple[float, ...]) -> list[Series]:
-    """The forward passes."""
+    """Return the force over position of each forward pass."""
     forward = [record for record in passes.place.passes if record.velocity > 0]
     return [
         Series(record.places, record.force, with_unit(speed, "m/s"), colour)
@@ -153,7 +155,7 @@ def _lines(passes: Passes, speeds: tuple[float, ...]) -> list[Series]:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """As JSON."""
+    """Return the results for the JSON document."""
     result: ConstantSpeedResult = outcome.result
     return {"speeds_m_per_s": [*result.speeds], "cases": {case.name: _numbers(case) for case in result.cases}} | {
         "many_speeds": {
@@ -165,6 +167,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
 
 
 def _place_numbers(place: PlaceOnRail) -> dict[str, Any]:
+    """Return the friction measured at one place, beside the true friction."""
     velocity = place.velocity
     both = (velocity.both.coulomb, velocity.both.viscous, velocity.both.static, velocity.both.stribeck_velocity)
     return {
@@ -178,6 +181,7 @@ def _place_numbers(place: PlaceOnRail) -> dict[str, Any]:
 
 
 def _estimates_document(estimates: Sequence[Estimate]) -> dict[str, Any]:
+    """Return identified estimates with intervals, and the reason for each that is missing."""
     return {
         "shown": {
             e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in estimates if e.determined
@@ -187,6 +191,7 @@ def _estimates_document(estimates: Sequence[Estimate]) -> dict[str, Any]:
 
 
 def _numbers(passes: Passes) -> dict[str, Any]:
+    """Return friction along the rail with the joint in one state."""
     coulomb = passes.velocity.both.coulomb
     return {
         "separated": passes.place.separated,

@@ -1,4 +1,7 @@
-"""What frequency responses on the rig show: plants, mass lines, open loops, the highest stable setting."""
+"""Show frequency responses on the rig.
+
+These are plants, mass lines, open loops, and the highest stable setting.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,7 @@ COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION, PINK)
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """The results in sentences."""
+    """Say which masses, modes and crossovers the frequency responses show."""
     result: Frf = outcome.result
     measured = [loop for loop in result.loops if loop.measured]
     last = measured[-1]
@@ -63,7 +66,7 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Fig. 17 and 29, 18, 22 and 23 of the thesis."""
+    """Draw the plants and open loops as in Fig. 17, 29, 18, 22 and 23 of the thesis."""
     result: Frf = outcome.result
     subject = outcome.stage.name
     return [
@@ -75,7 +78,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def _plant(name: str, title: str, plant: Plant, subject: str) -> Figure:
-    """All identifications, their average and the mass line, as magnitude over phase."""
+    """Draw magnitude over phase of all identifications, their average and the mass line."""
     hertz, average = plant.averaged.frequency, plant.averaged.response
     singles = [single.response for single in plant.single]
     angles = [_turned(single, average) for single in singles]
@@ -110,13 +113,13 @@ def _plant(name: str, title: str, plant: Plant, subject: str) -> Figure:
 
 
 def _turned(response: Array, average: Array) -> Array:
-    """The phase [deg] of a response in the turns in which that of the average is."""
+    """Return the phase [deg] of a response, in the same turns as the phase of the average."""
     angle = phases([average])[0]
     return angle + np.degrees(np.angle(response / average))
 
 
 def _loops(name: str, title: str, loops: tuple[MeasuredLoop, ...], subject: str) -> Figure:
-    """Open loops, magnitude over phase."""
+    """Draw the magnitude and phase of open loops."""
     named = [(loop, colour) for loop, colour in zip(loops, COLOURS, strict=False) if loop.measured]
     gains = tuple(
         Series(loop.response.frequency, np.abs(loop.response.response), f"tuned to {loop.tuned:.3g} Hz", colour)
@@ -142,6 +145,7 @@ def _loops(name: str, title: str, loops: tuple[MeasuredLoop, ...], subject: str)
 
 
 def _crossings(loop: MeasuredLoop) -> str:
+    """Write the crossovers of a loop with their intervals."""
     if not loop.measured:
         return "not stable"
     return (
@@ -151,6 +155,7 @@ def _crossings(loop: MeasuredLoop) -> str:
 
 
 def _mass(mass: Estimate) -> str:
+    """Write an identified mass with its interval, or why there is none."""
     return (
         f"{mass.value:.3g} {pretty('kg')} ({mass.low:.3g} to {mass.high:.3g})"
         if mass.determined
@@ -159,7 +164,7 @@ def _mass(mass: Estimate) -> str:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """As JSON."""
+    """Return the results for the JSON document."""
     result: Frf = outcome.result
     plants = {"locked": result.locked, "free": result.free}
     return {
@@ -176,6 +181,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
 
 
 def _numbers(plant: Plant) -> dict[str, Any]:
+    """Return the plant with the joint in one state."""
     averaged: FrequencyResponse = plant.averaged
     return {
         "mass_kg": plant.mass.value,
@@ -189,6 +195,7 @@ def _numbers(plant: Plant) -> dict[str, Any]:
 
 
 def _loop_numbers(loop: MeasuredLoop) -> dict[str, Any]:
+    """Return the crossovers of a loop."""
     return {"tuned_hz": loop.tuned, "crossings_hz": [crossing.value for crossing in loop.crossings]}
 
 

@@ -1,4 +1,7 @@
-"""What `friso rig hunting` shows: Fig. 24 and 25 of the thesis, and the share of rails with counted peaks."""
+"""Show the results of `friso rig hunting`.
+
+These are Fig. 24 and 25 of the thesis, and the share of rails with counted peaks.
+"""
 
 from __future__ import annotations
 
@@ -42,12 +45,15 @@ AFTERWARDS = 5.0
 
 
 def rails_text(share: Share, count: int) -> str:
-    """A share of rails with its interval, in words."""
+    """Write a share of rails with its interval."""
     return f"{round(share.probability * count)} of {count} rails ({percent(share.low)} to {percent(share.high)})"
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """Where peaks are counted and what swings on, by crossover, on the stage's own rail and on repeated ones."""
+    """Say at which crossovers peaks are counted and the stage swings on.
+
+    Results on the stage's own rail stand beside results on repeated rails.
+    """
     moves: HuntingResult = outcome.result
     first = moves.plotted[0]
     count = len(moves.rails)
@@ -62,7 +68,7 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def _swings(moves: HuntingResult) -> str:
-    """The swings at the stage's own crossover with the joint locked."""
+    """Describe the swings at the stage's own crossover with the joint locked."""
     runs = moves.cases["locked"]
     swings, counted = runs.swings[moves.plotted[0]], int(runs.counted[moves.plotted[0]].sum())
     if not swings.any():
@@ -76,7 +82,7 @@ def _swings(moves: HuntingResult) -> str:
 
 
 def _limit(moves: HuntingResult, case: str) -> str:
-    """Up to where peaks are counted, on any rail and on the one shown."""
+    """Say up to which crossover peaks are counted, on any rail and on the one shown."""
     last, on_rail = moves.limit(case), moves.limit(case, moves.rail)
     if np.isnan(last):
         return f"no peaks are counted from {moves.crossovers[0]:.3g} to {moves.crossovers[-1]:.3g} Hz."
@@ -91,7 +97,7 @@ def _limit(moves: HuntingResult, case: str) -> str:
 
 
 def _started(moves: HuntingResult) -> list[str]:
-    """What a release starts that the move does not."""
+    """Say on how many rails a release starts hunting that the move does not start."""
     counts = [
         f"{int(moves.cases['locked'].counted[row].sum())} and {int(moves.can_start[row].sum())} of {len(moves.rails)} "
         f"at {moves.crossovers[row]:.3g} Hz"
@@ -113,13 +119,14 @@ def _started(moves: HuntingResult) -> list[str]:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Fig. 24, Fig. 25, a start by release, and the share of rails over the crossover."""
+    """Draw Fig. 24 and 25, the share of rails over the crossover, and a start by release."""
     moves: HuntingResult = outcome.result
     figures = [_locked_and_free(moves), _crossovers(moves), _shares(moves)]
     return [*figures, _startable(moves)] if moves.startable is not None else figures
 
 
 def _locked_and_free(moves: HuntingResult) -> Figure:
+    """Draw the position after the move with the joint locked and free (Fig. 24)."""
     row = moves.plotted[0]
     lines = tuple(
         Series(t.time, t.deviation + moves.distance, f"joint {case}", COLOURS[case])
@@ -146,23 +153,26 @@ def _locked_and_free(moves: HuntingResult) -> Figure:
 
 
 def _on(moves: HuntingResult) -> str:
+    """Name the rail that is shown, if there are several."""
     return _rail(moves, moves.rail, ",")
 
 
 def _rail(moves: HuntingResult, number: int, before: str) -> str:
-    """A rail by its name, where there are several; a stage file without [rail] has one without a name."""
+    """Name a rail, if there are several; a stage file without [rail] has a single nameless one."""
     return f"{before} rail {moves.rails[number]:.0f}" if len(moves.rails) > 1 else ""
 
 
 def _reach(traces: list[Trace]) -> float:
-    """Half the height [m] of a panel that shows what remains after the move."""
+    """Return half the height [m] of a panel that shows what remains after the move."""
     late = [np.abs(t.deviation[t.time >= AFTERWARDS]).max() for t in traces]
     return 1.6 * max(float(np.nanmax(late)), 2 * COUNTED_ABOVE)
 
 
 def _crossovers(moves: HuntingResult) -> Figure:
-    """One panel for each case, a line for each crossover of the thesis and the one beyond which no peaks are
-    counted."""
+    """Draw the error after the move at several crossovers, with the joint locked and free.
+
+    These are the thesis's crossovers, and the one beyond which no peaks are counted.
+    """
     panels = []
     reach = _reach([moves.traces["locked", row] for row in moves.plotted])
     for case in COLOURS:
@@ -183,6 +193,7 @@ def _crossovers(moves: HuntingResult) -> Figure:
 
 
 def _shares(moves: HuntingResult) -> Figure:
+    """Draw the share of rails with counted peaks over the crossover, with its interval."""
     bands, lines = [], []
     for case, colour in COLOURS.items():
         shares = moves.shares(case)
@@ -203,6 +214,7 @@ def _shares(moves: HuntingResult) -> Figure:
 
 
 def _startable(moves: HuntingResult) -> Figure:
+    """Draw a run that rests after the move, but swings after a release."""
     startable = moves.startable
     assert startable is not None
     both = (
@@ -223,7 +235,7 @@ CRITERIA = {"outcome": OUTCOME, "band_m": BAND, "distinct_peaks": DISTINCT_CRITE
 
 
 def runs_document(runs: RailRuns) -> dict[str, Any]:
-    """What became of runs, as a document: arrays of the shape of the runs."""
+    """Return the outcomes of runs as arrays of the shape of the runs."""
     return {
         "distinct_peaks": runs.peaks.tolist(),
         "outcome": runs.outcome.tolist(),
@@ -233,12 +245,12 @@ def runs_document(runs: RailRuns) -> dict[str, Any]:
 
 
 def share_document(share: Share) -> dict[str, float]:
-    """A share and its 95 % interval."""
+    """Return a share and its 95 % interval."""
     return {"share": share.probability, "low": share.low, "high": share.high}
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """All results."""
+    """Return all results for the JSON document."""
     moves: HuntingResult = outcome.result
     cases = {
         case: {**runs_document(runs), "counted": [share_document(share) for share in moves.shares(case)]}

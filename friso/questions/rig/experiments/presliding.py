@@ -1,4 +1,4 @@
-"""What small motion on the rig shows of the bearing's bristles."""
+"""Show how much small motion on the rig reveals of the bearing's bristles."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROWS = 4
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """The results in sentences."""
+    """Say which stiffness and damping of the bristles each place shows, beside the truth."""
     result: Bristles = outcome.result
     lines = [f"Place {number}: {_place(place)}." for number, place in enumerate(result.by_place, start=1)]
     stiffness, damping = with_unit(result.stiffness, "N/m", 4), with_unit(result.damping, "N*s/m", 4)
@@ -31,6 +31,7 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def _place(result: Presliding) -> str:
+    """Write the bristles identified at one place."""
     estimates = {"stiffness": result.stiffness, "damping": result.damping, "moving mass": result.mass}
     return "; ".join(
         f"{words} {with_interval(estimate)}" if estimate.determined else f"{words} not shown ({estimate.reason})"
@@ -39,7 +40,7 @@ def _place(result: Presliding) -> str:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Force and model at the first place that shows the bristles, and the loops."""
+    """Draw force and model at the first place that shows the bristles, and the loops."""
     bristles: Bristles = outcome.result
     result = next((place for place in bristles.by_place if len(place.model)), None)
     small = [] if result is None else [_small(result, outcome)]
@@ -47,6 +48,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def _small(result: Presliding, outcome: Outcome) -> Figure:
+    """Draw small motion before sliding, with the model of mass and bristles."""
     title = "Small motion before sliding"
     return Figure(
         "rig_presliding", title, presliding_caption(result), presliding_panels(result), subject=outcome.stage.name
@@ -54,7 +56,7 @@ def _small(result: Presliding, outcome: Outcome) -> Figure:
 
 
 def _loops(bristles: Bristles, outcome: Outcome) -> Figure:
-    """Force over displacement, from the smallest loop on."""
+    """Draw force over displacement, from the smallest loop to the largest."""
     panels = []
     for share, log in zip(LOOPS, bristles.loops, strict=True):
         displacement = log.logged["position"] - log.logged["position"][:1]
@@ -69,7 +71,7 @@ def _loops(bristles: Bristles, outcome: Outcome) -> Figure:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """As JSON."""
+    """Return the results for the JSON document."""
     bristles: Bristles = outcome.result
     places = [
         {

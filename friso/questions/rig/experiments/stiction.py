@@ -1,4 +1,4 @@
-"""What slow motion on the rig shows of static friction (thesis, Fig. 20)."""
+"""Show how much slow motion on the rig reveals of static friction (thesis, Fig. 20)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from friso.studies.rig.outcome import Outcome
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """The results in sentences."""
+    """Say at which forces the cart breaks away, beside the true static friction."""
     result: Stiction = outcome.result
     forces, within = result.forces, rails_within_interval(result)
     rails = len(result.by_rail)
@@ -33,13 +33,13 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def rails_within_interval(result: Stiction) -> np.ndarray:
-    """On which rails the interval holds the middle of the true static friction, shape (rails,)."""
+    """Tell on which rails the interval holds the mean of the true static friction, shape (rails,)."""
     middles = result.true.mean(axis=1)
     return np.array([slips.static.holds(middle) for slips, middle in zip(result.by_rail, middles, strict=True)])
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Position, relative position and velocity against time on the first rail; break-away forces on all."""
+    """Draw the motion over time on the first rail, and the break-away forces on all rails."""
     result: Stiction = outcome.result
     log, first = outcome.logs[0], result.by_rail[0]
     time: Array = np.arange(len(first.pull), dtype=np.float64) * log.interval
@@ -70,7 +70,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def _rails(result: Stiction, subject: str) -> Figure:
-    """Break-away forces by rail, over the true static friction."""
+    """Draw the break-away forces of each rail over the true static friction."""
     numbers_ = np.arange(1.0, len(result.by_rail) + 1)
     rows = np.concatenate([np.full(len(slips.forces), n) for n, slips in zip(numbers_, result.by_rail, strict=True)])
     truth = Band(numbers_, result.true[:, 0], result.true[:, 1], "true static friction along the travel", "#cfdfee")
@@ -87,7 +87,7 @@ def _rails(result: Stiction, subject: str) -> Figure:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """As JSON."""
+    """Return the results for the JSON document."""
     result: Stiction = outcome.result
     rows = [
         {

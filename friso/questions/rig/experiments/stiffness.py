@@ -1,4 +1,4 @@
-"""What position steps on the rig show of the joint's stiffness (thesis, Fig. 19)."""
+"""Show how much position steps on the rig reveal of the joint's stiffness (thesis, Fig. 19)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from friso.studies.rig.outcome import Outcome
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """The results in sentences."""
+    """Say which joint stiffness the steps give, beside the true one."""
     result: Stiffness = outcome.result
     read = result.steps.stiffness
     if not read.determined:
@@ -30,7 +30,7 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Position over force against time."""
+    """Draw position and force over time."""
     result: Stiffness = outcome.result
     (log,) = outcome.logs
     time, seconds = result.steps.time, Axis("Time", "s")
@@ -59,7 +59,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """As JSON."""
+    """Return the results for the JSON document."""
     result: Stiffness = outcome.result
     read = result.steps.stiffness
     return {
