@@ -40,7 +40,7 @@ def measure(rtol: float, repetitions: int) -> dict[str, list[float | str]]:
 
 
 def measured_on(name: str, rtol: float, repetitions: int) -> dict[str, tuple[float, np.ndarray]]:
-    """The same in a process of its own, with code for the named processor."""
+    """Time the maps in a process of its own, with code for the named processor."""
     command = [sys.executable, "-m", "benchmarks.processors", "--child", str(rtol), str(repetitions)]
     done = subprocess.run(command, env={**os.environ, PROCESSOR_VARIABLE: name}, stdout=subprocess.PIPE, check=True)
     maps = json.loads(done.stdout)

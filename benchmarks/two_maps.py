@@ -77,7 +77,7 @@ def _count(chunk: Runs) -> np.ndarray:
 
 
 def _measured_map(case: Map, rtol: float) -> None:
-    """The same with all measures that `friso.sweep` reports."""
+    """Run a map with all measures that `friso.sweep` reports."""
     for chunk in run_chunks(case.rig.kernel, case.flat, len(case.prototype), measuring_options(rtol)):
         measure_runs(chunk.part(case.flat), chunk)
 

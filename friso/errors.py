@@ -45,20 +45,20 @@ class InputError(ValueError):
 
     @classmethod
     def of(cls, error: "InputError") -> Self:
-        """The same error as one of this kind."""
+        """Make an error of this kind of another one; all that it says stays."""
         return cls(error.key, error.actual, error.expected, error.example, error.origin, error.also)
 
     def under(self, table: str) -> Self:
-        """The same error, its keys seen from one level further out."""
+        """Return a copy whose keys begin with the name of the table around them."""
         also = tuple((_dotted(table, key), actual) for key, actual in self.also)
         return type(self)(_dotted(table, self.key), self.actual, self.expected, self.example, self.origin, also)
 
     def found_in(self, origin: str) -> Self:
-        """The same error, saying which file or option it comes from."""
+        """Return a copy that names the file or option it comes from."""
         return type(self)(self.key, self.actual, self.expected, self.example, origin, self.also)
 
     def together(self, others: "Iterable[InputError]") -> Self:
-        """The same error, which says what else is wrong."""
+        """Return a copy that also says what else is wrong."""
         also = (pair for error in others for pair in ((error.key, error.actual), *error.also))
         return type(self)(
             self.key, self.actual, self.expected, self.example, self.origin, tuple(dict.fromkeys((*self.also, *also)))

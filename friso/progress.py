@@ -118,4 +118,4 @@ class WorkClock:
 
 
 WORK_CLOCK = WorkClock()
-"""That of this process."""
+"""The clock of the work that this process does."""

@@ -205,7 +205,7 @@ class Number:
     unit = ""
 
     def on(self, kind: AxisKind) -> Self:
-        """The same on an axis of any kind."""
+        """Return itself: a bare number has no unit that the kind of axis could change."""
         return self
 
     @property
@@ -345,7 +345,7 @@ def _root(unit: str) -> tuple[float, dict[str, float], list[str]]:
 
 
 def by_pint(unit: str) -> tuple[float, dict[str, float], list[str]]:
-    """The same by pint."""
+    """Ask pint for the factor to its root units, these with their powers, and the names in a unit. Raises _Refused."""
     try:
         units = _registry().parse_units(unit)
         factor, root = _registry().get_root_units(units)

@@ -1,6 +1,9 @@
 """The house: what stands where, so that the fifth example of a pattern goes where the first four are."""
 
 import ast
+import importlib
+import importlib.util
+import inspect
 import re
 from collections import defaultdict
 from collections.abc import Iterator
@@ -15,6 +18,8 @@ import friso_thesis
 from friso import hunting
 from friso.cli.app import command_line
 from friso.hunting import criteria, measures
+from friso.interface.answer import Answer
+from friso.interface.question import QUESTIONS
 
 PACKAGE, THESIS = (Path(str(package.__file__)).parent for package in (friso, friso_thesis))
 ROOT = Path(__file__).parents[1]
@@ -47,6 +52,15 @@ RECIPES = {
 }
 """What CONTRIBUTING.md tells how to add, and the folder that takes its one file."""
 
+
+SHOWN_BY = {
+    **dict.fromkeys(("sentences", "blocks", "tables", "details"), ("words", 0)),
+    "next_steps": ("words", 1),
+    "figures": ("figures", 0),
+    "document": ("document", 0),
+    "files": ("page", 0),
+}
+"""Methods of answers to the modules of a question's folder that show them, and what those take beside the answer."""
 
 INTERFACE = {module.__name__: {*module.__all__} for module in (hunting, criteria, measures)}
 """What friso.hunting offers to other floors, to benchmarks, and to tests that are not of its inner modules."""
@@ -163,6 +177,22 @@ def test_files_and_documents_of_commands_are_made_in_the_same_places() -> None:
             if not path.exists() or f"def {function}(" not in path.read_text(encoding="utf-8"):
                 missing.append(f"{path.relative_to(package)}: {function}")
     assert missing == []
+
+
+def test_what_shows_an_answer_takes_what_answers_hand_over() -> None:
+    """Where the class of an answer leaves a method to a function of its question's folder, that takes the subject."""
+    wrong = []
+    for name, question in QUESTIONS.items():
+        module = importlib.import_module(question.module)
+        classes = [item for item in vars(module).values() if isinstance(item, type) and issubclass(item, Answer)]
+        for answer in (item for item in classes if item.__module__ == module.__name__):
+            for method, (place, more) in SHOWN_BY.items():
+                path = f"{question.package}.{place}"
+                own = f"{question.package.rpartition('.')[2]}_{method}" if place != "words" else method
+                shown = getattr(importlib.import_module(path), own, None) if importlib.util.find_spec(path) else None
+                if shown and method not in vars(answer) and len(inspect.signature(shown).parameters) != 1 + more:
+                    wrong.append(f"{name}: {answer.__name__}.{method}")
+    assert wrong == []
 
 
 @pytest.mark.parametrize("kind", RECIPES)

@@ -36,7 +36,7 @@ class DesignSettings(Settings):
     """A geometry that meets all requirements is found by then, or there is none."""
 
     front_seed: int = setting(34, "")
-    """The same front for the same specification."""
+    """Any number does; a fixed one gives equal fronts for equal specifications."""
 
     map_crossovers: int = setting(24, "")
     """Fewer show steps in the edge; each is a search of a cell."""
@@ -60,10 +60,10 @@ class DesignSettings(Settings):
     """Over Young's modulus times the stroke; of the thesis's limiter it is 0.105."""
 
     stop_damping: float = setting(0.016, "")
-    """Of the thesis's limiter with its stage."""
+    """Damping ratio of the stop; the thesis's limiter has it with its stage."""
 
     leaves_seed: int = setting(36, "")
-    """The same leaves for the same joint."""
+    """Any number does; a fixed one gives equal leaves for equal joints."""
 
     leaves_generations: int = setting(60, "")
     """Fewer have not converged; the search takes a second."""
@@ -123,7 +123,7 @@ class DesignSettings(Settings):
     """Hunting is not monotonous in static friction and gap: the middle counts too."""
 
     population_seed: int = setting(6, "")
-    """The same machines for the same specification."""
+    """Any number does; a fixed one draws equal machines for equal specifications."""
 
     return_after: float = setting(5.0, "s")
     """As in the thesis's path: a stage that hunts has shown it by then."""
@@ -138,7 +138,7 @@ class DesignSettings(Settings):
     """Fewer have not converged; the search takes a second."""
 
     relaxed_seed: int = setting(5, "")
-    """The same proposals for the same specification."""
+    """Any number does; a fixed one gives equal proposals for equal specifications."""
 
     unmet_penalty: float = setting(10.0, "")
     """The logarithm of a factor beyond all relaxation."""

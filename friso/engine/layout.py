@@ -71,12 +71,12 @@ SIZES = (
     "position",
     "velocity",
 )
-"""Of a model: lanes side by side, states, terms of the dense output of each, constants, kinks, inputs of the reference,
-behind which numbers are held; the first of all these that comes from tables, and how many tables are over places; 1
+"""Sizes of a model: lanes side by side, states, terms of the dense output of each, constants, kinks, inputs of the
+reference, behind which numbers are held; the first of all these that comes from tables, and how many tables are over places; 1
 where the drive has a clock; and which states are position and velocity of the stage."""
 
 LOOKED_UP = ("seen_states", "place_states", "walked")
-"""Of a model whose drive has a clock, arrays: the states that it measures, those that tables are looked up over, and
+"""Arrays of a model whose drive has a clock: the states that it measures, those that tables are looked up over, and
 over which of these, or time after them, each table is."""
 
 FUNCTIONS = ("step", "locate", "update")

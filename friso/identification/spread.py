@@ -11,7 +11,7 @@ from friso.identification.settings import IdentificationSettings
 from friso.intervals import COVERAGE
 
 CONFIDENCE = 0.975
-"""Of Student's t at each end of a 95 % interval."""
+"""Probability of Student's t up to the upper end of a 95 % interval."""
 
 
 def correlation_length(residual: np.ndarray) -> int:

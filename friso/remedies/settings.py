@@ -21,7 +21,7 @@ class RemedySettings(Settings):
     """Keys may go the other way too, by less: that is rarely a smaller change."""
 
     other_settings: int = setting(24, "")
-    """Of the settings that break nothing those of the least changes are looked at; more cost moves."""
+    """Settings that break no constraint are looked at from the least change on; more of them cost moves."""
 
     values_alone: int = setting(24, "")
     """Fewer overshoot the least change of a single key; each value costs a move of all machines."""
@@ -90,7 +90,7 @@ class RemedySettings(Settings):
     """Points tried with wider tolerances, the quickest to settle first; more take minutes."""
 
     optimiser_seed: int = setting(27, "")
-    """The same answer for the same input."""
+    """Any number does; a fixed one gives equal answers for equal input."""
 
     worst_time: float = setting(1e3, "s")
     """Longer than any move: a point that breaks a constraint is worse than any that does not."""

@@ -97,7 +97,7 @@ class LowPassFilter(ContinuousFilter):
     frequency: Annotated[Value, Quantity("Hz", positive, "1 kHz")]
     order: Literal[1, 2] = 1
     damping_ratio: Annotated[float, Number(positive, "0.7")] = sqrt(0.5)
-    """Of one of the second order."""
+    """Damping ratio zeta of a low-pass of the second order."""
 
     @classmethod
     def variant(cls, row: Mapping[str, Any]) -> int:

@@ -86,13 +86,13 @@ class Drive(UncertainSection):
     delay: Annotated[Value | None, Quantity("s", non_negative, "50 us")] = None
     velocity_sample_time: Annotated[Value | None, Quantity("s", positive, "125 us")] = None
     position_sample_time: Annotated[Value | None, Quantity("s", positive, "1 ms")] = None
-    """Of the loops of a cascade that are slower than sample_time, a whole number of samples each."""
+    """Sample times of loops of a cascade that are slower than sample_time: a whole number of samples each."""
     velocity_samples: Annotated[float | None, Number(at_least_1, "1")] = None
     """Over how many samples the position's difference is taken for its velocity."""
     integral_discretisation: IntegralRule | None = None
     """Default: a sum that ends with the present sample, by trapezoids for van Dijk's rules."""
     filter_discretisation: FilterRule | None = None
-    """Of the filters, and of the controller's own low-pass (which prewarping leaves as it is); default: bilinear."""
+    """Rule for filters, and for the controller's own low-pass (which prewarping leaves as it is); default: bilinear."""
     current_bandwidth: Annotated[Value | None, Quantity("Hz", positive, "2 kHz")] = None
     """Bandwidth of the current loop, a first-order lag between the controller's force and the actuator's."""
     encoder_resolution: Annotated[Value | None, Quantity("m", positive, "1 nm")] = None

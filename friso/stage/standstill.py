@@ -17,7 +17,7 @@ class AgainstFriction(UncertainSection):
 
     kind: Any
     integral_limit: Annotated[Value | None, Quantity("N", positive, "2 N")] = None
-    """Of the force that each integral holds."""
+    """Largest force that each integral holds."""
     integral_leak: Annotated[Value | None, Quantity("Hz", positive, "0.1 Hz")] = None
     """Corner below which an integral is a low-pass."""
     error_deadband: Annotated[Value | None, Quantity("m", positive, "1 um")] = None
@@ -35,7 +35,7 @@ class AgainstFriction(UncertainSection):
     """Force towards the reference while that rests and the error is larger than `stiction_push_window`."""
     stiction_push_window: Annotated[Value | None, Quantity("m", non_negative, "2 um")] = None
     dither_amplitude: Annotated[Value | None, Quantity("N", positive, "0.5 N")] = None
-    """Of a sinusoidal force, whose phase is 0 at every corner of the reference."""
+    """Amplitude of a sinusoidal force, whose phase is 0 at every corner of the reference."""
     dither_frequency: Annotated[Value | None, Quantity("Hz", positive, "200 Hz")] = None
 
     @model_validator(mode="after")

@@ -24,16 +24,16 @@ MOTOR_STATES = ("motor_position", "motor_velocity")
 """Names of the motor's position and velocity, at the load."""
 
 Side = Literal["motor", "load"]
-"""Of the transmission."""
+"""A side of the transmission."""
 
 
 class Transmission(UncertainSection):
     """A screw, belt or gear: what the motor weighs at the load, and the spring that connects them."""
 
     mass: Annotated[Value | None, Quantity("kg", positive, "2 kg")] = None
-    """Of all that moves with the motor, taken at the load; or else its `inertia` with `lead` or `ratio`."""
+    """Mass of all that moves with the motor, taken at the load; or else its `inertia` with `lead` or `ratio`."""
     inertia: Annotated[Value | None, Quantity("kg*m^2", positive, "1.2e-4 kg*m^2")] = None
-    """Of motor, coupling and screw, about the motor's axis, on linear and rotary axes alike."""
+    """Moment of inertia of motor, coupling and screw, about the motor's axis, on linear and rotary axes alike."""
     lead: Annotated[Value | None, Quantity("m", positive, "10 mm")] = None
     """By how much one turn of the motor moves the load."""
     ratio: Annotated[float | None, Number(positive, "5")] = None

@@ -66,7 +66,7 @@ class DisturbanceRejection(ControllerSection):
 
     kind: Literal["adrc"]
     bandwidth: Annotated[Value, Quantity("Hz", positive, "8 Hz")]
-    """Of the feedback, w_c/(2 pi): the loop crosses 0 dB above it."""
+    """Bandwidth of the feedback, w_c/(2 pi): the loop crosses 0 dB above it."""
     observer_ratio: Annotated[float, Number(at_least_1, "5")] = 5.0
     """The bandwidth of the observer over that of the feedback: 3 to 10 as a rule (Herbst 2021)."""
     tuned_mass: Annotated[Value | None, Quantity("kg", positive, "1.7 kg")] = None

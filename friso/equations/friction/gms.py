@@ -83,7 +83,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
     element_damping: Annotated[
         Values | None, Several(Quantity("N*s/m", non_negative, "100 N*s/m"), ("220 N*s/m", "95 N*s/m"), 1, MOST)
     ] = None
-    """Of the rate of each element's deflection (micro-damping); without it there is none."""
+    """Damping of the rate of each element's deflection (micro-damping); without it there is none."""
     attraction: Annotated[Value, Quantity("N/s", positive, "1000 N/s")]
     """The attraction parameter C: with the time constant s(v)/C the force of what slips follows its level."""
     decided_by: ClassVar[Mapping[str, str]] = {

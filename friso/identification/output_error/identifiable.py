@@ -23,8 +23,8 @@ PLAIN, LOOP, ALONG, AGAIN_LOOP = 0.1, 0.4, 0.85, 0.95
 the log, and the closed loop from there; the last is how well they are known then."""
 
 FITTED, SETTLED, PROFILED = 0.5, 0.65, 0.95
-"""The same of the fit along the log: that of all parameters, what the log does not say between its samples, and how
-well each is known; the last is the fit of those that are shown."""
+"""Shares of the work of the fit along the log up to the ends of its parts: the fit of all parameters, what the log does
+not say between its samples, and how well each is known; the last part fits those that are shown."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The same stage under another friction law, and what could not be kept."""
+"""Convert a stage to another friction law, and say what could not be kept."""
 
 from friso.interface.question import WHY, Choices, Question
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from friso.errors import InputError
-from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.answer import Answer, question
 from friso.interface.inputs import Changes, LengthLike, StageLike, read_stage, text_of, wrong
 from friso.leaf_springs.mechanism import Mechanism
 from friso.platform.extras import need
@@ -30,18 +30,6 @@ class FlexureAnswer(Answer):
     def failure(self) -> str:
         """Say why the beam model found no solution; empty if it found one."""
         return f"the beam model found no solution: {self.result.failure}" if self.result.failure else ""
-
-    def sentences(self) -> Sequence[str]:
-        """Return what the joint allows and what endangers it."""
-        from friso.questions.flexure.words import sentences
-
-        return sentences(self.result)
-
-    def tables(self) -> Sequence[AnswerTable]:
-        """Return the table of stiffness, modes, stress and buckling by both models."""
-        from friso.questions.flexure.table import rows
-
-        return [AnswerTable(self.result.stage.name, list(self.result.models), rows(self.result))]
 
 
 @question

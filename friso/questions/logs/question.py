@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from friso.errors import InputError
 from friso.identification.contents import LogContent, log_content
 from friso.identification.logs.mapping import from_options
-from friso.interface.answer import Answer, AnswerTable, question
+from friso.interface.answer import Answer, question
 from friso.interface.inputs import Changes, ChannelUnits, KindName, Roles, RoleScales, TimeLike, text_of
 from friso.progress import Progress, silent
 
@@ -34,29 +34,6 @@ class LogsAnswer(Answer):
     def failure(self) -> str:
         """Say what is wrong with the files that cannot be read; empty if all can."""
         return str(unreadable(self.errors)) if self.errors else ""
-
-    def sentences(self) -> Sequence[str]:
-        """Return what each file is, and what is still open about it."""
-        from friso.questions.logs.words import conclusions, open_questions
-
-        lines = []
-        for content in self.result:
-            lines += [sentence for _, sentence in conclusions(content)]
-            lines += [f"open: {line}" for line in open_questions(content)]
-            lines += [f"note: {line}" for line in (*content.lost, *content.warnings)]
-        return lines
-
-    def tables(self) -> Sequence[AnswerTable]:
-        """Return the channels of each file."""
-        from friso.questions.logs.words import COLUMNS, channel_rows
-
-        return [AnswerTable(item.path.name, COLUMNS, channel_rows(item)) for item in self.result if item.channels]
-
-    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """Return the command that identifies a machine from each file that allows it."""
-        from friso.questions.logs.words import next_command
-
-        return [command for content in self.result if (command := next_command(content))]
 
     def files(self) -> Files:
         """Return the page with its figures."""

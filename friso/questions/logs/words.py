@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
 from friso.identification.contents import ChannelContent, LogContent
+from friso.interface.answer import AnswerTable
 from friso.platform.system import shell_word
 from friso.shown.drawing.figure import GREEN, ORANGE
 from friso.shown.drawing.prefixes import NOTHING, range_with_unit, with_unit
@@ -16,6 +20,26 @@ PLAIN = 1e7
 """Numbers below this one stand without an exponent."""
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
+
+
+def sentences(contents: Sequence[LogContent]) -> list[str]:
+    """Say what each file is, and what is still open about it."""
+    lines = []
+    for content in contents:
+        lines += [sentence for _, sentence in conclusions(content)]
+        lines += [f"open: {line}" for line in open_questions(content)]
+        lines += [f"note: {line}" for line in (*content.lost, *content.warnings)]
+    return lines
+
+
+def tables(contents: Sequence[LogContent]) -> list[AnswerTable]:
+    """Return a table of the channels of each file."""
+    return [AnswerTable(item.path.name, COLUMNS, channel_rows(item)) for item in contents if item.channels]
+
+
+def next_steps(contents: Sequence[LogContent], files: Sequence[Path]) -> list[str]:
+    """Return the command that identifies a machine from each file that allows it."""
+    return [command for content in contents if (command := next_command(content))]
 
 
 def title(content: LogContent) -> str:

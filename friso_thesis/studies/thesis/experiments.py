@@ -119,7 +119,7 @@ BUILT = "rig_loops"
 """Loops and plants of the rig as built (Sec. 4.2)."""
 
 MOVES, GRID, ON_RAILS, STANDSTILL = "moves", "grid", "cycles", "standstill"
-"""Those of the rig as built (Sec. 4.3.2)."""
+"""Experiments with the rig as built (Sec. 4.3.2): moves, their maps, and standstill."""
 
 TRACES = "traces"
 """Single moves of the rig as built, which are shown and not judged."""
