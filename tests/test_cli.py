@@ -16,6 +16,7 @@ from refusals import Refused
 
 import friso
 from friso.cli.app import _failed
+from friso.cli.command import COMMANDS
 from friso.cli.progress import ProgressBar
 from friso.platform.system import LIBRARIES
 from friso.progress import WORK_CLOCK
@@ -151,6 +152,21 @@ def test_set_overrides_any_key() -> None:
     )
     assert document["cases"]["given"] == document["cases"]["locked"]
     assert document["cases"]["locked"]["verdict"] == "settles"
+
+
+@pytest.mark.parametrize(
+    ("typed", "fits"), [("friso ch", ["check"]), ("friso tune --b", ["--bandwidth-limit"]), ("friso ", [*COMMANDS])]
+)
+def test_a_shell_completes_commands_and_options(
+    typed: str, fits: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As bash asks: friso is called without arguments, what was typed stands in the environment."""
+    asked = {"_FRISO_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}
+    for name, value in asked.items():
+        monkeypatch.setenv(name, value)
+    done = run(cwd=tmp_path)
+    assert done.returncode == 0
+    assert sorted(done.stdout.split()) == sorted(fits)
 
 
 def test_simulate_writes_what_python_returns(tmp_path: Path) -> None:

@@ -151,7 +151,7 @@ def _run() -> int:
     messages.setFormatter(logging.Formatter("friso: %(message)s"))
     log.addHandler(messages)
     try:
-        if len(sys.argv) == 1:
+        if len(sys.argv) == 1 and "_FRISO_COMPLETE" not in os.environ:  # by which a shell asks what fits
             print(TOUR)
             return 0
         refuse_empty(sys.argv[1:])

@@ -72,8 +72,8 @@ SIZES = (
     "velocity",
 )
 """Sizes of a model: lanes side by side, states, terms of the dense output of each, constants, kinks, inputs of the
-reference, behind which numbers are held; the first of all these that comes from tables, and how many tables are over places; 1
-where the drive has a clock; and which states are position and velocity of the stage."""
+reference, behind which numbers are held; the first of all these that comes from tables, and how many tables are over
+places; 1 where the drive has a clock; and which states are position and velocity of the stage."""
 
 LOOKED_UP = ("seen_states", "place_states", "walked")
 """Arrays of a model whose drive has a clock: the states that it measures, those that tables are looked up over, and
