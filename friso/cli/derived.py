@@ -19,16 +19,6 @@ from friso.interface.question import OF_THE_CALLER, Question
 from friso.interface.shared_options import meaning
 from friso.stage.arguments import KINDS, ArgumentKind, alternatives
 
-IN_PYTHON_ALONE = (
-    "Progress",
-    "MappingKeeper",
-    "FileKeeper",
-    "Mapping[str, AxisValues]",
-    "Mapping[str, str]",
-    "Samples",
-)
-"""Kinds of arguments that a command line has no form for."""
-
 
 @dataclass(frozen=True)
 class CommandParameter:
@@ -98,10 +88,10 @@ def _kind_of(annotation: str) -> ArgumentKind | None:
 
     Returns None for a parameter without a form there.
     """
-    parts = [part for part in alternatives(annotation) if part not in ("None", *IN_PYTHON_ALONE)]
-    several = [part for part in parts if KINDS[part].several]
-    paths = [part for part in parts if KINDS[part].command_type is Path]
-    return KINDS[(several or paths or parts)[0]] if parts else None
+    kinds = [KINDS[part] for part in alternatives(annotation) if KINDS[part].command_type is not None]
+    several = [kind for kind in kinds if kind.several]
+    paths = [kind for kind in kinds if kind.command_type is Path]
+    return (several or paths or kinds)[0] if kinds else None
 
 
 def _argument(parameter: CommandParameter) -> Parameter:

@@ -102,14 +102,14 @@ class ArgumentKind:
     """Kind of an argument, chosen by its annotation.
 
     It has a test, words for values that pass it, and an example. On the command line, `metavar` stands for the value
-    ("": the name of the parameter), and `command_type` is the type of one value; there may be `several`.
+    ("": the name of the parameter), and `command_type` is the type of one value (None: it has no form there); there may be `several`.
     """
 
     holds: Callable[[Any], bool]
     words: str
     example: str = ""
     metavar: str = ""
-    command_type: type = str
+    command_type: type | None = str
     several: bool = False
 
 
@@ -118,7 +118,7 @@ _PATHS = ArgumentKind(
     lambda value: _is_list(value, _is_path), "a list of paths", '["map.nc"]', "FILE", Path, several=True
 )
 _TEXTS = ArgumentKind(lambda value: _is_list(value, _is_text), "a list of texts", several=True)
-_FUNCTION = ArgumentKind(callable, "a function")
+_FUNCTION = ArgumentKind(callable, "a function", command_type=None)
 _STAGE = ArgumentKind(
     lambda value: isinstance(value, Stage) or _has_text_keys(value) or _is_path(value),
     "a stage, the path of a stage file, or its tables as a dictionary",
@@ -138,7 +138,7 @@ _PATH = ArgumentKind(_is_path, "a path", '"report"', "FILE", Path)
 _QUANTITY = ArgumentKind(lambda value: _is_number(value) or _is_text(value), "a number or a text")
 
 KINDS: dict[str, ArgumentKind] = {
-    "None": ArgumentKind(lambda value: value is None, ""),
+    "None": ArgumentKind(lambda value: value is None, "", command_type=None),
     "str": _TEXT,
     **{name: replace(_TEXT, metavar=metavar) for name, metavar in TEXT_KINDS.items()},
     "int": replace(_WHOLE, holds=lambda value: _is_whole(value) and abs(int(value)) < MOST_INT, example="64"),
@@ -159,7 +159,7 @@ KINDS: dict[str, ArgumentKind] = {
     "Changes": _CHANGES,
     **{name: replace(_CHANGES, metavar=metavar) for name, metavar in PAIR_KINDS.items()},
     "Spec": ArgumentKind(lambda value: type(value).__name__ == "Spec", "a specification", "", "SPEC.toml", Path),
-    "Samples": ArgumentKind(lambda value: type(value).__name__ == "Samples", "friso.Samples"),
+    "Samples": ArgumentKind(lambda value: type(value).__name__ == "Samples", "friso.Samples", command_type=None),
     "Members": ArgumentKind(lambda value: type(value).__name__ == "Members", "friso.Members"),
     "Margin": ArgumentKind(lambda value: type(value).__name__ == "Margin", "the edge of hunting of a stage"),
     "tuple[float, float]": ArgumentKind(
@@ -173,8 +173,10 @@ KINDS: dict[str, ArgumentKind] = {
     ),
     "Sequence[int]": ArgumentKind(lambda value: _is_list(value, _is_whole), "whole numbers"),
     "Iterable[str | os.PathLike[str]]": _PATHS,
-    "Mapping[str, str]": ArgumentKind(_has_text_keys, "a dictionary of keys to ranges"),
-    "Mapping[str, AxisValues]": ArgumentKind(_has_text_keys, "a dictionary of keys to ranges or values"),
+    "Mapping[str, str]": ArgumentKind(_has_text_keys, "a dictionary of keys to ranges", command_type=None),
+    "Mapping[str, AxisValues]": ArgumentKind(
+        _has_text_keys, "a dictionary of keys to ranges or values", command_type=None
+    ),
     "Sequence[Mapping[str, Any]]": ArgumentKind(
         lambda value: _is_list(value, _has_text_keys), "a list of dictionaries"
     ),
