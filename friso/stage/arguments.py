@@ -102,7 +102,8 @@ class ArgumentKind:
     """Kind of an argument, chosen by its annotation.
 
     It has a test, words for values that pass it, and an example. On the command line, `metavar` stands for the value
-    ("": the name of the parameter), and `command_type` is the type of one value (None: it has no form there); there may be `several`.
+    ("": the name of the parameter), and `command_type` is the type of one value (None: it has no form there); there
+    may be `several`.
     """
 
     holds: Callable[[Any], bool]
