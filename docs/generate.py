@@ -47,7 +47,7 @@ def settings_page() -> str:
     for settings in settings_classes():
         room = settings.__module__.removesuffix(".settings")
         lines += [f"## {settings.__name__} (`{room}`)", "", "| setting | value | unit | why |", "|---|---|---|---|"]
-        lines += [f"| `{row.name}` | {row.value} | {row.unit} | {row.reason} |" for row in settings.rows()]
+        lines += [f"| `{row.name}` | {_shown(row.value)} | {row.unit} | {row.reason} |" for row in settings.rows()]
         lines.append("")
     return "\n".join(lines)
 
@@ -58,6 +58,13 @@ def doubts_page() -> str:
     for name, doubt in DOUBTS.items():
         lines.append(f"| {DOUBTS.one_line(name)} | {doubt.looks_at} | {doubt.consequence} | {doubt.decided_by} |")
     return "\n".join(lines)
+
+
+def _shown(value: Any) -> str:
+    """A value of a setting in four digits; the values of a tuple one after the other."""
+    if isinstance(value, tuple):
+        return ", ".join(map(_shown, value))
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def schema_page(of: str) -> str:
