@@ -102,7 +102,7 @@ def implausible_values(stage: Stage) -> Iterator[str]:
     """
     flat = stage.flat()
     complaints = _complaints(stage, flat)
-    for key in ("masses.cart", "masses.stage"):
+    for key in ("masses.cart", "masses.stage") if len(complaints) > 1 else ():
         for unit, factor in _other_units(stage, key):
             usual = _complaints(stage, {**flat, key: flat[key] * factor})
             others = [name for name in complaints if name not in usual and not name.startswith("masses.")]
