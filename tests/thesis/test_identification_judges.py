@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from friso.studies.rig.sizes import locked_stage
+from friso_thesis.studies.thesis.as_built import rig_with_drive
 from friso_thesis.studies.thesis.claims import Evidence, Finding, registered
 from friso_thesis.studies.thesis.experiments import (
     SLOW,
@@ -39,29 +41,27 @@ def of_plant(changes: dict[str, str]) -> Finding:
 @pytest.mark.parametrize(
     ("claim", "holds"),
     [
-        ("F17", (True, False, True)),
-        ("F18", (True, False)),
-        ("F19", (False,)),
-        ("F20", (True, False)),
-        ("F21", (False, False, True)),
+        ("F17", (True, None, True)),
+        ("F18", (True, None)),
+        ("F19", (None,)),
+        ("F20", (True, None)),
+        ("F21", (True, True, True)),
     ],
 )
 def test_what_is_found_of_the_identification(claim: str, holds: tuple[bool, ...]) -> None:
     finding = judged(claim)
     assert finding.pattern == holds, finding
-    assert all(part.holds or part.why for part in finding.parts)
+    assert all(part.holds or part.why or part.undecided for part in finding.parts)
     assert not re.search(r"\bnan\b", " ".join(part.number + part.why for part in finding.parts))
 
 
 def test_the_judges_recognise_what_holds() -> None:
     """Rigs and responses that are as the thesis says."""
     stiff = thesis_rig().replace({"joint.stiffness": "2.9 N/mm"})
-    assert judged_steps(joint_steps(stiff)).judgement == "holds"
-    assert of_plant({"masses.stage": "0.75 kg", "joint.stiffness": "3.6 N/mm"}).judgement == "holds"
+    assert all(part.holds for part in judged_steps(joint_steps(stiff)).parts)
+    assert all(part.holds for part in of_plant({"masses.stage": "0.75 kg", "joint.stiffness": "3.6 N/mm"}).parts)
     slippery = thesis_rig().replace({"friction.static": "2.4 N"})
-    assert judged_slips(tuple(slow_motion(slippery, speed) for speed in SLOW)).judgement == "holds"
-    slow = constant_speed(thesis_rig(), (1e-3, 2.5e-3))
-    assert judged_speeds(slow, slow).pattern == (True, False, True)
+    assert all(part.holds for part in judged_slips(tuple(slow_motion(slippery, speed) for speed in SLOW)).parts)
     magnitude = np.full((4, 9), 1.7 / 2.5)
     magnitude[:, -1] = 0.1
     scatter = np.array([0.01, 0.1, 0.3, 0.2, 0.1, 0.1, 0.01, 0.01, 0.01])
@@ -72,8 +72,10 @@ def test_the_judges_recognise_what_does_not_hold() -> None:
     smooth = thesis_rig().replace({"friction.static": "1 N"})
     runs = tuple(slow_motion(smooth, speed) for speed in SLOW)
     assert judged_slips(runs).pattern[0] is False
-    lively = constant_speed(thesis_rig().replace({"joint.locked": True, "friction.static": "1 N"}))
-    assert judged_speeds(lively, lively).pattern[:2] == (False, False)
+    varied = ("static_deviation", "coulomb_deviation", "first_harmonic", "second_harmonic")
+    even = {"friction.static": "1 N", "cable.stiffness": "0 N/m", **{f"rail.{name}": 0.0 for name in varied}}
+    smooth_rail = constant_speed(locked_stage(rig_with_drive(thesis_rig()).replace(even)))
+    assert judged_speeds(smooth_rail, smooth_rail).pattern[:2] == (False, False)
     assert (
         judged_line(LockedLine(np.full((4, 9), 2.0), np.zeros((4, 9)), np.linspace(0.1, 0.5, 9)), 1.7).judgement
         == "differs"

@@ -48,21 +48,21 @@ def changed(changes: Mapping[str, Any]) -> Linear:
     [
         ("E1", (True, True, True, True)),
         ("F7", (True, True, True, True, False, True)),
-        ("F8", (False, True, True)),
-        ("F22", (True, True, False, False)),
-        ("F23", (True, False)),
+        ("F8", (True, True, False)),
+        ("F22", (True, None, None)),
+        ("F23", (True, None)),
     ],
 )
 def test_the_rig(linear: Linear, claim: str, holds: tuple[bool, ...]) -> None:
     finding = judged(claim, linear)
     assert finding.pattern == holds, finding
-    assert all(part.holds or part.why for part in finding.parts)
+    assert all(part.holds or part.why or part.undecided for part in finding.parts)
     assert not re.search(r"\bnan\b", " ".join(part.number + part.why for part in finding.parts))
 
 
 HOLDS: Mapping[str, Mapping[str, Any]] = {
     "F7": {"joint.limiter_stiffness": "7e6 N/m", "parasitic.mass": "0.05 kg"},
-    "F8": {"friction.static": "1 N"},  # no Stribeck effect
+    "F8": {"parasitic.damping_ratio": 0.05},
     "F22": {"joint.limiter_stiffness": "2.9e6 N/m", "joint.limiter_damping": "1 N*s/m"},
     "F23": {"joint.damping": "0.05 N*s/m"},
 }
@@ -70,7 +70,7 @@ HOLDS: Mapping[str, Mapping[str, Any]] = {
 
 FAILS: Mapping[str, Mapping[str, Any]] = {
     "F7": {"joint.stiffness": "24 N/mm", "parasitic.frequency": "600 Hz", "joint.limiter_damping": "1e4 N*s/m"},
-    "F8": {"parasitic.damping_ratio": 0.001},
+    "F8": {"friction.viscous": "200 N*s/m", "parasitic.damping_ratio": 0.0005},
     "F22": {"controller.tuned_mass": "5 kg", "parasitic.damping_ratio": 0.05},
     "F23": {"controller.tuned_mass": "10 kg", "joint.damping": "0.005 N*s/m"},
 }
@@ -80,20 +80,21 @@ FAILS: Mapping[str, Mapping[str, Any]] = {
 @pytest.mark.parametrize("claim", HOLDS)
 def test_judges_recognise_what_holds(claim: str) -> None:
     finding = judged(claim, changed(HOLDS[claim]))
-    assert finding.judgement == "holds", finding
+    assert all(part.holds for part in finding.parts), finding
 
 
 @pytest.mark.parametrize("claim", FAILS)
 def test_judges_recognise_what_does_not(linear: Linear, claim: str) -> None:
     finding = judged(claim, changed(FAILS[claim]))
-    assert sum(finding.pattern) < sum(judged(claim, linear).pattern), finding
+    met = sum(part.holds for part in finding.parts)
+    assert met < sum(part.holds for part in judged(claim, linear).parts), finding
 
 
 def test_parts_of_made_evidence(linear: Linear) -> None:
     """Single numbers, made otherwise, turn the parts that they decide."""
-    alike = replace(linear, speeds=replace(linear.speeds, unstable=(), unstable_touched=(), slow=1.5))
-    assert judged("F8", alike).pattern == (True, False, True)
-    assert judged("F8", replace(linear, free=replace(linear.free, single=None))).pattern == (False, True, False)
+    shaky = replace(linear, speeds=replace(linear.speeds, undeflected=linear.speeds.unstable, slow=1.5))
+    assert judged("F8", shaky).pattern == (False, False, False)
+    assert judged("F8", replace(linear, free=replace(linear.free, single=None))).pattern == (True, True, True)
     sliding = linear.plants["sliding"]
     made = {
         "sliding": replace(sliding, antiresonances=sliding.antiresonances[1:], mass=1.7),
@@ -102,7 +103,7 @@ def test_parts_of_made_evidence(linear: Linear) -> None:
     other = replace(linear, plants={**linear.plants, **made})
     assert judged("F7", other).pattern == (False, False, False, True, False, False)
     limited = replace(linear, free=replace(linear.free, unsampled=50.0))
-    assert judged("F23", limited).judgement == "holds"
+    assert all(part.holds for part in judged("F23", limited).parts)
 
 
 def test_every_linear_claim_is_tried_both_ways() -> None:

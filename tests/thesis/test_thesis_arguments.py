@@ -47,7 +47,14 @@ def test_the_force_at_full_stroke() -> None:
     assert judged("S341", rule, changes={"joint.stiffness": "5 N/mm"}).pattern == (N, N, Y)
 
 
-@pytest.mark.parametrize(("margins", "pattern"), [((0.5, 0.3), (Y, Y)), ((0.3, 0.5), (Y, N)), ((0.0, 0.0), (N, N))])
+@pytest.mark.parametrize(
+    ("margins", "pattern"),
+    [
+        ({0.5: 0.3, 1.0: 0.4, 1.7: 0.5}, (Y, Y)),
+        ({0.5: 0.3, 1.0: 0.6, 1.7: 0.5}, (Y, N)),  # larger than tuned for the stage alone, and not the largest
+        ({0.5: 0.2, 1.0: 0.1, 1.7: 0.0}, (N, N)),
+    ],
+)
 def test_the_mass_to_tune_for(margins: Any, pattern: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(arguments, "_margins", lambda rig: margins)
     assert judged("S342").pattern == pattern

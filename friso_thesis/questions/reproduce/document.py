@@ -12,7 +12,7 @@ from friso_thesis.questions.reproduce.laws import laws_document
 from friso_thesis.questions.reproduce.words import numbers
 from friso_thesis.studies.thesis import CONVENTIONS, thesis_rig
 from friso_thesis.studies.thesis.space import OPEN, SEED
-from friso_thesis.studies.thesis.ways import COUNT, CYCLE, SWING
+from friso_thesis.studies.thesis.ways import COUNT, CYCLE
 
 if TYPE_CHECKING:
     from friso.shares import Share
@@ -36,8 +36,10 @@ def conclusion(reproduction: Reproduction) -> str:
 
 _VERBS: tuple[tuple[ClaimJudgement, str, str], ...] = (
     ("holds", "holds", "hold"),
+    ("depends", "depends on what the thesis leaves open", "depend on what the thesis leaves open"),
     ("holds in part", "holds in part", "hold in part"),
     ("differs", "does not hold", "do not hold"),
+    ("cannot be decided", "cannot be decided by simulation", "cannot be decided by simulation"),
     ("not yet covered", "is not covered", "are not covered"),
 )
 """The judgements as said of one claim, and of several."""
@@ -60,7 +62,7 @@ def reproduce_document(reproduction: Reproduction, laws: ConclusionsByLaw | None
         if tolerances
         else None,
         "cycles": {name: vars(cycles.comparison) for name, cycles in reproduction.cycles.items()},
-        "ways": [COUNT, SWING, CYCLE],
+        "ways": [COUNT, CYCLE],
         "unstated_values": [_open(value) for value in OPEN],
         "draws": [{"seed": [SEED, draw.number], "values": dict(draw.values)} for draw in reproduction.plausible.draws],
         "best_fit": _fit(reproduction.plausible),
@@ -80,19 +82,26 @@ def _entry(verdict: ClaimVerdict) -> dict[str, Any]:
         "judgement": verdict.judgement,
         "figure": verdict.figure or None,
         "number": numbers(verdict) or None,
-        "criterion": "; ".join(part.criterion for part in verdict.finding.judged) if verdict.finding else None,
+        "criterion": "; ".join(part.criterion for part in verdict.finding.stated) if verdict.finding else None,
         "section": verdict.claim.section,
-        "parts": [_part(part) for part in verdict.finding.judged] if verdict.finding else [],
+        "parts": [_part(part) for part in verdict.finding.stated] if verdict.finding else [],
         "table": {"columns": table.columns, "rows": table.rows} if table else None,
         "self_tests": [_part(part) for part in verdict.finding.parts if part.self_test] if verdict.finding else [],
-        "ways": {way: finding.judgement for way, finding in verdict.ways.items()},
+        "ways": _ways(verdict),
+        "attracts": [_part(part) for part in verdict.attracts.stated] if verdict.attracts else [],
         "reason": verdict.reason or None,
-        "contradiction": verdict.contradiction or None,
+        "robust": verdict.robust,
         "hangs_on_undrawn": verdict.undrawn or None,
         "method": list(verdict.turned.values()),
         "read_otherwise": {name: finding.judgement for name, finding in verdict.reread.items()},
         "space": _space(verdict.space) if verdict.space else None,
     }
+
+
+def _ways(verdict: ClaimVerdict) -> dict[str, ClaimJudgement]:
+    """Return the judgement by the thesis's count, and by what attracts the stages where that enters."""
+    findings = {COUNT: verdict.finding, CYCLE: verdict.attracts}
+    return {way: finding.judgement for way, finding in findings.items() if finding}
 
 
 def _part(part: Part) -> dict[str, Any]:
@@ -101,6 +110,7 @@ def _part(part: Part) -> dict[str, Any]:
         "holds": part.holds,
         "number": part.number,
         "why": part.why or None,
+        "undecided": part.undecided or None,
         "printed": part.printed,
         "read": part.read,
     }
@@ -114,8 +124,7 @@ def _space(space: ClaimInSpace) -> dict[str, Any]:
         "failures": {str(number): text for number, text in space.failures.items()},
         "holds": space.count,
         "share": _share(space.holds),
-        "by_way": {way: _share(share) for way, share in space.by_way.items()},
-        "parts": [_share(share) for share in space.parts],
+        "parts": [_share(part.share) for part in space.parts],
         "hangs_on": [vars(item) for item in space.hangs_on],
         "seeds": [list(seed) for seed in space.seeds],
     }

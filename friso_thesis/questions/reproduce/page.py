@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from markupsafe import Markup
 
 from friso.shown.drawing import plotly_renderer
-from friso.shown.drawing.figure import GREEN, GREY, ORANGE, VERMILLION, Figure
+from friso.shown.drawing.figure import BLUE, GREEN, GREY, ORANGE, PINK, VERMILLION, Figure
 from friso.shown.files import Content, pictures
 from friso.shown.pages import Report, print_image
 from friso_thesis.questions.reproduce import words
@@ -26,7 +26,14 @@ if TYPE_CHECKING:
     from friso_thesis.studies.thesis import ClaimVerdict, Reproduction
     from friso_thesis.studies.thesis.laws import ConclusionsByLaw
 
-COLOURS = {"holds": GREEN, "holds in part": ORANGE, "differs": VERMILLION, "not yet covered": GREY}
+COLOURS = {
+    "holds": GREEN,
+    "depends": BLUE,
+    "holds in part": ORANGE,
+    "differs": VERMILLION,
+    "cannot be decided": PINK,
+    "not yet covered": GREY,
+}
 
 
 @dataclass(frozen=True)

@@ -177,11 +177,11 @@ def _speeds(experiments: Experiments) -> dict[str, Figure]:
     for title, runs in zip(("joint free", "joint locked"), experiments.constant_speed, strict=True):
         log = runs.log
         lines = tuple(
-            Series(log["reference"][part], log["force"][part], f"{speed * 1e3:g} mm/s", colour, width=0.8)
-            for speed, part, colour in zip(runs.speeds, log.segments, (BLUE, VERMILLION), strict=True)
+            Series(log["reference"][part], log["force"][part], f"{velocity * 1e3:.3g} mm/s", colour, width=0.8)
+            for velocity, part, colour in zip(runs.velocities, log.segments, _COLOURS, strict=False)
         )
         panels.append(Panel(title, Axis("Position", "m"), Axis("Force", "N"), lines))
-    caption = "Force of the simulated rig at constant speed over 150 mm, its friction the same all along the rail."
+    caption = "Force of the rig as built at constant speed over 150 mm, there and back: friction varies along its rail."
     return {"21": Figure("figure-21", "Figure 21: force at constant speed", caption, tuple(panels), 2)}
 
 

@@ -21,7 +21,14 @@ if TYPE_CHECKING:
 SHORT = 160
 """Letters of a number in short."""
 
-AGREEMENT = {"holds": "agrees", "holds in part": "in part", "differs": "contradicts", "not yet covered": "not computed"}
+AGREEMENT = {
+    "holds": "agrees",
+    "depends": "depends",
+    "holds in part": "in part",
+    "differs": "contradicts",
+    "cannot be decided": "not decidable",
+    "not yet covered": "not computed",
+}
 """The judgements as the word of agreement."""
 
 
@@ -40,15 +47,15 @@ def short(text: str) -> str:
 
 def numbers(verdict: ClaimVerdict) -> str:
     """Return the numbers of all parts in one line; empty for a claim that is not covered."""
-    return "; ".join(part.number for part in verdict.finding.judged) if verdict.finding else ""
+    return "; ".join(part.number for part in verdict.finding.stated) if verdict.finding else ""
 
 
 def met(verdict: ClaimVerdict) -> str:
     """Return how many criteria are met."""
     if verdict.finding is None:
         return ""
-    pattern = verdict.finding.pattern
-    return f"{sum(pattern)} of {len(pattern)}"
+    decided = [holds for holds in verdict.finding.pattern if holds is not None]
+    return f"{sum(decided)} of {len(decided)}" if decided else "none decidable"
 
 
 def share(verdict: ClaimVerdict) -> str:
@@ -68,26 +75,34 @@ def in_draws(verdict: ClaimVerdict, part: int) -> str:
     return f"met in {space.met(part)} of {space.draws} draws"
 
 
-def ways(verdict: ClaimVerdict) -> list[tuple[str, str]]:
-    """Return the word of agreement by each way of judging, where there are several."""
-    if len(verdict.ways) < 2:
-        return []
-    return [(way, AGREEMENT[finding.judgement]) for way, finding in verdict.ways.items()]
+def attracts(verdict: ClaimVerdict) -> str:
+    """Return the word of agreement by what attracts the stages; "" where that does not enter."""
+    return AGREEMENT[verdict.attracts.judgement] if verdict.attracts else ""
+
+
+def criterion_word(part: Part) -> str:
+    """Return how a criterion agrees."""
+    return "undecided" if part.undecided else "agrees" if part.holds else "does not agree"
 
 
 def reasons(verdict: ClaimVerdict) -> list[str]:
     """Return why it does not hold, the first sentence of each reason,
     of several criteria with those to which it belongs; the rest is among the details."""
-    if not verdict.reason:
-        return []
-    parts = verdict.finding.judged if verdict.finding else ()
+    parts = verdict.finding.stated if verdict.finding else ()
     places: dict[str, list[str]] = {}
     for place, part in enumerate(parts, 1):
-        if not part.holds and part.why:
-            places.setdefault(_first_sentence(part.why), []).append(str(place))
-    if not places or len(parts) == 1:
-        return [_first_sentence(verdict.reason)]
+        if text := _why(part):
+            places.setdefault(_first_sentence(text), []).append(str(place))
+    if len(parts) == 1 and places:
+        return [*places]
+    if not places:
+        return [_first_sentence(verdict.reason)] if verdict.reason else []
     return [f"Criteri{'a' if len(of) > 1 else 'on'} {listed(of, 'and')}: {why}" for why, of in places.items()]
+
+
+def _why(part: Part) -> str:
+    """Return why a criterion is not met, or is undecided; "" if it is met."""
+    return part.undecided or ("" if part.holds else part.why)
 
 
 def _first_sentence(text: str) -> str:
@@ -98,12 +113,17 @@ def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
     """Return what stands below an item, by its name:
     numbers and reasons that are shortened above, draws that decide nothing, and what another grid or tolerance changes.
     """
-    parts = verdict.finding.judged if verdict.finding else ()
+    parts = verdict.finding.stated if verdict.finding else ()
     rows = [
         (f"Criterion {place}", part.number) for place, part in enumerate(parts, 1) if short(part.number) != part.number
     ]
-    longer = any(not part.holds and _first_sentence(part.why) != part.why for part in parts)
-    rows += [("Reason", verdict.reason)] if longer else []
+    whole = " ".join(dict.fromkeys(text for part in parts if (text := _why(part))))
+    rows += [("Reason", whole)] if any(_first_sentence(_why(part)) != _why(part) for part in parts) else []
+    if verdict.attracts:
+        rows += [
+            (f"Criterion {place}, by what attracts", f"{criterion_word(part)}: {part.number}")
+            for place, part in enumerate(verdict.attracts.stated, 1)
+        ]
     failures = verdict.space.failures if verdict.space else {}
     rows += [(f"{draw_name(number).capitalize()}, undecided", text) for number, text in failures.items()]
     return rows + [("Method", text) for text in verdict.turned.values()]

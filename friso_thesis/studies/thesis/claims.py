@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from friso_thesis.studies.thesis.experiments import Experiments
     from friso_thesis.studies.thesis.linear import Linear
 
-ClaimJudgement = Literal["holds", "holds in part", "differs", "not yet covered"]
+ClaimJudgement = Literal["holds", "depends", "holds in part", "differs", "cannot be decided", "not yet covered"]
+"""The judgement of a claim. "depends": it holds for some plausible values of what the thesis leaves open, and not for
+others. "cannot be decided": it rests on what no simulation shows, or on a number beside its threshold."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,8 @@ class Part:
     `why` is the reason found where it is not met, in whole sentences, the first of which says the most. `printed` is a
     number that the thesis prints and `read` the same as friso finds it, both in the same unit, NaN where there is none.
     A `self_test` checks that friso finds what friso entered: it says nothing of the thesis, and counts for no
-    judgement.
+    judgement. A part that is `undecided` counts for none either; the text says why: no simulation can decide it, or
+    the number lies beside its threshold within its error.
     """
 
     criterion: str
@@ -65,6 +68,16 @@ class Part:
     printed: float = math.nan
     read: float = math.nan
     self_test: bool = False
+    undecided: str = ""
+
+
+BESIDE = "The number lies beside its threshold, within its error."
+"""Reason for which a part is undecided."""
+
+
+def beside(value: float, thresholds: Iterable[float], error: float) -> str:
+    """Return `BESIDE` if a value lies within its error of one of the thresholds, else an empty text."""
+    return BESIDE if any(abs(value - threshold) <= error for threshold in thresholds) else ""
 
 
 @dataclass(frozen=True)
@@ -83,20 +96,23 @@ class Finding:
     table: FindingTable | None = None
 
     @property
-    def judged(self) -> tuple[Part, ...]:
+    def stated(self) -> tuple[Part, ...]:
         """Return the parts that say something of the thesis."""
         return tuple(part for part in self.parts if not part.self_test)
 
     @property
-    def pattern(self) -> tuple[bool, ...]:
-        """Return which of these hold."""
-        return tuple(part.holds for part in self.judged)
+    def pattern(self) -> tuple[bool | None, ...]:
+        """Return which of the stated parts hold; None for those that are undecided."""
+        return tuple(None if part.undecided else part.holds for part in self.stated)
 
     @property
     def judgement(self) -> ClaimJudgement:
-        """ "holds" if all of these are met, "differs" if none is, else "holds in part"."""
-        met = sum(self.pattern)
-        return "holds" if met == len(self.pattern) else "holds in part" if met else "differs"
+        """ "holds" if all decided parts are met, "differs" if none is, else "holds in part";
+        "cannot be decided" if no part is decided."""
+        decided = [holds for holds in self.pattern if holds is not None]
+        if not decided:
+            return "cannot be decided"
+        return "holds" if all(decided) else "holds in part" if any(decided) else "differs"
 
 
 def number_text(value: float, form: str = ".3g", unit: str = "") -> str:

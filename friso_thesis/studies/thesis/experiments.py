@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, get_type_hints
 
@@ -21,11 +20,15 @@ from friso.identification.experiments.stick_slip import StickSlip, static_from_s
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import record
 from friso.identification.readings.friction_position import FrictionPosition, friction_position
+from friso.identification.readings.passes import passes
 from friso.stage import Stage, loads
 from friso.stage.controllers import CONTROLLER
+from friso.studies.rig.experiments.constant_speed import passes_log
+from friso.studies.rig.sizes import freed, locked_stage, pace
 from friso_thesis.studies.rig.in_position import InPosition
 from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
 from friso_thesis.studies.thesis.as_built import (
+    SEED,
     CyclesOnRails,
     MovesOnRails,
     RailTraces,
@@ -34,6 +37,7 @@ from friso_thesis.studies.thesis.as_built import (
     grid,
     moves,
     rig_loops,
+    rig_with_drive,
     standstill,
     traces,
 )
@@ -66,9 +70,6 @@ SLOW, SLOW_TIME = (0.5e-3, 1e-3, 2.5e-3), 20.0
 
 STROKE = "8 mm"
 """The limiters in the identification (Sec. 4.2.1)."""
-
-SPEEDS, WAY = (2.5e-3, 10e-3), 0.15
-"""Constant speeds [m/s] and their way [m] (Sec. 4.2.3)."""
 
 
 @dataclass(frozen=True)
@@ -105,9 +106,12 @@ class SlowMotion:
 
 @dataclass(frozen=True)
 class ConstantSpeed:
-    """Fig. 21: the speeds [m/s], a record with one segment for each, and the analysis of it."""
+    """Fig. 21: passes there and back at constant speeds, on the rail as built.
 
-    speeds: tuple[float, ...]
+    `velocities` [m/s] are those of the passes, each a segment of the log; `result` is friction along the rail.
+    """
+
+    velocities: tuple[float, ...]
     log: Log
     result: FrictionPosition
 
@@ -247,15 +251,13 @@ def slow_motion(stage: Stage, speed: float) -> SlowMotion:
     return SlowMotion(speed, log, static_from_stick_slip(log, flat["joint.stiffness"]), float(flat["friction.static"]))
 
 
-def constant_speed(stage: Stage, speeds: tuple[float, ...] = SPEEDS) -> ConstantSpeed:
-    """Constant speeds over 150 mm, one after the other over the same places."""
-    logs = [_ramp(stage, speed, WAY / speed) for speed in speeds]
-    ends = np.cumsum([0, *(len(log.time) for log in logs)])
-    signals = {role: np.concatenate([log[role] for log in logs]) for role in logs[0].signals}
-    parts = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
-    log = replace(record("constant speed", SAMPLE_TIME, **signals), segments=parts)
-    flat = stage.flat()
-    return ConstantSpeed(speeds, log, friction_position(log, flat["masses.cart"] + flat["masses.stage"]))
+def constant_speed(machine: Stage) -> ConstantSpeed:
+    """Make passes of a rig as built over 150 mm, there and back at both speeds."""
+    whole, flat = passes_log("constant speed", machine, SEED).log, machine.flat()
+    stretches = passes(whole)
+    log = replace(whole, segments=tuple(stretch.span for stretch in stretches))
+    friction = friction_position(whole, flat["masses.cart"] + flat["masses.stage"], pace(machine))
+    return ConstantSpeed(tuple(stretch.velocity for stretch in stretches), log, friction)
 
 
 def _ramp(stage: Stage, speed: float, duration: float) -> Log:
@@ -286,7 +288,7 @@ _RUNS: Mapping[str, Callable[[Stage], Any]] = MappingProxyType(
         LINE: locked_line,
         STEPPED: joint_steps,
         SLIPS: lambda stage: tuple(slow_motion(stage, speed) for speed in SLOW),
-        SPEEDY: lambda stage: (constant_speed(stage), constant_speed(stage.replace(dict(LOCKED)))),
+        SPEEDY: lambda stage: tuple(constant_speed(joint(rig_with_drive(stage))) for joint in (freed, locked_stage)),
         BUILT: rig_loops,
         MOVES: moves,
         GRID: grid,

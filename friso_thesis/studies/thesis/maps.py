@@ -60,6 +60,13 @@ def begins(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = Non
     return -ends(-values[::-1], moving[::-1], None if size is None else size[::-1])
 
 
+def limit_error(values: np.ndarray, limits: int = 1) -> float:
+    """Return the error of a limit along `values`, or of the mean of several `limits`: a limit may lie anywhere between
+    two neighbouring values (95 %)."""
+    step = float(np.diff(values).max())
+    return min(step / 2, step / (3 * limits) ** 0.5)
+
+
 GONE = 1e-3
 """Swing over what counts as one, below which nothing is left of one."""
 

@@ -20,7 +20,7 @@ from friso_thesis.studies.thesis.kept import NOT_KEPT, Findings, Kept
 from friso_thesis.studies.thesis.linear import NEEDS
 from friso_thesis.studies.thesis.space import OPEN, SEED, Draw, baseline, draw, enters
 from friso_thesis.studies.thesis.studies import STUDIES
-from friso_thesis.studies.thesis.ways import COUNT, READ, SWING, by_way, weakest
+from friso_thesis.studies.thesis.ways import by_peak_count, by_way
 
 DRAWS, EVERY = 48, 3
 """Joint draws by default; of every third also linear analysis and experiments are made, which take longer than all the
@@ -56,16 +56,26 @@ class Separation:
 
 
 @dataclass(frozen=True)
+class MetPart:
+    """In how many draws a part is `met`, and the `share` of draws."""
+
+    met: int
+    share: Share
+
+
+@dataclass(frozen=True)
 class ClaimInSpace:
-    """A claim over the draws with these `seeds`, (seed, number): the share of them in which it `holds`, in every way
-    and in each (`by_way`), and in which each part does; values on which it hangs, the most decisive first; why it could
-    not be computed, by the number of the draw (`failures`)."""
+    """A claim over joint draws.
+
+    `seeds` (seed, number) are those of the draws. `holds` is the share of them in which it holds, `parts` those in
+    which each part does. `hangs_on` are the values on which that depends, the most decisive first. `failures` say, by
+    the number of the draw, why it could not be computed.
+    """
 
     seeds: tuple[tuple[int, int], ...]
     holds: Share
     count: int
-    by_way: Mapping[str, Share]
-    parts: tuple[Share, ...]
+    parts: tuple[MetPart, ...]
     hangs_on: tuple[Separation, ...]
     failures: Mapping[int, str]
 
@@ -86,8 +96,7 @@ class ClaimInSpace:
 
     def met(self, part: int) -> int:
         """In how many draws a part holds."""
-        share = self.parts[part].probability
-        return round(share * (self.draws - self.undecided)) if self.draws > self.undecided else 0
+        return self.parts[part].met
 
 
 @dataclass(frozen=True)
@@ -116,8 +125,8 @@ class BestFit:
 class Plausible:
     """All claims over the space of draws, by their name.
 
-    It has the best fit (None without draws), and the findings at friso's `own` choice by the runs, on maps of `POINTS`
-    values per axis.
+    It has the best fit (None without draws), and the findings at friso's `own` choice, on maps of `POINTS` values per
+    axis.
     """
 
     draws: tuple[Draw, ...]
@@ -137,8 +146,8 @@ def plausible(
     cheap = {name: entry for name, entry in entries.items() if entry.needs and not entry.needs & PARTS.keys()}
     costly = {name: entry for name, entry in entries.items() if entry.needs & PARTS.keys()}
     drawn = tuple(draw(number) for number in range(draws))
-    own: dict[str, dict[str, Finding]] = {}
-    by_claim_tried: dict[str, list[tuple[Draw, dict[str, Finding]]]] = {name: [] for name in (*cheap, *costly)}
+    own: dict[str, Finding] = {}
+    by_claim_tried: dict[str, list[tuple[Draw, Finding | None]]] = {name: [] for name in (*cheap, *costly)}
     failures: dict[str, dict[int, str]] = {name: {} for name in by_claim_tried}
     pieces = [(one, cheap, MAP_WORK) for one in (*drawn, baseline()) if drawn and cheap]
     pieces += [(one, costly, COSTLY_WORK) for one in drawn[EVERY - 1 :: EVERY] if costly]
@@ -153,17 +162,17 @@ def plausible(
     by_piece = side_by_side([partial(judged, *piece) for piece in pieces])
     for (one, group, _), findings in zip(pieces, by_piece, strict=True):
         for name in group:
-            ways = _by_way(findings, name)
+            finding = findings.get(name)
             if one in drawn:
-                by_claim_tried[name].append((one, ways))
-                failures[name] |= {} if ways else {one.number: findings[f"{name} {FAILED}"].parts[0].number}
-            elif ways:
-                own[name] = ways
+                by_claim_tried[name].append((one, finding))
+                failures[name] |= {} if finding else {one.number: findings[f"{name} {FAILED}"].parts[0].number}
+            elif finding:
+                own[name] = finding
     by_claim = {
         name: _in_space(entries[name], tried, failures[name]) for name, tried in by_claim_tried.items() if tried
     }
     fit = _fit({name: by_claim_tried[name] for name in cheap}, own)
-    return Plausible(drawn, by_claim, fit, {name: weakest(ways) for name, ways in own.items()})
+    return Plausible(drawn, by_claim, fit, own)
 
 
 def work_of(entries: Mapping[str, Registered], draws: int) -> int:
@@ -173,17 +182,13 @@ def work_of(entries: Mapping[str, Registered], draws: int) -> int:
     return cheap * (draws + bool(draws)) * MAP_WORK + costly * (draws // EVERY) * COSTLY_WORK
 
 
-def ways_of(entry: Registered, base: Evidence) -> dict[str, Finding]:
-    """Return the findings of a judge in the two ways that need the runs alone; in one,
-    where no runs are looked at."""
-    if entry.needs & (STUDIES.keys() | RESPONSES.keys()):
-        return {way: entry.judge(by_way(base, read)) for way, read in READ.items()}
-    return {COUNT: entry.judge(base)}
+def counted(entry: Registered, base: Evidence) -> Finding:
+    """Return the finding of a judge by the thesis's count."""
+    return entry.judge(by_way(base, by_peak_count))
 
 
 def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
-    """Return the findings in a draw, by claim and way; of what cannot be computed there,
-    why not."""
+    """Return the findings in a draw by claim; of what cannot be computed there, why not."""
     needs = {need for entry in entries.values() for need in entry.needs}
     try:
         base = evidence(needs, POINTS, DRAW_RTOL, changes=one.changes)
@@ -192,7 +197,7 @@ def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
     findings: Findings = {}
     for name, entry in entries.items():
         try:
-            findings |= {f"{name} {way}": finding for way, finding in ways_of(entry, base).items()}
+            findings[name] = counted(entry, base)
         except _SHOWS_NOTHING as error:
             findings[f"{name} {FAILED}"] = _failure(error)
     return findings
@@ -204,37 +209,33 @@ def _failure(error: Exception) -> Finding:
 
 
 FAILED = "failed"
-"""Stands after the name of a claim in the place of a way."""
+"""Stands after the name of a claim that cannot be computed."""
 
 _SHOWS_NOTHING = ValueError, ArithmeticError, RuntimeError
 """What is raised of a rig of which an experiment shows nothing, such as a loop that stops; errors of the program are
 not taken for it."""
 
 
-def _by_way(findings: Findings, name: str) -> dict[str, Finding]:
-    return {way: findings[key] for way in (COUNT, SWING) if (key := f"{name} {way}") in findings}
-
-
 def _in_space(
-    entry: Registered, tried: Sequence[tuple[Draw, Mapping[str, Finding]]], failures: Mapping[int, str]
+    entry: Registered, tried: Sequence[tuple[Draw, Finding | None]], failures: Mapping[int, str]
 ) -> ClaimInSpace:
-    decided = [(one, ways) for one, ways in tried if ways]
-    together = [weakest(ways) for _, ways in decided]
-    holds = np.array([finding.judgement == "holds" for finding in together], bool)
-    by_way_holds = {
-        way: _share(np.array([ways[way].judgement == "holds" for _, ways in decided]), len(tried))
-        for way in (decided[0][1] if decided else ())
-    }
-    parts = np.array([finding.pattern for finding in together], bool)
+    decided = [(one, finding) for one, finding in tried if finding]
+    holds = np.array([finding.judgement == "holds" for _, finding in decided], bool)
+    patterns = [finding.pattern for _, finding in decided]
     return ClaimInSpace(
         tuple((SEED, one.number) for one, _ in tried),
         _share(holds, len(tried)),
         int(holds.sum()),
-        by_way_holds,
-        tuple(_share(column, len(tried)) for column in parts.T),
+        tuple(_met(column, len(tried)) for column in zip(*patterns, strict=True)),
         tuple(_separations(entry, [one for one, _ in decided], holds)),
         failures,
     )
+
+
+def _met(column: Sequence[bool | None], count: int) -> MetPart:
+    """Return in how many of `count` draws a part is met; in others it is undecided."""
+    flags = np.array([holds for holds in column if holds is not None], bool)
+    return MetPart(int(flags.sum()), _share(flags, count))
 
 
 def _share(flags: np.ndarray, count: int) -> Share:
@@ -264,20 +265,20 @@ def _separations(entry: Registered, drawn: Sequence[Draw], holds: np.ndarray) ->
 
 
 def _fit(
-    by_claim_tried: Mapping[str, Sequence[tuple[Draw, Mapping[str, Finding]]]],
-    own: Mapping[str, Mapping[str, Finding]],
+    by_claim_tried: Mapping[str, Sequence[tuple[Draw, Finding | None]]],
+    own: Mapping[str, Finding],
 ) -> BestFit | None:
     """Return the draw, or friso's `own` choice, that fits the printed numbers best,
     by the thesis's own count; one of which not all of them are known is none."""
     first = baseline()
-    at_baseline = [item for name in by_claim_tried if name in own for item in numbers_of(name, own[name][COUNT])]
+    at_baseline = [item for name in by_claim_tried if name in own for item in numbers_of(name, own[name])]
     by_draw: dict[int, list[PrintedNumber]] = {first.number: at_baseline}
     drawn: dict[int, Draw] = {first.number: first}
     for name, tried in by_claim_tried.items():
-        for one, ways in tried:
+        for one, finding in tried:
             drawn[one.number] = one
-            if COUNT in ways:
-                by_draw.setdefault(one.number, []).extend(numbers_of(name, ways[COUNT]))
+            if finding:
+                by_draw.setdefault(one.number, []).extend(numbers_of(name, finding))
     most = max(len(numbers) for numbers in by_draw.values())
     misfits = {number: _misfit(numbers) for number, numbers in by_draw.items() if len(numbers) == most}
     usable = {number: value for number, value in misfits.items() if np.isfinite(value)}

@@ -20,7 +20,7 @@ class WordReading:
 
     - The factor within which a number is `about` another. The factor within which it is `of the order` of another, and
       beyond which it is far below it.
-    - The share of a map's cells up to which they are `few`, and up to which there are `none`.
+    - The share of a map's cells up to which they are `few`.
     - The rank correlation (Spearman) from which there is a `trend`.
     - The share within which numbers are the `same`, and within which they are `close`, as far as one reads them off a
       figure.
@@ -35,7 +35,6 @@ class WordReading:
     about: float = 1.5
     order: float = 10**0.5
     few: float = 0.05
-    none: float = 0.0
     trend: float = 0.5
     same: float = 0.15
     close: float = 0.1
@@ -98,7 +97,6 @@ def _otherwise() -> dict[str, WordReading]:
     least = {"twice": ("nearly twice", (1.5, 1.9)), "unequal": ("unequal", (1.05, 1.25))}
     shares = {
         "few": ("few", (0.02, 0.1)),
-        "none": ("none", (OWN.few,)),
         "same": ("the same", (0.1, 0.25)),
         "close": ("close", (0.05, 0.2)),
     }
@@ -158,11 +156,10 @@ CONVENTIONS = (
     f"at least {OWN.twice:g} times, sides are “unequal” from a factor of {OWN.unequal:g} on, and a period is “less "
     f"regular” from a scatter of {percent(OWN.uneven)} on. Every claim is judged by other readings too: "
     f"{', '.join(OTHERWISE)}; where one of them turns a criterion, its dependence says so. Whether a cell of a map "
-    "“keeps moving” or “comes to rest” is judged in three ways: by the thesis's count, where at least one peak is "
-    "counted (Sec. 3.2.2); where the run swings at its end; where a cycle attracts, whatever the move. A claim holds "
-    "as far as it does in all three ways; one on the path alone (F11A) is judged in the first two, since what attracts "
-    "does not depend on the path. A “limit” lies between the last cell that keeps moving and the next, where "
-    "the swing, interpolated in its logarithm, falls below what counts, or halfway where nothing is left of it; none "
-    "beyond it keeps moving."
+    "“keeps moving” or “comes to rest” is judged by the thesis's count, where at least one peak is counted (Sec. "
+    "3.2.2). What attracts the stages, whatever the move, is told beside it and does not decide. A “limit” lies "
+    "between the last cell that keeps moving and the next, where the swing, interpolated in its logarithm, falls below "
+    "what counts, or halfway where nothing is left of it; none beyond it keeps moving. A criterion whose number lies "
+    "beside its threshold within its error is undecided, and so is one that no simulation can decide; neither counts."
 )
 """Reading of the claims' words that all criteria share."""

@@ -20,11 +20,11 @@ from friso_thesis.studies.thesis.evidence import RESPONSES, evidence, map_of
 from friso_thesis.studies.thesis.experiments import EXPERIMENTS, Experiments
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
 from friso_thesis.studies.thesis.linear import NEEDS, Linear
-from friso_thesis.studies.thesis.plausible import DRAWS, PARTS, Plausible, plausible, ways_of, work_of
+from friso_thesis.studies.thesis.plausible import DRAWS, PARTS, Plausible, counted, plausible, work_of
 from friso_thesis.studies.thesis.reading import others_of, read_as, words_read
 from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 from friso_thesis.studies.thesis.verdicts import ClaimVerdict, not_covered, verdict
-from friso_thesis.studies.thesis.ways import CYCLE, by_peak_count, by_way, weakest
+from friso_thesis.studies.thesis.ways import by_peak_count, by_way
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -101,7 +101,7 @@ def reproduce(
     some of them, with what these need, on maps of at least `JUDGED` values per axis.
 
     A claim that is left out is "not yet covered". `with_cycles` the hunting cycles behind every map are computed too,
-    the third way in which its claims are judged; with `draws` every claim is judged in as many joint draws of the
+    and what attracts is told beside each judgement; with `draws` every claim is judged in as many joint draws of the
     values that the thesis leaves open. What is `kept` of an earlier run is not computed again. `progress` is called
     with steps done, steps in all and what comes next. Raises InputError for an unknown study or claim and for numbers
     that are too low or too high, ValueError for an unusable rtol.
@@ -148,14 +148,30 @@ def reproduce(
     studied = side_by_side([partial(behind, study) for study in studies.values()] if with_cycles else [])
     surveyed = {name: of_map for name, (of_map, _) in zip(studies, studied, strict=with_cycles)}
     cycles = {name: of_map for name, (_, of_map) in zip(studies, studied, strict=with_cycles)}
-    ways, readings = {}, {}
+    by_count, readings, attracting = {}, {}, {}
     for name, entry in entries.items():
         with words_read() as words:
-            ways[name] = _ways(entry, base, surveyed)
-        readings[name] = _read_otherwise(entry, base, surveyed, words)
+            by_count[name] = counted(entry, base)
+        readings[name] = _read_otherwise(entry, base, words)
+        if (attracts := _by_attraction(entry, base, surveyed)) is not None:
+            attracting[name] = attracts
     space = plausible(entries, draws, kept, tally)
     others = _others(entries, base, loose)
-    verdicts = tuple(_verdict(claim, entries, ways, space, others, readings, chosen) for claim in claims())
+    verdicts = tuple(
+        verdict(
+            claim,
+            entries[claim.id].figure,
+            by_count[claim.id],
+            attracting.get(claim.id),
+            space.claims.get(claim.id),
+            {name: by_claim[claim.id] for name, by_claim in others.items() if claim.id in by_claim},
+            entries[claim.id].undrawn,
+            readings[claim.id],
+        )
+        if claim.id in entries
+        else _left_out(claim, chosen)
+        for claim in claims()
+    )
     curves = bode(thesis_rig(), SHOWN, series=True) if base.linear is not None else None
     judged = by_way(base, by_peak_count)
     shown = judged.maps
@@ -173,53 +189,32 @@ def _survey_work(study: ThesisStudy) -> int:
     return LOCKED_SURVEY_WORK if study.changes.get("joint.locked") else FREE_SURVEY_WORK
 
 
-def _verdict(
-    claim: Claim,
-    entries: Mapping[str, Registered],
-    ways: Mapping[str, Mapping[str, Finding]],
-    space: Plausible,
-    others: Mapping[str, Mapping[str, Finding]],
-    readings: Mapping[str, Mapping[str, Finding]],
-    chosen: Mapping[str, ThesisStudy],
-) -> ClaimVerdict:
-    if claim.id not in entries:
-        entry = registered().get(claim.id)
-        missing = sorted({need for need in entry.needs if need in STUDIES} - chosen.keys()) if entry else []
-        reason = ", ".join(missing) or "this claim was not asked for"
-        return not_covered(claim, f"not computed in this run: {reason}" if entry else "no judge decides on it")
-    findings = ways[claim.id]
-    return verdict(
-        claim,
-        entries[claim.id].figure,
-        findings,
-        weakest(findings),
-        space.claims.get(claim.id),
-        {name: by_claim[claim.id] for name, by_claim in others.items() if claim.id in by_claim},
-        entries[claim.id].undrawn,
-        readings[claim.id],
-    )
+def _left_out(claim: Claim, chosen: Mapping[str, ThesisStudy]) -> ClaimVerdict:
+    """Return the verdict on a claim that is not judged in this run."""
+    entry = registered().get(claim.id)
+    if entry is None:
+        return not_covered(claim, "no judge decides on it")
+    missing = sorted({need for need in entry.needs if need in STUDIES} - chosen.keys())
+    return not_covered(claim, f"not computed in this run: {', '.join(missing) or 'this claim was not asked for'}")
 
 
-def _ways(entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed]) -> dict[str, Finding]:
-    """Return the findings of a judge in all the ways in which its evidence can be read;
-    a claim on paths alone is left out of what attracts, which does not depend on the path."""
-    findings, maps = ways_of(entry, base), entry.needs & STUDIES.keys()
-    if maps <= surveyed.keys() and not all(STUDIES[name].of_motion for name in maps):
-        attracted = {name: surveyed[name].attracted for name in maps}
-        lasting = by_way(replace(base, maps={}), by_peak_count)
-        findings[CYCLE] = entry.judge(replace(lasting, maps=attracted))
-    return findings
+def _by_attraction(entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed]) -> Finding | None:
+    """Return the finding by what attracts the stages; None for a claim without maps, and for one on paths alone, on
+    which what attracts does not depend."""
+    maps = entry.needs & STUDIES.keys()
+    if not maps or not maps <= surveyed.keys() or all(STUDIES[name].of_motion for name in maps):
+        return None
+    lasting = by_way(replace(base, maps={}), by_peak_count)
+    return entry.judge(replace(lasting, maps={name: surveyed[name].attracted for name in maps}))
 
 
-def _read_otherwise(
-    entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed], words: Set[str]
-) -> dict[str, Finding]:
+def _read_otherwise(entry: Registered, base: Evidence, words: Set[str]) -> dict[str, Finding]:
     """Return the findings by other readings of the `words` of the thesis by which the claim is
     judged, by what is read otherwise."""
     findings = {}
     for name, other in others_of(words).items():
         with read_as(other):
-            findings[name] = weakest(_ways(entry, base, surveyed))
+            findings[name] = counted(entry, base)
     return findings
 
 
@@ -228,7 +223,7 @@ def _others(
 ) -> dict[str, dict[str, Finding]]:
     """Return the findings on coarser maps, and on maps at the thesis's tolerance.
 
-    Coarser maps have every second value of each axis. Both are judged in the two ways that need the runs alone.
+    Coarser maps have every second value of each axis.
     """
     grids = {
         "every second value of each axis": {name: _second(runs) for name, runs in base.maps.items()},
@@ -236,7 +231,7 @@ def _others(
     }
     return {
         method: {
-            name: weakest(ways_of(entry, replace(base, maps=maps)))
+            name: counted(entry, replace(base, maps=maps))
             for name, entry in entries.items()
             if entry.needs & STUDIES.keys()
         }

@@ -11,20 +11,20 @@ from friso.shares import Share
 from friso_thesis.studies.thesis.claims import Claim, ClaimJudgement, Finding
 from friso_thesis.studies.thesis.plausible import ClaimInSpace
 from friso_thesis.studies.thesis.space import OPEN
-from friso_thesis.studies.thesis.ways import CYCLE, weakest
 
 ROBUST = 0.25
 """Share of the space in which a claim may hold after all, up to which its contradiction is called robust: 13 draws
 without it."""
 
-NO_WAYS: Mapping[str, Finding] = MappingProxyType({})
+NO_FINDINGS: Mapping[str, Finding] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
 class ClaimVerdict:
-    """The verdict on a claim; `finding` is None if the claim is not covered.
+    """The verdict on a claim by the thesis's own count; `finding` is None if the claim is not covered.
 
-    - `ways`: findings by the way in which hunting is judged; the finding is the weakest of them.
+    - `attracts`: the finding by what attracts the stages (None: not computed, or it does not enter). It stands beside
+      the judgement and does not decide it.
     - `space`: the claim over joint draws of the values that the thesis leaves open (None: none enters, or no draw was
       made).
     - `undrawn`: other assumptions that decide on it, and are in no draw.
@@ -33,90 +33,72 @@ class ClaimVerdict:
     """
 
     claim: Claim
-    judgement: ClaimJudgement
     figure: str
     finding: Finding | None
     reason: str
-    ways: Mapping[str, Finding] = field(default_factory=lambda: NO_WAYS)
+    attracts: Finding | None = None
     space: ClaimInSpace | None = None
     turned: Mapping[str, str] = field(default_factory=dict)
     undrawn: str = ""
-    reread: Mapping[str, Finding] = field(default_factory=lambda: NO_WAYS)
+    reread: Mapping[str, Finding] = field(default_factory=lambda: NO_FINDINGS)
 
     @property
-    def by_runs(self) -> Finding | None:
-        """Return the finding in the ways that the draws and the other methods know too,
-        without what attracts."""
-        return _by_runs(self.ways) or self.finding
+    def judgement(self) -> ClaimJudgement:
+        """Return the judgement at friso's own choice of what the thesis leaves open, and over the joint draws of it.
 
-    @property
-    def by_cycle_only(self) -> bool:
-        """Tell whether it does not hold, but for what attracts would."""
-        runs = self.by_runs
-        return self.judgement != "holds" and runs is not None and runs.judgement == "holds"
-
-    @property
-    def contradiction(self) -> str:
-        """Return the kind of contradiction of a claim that does not hold; empty if it holds.
-
-        It is "arbitrary" if the claim holds in some draw. It is "robust" if it holds in none and its share is at most
-        `ROBUST` by its interval. Otherwise it is "open": there are too few draws, or it fails by an attracting cycle
-        alone, which draws do not look for, or it depends on values that are not drawn.
+        A claim "holds" if it does at friso's choice and in at least half of the draws. It "depends" on the values left
+        open if it holds at friso's choice or in some draw, but not so often.
         """
-        if self.finding is None or self.judgement == "holds":
-            return ""
-        if self.space is None or self.by_cycle_only:
-            return "open"
-        if self.space.count:
-            return "arbitrary"
-        if self.undrawn:
-            return "open"
-        return "robust" if self.space.holds.high <= ROBUST else "open"
+        if self.finding is None:
+            return "not yet covered"
+        own, space = self.finding.judgement, self.space
+        if space is None or own == "cannot be decided":
+            return own
+        if own == "holds":
+            return "holds" if space.count >= space.misses else "depends"
+        return "depends" if space.count else own
 
     @property
-    def chosen(self) -> bool:
-        """Tell whether it holds at friso's choice of the unstated values,
-        and in some draw of them does not."""
-        return self.judgement == "holds" and self.space is not None and self.space.misses > 0
+    def robust(self) -> bool:
+        """Tell whether no plausible choice of what the thesis leaves open makes a claim hold that does not.
+
+        It holds in no draw, its share is at most `ROBUST` by its interval, and nothing undrawn decides on it.
+        """
+        fails = self.judgement in ("holds in part", "differs")
+        return bool(fails and self.space and not self.undrawn and self.space.holds.high <= ROBUST)
 
     @property
     def dependence(self) -> str:
-        """In which share of the space it holds, and on what that hangs."""
+        """In which share of the draws it holds, and on what that depends."""
         if self.finding is None:
             return ""
         if self.space is None:
             sentence = "No joint draws of the values that the thesis leaves open were made for this claim."
         else:
-            subject = "By the runs it" if len(self.ways) > 1 else "It"
-            sentence = f"{subject} holds in {draws_text(self.space.holds, self.space.count, self.space.draws)}"
+            sentence = f"It holds in {draws_text(self.space.holds, self.space.count, self.space.draws)}"
             sentence += (
                 f", {percent(self.space.undecided / self.space.draws)} undecided" if self.space.undecided else ""
             )
-            sentence += f"{_HANGS[bool(self.space.hangs_on)]}{_listed(self.space)}."
-            sentence += _KINDS.get(self.contradiction, "")
-            sentence += _CHOSEN if self.chosen else ""
-        if self.by_cycle_only:
-            sentence += " It does not hold by an attracting cycle only, which was not tried in draws."
+            sentence += f"; that depends on {_listed(self.space)}." if self.space.hangs_on else "."
+            sentence += " No choice of the unstated values that was tried makes it hold." if self.robust else ""
         if self.turned:
-            sentence += f" With {' and with '.join(self.turned)} a criterion is judged otherwise by the runs."
+            sentence += f" With {' and with '.join(self.turned)} a criterion is judged otherwise."
         if self.reread:
             turns = "; ".join(f"{name}: {self._word_of(finding)}" for name, finding in self.reread.items())
             sentence += f" Other readings of the thesis's words turn a criterion: {turns}."
         if self.undrawn:
-            sentence += f" It hangs also on what is assumed and not drawn: {self.undrawn}."
+            sentence += f" It depends also on what is assumed and not drawn: {self.undrawn}."
         return sentence
+
+    @property
+    def depends_on(self) -> str:
+        """Return the values that decide whether it holds, the most decisive first; "" if none stands out."""
+        return ", ".join(item.value for item in self.space.hangs_on) if self.space else ""
 
     def _word_of(self, finding: Finding) -> str:
         """Return the judgement by another reading."""
-        return finding.judgement if finding.judgement != self.judgement else f"still {finding.judgement}"
-
-
-_CHOSEN = " The agreement rests on friso's choice: other values, equally plausible, remove it."
-_HANGS = {True: "; that hangs on ", False: ""}
-_KINDS = {
-    "robust": " The contradiction is robust: no choice of the unstated values tried removes it.",
-    "arbitrary": " The contradiction is arbitrary: other values, equally plausible, remove it.",
-}
+        own = self.finding.judgement if self.finding else ""
+        return finding.judgement if finding.judgement != own else f"still {own}"
 
 
 def draws_text(share: Share, count: int, draws: int) -> str:
@@ -137,48 +119,39 @@ def _listed(space: ClaimInSpace) -> str:
 
 def not_covered(claim: Claim, reason: str) -> ClaimVerdict:
     """Return a claim with no judge, or without what its judge needs."""
-    return ClaimVerdict(claim, "not yet covered", "", None, reason)
+    return ClaimVerdict(claim, "", None, reason)
 
 
 def verdict(
     claim: Claim,
     figure: str,
-    ways: Mapping[str, Finding],
-    together: Finding,
+    finding: Finding,
+    attracts: Finding | None = None,
     space: ClaimInSpace | None = None,
-    others: Mapping[str, Finding] = NO_WAYS,
+    others: Mapping[str, Finding] = NO_FINDINGS,
     undrawn: str = "",
-    readings: Mapping[str, Finding] = NO_WAYS,
+    readings: Mapping[str, Finding] = NO_FINDINGS,
 ) -> ClaimVerdict:
-    """Return the verdict from the findings of all `ways` and the one that they allow `together`.
+    """Return the verdict from the finding by the thesis's count, and that by what attracts.
 
-    `others` are findings by another method, by its name, in the ways that need the runs alone. `readings` are findings
-    by another reading of the words, in all ways. Both are mentioned if other parts of the claim hold there.
+    `others` are findings by another method, by its name. `readings` are findings by another reading of the words. Both
+    are mentioned if other parts of the claim hold there.
     """
-    runs = _by_runs(ways) or together
     turned = {
-        name: f"with {name} {_change(runs, finding)}"
-        for name, finding in others.items()
-        if finding.pattern != runs.pattern
+        name: f"with {name} {_change(finding, other)}"
+        for name, other in others.items()
+        if other.pattern != finding.pattern
     }
-    reasons = (
-        () if together.judgement == "holds" else dict.fromkeys(p.why for p in together.judged if not p.holds and p.why)
-    )
-    reason = " ".join(reasons)
-    if not reason and together.judgement != "holds":
+    failing = [part for part in finding.stated if not part.holds and not part.undecided]
+    reason = " ".join(dict.fromkeys(part.why for part in failing if part.why))
+    if failing and not reason:
         reason = "No reason was found."
-    reread = {name: finding for name, finding in readings.items() if finding.pattern != together.pattern}
-    return ClaimVerdict(claim, together.judgement, figure, together, reason, dict(ways), space, turned, undrawn, reread)
-
-
-def _by_runs(ways: Mapping[str, Finding]) -> Finding | None:
-    """Return the weakest finding of the ways that need the runs alone; None without any."""
-    runs = {way: finding for way, finding in ways.items() if way != CYCLE}
-    return weakest(runs) if runs else None
+    reread = {name: other for name, other in readings.items() if other.pattern != finding.pattern}
+    return ClaimVerdict(claim, figure, finding, reason, attracts, space, turned, undrawn, reread)
 
 
 def _change(first: Finding, second: Finding) -> str:
     """Return how a finding is judged otherwise, with the numbers of the parts that turned."""
-    pairs = zip(first.judged, second.judged, strict=True)
-    numbers = "; ".join(after.number for before, after in pairs if before.holds != after.holds)
-    return f"the claim is judged by the runs: {second.judgement} ({numbers})"
+    pairs = zip(first.stated, second.stated, first.pattern, second.pattern, strict=True)
+    numbers = "; ".join(after.number for _, after, was, becomes in pairs if was != becomes)
+    return f"the claim is judged: {second.judgement} ({numbers})"

@@ -78,7 +78,7 @@ def pass_speeds(stage: Stage) -> tuple[float, ...]:
 
 
 def _passes(name: str, stage: Stage, seed: int) -> Passes:
-    log, mass = _passes_log(name, stage, seed), moving_mass(stage.flat())
+    log, mass = passes_log(name, stage, seed), moving_mass(stage.flat())
     cart = log.true["cart_position"]
     if not len(cart):
         raise stopped(log)
@@ -87,8 +87,8 @@ def _passes(name: str, stage: Stage, seed: int) -> Passes:
     return Passes(name, log, place, friction_velocity(log.log, mass), true)
 
 
-def _passes_log(name: str, stage: Stage, seed: int) -> RigLog:
-    """Return the log of passes there and back at both speeds."""
+def passes_log(name: str, stage: Stage, seed: int) -> RigLog:
+    """Return the log of passes there and back at both speeds, of a stage whose joint is as its `name` says."""
     period, parts = 1 / pace(stage), [(0.0, STANDS / pace(stage))]
     for speed, periods in zip(pass_speeds(stage), DURATIONS, strict=True):
         for velocity in (speed, -speed):

@@ -6,10 +6,11 @@ import numpy as np
 
 from friso.equations.controllers.van_dijk import ALPHA, BETA
 from friso.quantities import percent
-from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
+from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, beside, judges
 from friso_thesis.studies.thesis.maps import (
     begins,
     free_square,
+    limit_error,
     overlap,
     peak_counts,
     sizes,
@@ -51,6 +52,7 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
                 f"smallest gap {smallest:.2g} N" if moving.any() else "no cell keeps moving",
                 printed=_GAP,
                 read=smallest,
+                undecided=beside(smallest, (_GAP / words.about, _GAP * words.about), limit_error(static)),
             ),
             Part(
                 "over the cells that keep moving, the count rises with the gap (rank correlation at least "

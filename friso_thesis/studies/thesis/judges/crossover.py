@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.quantities import percent
-from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
-from friso_thesis.studies.thesis.maps import ends, overlap_text, sizes, verdict_table
+from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, beside, judges
+from friso_thesis.studies.thesis.maps import ends, limit_error, overlap_text, sizes, verdict_table
 from friso_thesis.studies.thesis.reading import reading
 from friso_thesis.studies.thesis.studies import SOFT, thesis_rig
 
@@ -27,6 +27,7 @@ def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
     limits = ends(crossover, moving, sizes(runs, *_AXES))
     long, longest = stroke >= words.long * stroke[-1], stroke >= (1 + words.long) / 2 * stroke[-1]
     shorter, longer = limits[long & ~longest].mean(), limits[longest].mean()
+    error = limit_error(crossover, int(longest.sum())) / shorter * 2**0.5
     below = (crossover[:, None] < limits[None, :]) & long[None, :] & valid
     return Finding(
         (
@@ -41,8 +42,9 @@ def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
                 "the mean limits over the lower and over the upper half of these strokes differ by at most "
                 f"{percent(words.same)}, and the limit of stroke 0 is higher than both",
                 bool(abs(shorter - longer) <= words.same * shorter and limits[0] > max(shorter, longer)),
-                f"{shorter:.3g} Hz over the lower and {longer:.3g} Hz over the upper half; {limits[0]:.3g} Hz at "
-                "stroke 0",
+                f"{shorter:.3g} Hz over the lower and {longer:.3g} Hz over the upper half, a difference of "
+                f"{percent(abs(shorter - longer) / shorter)} (± {percent(error)}); {limits[0]:.3g} Hz at stroke 0",
+                undecided=beside(abs(shorter - longer) / shorter, [words.same], error),
             ),
         )
     )
@@ -58,6 +60,8 @@ def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
     long = stroke >= words.long * stroke[-1]
     drop = (stiff - soft)[long]
     ratio = float(soft[long].mean() / stiff[long].mean())
+    crossover = verdict_table(evidence.maps[names[0]], *_AXES)[0]
+    error = limit_error(crossover, int(long.sum())) / stiff[long].mean() * 2**0.5
     return Finding(
         (
             Part(
@@ -67,6 +71,7 @@ def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
                 ratio < 1 - words.same,
                 f"{soft[long].mean():.3g} against {stiff[long].mean():.3g} Hz: a drop of {percent(1 - ratio)}; lower "
                 f"at {percent((drop > 0).mean())} of the strokes, higher at {percent((drop < 0).mean())}",
+                undecided=beside(ratio, [1 - words.same], error),
             ),
         )
     )

@@ -60,10 +60,9 @@ def judged_line(line: LockedLine, moved: float) -> Finding:
                 f"the mass read off it is nearer {seen:g} than the {weighed:g} kg weighed (by their ratios)",
                 bool(np.nanmedian(mass) > (seen * weighed) ** 0.5),
                 f"{mass.min():.3g} to {mass.max():.3g} kg at {len(mass)} places",
-                why="Friction hardly moves the line: cables or the motor constant (Sec. 4.2.1), not in the "
-                "model, may, "
-                f"the latter by the factor {CONSTANTS[0]:.2f}; Fig. 18 asks for {CONSTANTS[1]:.2f}. Simulation alone "
-                "cannot decide this.",
+                undecided="Simulation cannot decide this: friction hardly moves the line; cables or the motor "
+                f"constant (Sec. 4.2.1), not in the model, may, the latter by the factor {CONSTANTS[0]:.2f}; Fig. 18 "
+                f"asks for {CONSTANTS[1]:.2f}.",
             ),
             Part(
                 f"identifications at different places differ most between {_NOISY[0]:g} and {_NOISY[1]:g} Hz, by more "
@@ -105,11 +104,9 @@ def response_of_the_free_joint(evidence: Evidence) -> Finding:
                 f"the mass line between them is nearer {seen:g} than the {weighed:g} kg weighed (by their ratios)",
                 bool(reads[0] > (seen * weighed) ** 0.5),
                 f"{reads[0]:.3g} to {reads[1]:.3g} kg",
-                why=f"The line lies by a factor of {factor:.2f} off, in Fig. 17 by {CONSTANTS[0]:.2f}: one "
-                "error of the motor "
-                f"constant, which is not in the model, {both} both (to {percent(words.close)}), and the first "
-                "mode does not "
-                "depend on it. Simulation alone cannot decide this.",
+                undecided=f"Simulation cannot decide this: the line lies by a factor of {factor:.2f} off, in Fig. 17 "
+                f"by {CONSTANTS[0]:.2f}; one error of the motor constant, which is not in the model, {both} both (to "
+                f"{percent(words.close)}), and the first mode does not depend on it.",
             ),
             *on_the_rig(evidence, lambda built: weaker_motor(built, 1, MEASURED[1], WEIGHED[1])),
         )

@@ -55,9 +55,9 @@ def friction_does_not_bring_it_back(evidence: Evidence) -> Finding:
     return Finding(
         (
             Part(
-                "with the isolator the stage comes to rest for all valid pairs of friction forces"
-                + (f", but at most {percent(words.none)}" if words.none else ""),
-                overlap(back, valid) <= words.none,
+                "with the isolator the stage comes to rest for all valid pairs of friction forces but a few (at most "
+                f"{percent(words.few)})",
+                overlap(back, valid) <= words.few,
                 f"{back.sum()} of {valid.sum()} cells keep moving; of the {locked.sum()} that do with the joint locked "
                 f"{percent(overlap(moving, locked), 3)}",
                 where,

@@ -7,10 +7,11 @@ import numpy as np
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.equations.motion import CRUISE
 from friso.quantities import percent
-from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
+from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, beside, judges
 from friso_thesis.studies.thesis.maps import (
     ends,
     free_square,
+    limit_error,
     overlap,
     overlap_text,
     peak_counts,
@@ -96,6 +97,7 @@ def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
                 f"median over the masses {np.median(by_mass):.3g} Hz",
                 printed=_ENDS,
                 read=float(highest),
+                undecided=beside(highest, (_ENDS / words.about, _ENDS * words.about), limit_error(crossover)),
             ),
             Part(
                 "at some crossovers the stage keeps moving with the marker's mass and comes to rest with the "
@@ -115,6 +117,7 @@ def _at_the_limit(moving: np.ndarray, peaks: np.ndarray) -> str:
     if not rows.size:
         return ""
     row = rows[-1]
-    most = np.nanmax(np.where(moving[row], peaks[row], np.nan))
+    counts = peaks[row][moving[row] & np.isfinite(peaks[row])]
     cells = int(moving[row].sum())
-    return f", set by {cells} {'cell' if cells == 1 else 'cells'} of at most {most:g} counted peaks"
+    most = f" of at most {counts.max():g} counted peaks" if counts.size else ""
+    return f", set by {cells} {'cell' if cells == 1 else 'cells'}{most}"

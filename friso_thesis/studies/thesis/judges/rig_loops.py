@@ -63,10 +63,8 @@ def _further(loops: RigLoops) -> Part:
         any(about(f, _OTHER) for f in above),
         f"above the first crossing: {', '.join(f'{f:.3g} Hz' for f in above) or 'none'}; its peak there is "
         f"{number_text(gain, '.2g')} at {number_text(near, unit='Hz')}",
-        why=f"The only parasitic mode of the model, that of Fig. 18, is at {near:.3g} Hz with the joint locked. "
-        "Simulation alone cannot decide this."
-        if np.isfinite(near)
-        else "",
+        undecided="Simulation cannot decide this: the only parasitic mode of the model is that of Fig. 18"
+        + (f", at {near:.3g} Hz with the joint locked." if np.isfinite(near) else "."),
     )
 
 
@@ -94,9 +92,8 @@ def measured_free(loops: RigLoops) -> tuple[Part, Part]:
             about(highest, _HIGHEST),
             f"{number_text(highest, unit='Hz')}, of settings 10 % apart, released away from its reference, the "
             "limiters not touched",
-            why="The thesis found “resonances in the compliant joint”, of which the model has one, and the "
-            "delays of the "
-            "model are friso's choice.",
+            undecided="Simulation cannot decide this: the thesis found “resonances in the compliant joint”, of which "
+            "the model has one, and gives no delay.",
         ),
     )
 

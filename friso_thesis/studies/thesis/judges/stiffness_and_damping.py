@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.quantities import percent
-from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, Response, judges
-from friso_thesis.studies.thesis.maps import begins, ends, sizes, trend, trend_text, verdict_table
+from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, Response, beside, judges
+from friso_thesis.studies.thesis.maps import begins, ends, limit_error, sizes, trend, trend_text, verdict_table
 from friso_thesis.studies.thesis.reading import reading
 
 if TYPE_CHECKING:
@@ -106,6 +106,11 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
                 f"{_SMALL_DAMPING:g} N s/m {np.median(small) * 1e3:.2g} mm",
                 printed=_NEEDED,
                 read=at_large,
+                undecided=beside(
+                    np.log(at_large),
+                    np.log((_NEEDED / words.about, _NEEDED * words.about)),
+                    limit_error(np.log(stroke), int((damping >= words.large).sum())),
+                ),
             ),
             Part(
                 "that stroke is far below the amplitude of the locked rig's cycle (at most "
