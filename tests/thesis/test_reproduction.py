@@ -53,7 +53,7 @@ from friso_thesis.studies.thesis import (
     thesis_rig,
 )
 from friso_thesis.studies.thesis.as_built import _prescribed, rig_with_drive
-from friso_thesis.studies.thesis.claims import _JUDGES, FindingTable, judges, registered
+from friso_thesis.studies.thesis.claims import _JUDGES, BESIDE, beside, judges, registered
 from friso_thesis.studies.thesis.cycles import map_cycles, survey
 from friso_thesis.studies.thesis.evidence import RESPONSES
 from friso_thesis.studies.thesis.experiments import (
@@ -67,7 +67,6 @@ from friso_thesis.studies.thesis.experiments import (
     Experiments,
 )
 from friso_thesis.studies.thesis.experiments import BUILT as LOOPS_BUILT
-from friso_thesis.studies.thesis.claims import BESIDE, beside
 from friso_thesis.studies.thesis.judges import design_rules
 from friso_thesis.studies.thesis.judges.identified_in_time import force_swings
 from friso_thesis.studies.thesis.judges.rig_hunting import judged_move
@@ -83,7 +82,7 @@ from friso_thesis.studies.thesis.space import OPEN, OpenValue, baseline, draw, e
 from friso_thesis.studies.thesis.studies import rig_gains
 from friso_thesis.studies.thesis.taken_apart import put_together, taken_apart
 from friso_thesis.studies.thesis.verdicts import not_covered, verdict
-from friso_thesis.studies.thesis.ways import COUNT, CYCLE, by_attraction, by_peak_count
+from friso_thesis.studies.thesis.ways import by_attraction, by_peak_count
 
 ROOT = Path(__file__).parents[2]
 POINTS = 21
