@@ -24,7 +24,7 @@ from typing import Any
 
 from benchmarks.canonical import differ, reference_numbers
 from benchmarks.code_digest import code_digest
-from benchmarks.ode23s import thesis_solver
+from benchmarks.ode23s import other_solvers, thesis_solver
 from benchmarks.report import print_table
 from friso import evidence
 from friso.evidence import Entry, Equations
@@ -266,6 +266,7 @@ QUICK: Mapping[str, Callable[[], Values]] = {
     "hunting.supercritical": hunting_supercritical,
     "hunting.adrc": hunting_adrc,
     "thesis.solver": thesis_solver,
+    "thesis.other-solvers": other_solvers,
 }
 
 LONG: Mapping[str, Callable[[], Values]] = {

@@ -162,6 +162,48 @@ def thesis_solver() -> dict[str, float]:
     return values
 
 
+def other_solvers() -> dict[str, float]:
+    """Peaks, swing over the last quarter [m], steps and evaluations of the equations of ode23s, of backward
+    differentiation of variable order (the method of ode15s) and of Dormand and Prince's (ode45), the joint locked and
+    free, at the thesis's tolerance, with no largest step: `locked_ode45_evaluations`, for one."""
+    from friso_thesis.studies.thesis import thesis_rig
+
+    values: dict[str, float] = {}
+    for joint in ("locked", "free"):
+        flat = thesis_rig().replace({"joint.locked": joint == "locked"}).flat()
+        numbers, end = parameters(flat), flat["motion.duration"]
+        position, steps, rejected = ode23s(numbers, end, RTOL, ATOL, end, SAMPLE)
+        runs = {"ode23s": (position, steps, (STATES + 3) * steps + 2 * rejected)}
+        runs |= {name: _of_scipy(name, numbers, end) for name in ("ode15s", "ode45")}
+        for name, (position, steps, evaluations) in runs.items():
+            swing = float(np.ptp(position[3 * len(position) // 4 :]))
+            found = {"peaks": counted_peaks(position), "swing_m": swing, "steps": steps, "evaluations": evaluations}
+            values |= {f"{joint}_{name}_{key}": value for key, value in found.items()}
+    return values
+
+
+def _of_scipy(name: str, numbers: np.ndarray, end: float) -> tuple[np.ndarray, int, int]:
+    """Samples of the stage's position, steps and evaluations, those of numerical Jacobians included."""
+    from scipy.integrate import BDF, RK45
+
+    def derivative(t: float, x: np.ndarray) -> np.ndarray:
+        out = np.empty(STATES)
+        rates(t, x, numbers, out)
+        return out
+
+    method = {"ode15s": BDF, "ode45": RK45}[name]
+    solver = method(derivative, 0.0, np.zeros(STATES), end, rtol=RTOL, atol=ATOL, first_step=1e-6)
+    times = np.arange(round(end / SAMPLE) + 1) * SAMPLE
+    position, steps = np.zeros(len(times)), 0
+    while solver.status == "running":
+        solver.step()
+        steps += 1
+        first, last = np.searchsorted(times, [solver.t_old, solver.t], side="right")
+        if last > first:
+            position[first:last] = solver.dense_output()(times[first:last])[2]
+    return position, steps, solver.nfev + STATES * solver.njev
+
+
 if __name__ == "__main__":
-    for name, value in thesis_solver().items():
+    for name, value in (thesis_solver() | other_solvers()).items():
         print(name, value)

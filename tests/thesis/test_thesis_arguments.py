@@ -10,9 +10,14 @@ import xarray as xr
 from friso_thesis.studies.thesis import STUDIES, Evidence, Finding, Response, thesis_rig
 from friso_thesis.studies.thesis.claims import registered
 from friso_thesis.studies.thesis.evidence import RESPONSES
-from friso_thesis.studies.thesis.judges import arguments
+from friso_thesis.studies.thesis.judges import arguments, control_law, step_by_step
 from friso_thesis.studies.thesis.judges.arguments import HEAVY, LIGHT
-from friso_thesis.studies.thesis.judges.solver import judged_runs
+from friso_thesis.studies.thesis.judges.control_law import K_P, TAU_I, TAU_Z, judged_crossovers, judged_forms, rewritten
+from friso_thesis.studies.thesis.judges.influence import judged_ranks
+from friso_thesis.studies.thesis.judges.joint_shape import evaluated, judged_dimensions, judged_place, judged_shortening
+from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE, Sticking
+from friso_thesis.studies.thesis.judges.solver import judged_runs, judged_solvers
+from friso_thesis.studies.thesis.judges.step_by_step import HEAVIEST, HIGH_ALPHA, LOW_ALPHA, Cycle
 from friso_thesis.studies.thesis.space import draw
 from friso_thesis.studies.thesis.ways import by_attraction, by_peak_count
 
@@ -140,3 +145,101 @@ def test_the_solver_is_accurate_where_it_counts_and_swings_alike() -> None:
     assert "still" in other_count.parts[0].number
     other_swing = judged_runs({**runs, "swinging": (6, 1.2e-3, 200_000.0)}, runs, runs)
     assert other_swing.pattern == (True, False)
+
+
+# --- claims that were found by reading on -----------------------------------------------------------------------------
+
+
+def test_two_forms_of_the_controller() -> None:
+    tuned = {"k_p": 1000.0, "tau_z": 0.06, "tau_i": 0.12, "tau_p": 0.006}
+    assert judged_forms(rewritten(), tuned).pattern == (Y, Y)
+    plain = K_P * (1 + TAU_Z / TAU_I), K_P / TAU_I, K_P * TAU_Z  # the coefficients of Eq. 7 are not those of Eq. 6
+    assert judged_forms(plain, tuned).pattern == (N, Y)
+    assert judged_forms(rewritten(), {**tuned, "tau_p": 0.1}).pattern == (Y, N)
+
+
+@pytest.mark.parametrize(
+    ("near", "far", "force", "settling", "pattern"),
+    [(0.0, 0.3, 0.9, -0.9, (Y, Y, Y)), (0.2, 0.3, 0.1, 0.2, (N, N, N)), (0.0, 0.0, 0.9, np.nan, (N, Y, N))],
+)
+def test_the_crossover_and_the_first_mode(near: float, far: float, force: float, settling: float, pattern: Any) -> None:
+    margins = {0.2: far, 0.9: 0.5, 1.5: near, 5.0: 0.6}
+    assert judged_crossovers(margins, 10.0, force, settling).pattern == pattern
+
+
+def test_the_motor_constant(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert judged("S421").pattern == (Y,)
+    monkeypatch.setattr(control_law, "loops", lambda flat, *_: np.array([1.0 + flat["controller.tuned_mass"]]))
+    assert judged("S421").pattern == (N,)
+
+
+def test_the_leaf_springs_in_words() -> None:
+    leaves = evaluated()
+    assert judged_shortening(leaves).pattern == (Y, Y)
+    assert leaves.shortening == pytest.approx(0.6 * 1e-3**2 / 70e-3, rel=0.01)  # parallel leaves (Brouwer et al.)
+    assert judged_dimensions((1.1, 1.1, 1.2), (0.75, 0.9, 0.8)).pattern == (Y, Y)
+    assert judged_dimensions((1.1, 1.1, 1.1), (0.75, 0.9, 0.9)).pattern == (N, N)
+    assert judged_dimensions((1.1, 1.0, 1.2), (0.75, 0.9, 0.8)).pattern == (N, Y)
+    assert judged_place(leaves.stiffness[0], 70e-3).pattern == (Y,)
+    assert judged_place(leaves.stiffness[0], 140e-3).pattern == (N,)
+
+
+def test_the_ranks_of_influence() -> None:
+    locked, free = (
+        {"crossover": -0.8, "mass": 0.3},
+        {"crossover": -0.7, "stroke": -0.5, "joint stiffness": 0.4, "x": 0.1},
+    )
+    assert judged_ranks(locked, free).pattern == (Y, Y)
+    assert judged_ranks({**locked, "mass": 0.9}, {**free, "x": -0.6}).pattern == (N, N)
+
+
+def test_other_solvers() -> None:
+    own = {"peaks": 6, "swing_m": 1e-3, "steps": 100, "evaluations": 1000}
+    values = {f"{joint}_{name}_{key}": value for joint in ("locked", "free") for name in ("ode23s", "ode15s", "ode45")
+              for key, value in own.items()}  # fmt: skip
+    assert judged_solvers(values | {f"{joint}_ode15s_evaluations": 2000 for joint in ("locked", "free")}).pattern == (
+        Y,
+        N,
+    )
+    assert judged_solvers(values | {"locked_ode45_peaks": 0}).pattern == (N, Y)
+    assert judged_solvers(values | {"locked_ode45_swing_m": 2e-3}).pattern == (N, Y)
+
+
+def cycle(
+    overshoot: float = 1e-3, build_up: float = 5.0, time: float = 1.0, integral: float = 0.7, both: bool = True
+) -> Cycle:
+    directions = np.array([1, -1] if both else [1, 1])
+    return Cycle(overshoot, build_up, Sticking(np.full(2, time), np.full(2, integral), directions))
+
+
+@pytest.mark.parametrize(
+    ("claim", "cycles", "pattern"),
+    [
+        ("S41G", {WIDE: cycle(2e-3, 6.0), NARROW: cycle()}, (Y, Y)),
+        ("S41G", {WIDE: cycle(), NARROW: cycle(2e-3, 6.0)}, (N, N)),
+        ("S41G", {WIDE: cycle(2e-3, 6.0), NARROW: cycle(both=False)}, (None, None)),
+        ("S41A", {LOW_ALPHA: cycle(), HIGH_ALPHA: cycle(time=0.5, integral=0.6)}, (Y, Y)),
+        ("S41A", {LOW_ALPHA: cycle(time=0.5, integral=0.6), HIGH_ALPHA: cycle()}, (N, N)),
+        ("S41M", {LIGHT: cycle(), HEAVIEST: cycle(build_up=4.0)}, (Y, Y)),
+        ("S41M", {LIGHT: cycle(build_up=4.0), HEAVIEST: cycle()}, (N, Y)),
+    ],
+)
+def test_the_steps_of_the_arguments(claim: str, cycles: Any, pattern: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(step_by_step, "cycle_of", lambda response: cycles[response.trace])
+    still = xr.Dataset({"count": 0.0})
+    responses = {name: Response(still, name) for name in cycles}  # type: ignore[arg-type]
+    assert registered()[claim].judge(Evidence({}, responses)).pattern == pattern
+
+
+def test_periods_and_peaks_of_maps() -> None:
+    def with_periods(name: str, period: Cells) -> xr.Dataset:
+        runs = made(name, lambda x, y: 6 + 0 * x)
+        x, y = (runs[span.key] for span in STUDIES[name].spans)
+        return runs.assign(period=period(x, y) + 0 * runs["peaks"])
+
+    falling, rising = (with_periods("system", lambda f, m, power=power: f**power) for power in (-1, 1))
+    assert judged("F25R", {"system": falling}).pattern == (Y,)
+    assert judged("F25R", {"system": rising}).pattern == (N,)
+    isolated = [name for name in STUDIES if name.startswith("isolator")]
+    assert judged("S5P", {name: with_periods(name, lambda x, y: 2.5 + 0 * x) for name in isolated}).pattern == (Y,)
+    assert judged("S5P", {name: with_periods(name, lambda x, y: 1.6 + 0 * x) for name in isolated}).pattern == (N,)

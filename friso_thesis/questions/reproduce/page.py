@@ -14,7 +14,7 @@ from friso.shown.drawing import plotly_renderer
 from friso.shown.drawing.figure import BLUE, GREEN, GREY, ORANGE, PINK, VERMILLION, Figure
 from friso.shown.files import Content, pictures
 from friso.shown.pages import Report, print_image
-from friso_thesis.questions.reproduce import words
+from friso_thesis.questions.reproduce import first_screen, words
 from friso_thesis.questions.reproduce.document import conclusion, reproduce_document
 from friso_thesis.questions.reproduce.figures import reproduction_figures
 from friso_thesis.questions.reproduce.laws import laws_rows, laws_sentences
@@ -64,6 +64,7 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
     """Return the whole page: all claims at a glance,
     then item by item in the order of the thesis. It opens offline."""
     verdicts = words.in_order(reproduction.verdicts)
+    by_claim = {verdict.claim.id: verdict for verdict in verdicts}
     numbered = reproduction_figures(reproduction)
     parts = sections(numbered, verdicts)
     figures = [section.figure for section in parts if section.figure]
@@ -77,6 +78,9 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
         templates="friso_thesis.shown",
         values={
             "verdicts": verdicts,
+            "right": first_screen.right(verdicts),
+            "other_reason": first_screen.remarks(first_screen.OTHER_REASON, by_claim),
+            "slips": first_screen.remarks(first_screen.SLIPS, by_claim),
             "counts": _counts(verdicts),
             "colours": COLOURS,
             "words": words,

@@ -7,12 +7,14 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from friso.engine.simulate import simulate
+from friso.equations.controllers.van_dijk import ALPHA
 from friso.studies.request import Request
 from friso.studies.sweep import sweep
 from friso_thesis.studies.thesis.claims import Evidence, Response
 from friso_thesis.studies.thesis.experiments import Experiments
 from friso_thesis.studies.thesis.judges.arguments import HEAVY, LIGHT
 from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE
+from friso_thesis.studies.thesis.judges.step_by_step import HEAVIEST, HIGH_ALPHA, LOW_ALPHA
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
 from friso_thesis.studies.thesis.linear import NEEDS, analysed
 from friso_thesis.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, masses, thesis_rig
@@ -27,9 +29,12 @@ RESPONSES: Mapping[str, Mapping[str, object]] = {
     NARROW: {**LOCKED, "friction.static": "4 N", "friction.coulomb": "1.5 N"},
     LIGHT: {**LOCKED, **masses(1.7)},
     HEAVY: {**LOCKED, **masses(2.5)},
+    LOW_ALPHA: {**LOCKED, ALPHA: 0.1},
+    HIGH_ALPHA: {**LOCKED, ALPHA: 0.2},
+    HEAVIEST: {**LOCKED, **masses(5.1)},
 }
-"""What runs in time change in the rig: those of Fig. 5 and 13, and two that differ in their masses alone, whatever
-those of the rig are."""
+"""What runs in time change in the rig: those of Fig. 5 and 13, and some that differ in their masses or in alpha alone,
+whatever those of the rig are."""
 
 
 def maps_of(

@@ -17,7 +17,7 @@ from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
 from friso_thesis.studies.thesis.reading import reading
 from friso_thesis.studies.thesis.studies import thesis_rig
 
-_STROKE, _STIFFNESS, _FIRST, _PARASITIC, _STRESS = 1e-3, 2.4e3, 11.0, 360.0, 50e6
+STROKE, _STIFFNESS, _FIRST, _PARASITIC, _STRESS = 1e-3, 2.4e3, 11.0, 360.0, 50e6
 """What the thesis finds with SPACAR [m, N/m, Hz, Hz, Pa] (Sec. 3.5)."""
 
 _CLOSE = 0.05
@@ -33,10 +33,10 @@ _SPACINGS, _HEIGHTS = (0.03, 0.06, 0.09), (0.0, 0.03, 0.06)
 @cache
 def _evaluated() -> tuple[Evaluation, ...]:
     """Return the thesis's leaves over what it leaves open."""
-    return tuple(beams(_mechanism(*variant), _STROKE) for variant in product(_YOUNG, _SPACINGS, _HEIGHTS))
+    return tuple(beams(mechanism(*variant), STROKE) for variant in product(_YOUNG, _SPACINGS, _HEIGHTS))
 
 
-def _mechanism(young: float, spacing: float, height: float) -> Mechanism:
+def mechanism(young: float, spacing: float, height: float) -> Mechanism:
     steel, mass, length = materials()["stainless 1.4310"], thesis_rig().flat()["masses.stage"], 70e-3
     centre = (length + height, 0.0, 0.0)
     return Mechanism(
@@ -110,8 +110,8 @@ def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
 
 def _as_beams(young: float) -> float:
     """Drive stiffness [N/m] of leaves that curl freely across their width: n 12 E I/L^3."""
-    mechanism = _mechanism(young, _SPACINGS[0], _HEIGHTS[0])
-    return mechanism.leaves * 12 * mechanism.young * mechanism.bending / mechanism.length**3
+    own = mechanism(young, _SPACINGS[0], _HEIGHTS[0])
+    return own.leaves * 12 * own.young * own.bending / own.length**3
 
 
 def _met(ratio: np.ndarray) -> bool:

@@ -126,6 +126,59 @@ def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loo
     )
 
 
+OTHER_SOLVERS = "thesis.other-solvers"
+"""What ode23s, ode15s and ode45 need for the same runs (`benchmarks/ode23s.py`)."""
+
+
+@judges("S323C", figure="Sec. 3.2.3, other solvers")
+def other_solvers(evidence: Evidence) -> Finding:
+    """Compare the solvers that the thesis weighs, on the locked and on the free rig."""
+    return judged_solvers(findings_on_file()[OTHER_SOLVERS].values)
+
+
+def judged_solvers(values: Mapping[str, float]) -> Finding:
+    """Return the finding from runs by three solvers, as `benchmarks.ode23s.other_solvers` names them."""
+    words = reading()
+    cost = {name: {joint: values[f"{joint}_{name}_evaluations"] for joint in ("locked", "free")} for name in _SOLVERS}
+    cheaper = min(cost["ode15s"][joint] / cost["ode23s"][joint] for joint in ("locked", "free"))
+    swing = values["locked_ode45_swing_m"] / values["locked_ode23s_swing_m"]
+    right = all(values[f"{joint}_ode45_peaks"] == values[f"{joint}_ode23s_peaks"] for joint in ("locked", "free"))
+    rows = tuple(
+        (
+            f"{name}, joint {joint}",
+            f"{values[f'{joint}_{name}_steps']:.0f}",
+            f"{values[f'{joint}_{name}_evaluations']:.0f}",
+            f"{values[f'{joint}_{name}_peaks']:.0f}",
+            f"{values[f'{joint}_{name}_swing_m'] * 1e3:.4g} mm",
+        )
+        for name in _SOLVERS
+        for joint in ("locked", "free")
+    )
+    return Finding(
+        (
+            Part(
+                "ode23s evaluates the equations less often than ode15s at the same tolerance, joint locked and free",
+                cheaper > 1,
+                f"ode15s needs {cheaper:.2g} times as many and more, those of numerical Jacobians included",
+                why="The method of several steps saves more than it starts again at each break-away.",
+            ),
+            Part(
+                "ode45 is unstable: it counts other peaks than ode23s, or another swing (by more than "
+                f"{percent(words.same)})",
+                not right or abs(swing - 1) > words.same,
+                f"{'the same peaks' if right else 'other peaks'}, {swing:.3g} times the swing, at "
+                f"{min(cost['ode45'][joint] / cost['ode23s'][joint] for joint in ('locked', 'free')):.2g} times the "
+                "evaluations and more",
+                why="Its control of the step keeps it stable: it costs more, and is right.",
+            ),
+        ),
+        FindingTable(("solver", "steps", "evaluations", "counted peaks", "swing at the end"), rows),
+    )
+
+
+_SOLVERS = ("ode23s", "ode15s", "ode45")
+
+
 def _title(name: str) -> str:
     """Return a run's name in words."""
     return name.replace("_", " ").replace(" hz", " Hz").replace(" um damping", " um, damping")

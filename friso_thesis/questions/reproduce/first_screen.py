@@ -1,0 +1,95 @@
+"""The first screen of the page of `friso reproduce`: what is right, what is right for another reason, and slips."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from friso_thesis.questions.reproduce.words import short
+
+if TYPE_CHECKING:
+    from friso_thesis.studies.thesis import ClaimVerdict
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A remark on a claim: what is to be said, the number of the criterion (from 0) that shows it, whether that
+    criterion is met where the remark applies, and the command that shows more."""
+
+    claim: str
+    part: int
+    met: bool
+    text: str
+
+    @property
+    def command(self) -> str:
+        """Return the command that shows more."""
+        return f"friso reproduce --only {self.claim}"
+
+
+OTHER_REASON = (
+    Remark(
+        "F8", 0, True,
+        "The loop is stable at every speed if it is linearised before the bristles deflect. In steady sliding, "
+        "friction that falls with the speed makes it unstable at low speeds.",
+    ),
+    Remark(
+        "S41M", 0, False,
+        "More mass ends hunting, but not because the integral action builds up more slowly.",
+    ),
+    Remark(
+        "S342F", 0, False,
+        "A higher crossover settles sooner, but one beside the first eigenfrequency is stable too.",
+    ),
+    Remark(
+        "S323C", 1, False,
+        "ode23s is the cheaper solver, but ode45 is not unstable: it costs more, and is right.",
+    ),
+)  # fmt: skip
+"""What is right, but not for the reason that the thesis gives."""
+
+SLIPS = (
+    Remark(
+        "F7", 4, True,
+        "Table 1 prints the joint and the touched limiter in series; they carry the force side by side. With the "
+        "formula as printed there is no second pair of modes.",
+    ),
+    Remark(
+        "F7", 5, True,
+        "The limiter sets which mass line is seen, and not whether the cart sticks.",
+    ),
+    Remark(
+        "F18", 2, False,
+        "2.5 kg instead of 1.7, and 0.75 instead of 0.5, are one slip: a motor that gives 0.68 and 0.67 of the force "
+        "assumed shows both.",
+    ),
+    Remark(
+        "F14A", 1, False,
+        "A shorter stroke does not allow a stiffer joint: the force at full stroke does not set the limit.",
+    ),
+)  # fmt: skip
+"""Where the text has a slip."""
+
+
+@dataclass(frozen=True)
+class RemarkRow:
+    """A remark that applies, with the number that shows it."""
+
+    remark: Remark
+    number: str
+
+
+def remarks(of: Iterable[Remark], verdicts: Mapping[str, ClaimVerdict]) -> list[RemarkRow]:
+    """Return the remarks that apply: their criterion is judged in this run, as they say."""
+    rows = []
+    for remark in of:
+        finding = verdicts[remark.claim].finding
+        if finding and remark.part < len(finding.stated) and finding.stated[remark.part].holds == remark.met:
+            rows.append(RemarkRow(remark, short(finding.stated[remark.part].number)))
+    return rows
+
+
+def right(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:
+    """Return the claims of the thesis's own list that hold."""
+    return [verdict for verdict in verdicts if verdict.judgement == "holds" and verdict.claim.listed]

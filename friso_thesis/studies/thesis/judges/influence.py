@@ -1,0 +1,108 @@
+"""Sec. 3.3: which parameter decides most on hunting, over the ranges of Table 3 drawn together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from types import MappingProxyType
+
+import numpy as np
+
+from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER
+from friso.stage import loads
+from friso.studies.samples import Samples
+from friso.studies.sweep import sweep
+from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges
+from friso_thesis.studies.thesis.space import SEED
+from friso_thesis.studies.thesis.studies import STUDIES
+
+_RUNS = 1024
+"""Stages drawn: a correlation is then known to about 0.06 (two standard errors)."""
+
+_RTOL = 1e-5
+
+_LOCKED, _FREE = ("system", "friction", "control"), ("isolator-stiffness", "isolator-masses", "isolator-friction")
+_NAMES: Mapping[str, str] = MappingProxyType(
+    {
+        CROSSOVER: "crossover",
+        "mass": "mass",
+        "friction.static": "static friction",
+        "friction.coulomb": "Coulomb friction",
+        ALPHA: "alpha",
+        BETA: "beta",
+        "joint.stiffness": "joint stiffness",
+        "joint.stroke": "stroke",
+        "joint.limiter_damping": "limiter damping",
+        "masses.cart": "mass of the cart",
+        "masses.stage": "mass of the stage",
+    }
+)
+
+
+@judges("S33", figure="Sec. 3.3, influence")
+def ranks_of_influence(evidence: Evidence) -> Finding:
+    """Return how well each parameter of Table 3 separates the stages that hunt from the others."""
+    return judged_ranks(*influences(evidence.rig.to_toml()))
+
+
+@lru_cache(maxsize=8)
+def influences(stage_file: str) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the rank-biserial correlation of every parameter with counted peaks, the joint locked and free."""
+    locked = [STUDIES[name] for name in _LOCKED]
+    free = [STUDIES[name] for name in _FREE] + [STUDIES["isolator-damping"], STUDIES["isolator-crossover"]]
+    return _influence(stage_file, locked, True), _influence(stage_file, free, False)
+
+
+def _influence(stage_file: str, studies: list, locked: bool) -> dict[str, float]:
+    """Return the correlations over stages drawn evenly from the ranges of some studies."""
+    spans = {span.key: span for study in studies for span in study.spans}
+    links = {key: text for study in studies for key, text in study.links.items()}
+    ranges = {key: span.text(2).rsplit(":", 2)[0] + (":log" if span.log else "") for key, span in spans.items()}
+    stage = loads(stage_file).replace({"joint.locked": locked})
+    runs = sweep(stage, {}, Samples(ranges, count=_RUNS, seed=SEED), links, ["peaks", "outcome"], _RTOL)
+    valid = ~runs["outcome"].isin(["invalid", "failed"]).values
+    hunts = runs["peaks"].values[valid] > 0
+    return {_NAMES[key]: _rank_biserial(runs[key].values[valid], hunts) for key in spans}
+
+
+def _rank_biserial(values: np.ndarray, hunts: np.ndarray) -> float:
+    """Return the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1); 0 if all stages are alike."""
+    from scipy.stats import mannwhitneyu
+
+    if hunts.all() or not hunts.any():
+        return 0.0
+    statistic = float(mannwhitneyu(values[hunts], values[~hunts]).statistic)
+    return 2 * statistic / (hunts.sum() * (~hunts).sum()) - 1
+
+
+def judged_ranks(locked: Mapping[str, float], free: Mapping[str, float]) -> Finding:
+    """Return the finding from the correlations of all parameters, the joint locked and free."""
+    orders = {name: sorted(of, key=lambda key: -abs(of[key])) for name, of in (("locked", locked), ("free", free))}
+    rows = tuple(
+        (name, str(place), key, f"{of[key]:+.2f}")
+        for name, of in (("locked", locked), ("free", free))
+        for place, key in enumerate(orders[name], 1)
+    )
+    return Finding(
+        (
+            Part(
+                "with the joint locked the crossover separates the stages that hunt from the others best",
+                orders["locked"][0] == "crossover",
+                _listed(locked, orders["locked"]),
+                why="Another parameter of Table 3 decides more, over its range.",
+            ),
+            Part(
+                "with it free, of the parameters of the joint and the friction, stroke and stiffness do best, the "
+                "crossover apart",
+                {"stroke", "joint stiffness"} == set([key for key in orders["free"] if key != "crossover"][:2]),
+                _listed(free, orders["free"]),
+                why="Another parameter of Table 3 decides more, over its range.",
+            ),
+        ),
+        FindingTable(("joint", "rank", "parameter", "rank-biserial correlation"), rows),
+    )
+
+
+def _listed(of: Mapping[str, float], order: list[str]) -> str:
+    """Return the parameters with their correlations, the most decisive first."""
+    return ", ".join(f"{key} {of[key]:+.2f}" for key in order[:4])

@@ -1,0 +1,127 @@
+"""Sec. 3.4.1: what the thesis says of parallel leaf springs in words: shortening, width, length, where to push."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from friso.leaf_springs.beams import beams
+from friso.leaf_springs.evaluation import Evaluation
+from friso.quantities import percent
+from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
+from friso_thesis.studies.thesis.judges.leaf_springs import STROKE, mechanism
+from friso_thesis.studies.thesis.reading import reading
+
+_YOUNG, _SPACING, _LARGER = 195e9, 0.06, 1.1
+"""Young's modulus [Pa] of tempered strip, spacing of the leaves [m], and the factor by which a dimension grows."""
+
+_WITHIN = 1e-2
+"""Share up to which a spring is linear, and a motion of no account; and by which stiffnesses rise alike."""
+
+
+_STIFFNESSES = "drive", "support_x", "support_y"
+
+
+@cache
+def evaluated(dimension: str = "", factor: float = 1.0) -> Evaluation:
+    """Return the leaf springs of Sec. 3.5, one of their dimensions larger by a factor."""
+    own = mechanism(_YOUNG, _SPACING, 0.0)
+    return beams(replace(own, **{dimension: factor * getattr(own, dimension)}) if dimension else own, STROKE)
+
+
+@judges("S341S", figure="Sec. 3.4.1, shortening")
+def shortening_is_negligible(evidence: Evidence) -> Finding:
+    """Return how nonlinear the leaves are, and how much they shorten, at full stroke."""
+    return judged_shortening(evaluated())
+
+
+def judged_shortening(leaves: Evaluation) -> Finding:
+    """Return the finding from leaf springs at full stroke."""
+    share = leaves.shortening / leaves.stroke
+    return Finding(
+        (
+            Part(
+                f"at full stroke the force is linear in the deflection (within {percent(_WITHIN)})",
+                leaves.nonlinearity <= _WITHIN,
+                f"off by {percent(leaves.nonlinearity, 2)} at {leaves.stroke * 1e3:g} mm",
+                why="The leaves stretch.",
+            ),
+            Part(
+                f"the motion in height is negligible: at most {percent(_WITHIN)} of the stroke",
+                share <= _WITHIN,
+                f"the leaves shorten by {leaves.shortening * 1e6:.2g} um, {percent(share, 2)} of the stroke",
+                why="It rises with the square of the deflection.",
+            ),
+        )
+    )
+
+
+@judges("S341W", figure="Sec. 3.4.1, width and length")
+def width_against_length(evidence: Evidence) -> Finding:
+    """Return the stiffnesses of leaves that are wider, and of leaves that are longer."""
+    return judged_dimensions(*(_ratios(name) for name in ("width", "length")))
+
+
+def _ratios(dimension: str) -> tuple[float, float, float]:
+    """Return the factors by which drive stiffness, and the support along the leaves and along their width, change."""
+    own, other = evaluated(), evaluated(dimension, _LARGER)
+    drive, along, across = (float(getattr(other, name)[0] / getattr(own, name)[0]) for name in _STIFFNESSES)
+    return drive, along, across
+
+
+def judged_dimensions(wider: tuple[float, float, float], longer: tuple[float, float, float]) -> Finding:
+    """Return the finding from the factors of the stiffnesses of wider and of longer leaves."""
+    words = reading()
+    drive, along, across = wider
+    return Finding(
+        (
+            Part(
+                "wider leaves gain more stiffness in a supporting direction than in the direction of the drive, and "
+                f"less in none (within {percent(_WITHIN)})",
+                across > (1 + _WITHIN) * drive and along >= (1 - _WITHIN) * drive,
+                f"{_LARGER:g} times the width: {across:.3g} times the support along the width, {along:.3g} times that "
+                f"along the leaves, {drive:.3g} times the drive stiffness",
+                why="The supports gain no more than the drive.",
+            ),
+            Part(
+                "longer leaves lose support along their width, in proportion significantly: by more than what is the "
+                f"same ({percent(words.same)})",
+                longer[2] < 1 - words.same,
+                f"{_LARGER:g} times the length: {longer[2]:.3g} times the support along the width, {longer[1]:.3g} "
+                f"times that along the leaves, {longer[0]:.3g} times the drive stiffness",
+                why="They lose less.",
+            ),
+        )
+    )
+
+
+@judges("S341A", figure="Sec. 3.4.1, where to push")
+def pushed_at_the_centre(evidence: Evidence) -> Finding:
+    """Return where a force along the drive tilts the stage not at all."""
+    leaves = evaluated()
+    return judged_place(leaves.stiffness[0], leaves.mechanism.length)
+
+
+def judged_place(stiffness: np.ndarray, length: float) -> Finding:
+    """Return the finding from the stiffness (6, 6) of the stage at the leaf ends, for leaves of a length [m].
+
+    A force F along z that acts at a distance d from the leaf ends exerts the moment -d F about y.
+    """
+    words = reading()
+    compliance = np.linalg.inv(stiffness)
+    place = float(compliance[4, 2] / compliance[4, 4])
+    beneath = abs(float(compliance[4, 2] + length * compliance[4, 4]))
+    return Finding(
+        (
+            Part(
+                "a force that acts in the middle of the leaves does not tilt the stage (the place at which it does not "
+                f"is there within {percent(words.same)} of their length)",
+                abs(place + length / 2) <= words.same * length,
+                f"no tilt with the force {-place * 1e3:.3g} mm from the ends of {length * 1e3:g} mm long leaves; at "
+                f"their clamps at the cart, where the rig has its actuator, {beneath * 1e6:.2g} urad/N",
+                why="The place of no tilt lies elsewhere.",
+            ),
+        )
+    )
