@@ -52,7 +52,7 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
     position at the velocity's encoder [m], and the velocity of the stage [m/s]. `flat` may hold arrays of shape
     (members,).
     """
-    form = _plant(shared_structure(flat))
+    form = _plant(shared_structure(flat).standing)
     velocity = np.where(members.forward, members.speed, -members.speed)
     values = {**flat, **operating_point(flat, members)}
     values |= dict.fromkeys(form.velocities, velocity)
@@ -78,7 +78,7 @@ def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
     if drive is not None and (drive.backlash or drive.friction != "none"):
         actual = "a backlash" if drive.backlash else "friction at the motor"
         raise InputError("transmission", actual, "the friction of the guide alone", "friso check, which simulates")
-    declared = _plant(replace(shared_structure(flat), friction="none", friction_variant=None)).declared
+    declared = _plant(replace(shared_structure(flat).standing, friction="none", friction_variant=None)).declared
     return declared.at({**flat, **_limiter(touched)}, len(touched)).take((FORCE, DISTURBANCE), (STAGE, CART))
 
 
@@ -148,7 +148,7 @@ def _plant(form: Structure) -> _Plant:
 def cart_states(flat: Mapping[str, Any]) -> tuple[str, str]:
     """Return names of position and velocity of what the friction acts on,
     in the plant's systems."""
-    return _plant(shared_structure(flat)).cart
+    return _plant(shared_structure(flat).standing).cart
 
 
 @cache
