@@ -107,6 +107,8 @@ class FakeCase:
     feeding: Any = None
     static_friction: Any = None
     advice_keeps_friction: bool | None = None
+    dwells: tuple[Any, ...] = ()
+    tracking: Any = None
 
     @property
     def verdict(self) -> str:

@@ -112,12 +112,12 @@ def prepare(
         rates = columns(kernel.module.rate(values), runs)[:, 0]
     scales[~((scales > 0) & np.isfinite(scales))] = 1.0  # nothing moves: any tolerance will do
     segments, windows = _segments(flat, runs, options.window)
-    windows = np.ascontiguousarray(np.broadcast_to(windows, (runs,)))
+    windows = np.broadcast_to(windows, (runs,)).copy()
     starts = _starts(kernel, flat, runs) if starts is None else np.ascontiguousarray(starts, dtype=float)
     starts = kernel.with_modes(starts, segments[:, 0, 1:].T, values)
     modes = np.ascontiguousarray(kernel.modes(starts.T, 0.0, segments[:, 0, 1:].T, values).T)
     first_steps = np.ascontiguousarray(FIRST_STEP / rates)
-    longest = np.ascontiguousarray(np.broadcast_to(LONGEST_SHARE * segments[:, -1, 0], (runs,)))
+    longest = np.broadcast_to(LONGEST_SHARE * segments[:, -1, 0], (runs,)).copy()
     clocks = columns(kernel.module.clock(values), runs) if kernel.layout.clocked else np.zeros((1, 2))
     least = np.full(runs, options.least_swing, dtype=float)
     tolerances = options.rtol * scales

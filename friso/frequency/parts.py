@@ -28,20 +28,19 @@ from friso.frequency.system import System
 from friso.stage.transmission import MOTOR_STATES
 
 FORCE, DISTURBANCE, REFERENCE, NOISE = "force", "disturbance on cart", "reference", "sensor noise"
-REFERENCE_VELOCITY, REFERENCE_ACCELERATION = FEEDFORWARD = "reference velocity", "reference acceleration"
+FEEDFORWARD = "reference velocity", "reference acceleration", "reference jerk"
 STAGE, CART, DEFLECTION, VELOCITY = "stage", "cart", "joint deflection", "stage velocity"
 RATED = "velocity's encoder"
 """The position of which the velocity is the rate."""
 
-_REFERENCE, _POSITION, _VELOCITY, _SPEED, _ACCELERATION = (
-    sp.Symbol(f"measured_{name}", real=True) for name in ("r", "y", "v", "r_rate", "r_bend")
+_REFERENCE, _POSITION, _VELOCITY, *_DERIVATIVES = (
+    sp.Symbol(f"measured_{name}", real=True) for name in ("r", "y", "v", "r_rate", "r_bend", "r_jerk")
 )
 _CONTROLLER_INPUTS = {
     REFERENCE: _REFERENCE,
     STAGE: _POSITION,
     VELOCITY: _VELOCITY,
-    REFERENCE_VELOCITY: _SPEED,
-    REFERENCE_ACCELERATION: _ACCELERATION,
+    **dict(zip(FEEDFORWARD, _DERIVATIVES, strict=True)),
 }
 
 
@@ -96,8 +95,8 @@ def _on_flank() -> dict[str, Any]:
 
 def compensator(flat: Mapping[str, Any], members: int) -> System:
     """Return the controller: from reference, position [m] and velocity [m/s] of the stage,
-    velocity [m/s] and acceleration [m/s^2] of the reference to the force [N]. Raises InputError for one that exerts
-    none."""
+    velocity [m/s], acceleration [m/s^2] and jerk [m/s^3] of the reference to the force [N]. Raises InputError for one
+    that exerts none."""
     form = shared_structure(flat).controller
     assert form is not None  # a stage file has a controller
     system = _compensator(replace(form, anti_windup=None)).at(flat, members)
@@ -153,7 +152,8 @@ def cart_states(flat: Mapping[str, Any]) -> tuple[str, str]:
 
 @cache
 def _compensator(form: ControllerForm) -> Declared:
-    loop = Loop(_REFERENCE - _POSITION, _POSITION, _VELOCITY, _SPEED, _ACCELERATION)
+    speed, acceleration, jerk = _DERIVATIVES
+    loop = Loop(_REFERENCE - _POSITION, _POSITION, _VELOCITY, speed, acceleration, reference_jerk=jerk)
     control = continuous_controller(form, loop, sp.S.One, sp.S.One)
     states = control.component.states
     within: dict[Any, Any] = {kink.beyond: sp.S.Zero for kink in control.component.kinks}  # of limits inside it

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple, cast
 
-from friso.quantities import Quantity, Value, positive
+from friso.quantities import Quantity, positive
 from friso.stage.section import UncertainSection, Variants
 
 KIND, DURATION = "motion.kind", "motion.duration"
@@ -65,12 +65,10 @@ class Motion(UncertainSection):
     """
 
     kind: Any
-    duration: Annotated[Value, Quantity("s", positive, "20 s")]
+    duration: Annotated[Any, Quantity("s", positive, "20 s")]
 
     rests: ClassVar[bool] = True
     """Whether the reference stands in the end, so that the stage may hunt about a place."""
-    travel: ClassVar[tuple[str, float] | None] = None
-    """The key that decides on the length of the move, and the power of the length with which it goes."""
 
     @staticmethod
     def form(flat: Mapping[str, Any]) -> ReferenceForm:
@@ -115,6 +113,11 @@ class Motion(UncertainSection):
     @staticmethod
     def with_defaults(flat: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return the values of keys that follow from others where they are not given."""
+        return {}
+
+    @staticmethod
+    def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
+        """Return the keys that change in a move that is longer by a factor; none if the motion is no move."""
         return {}
 
     @staticmethod

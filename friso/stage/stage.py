@@ -489,7 +489,7 @@ def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
     for key, value in controller_of(flat).with_defaults(flat).items():
         flat.setdefault(key, value)
     for key, value in motion_of(flat).with_defaults(flat).items():
-        flat.setdefault(key, value)
+        flat.setdefault(key, value if np.ndim(value) else float(value))
     if FORCE_LIMIT in flat:
         flat.setdefault(ANTI_WINDUP, "clamp")
     return with_material(flat)

@@ -20,8 +20,6 @@ class Release(Motion):
     kind: Literal["release"]
     displacement: Annotated[Value, Quantity("m", any_sign, "2 mm")]
 
-    travel = (DISPLACEMENT, 1.0)
-
     @staticmethod
     def motion_size(flat: Mapping[str, Any]) -> Any:
         """Return how far the masses are displaced [m]."""
@@ -31,3 +29,8 @@ class Release(Motion):
     def initial_displacement(flat: Mapping[str, Any]) -> Any:
         """Return the position from which the masses are released [m]."""
         return flat[DISPLACEMENT]
+
+    @staticmethod
+    def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
+        """Return the displacement of a longer one."""
+        return {DISPLACEMENT: flat[DISPLACEMENT] * factor} if np.any(flat[DISPLACEMENT]) else {}

@@ -20,8 +20,6 @@ class Step(Motion):
     kind: Literal["step"]
     size: Annotated[Value, Quantity("m", any_sign, "1 mm")]
 
-    travel = (SIZE, 1.0)
-
     @staticmethod
     def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
         """Return the place at which the reference stands from the start."""
@@ -31,3 +29,8 @@ class Step(Motion):
     def motion_size(flat: Mapping[str, Any]) -> Any:
         """Return the size of the step [m]."""
         return np.abs(flat[SIZE])
+
+    @staticmethod
+    def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
+        """Return the size of a longer one."""
+        return {SIZE: flat[SIZE] * factor} if np.any(flat[SIZE]) else {}

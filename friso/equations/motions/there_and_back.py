@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
+
 from friso.quantities import Number, Quantity, Value, non_negative, positive
 from friso.stage.motion import DURATION, Motion, Piece, Stand, register_motion
 from friso.stage.section import Rule
@@ -31,7 +33,6 @@ class ThereAndBack(Motion):
     return_at: Annotated[Value, Quantity("s", non_negative, "5 s")]
     cruise_ratio: Annotated[float | None, Number(positive, "1.0")] = None
 
-    travel = (TIME, 0.5)
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
             (TIME, RETURN),
@@ -83,6 +84,11 @@ class ThereAndBack(Motion):
         """Return both ends of the motion."""
         rows = cls.pieces(flat)
         return [Stand(rows[len(rows) // 2 - 1][0], flat[RETURN]), Stand(rows[-1][0], flat[DURATION])]
+
+    @staticmethod
+    def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
+        """Return the acceleration time of a longer move."""
+        return {TIME: flat[TIME] * factor**0.5} if np.any(flat[TIME]) else {}
 
     @staticmethod
     def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:

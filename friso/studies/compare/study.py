@@ -221,7 +221,7 @@ def _places(stage: Stage) -> list[Stand]:
     if corner > LATEST * duration:
         expected = f"at least {corner / LATEST:g} s: the reference stands by half of it"
         raise InputError("motion.duration", f"{duration:g} s", expected, f'duration = "{corner / LATEST:g} s"')
-    return stands(flat)
+    return [*stands(flat)]
 
 
 @dataclass(frozen=True)
