@@ -65,7 +65,7 @@ def hunts(**changes: Any) -> Judgement:
         fake_hunting(fake_cycle()),
         Kick(((1.72e-3, 10.8e-3), (22.7e-3, 43.3e-3), (59.3e-3, 0.156)), (1.73e-5, 0.156)),
         Kick(((0.0231, 0.0734),), (5e-4, 4.4)),
-        MoveShare(128, 111, (10.0, 200.0), (0.003, 0.06)),
+        MoveShare(128, 111, {"motion.acceleration": (10.0, 200.0), "motion.acceleration_time": (0.003, 0.06)}),
         Margin(1.2187, 9.7496, True, 1.2248),
     )
     return replace(result, **changes)
@@ -107,6 +107,8 @@ class FakeCase:
     feeding: Any = None
     static_friction: Any = None
     advice_keeps_friction: bool | None = None
+    dwells: tuple[Any, ...] = ()
+    tracking: Any = None
 
     @property
     def verdict(self) -> str:

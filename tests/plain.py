@@ -5,7 +5,7 @@ Nothing here is shared with friso but the names of states and of the keys of the
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from math import exp, hypot, pi, sin, sqrt, tanh
+from math import cos, exp, hypot, pi, sin, sqrt, tanh
 from typing import Any
 
 Flat = Mapping[str, Any]
@@ -21,6 +21,10 @@ def reference(flat: Flat, t: float) -> tuple[float, float, float]:
         return flat["motion.velocity"] * t, flat["motion.velocity"], 0.0
     if kind in ("hold", "release"):
         return 0.0, 0.0, 0.0
+    if kind in ("sine", "multisine", "chirp"):
+        return _swings(flat, t)
+    if kind == "profile":
+        return _profile(flat, t)
     a, ramp, back = (flat[f"motion.{name}"] for name in ("acceleration", "acceleration_time", "return_at"))
     there, here = _stroke(a, ramp, t), _stroke(a, ramp, t - back)
     return there[0] - here[0], there[1] - here[1], there[2] - here[2]
@@ -36,6 +40,57 @@ def _stroke(a: float, ramp: float, t: float) -> tuple[float, float, float]:
         left = 2 * ramp - t
         return a * ramp * ramp - a * left * left / 2, a * left, -a
     return a * ramp * ramp, 0.0, 0.0
+
+
+def _swings(flat: Flat, t: float) -> tuple[float, float, float]:
+    """A sum of sinusoids, or one whose frequency rises evenly."""
+    get = {name.removeprefix("motion."): value for name, value in flat.items() if name.startswith("motion.")}
+    if get["kind"] == "chirp":
+        rise = (get["end_frequency"] - get["start_frequency"]) / get["duration"]
+        parts = [(get["amplitude"], 0.0, get["start_frequency"], rise)]
+    elif get["kind"] == "sine":
+        parts = [(get["amplitude"], 0.0, get["frequency"], 0.0)]
+    else:
+        parts = [(get[f"amplitude.{n}"], get.get(f"phase.{n}", 0.0), get[f"frequency.{n}"], 0.0) for n in (1, 2)]
+    r = v = a = 0.0
+    for size, phase, frequency, rise in parts:
+        angle, rate = phase + 2 * pi * (frequency * t + rise * t * t / 2), 2 * pi * (frequency + rise * t)
+        r, v = r + size * sin(angle), v + size * rate * cos(angle)
+        a += size * (2 * pi * rise * cos(angle) - rate**2 * sin(angle))
+    return r, v, a
+
+
+def s_curve_times(distance: float, velocity: float, acceleration: float, jerk: float) -> tuple[float, float, float]:
+    """Times of constant jerk, of constant acceleration and of constant velocity of an S-curve, case by case."""
+    tj = min((distance / (2 * jerk)) ** (1 / 3), (velocity / jerk) ** 0.5, acceleration / jerk)
+    ta = 0.0
+    if tj == acceleration / jerk:  # 2 (tj + ta) and the cruise make the distance: acceleration (tj + ta)(2 tj + ta)
+        reached = -1.5 * tj + (tj * tj / 4 + distance / acceleration) ** 0.5
+        ta = max(0.0, min(velocity / acceleration - tj, reached))
+    top = jerk * tj * (tj + ta)
+    return tj, ta, max(0.0, distance / top - 2 * tj - ta)
+
+
+def _profile(flat: Flat, t: float) -> tuple[float, float, float]:
+    """Moves with bounded jerk, one after the other, each of seven phases, integrated one by one."""
+    get = {name.removeprefix("motion."): value for name, value in flat.items() if name.startswith("motion.")}
+    here, number = 0.0, 1
+    while f"distance.{number}" in get:
+        distance = get[f"distance.{number}"]
+        sign = 1.0 if distance > 0 else -1.0
+        tj, ta, tv = s_curve_times(abs(distance), get["velocity"], get["acceleration"], get["jerk"])
+        r = v = a = 0.0
+        for jerk, lasts in ((1, tj), (0, ta), (-1, tj), (0, tv), (-1, tj), (0, ta), (1, tj)):
+            j, h = jerk * get["jerk"], min(max(t, 0.0), lasts)
+            r, v, a = r + v * h + a * h * h / 2 + j * h**3 / 6, v + a * h + j * h * h / 2, a + j * h
+            if t < lasts:
+                return here + sign * r, sign * v, sign * a
+            t -= lasts
+        here += distance
+        if t < get["dwell"]:
+            break
+        t, number = t - get["dwell"], number + 1
+    return here, 0.0, 0.0
 
 
 def under_conditions(flat: Flat, acceleration: float) -> Flat:

@@ -213,19 +213,19 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
             (
                 "motion.kind",
                 '"there and back"',
-                '"there_and_back", "release", "step", "ramp", "hold"',
+                '"profile", "ramp", "recorded", "release", "sine", "step", "there_and_back"',
                 'kind = "there',
             ),
         ),
         (
             'kind = "there_and_back"',
             "",
-            ("motion.kind", "nothing", 'one of "there_and_back"', 'kind = "there_and_b'),
+            ("motion.kind", "nothing", 'one of "chirp", "hold"', 'kind = "chirp"'),
         ),
         (
             'kind = "there_and_back"',
             "kind = []",
-            ("motion.kind", "an array", 'one of "there_and_back"', "kind ="),
+            ("motion.kind", "an array", 'one of "chirp"', "kind ="),
         ),
         (
             'model = "lugre"',

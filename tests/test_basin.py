@@ -176,8 +176,8 @@ def test_share_of_moves_is_reproducible() -> None:
     assert first is not None
     assert first == second
     assert first.count == MOVES
-    assert first.accelerations == pytest.approx([10, 200])
-    assert first.times == pytest.approx([0.003, 0.06])
+    assert first.ranges["motion.acceleration"] == pytest.approx([10, 200])
+    assert first.ranges["motion.acceleration_time"] == pytest.approx([0.003, 0.06])
     low, high = first.interval
     assert 0 < low < first.fraction < high < 1
 
@@ -206,7 +206,7 @@ def test_moves_by_single_runs() -> None:
     """The count is that of single runs of the same draws; eight of them are simulated, hunting and resting ones."""
     result = moves_that_hunt(MOVING, target())
     assert result is not None
-    drawn = qmc.scale(evenly(MOVES).T, *zip(result.accelerations, result.times, strict=True))
+    drawn = qmc.scale(evenly(MOVES).T, *zip(*result.ranges.values(), strict=True))
     own = MOVING.flat() | {"motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
     item, completed, _ = ends_in(own, MOVES, target())
     assert completed.all()
@@ -225,7 +225,7 @@ def test_moves_that_overlap_are_not_drawn() -> None:
     soon = MOVING.replace({"motion.return_at": "0.08 s"})
     result = moves_that_hunt(soon, target())
     assert result is not None
-    assert result.times == pytest.approx([SEARCH_LIMITS.move_shares[0] * 0.03, 0.04])
+    assert result.ranges["motion.acceleration_time"] == pytest.approx([SEARCH_LIMITS.move_shares[0] * 0.03, 0.04])
 
 
 @RIGID
@@ -240,7 +240,7 @@ def test_interval_holds_the_share(drawn: int, data: st.DataObject) -> None:
     """Clopper and Pearson 1934: at its lower end so many hits or more have a probability of 2.5 %, at its upper end so
     many or fewer."""
     hunting = data.draw(st.integers(0, drawn))
-    result = MoveShare(drawn, hunting, (1.0, 2.0), (1.0, 2.0))
+    result = MoveShare(drawn, hunting, {})
     low, high = result.interval
     assert 0 <= low <= result.fraction <= high <= 1
     assert low == 0.0 or binom.sf(hunting - 1, drawn, low) == pytest.approx(0.025, rel=1e-6)

@@ -161,7 +161,7 @@ def test_what_is_compiled_is_named_by_all_that_differs(rig: Stage) -> None:
 def test_a_move_with_a_cruise_is_a_trapezoid_of_velocity() -> None:
     """It accelerates, runs at constant speed for so many times as long, and brakes; both steps cover the same way."""
     flat = {"motion.kind": "there_and_back", "motion.acceleration": 10.0, "motion.acceleration_time": 0.1}
-    flat |= {"motion.return_at": 2.0, "motion.duration": 4.0, motion.CRUISE: 1.5}
+    flat |= {"motion.return_at": 2.0, "motion.duration": 4.0, "motion.cruise_ratio": 1.5}
     time = np.linspace(0.0, 3.0, 30001)
     place = motion.reference(flat, time)
     speed = np.gradient(place, time)

@@ -209,7 +209,7 @@ def _is_of_loading(error: BaseException) -> bool:
 
 def _plug_ins() -> str:
     """Return a line for the help that names controllers and friction laws of installed packages."""
-    if not any(map(installed_modules, ("friso.controllers", "friso.friction"))):
+    if not any(map(installed_modules, ("friso.controllers", "friso.friction", "friso.motions"))):
         return ""
     from friso.stage.foreign import installed
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from friso.axis import LINEAR, AxisKind
+from friso.equations.motions.there_and_back import ThereAndBack
 from friso.errors import InputError
 from friso.quantities import Number, Quantity, quoted
 from friso.stage.section import Section, nearest_name, numeric_fields
-from friso.stage.tables import FRICTION, Masses, ThereAndBack, friction_law
+from friso.stage.tables import FRICTION, Masses, friction_law
 
 
 @dataclass(frozen=True)

@@ -102,8 +102,8 @@ STATISTICS = (
     "outer_before",
 )
 """Largest force [N], extremes of the deviation in the window [m], when it last was outside the two bands [s], steps
-attempted and rejected, the time reached [s], and when, before the reference left the place where it stood, it last was
-outside the two bands [s] (infinite: it still was; 0: the reference does not leave again). Extremes and moments are NaN
+attempted and rejected, the time reached [s], and how long it took at most to enter the two bands at the places that the
+reference left again [s] (infinite: it had not when the reference left; 0: there is none). Extremes and moments are NaN
 where a drive has a clock: its samples tell them."""
 
 

@@ -16,6 +16,7 @@ from friso.engine.layout import LANES
 from friso.engine.overtaken import current_flag, go_on
 from friso.engine.side_by_side import cores_to_use, results_of
 from friso.equations import motion
+from friso.equations.reference import moved_on
 from friso.equations.roles import Steady
 
 LONGEST_SHARE = 1 / 200
@@ -111,11 +112,12 @@ def prepare(
         rates = columns(kernel.module.rate(values), runs)[:, 0]
     scales[~((scales > 0) & np.isfinite(scales))] = 1.0  # nothing moves: any tolerance will do
     segments, windows = _segments(flat, runs, options.window)
+    windows = np.broadcast_to(windows, (runs,)).copy()
     starts = _starts(kernel, flat, runs) if starts is None else np.ascontiguousarray(starts, dtype=float)
     starts = kernel.with_modes(starts, segments[:, 0, 1:].T, values)
     modes = np.ascontiguousarray(kernel.modes(starts.T, 0.0, segments[:, 0, 1:].T, values).T)
     first_steps = np.ascontiguousarray(FIRST_STEP / rates)
-    longest = LONGEST_SHARE * segments[:, -1, 0]
+    longest = np.broadcast_to(LONGEST_SHARE * segments[:, -1, 0], (runs,)).copy()
     clocks = columns(kernel.module.clock(values), runs) if kernel.layout.clocked else np.zeros((1, 2))
     least = np.full(runs, options.least_swing, dtype=float)
     tolerances = options.rtol * scales
@@ -130,18 +132,18 @@ def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
 
 def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.ndarray, np.ndarray]:
     """Pieces of the reference with the window's start and the end of the run among them, and the window's place; of
-    those that begin behind that end, nothing is left."""
+    those that begin behind that end, nothing is left. Runs that have the same motion share one row."""
+    runs = runs if motion.varies(flat) else 1
     pieces = motion.pieces(flat, runs)
     end = np.broadcast_to(np.asarray(flat["motion.duration"], dtype=float), (runs,))
     pieces[:, :, 0] = np.minimum(pieces[:, :, 0], end[:, None])
     start = window * end
     rows = np.arange(runs)
     windows = (pieces[:, :, 0] <= start[:, None]).sum(axis=1)
-    r0 = pieces[rows, windows - 1]
-    elapsed = start - r0[:, 0]
-    position = r0[:, 1] + elapsed * (r0[:, 2] + elapsed * r0[:, 3] / 2)
-    at_window = np.stack([start, position, r0[:, 2] + elapsed * r0[:, 3], r0[:, 3]], axis=1)
-    segments = np.zeros((runs, pieces.shape[1] + 2, 4))
+    before = pieces[rows, windows - 1]
+    at_window = moved_on(motion.form_of(flat), before, start - before[:, 0])
+    at_window[:, 0] = start
+    segments = np.zeros((runs, pieces.shape[1] + 2, pieces.shape[2]))
     places = np.arange(pieces.shape[1])
     shifted = places[None, :] + (places[None, :] >= windows[:, None])
     segments[rows[:, None], shifted] = pieces

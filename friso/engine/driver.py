@@ -9,10 +9,12 @@ import numpy as np
 from friso.engine.arrays import STATISTICS, Status
 from friso.engine.layout import AXES, ROW
 from friso.engine.scalar_code import call_at, take_next
+from friso.engine.simd_math import sine
 
 NOT_RUN, DONE, BUDGET = int(Status.NOT_RUN), int(Status.DONE), int(Status.BUDGET)
 UNDERFLOW, DIVERGED = int(Status.UNDERFLOW), int(Status.DIVERGED)
 AXIS_ROWS = len(AXES)
+TONE_ROWS, TURN = 4, 6.283185307179586
 FOLLOWED = STATISTICS.index("attempted")
 """So many statistics are what the step itself keeps, in rows from `force_peak` on."""
 
@@ -26,20 +28,34 @@ def between(B, layout, lane, i, theta):
     return x + theta * (end - x + (1.0 - theta) * inner)
 
 
+def reference_at(B, layout, lane, t, order):
+    """Return the reference [m], or its rate [m/s], a time t after its last corner: polynomial and tones."""
+    total, k = 0.0, layout.degree
+    while k >= order:
+        total = total * t / (k - order + 1) + B[(layout.reference + k) * layout.lanes + lane]
+        k -= 1
+    for number in range(layout.tones):
+        row = layout.reference + layout.degree + 2 + TONE_ROWS * number
+        amplitude, turns = B[row * layout.lanes + lane], B[(row + 1) * layout.lanes + lane]
+        frequency, sweep = B[(row + 2) * layout.lanes + lane], B[(row + 3) * layout.lanes + lane]
+        turns += (frequency + 0.5 * sweep * t) * t
+        if order == 0:
+            total += amplitude * sine(turns)
+        else:
+            total += amplitude * TURN * (frequency + sweep * t) * sine(turns + 0.25)
+    return total
+
+
 def deviation(B, layout, lane, theta):
     """Position minus reference [m] at the fraction theta of the step last tried."""
     t = B[ROW.old_time * layout.lanes + lane] + theta * B[ROW.taken * layout.lanes + lane]
-    reference = layout.reference * layout.lanes + lane
-    r, v, a = B[reference], B[reference + layout.lanes], B[reference + 2 * layout.lanes]
-    return between(B, layout, lane, layout.position, theta) - (r + t * (v + 0.5 * a * t))
+    return between(B, layout, lane, layout.position, theta) - reference_at(B, layout, lane, t, 0)
 
 
 def deviation_rate(B, layout, lane, theta):
     """Velocity minus that of the reference [m/s] at the fraction theta of the step last tried."""
     t = B[ROW.old_time * layout.lanes + lane] + theta * B[ROW.taken * layout.lanes + lane]
-    reference = layout.reference * layout.lanes + lane
-    v, a = B[reference + layout.lanes], B[reference + 2 * layout.lanes]
-    return between(B, layout, lane, layout.velocity, theta) - (v + a * t)
+    return between(B, layout, lane, layout.velocity, theta) - reference_at(B, layout, lane, t, 1)
 
 
 def find_turn(B, layout, lane, high):
@@ -192,7 +208,7 @@ def enter_segment(B, layout, lane, j, segment, batch):
     if not layout.clocked:
         B[ROW.ticked * layout.lanes + lane] = 1.0
     if segment == batch.windows[j]:
-        away = B[(layout.x + layout.position) * layout.lanes + lane] - segments[segment, 1]
+        away = B[(layout.x + layout.position) * layout.lanes + lane] - reference_at(B, layout, lane, 0.0, 0)
         B[ROW.deviation_max * layout.lanes + lane] = away
         B[ROW.deviation_min * layout.lanes + lane] = away
     else:
@@ -341,20 +357,29 @@ def answer(B, layout, lane, batch, settings, results):
 
 
 def next_segment(B, layout, lane, j, batch):
-    """Go on to the next segment; where the reference leaves a place at which it stood, note when the run entered the
-    bands there."""
+    """Go on to the next segment; where the reference leaves a place at which it stood, note how long the run took to
+    enter the bands there, if that was the longest so far."""
     stood, now = stands(B, layout, lane), B[ROW.start * layout.lanes + lane] + B[ROW.time * layout.lanes + lane]
     enter_segment(B, layout, lane, j, int(B[ROW.segment * layout.lanes + lane]) + 1, batch)
-    if stood and not stands(B, layout, lane):
-        inner, outer = B[ROW.inner_exit * layout.lanes + lane], B[ROW.outer_exit * layout.lanes + lane]
-        B[ROW.inner_before * layout.lanes + lane] = inner if inner < now else np.inf
-        B[ROW.outer_before * layout.lanes + lane] = outer if outer < now else np.inf
+    stands_now, since = stands(B, layout, lane), layout.stands_since * layout.lanes + lane
+    if stood and not stands_now:
+        for band in range(2):
+            last = B[(ROW.inner_exit + band) * layout.lanes + lane]
+            before = (ROW.inner_before + band) * layout.lanes + lane
+            B[before] = max(B[before], last - B[since] if last < now else np.inf)
+    if stands_now and not stood:
+        B[since] = B[ROW.start * layout.lanes + lane]
 
 
 def stands(B, layout, lane):
     """Tell whether the reference stands still in the present segment of the lane."""
-    velocity = (layout.reference + 1) * layout.lanes + lane
-    return B[velocity] == 0.0 and B[velocity + layout.lanes] == 0.0
+    for k in range(1, layout.degree + 1):
+        if B[(layout.reference + k) * layout.lanes + lane] != 0.0:
+            return False
+    for number in range(layout.tones):
+        if B[(layout.reference + layout.degree + 2 + TONE_ROWS * number) * layout.lanes + lane] != 0.0:
+            return False
+    return True
 
 
 def look_inside(B, layout, lane, fraction, batch, settings, results):

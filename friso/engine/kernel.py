@@ -26,6 +26,7 @@ from friso.equations.imposed import Imposed
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure
 from friso.stage import Section
+from friso.stage.motion import QUADRATIC
 from friso.stage.plug_ins import plug_ins
 from friso.stage.tables import friction_law
 
@@ -287,7 +288,8 @@ def _load(request: KernelRequest, entry: Compiled) -> None:
         functions = [name for name in FUNCTIONS if hasattr(module, name)]
         code = {**dict.fromkeys(FUNCTIONS, 0), **load_object(entry.code, functions)}
         arrays = {name: np.array(module.LOOKED_UP[name], np.int64) for name in LOOKED_UP}
-        layout = ModelLayout(**module.LAYOUT, **arrays, **code)
+        sizes = {**QUADRATIC._asdict(), **module.LAYOUT, "stands_since": module.LAYOUT["rows"]}
+        layout = ModelLayout(**sizes | {"rows": sizes["rows"] + 1}, **arrays, **code)
         _kernels[request] = Kernel(module, layout, _loops(), entry.source)
 
 

@@ -42,8 +42,8 @@ last_kind: of the last one kept, 1 for a maximum, -1 for a minimum."""
 
 DRIVER = ("run", "segment", "inner_before", "outer_before")
 """Rows of use to the driver alone: the number of the run in the lane, negative where there is none, and of the piece of
-the reference it is in; and when, before the reference left a place where it stood, the deviation last was outside the
-two bands."""
+the reference it is in; and how long at most the deviation took to enter the two bands at places where the reference
+stood and which it has left."""
 
 CLOCK = ("period", "tick", "due", "ticked", "noted", "left")
 """Further rows, of use to a model that holds numbers between samples. period: time between them; tick: number of the
@@ -70,10 +70,13 @@ SIZES = (
     "clocked",
     "position",
     "velocity",
+    "degree",
+    "tones",
 )
 """Sizes of a model: lanes side by side, states, terms of the dense output of each, constants, kinks, inputs of the
 reference, behind which numbers are held; the first of all these that comes from tables, and how many tables are over
-places; 1 where the drive has a clock; and which states are position and velocity of the stage."""
+places; 1 where the drive has a clock; which states are position and velocity of the stage; and the degree and the tones
+of its reference."""
 
 LOOKED_UP = ("seen_states", "place_states", "walked")
 """Arrays of a model whose drive has a clock: the states that it measures, those that tables are looked up over, and
@@ -100,8 +103,9 @@ BLOCKS = (
 )
 """Blocks of rows whose first row depends on the model; after the last of them the buffer ends."""
 
-ModelLayout = namedtuple("ModelLayout", (*SIZES, *BLOCKS, "rows", *LOOKED_UP, *FUNCTIONS))
-"""Layout of a model for the driver: sizes, first rows of blocks, arrays, and addresses of functions."""
+ModelLayout = namedtuple("ModelLayout", (*SIZES, *BLOCKS, "rows", "stands_since", *LOOKED_UP, *FUNCTIONS))
+"""Layout of a model for the driver: sizes, first rows of blocks, arrays, and addresses of functions. Behind the rows
+that a module numbers comes one of use to the driver alone: since when the reference stands."""
 
 
 @dataclass(frozen=True)
@@ -121,11 +125,12 @@ class Layout:
     seen: int
     tables: int
     walks: int
+    inputs: int
 
     @property
     def first_rows(self) -> dict[str, int]:
         """Return the first row of each block, and how many `rows` there are."""
-        axis, before = self.walks and 2 * len(AXES), self.walks and 4
+        axis, before = self.walks and 2 * len(AXES), self.walks and 1 + self.inputs
         sizes = (self.states, self.states, self.states, self.dense * self.states, self.states)
         sizes += (self.constants, self.kinks, self.fixed, self.seen, axis, before, self.walks, self.tables, self.tables)
         return dict(zip((*BLOCKS, "rows"), accumulate(sizes, initial=len(ROW)), strict=True))

@@ -117,7 +117,7 @@ class StepWriter:
         self._walks = [*dict.fromkeys(model.clock.places.values()), TICK] if model.clock else []
         sizes_of = (self.size, len(tableau.dense), len(self.constants.index), self.kinks, len(self._fixed_names))
         looked_up = (len(model.clock.seen), len(model.clock.tabled)) if model.clock else (0, 0)
-        self.layout = Layout(*sizes_of, *looked_up, len(self._walks))
+        self.layout = Layout(*sizes_of, *looked_up, len(self._walks), len(model.inputs))
         self._rows = ROW._asdict() | self.layout.first_rows
 
     def _jumping(self, jumps: Mapping[sp.Symbol, sp.Expr]) -> tuple[Block, list[int]]:

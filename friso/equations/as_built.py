@@ -166,7 +166,6 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
 
     from friso.equations.cases import Piecewise
     from friso.equations.component import STEADY, TICK, Held, gaussian, key, quantised, state
-    from friso.equations.model import REFERENCE
     from friso.equations.sampled import Rest, sampled_controller
 
     assert form.structure.controller is not None
@@ -179,7 +178,7 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
     reading = read("seen", key("drive.seed"))
     rated = None if loop.rated is None else read(RATED, key("drive.seed") + OF_RATED)
     error = loop.error.xreplace({loop.position: reading})
-    acceleration, speed, before = REFERENCE[2], loop.reference_velocity, state("error_before")
+    acceleration, speed, before = loop.reference_acceleration, loop.reference_velocity, state("error_before")
     ahead = drive["feedforward_mass"] * acceleration + drive["feedforward_viscous"] * speed
     ahead += drive["feedforward_coulomb"] * Piecewise((1, speed > 0), (-1, speed < 0), (0, True))
     rest = Rest(

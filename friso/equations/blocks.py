@@ -15,7 +15,7 @@ from typing import Any
 import sympy as sp
 
 from friso.equations.cases import Piecewise
-from friso.equations.component import STEADY, Component, Held, key
+from friso.equations.component import STEADY, TIME, Component, Held, key
 from friso.equations.structure import ControllerForm
 from friso.stage.controllers import ANTI_WINDUP_TIME, FILTERS_KEY, FORCE_LIMIT, ControllerSection
 from friso.stage.filters import FEEDBACK, FORWARD, FilterRule, Polynomial
@@ -29,7 +29,7 @@ class Loop:
 
     They are the error [m], the position [m] and its rate, and the rate [m/s] and acceleration [m/s^2] of the reference.
     The direction of the reference is 1 ahead, -1 back, 0 at rest. The position [m] at the encoder of the velocity is
-    separate where that is another encoder.
+    separate where that is another encoder. The jerk of the reference is in m/s^3.
     """
 
     error: sp.Expr
@@ -39,6 +39,7 @@ class Loop:
     reference_acceleration: sp.Expr = sp.S.Zero
     reference_direction: sp.Expr = sp.S.Zero
     rated: sp.Expr | None = None
+    reference_jerk: sp.Expr = sp.S.Zero
 
 
 def sign_of_motion(*rates: sp.Expr) -> sp.Expr:
@@ -109,7 +110,7 @@ class Measured:
     """Measured inputs of a controller.
 
     They are error and position [m], and the position behind the velocity, from one encoder or from two. Of the
-    reference they are velocity [m/s], acceleration [m/s^2] and direction (1, -1, 0).
+    reference they are velocity [m/s], acceleration [m/s^2], direction (1, -1, 0) and jerk [m/s^3].
     """
 
     error: Signal
@@ -118,6 +119,7 @@ class Measured:
     reference_velocity: Signal
     reference_acceleration: Signal
     reference_direction: Signal
+    reference_jerk: Signal
 
 
 def loop_signals(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
@@ -136,8 +138,9 @@ def loop_signals(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
             sp.S.Zero,
             rate=loop.reference_acceleration,
         ),
-        Signal(loop.reference_acceleration, length * rate**2, sp.S.Zero, sp.S.Zero, rate=sp.S.Zero),
+        Signal(loop.reference_acceleration, length * rate**2, sp.S.Zero, sp.S.Zero, rate=loop.reference_jerk),
         Signal(loop.reference_direction, sp.S.One, sign_of_motion(STEADY.reference_velocity), sp.S.Zero),
+        Signal(loop.reference_jerk, length * rate**3, sp.S.Zero, sp.S.Zero, rate=sp.diff(loop.reference_jerk, TIME)),
     )
 
 

@@ -58,12 +58,10 @@ def level_under_conditions(flat: Mapping[str, Any], name: str) -> Any:
 
 def under_acceleration(acceleration: sp.Expr) -> dict[Any, Any]:
     """Return the factors while the reference accelerates [m/s^2], for those at constant speed."""
-    from sympy import Abs
-
     from friso.equations.component import key
 
     factors = [key(factor_key(name)) for name in LEVELS]
-    return {factor: factor * (1 + key(GROWTH) * Abs(acceleration)) for factor in factors}
+    return {factor: factor * (1 + key(GROWTH) * acceleration) for factor in factors}
 
 
 @register_derivation(CONDITIONS)

@@ -35,7 +35,9 @@ def driven(form: Driven) -> Model:
     from friso.equations.model import REFERENCE, assemble
 
     force, rate = key("external.force"), key("external.rate")
-    model = assemble(form.structure, lambda _: force + rate * TIME, _sampled(form) if form.velocity_samples else None)
+    model = assemble(
+        form.structure.standing, lambda _: force + rate * TIME, _sampled(form) if form.velocity_samples else None
+    )
     return replace(model, inputs=(*REFERENCE, force, rate))
 
 

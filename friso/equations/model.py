@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from friso.equations.blocks import Controller, Loop, sign_of_motion
+from friso.equations.blocks import Controller, Loop
 from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, TICK, TIME, Clock, Component, Held, Kink, Output, State, Switch, key
 from friso.equations.conditions import under_acceleration
@@ -17,13 +17,15 @@ from friso.equations.continuous import Continuous, continuous_controller
 from friso.equations.friction.common import Friction
 from friso.equations.joint import joint_force
 from friso.equations.masses import Body, parasitic_force, position_outputs
+from friso.equations.reference import declared
 from friso.equations.structure import ControllerForm, Structure
 from friso.equations.transmission import BACKLASH, at_motor, transmission
+from friso.stage.motion import QUADRATIC, ReferenceForm
 from friso.stage.tables import friction_law
 from friso.stage.transmission import MOTOR_MASS
 
-REFERENCE = tuple(key(f"reference.{name}") for name in ("position", "velocity", "acceleration"))
-"""Position, velocity and acceleration of the reference at its last corner."""
+REFERENCE = declared().inputs
+"""Position, velocity and acceleration of a reference in pieces of parabola at its last corner."""
 
 MOTION_SIZE = key("motion.size")
 """Length of the motion [m]; 0 where the reference stands still."""
@@ -48,7 +50,8 @@ class Model:
     - `stiffness` [N/m]: proportional stiffness of the loop.
     - `jumps`: jumps of states where a kink is crossed, in terms of the values just before: kinks to states to
       expressions.
-    - `inputs`: values given anew at every corner of the reference, in this order.
+    - `inputs`: values given anew at every corner of the reference, in this order; `reference`: of what its pieces are
+      made.
     - `held`: numbers that stay constant between corners, or between the samples of a `clock` if there is one.
     """
 
@@ -66,6 +69,7 @@ class Model:
     steady: sp.Expr | None = None
     jumps: Mapping[Kink, Mapping[sp.Symbol, sp.Expr]] = field(default_factory=dict)
     inputs: tuple[sp.Symbol, ...] = REFERENCE
+    reference: ReferenceForm = QUADRATIC
     held: tuple[Held, ...] = ()
     clock: Clock | None = None
 
@@ -133,24 +137,24 @@ def assemble(structure: Structure, external: External | None = None, control: Co
 
     Instead of the structure's controller in continuous time there may be another one.
     """
-    chain = _bodies(structure)
+    chain, course = _bodies(structure), declared(structure.reference)
     friction = friction_law(structure.friction).declare(chain.cart.velocity, structure.friction_variant)
     unaccelerated = friction
     if friction and structure.load_follows:
-        friction = friction.with_values(under_acceleration(REFERENCE[2]))
+        friction = friction.with_values(under_acceleration(course.acceleration_size))
     motor_friction = _motor_friction(structure, chain)
-    position, velocity, acceleration = REFERENCE
-    reference = position + velocity * TIME + acceleration * TIME**2 / 2
-    reference_velocity = velocity + acceleration * TIME
     breakaway = _breakaway(structure, friction, motor_friction)
     length, rate = _scales(structure, breakaway, chain.mass)
     stage, rated = chain.measured(structure)
-    directions = sign_of_motion(
-        velocity, acceleration
-    )  # as they are at the last corner: where it turns there is another
-    two = None if rated is stage else rated.position
     loop = Loop(
-        reference - stage.position, stage.position, rated.velocity, reference_velocity, acceleration, directions, two
+        course.position - stage.position,
+        stage.position,
+        rated.velocity,
+        course.velocity,
+        course.acceleration,
+        course.direction,
+        None if rated is stage else rated.position,
+        course.jerk,
     )
     form = structure.controller
     if control is None and form is not None:
@@ -161,7 +165,7 @@ def assemble(structure: Structure, external: External | None = None, control: Co
     if acting:
         parts.append(acting.component)
     outputs = {
-        "reference": Output(reference, "m", "reference"),
+        "reference": Output(course.position, "m", "reference"),
         "error": Output(loop.error, "m", "error"),
     }
     for part in parts:
@@ -173,14 +177,16 @@ def assemble(structure: Structure, external: External | None = None, control: Co
         cart=chain.cart,
         kinks=kinks,
         outputs=outputs,
-        deviation=stage.position - reference,
-        deviation_rate=stage.velocity - reference_velocity,
+        deviation=stage.position - course.position,
+        deviation_rate=stage.velocity - course.velocity,
         length=length,
         rate=rate,
         breakaway=breakaway,
         stiffness=loop_stiffness(structure.controller),
         steady=_steady(chain, unaccelerated, motor_friction),
         jumps=resets(kinks),
+        inputs=course.inputs,
+        reference=structure.reference,
         held=acting.held if acting else (),
     )
 

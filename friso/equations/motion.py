@@ -1,124 +1,119 @@
-"""The kinds of motion as pieces of parabola: within a piece, r = r_0 + v_0 t + a_0 t^2/2, t from its start."""
+"""What other rooms ask of a stage's motion: pieces of its reference, where that stands, its size, where runs begin."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-Piece = tuple[Any, Any, Any, Any]
-"""Start time [s], and position [m], velocity [m/s] and acceleration [m/s^2] there."""
+from friso.equations.motions.settings import MotionSettings
+from friso.equations.reference import at_rest, moved_on, value
+from friso.stage.motion import DURATION, ReferenceForm, Stand, Tone, motion_of
 
 
-CRUISE = "motion.cruise_ratio"
-"""Time at constant speed between acceleration and braking, over the acceleration time; without it there is none."""
+def form_of(flat: Mapping[str, Any]) -> ReferenceForm:
+    """Return the form of the reference of a stage's motion."""
+    return motion_of(flat).form(flat)
 
 
-def _there(flat: Mapping[str, Any]) -> Any:
-    """Length of the step there [m]."""
-    return flat["motion.acceleration"] * flat["motion.acceleration_time"] ** 2 * (1 + flat.get(CRUISE, 0.0))
-
-
-def _there_and_back(flat: Mapping[str, Any]) -> list[Piece]:
-    """Return the pieces of a motion there and back: time, position,
-    velocity and acceleration at each corner."""
-    a, ramp, return_at = (flat[f"motion.{name}"] for name in ("acceleration", "acceleration_time", "return_at"))
-    size, top, cruise = _there(flat), a * ramp, flat.get(CRUISE)
-    if cruise is not None:
-        middle = size - top * ramp / 2
-        return [
-            (0.0, 0.0, 0.0, a),
-            (ramp, top * ramp / 2, top, 0.0),
-            ((1 + cruise) * ramp, middle, top, -a),
-            ((2 + cruise) * ramp, size, 0.0, 0.0),
-            (return_at, size, 0.0, -a),
-            (return_at + ramp, middle, -top, 0.0),
-            (return_at + (1 + cruise) * ramp, top * ramp / 2, -top, a),
-            (return_at + (2 + cruise) * ramp, 0.0, 0.0, 0.0),
-        ]
-    return [
-        (0.0, 0.0, 0.0, a),
-        (ramp, size / 2, top, -a),
-        (2 * ramp, size, 0.0, 0.0),
-        (return_at, size, 0.0, -a),
-        (return_at + ramp, size / 2, -top, a),
-        (return_at + 2 * ramp, 0.0, 0.0, 0.0),
-    ]
-
-
-def _constant(position: Any, velocity: Any) -> list[Piece]:
-    return [(0.0, position, velocity, 0.0)]
-
-
-_PIECES: dict[str, Callable[[Mapping[str, Any]], list[Piece]]] = {
-    "there_and_back": _there_and_back,
-    "release": lambda flat: _constant(0.0, 0.0),
-    "step": lambda flat: _constant(flat["motion.size"], 0.0),
-    "ramp": lambda flat: _constant(0.0, flat["motion.velocity"]),
-    "hold": lambda flat: _constant(0.0, 0.0),
-}
-
-_SIZES: dict[str, Callable[[Mapping[str, Any]], Any]] = {
-    "there_and_back": _there,
-    "release": lambda flat: flat["motion.displacement"],
-    "step": lambda flat: flat["motion.size"],
-    "ramp": lambda flat: flat["motion.velocity"] * flat["motion.duration"],
-    "hold": lambda flat: 0.0,
-}
+def varies(flat: Mapping[str, Any]) -> bool:
+    """Tell whether the runs of some stages have different motions."""
+    return any(np.ndim(value) for key, value in flat.items() if key.startswith("motion."))
 
 
 def pieces(flat: Mapping[str, Any], runs: int) -> np.ndarray:
-    """Return the reference of each run, shape (runs, pieces, 4): start [s], position [m],
-    velocity, acceleration."""
-    rows = _PIECES[flat["motion.kind"]](flat)
-    full = np.empty((runs, len(rows), 4))
-    for i, j in np.ndindex(len(rows), 4):
-        full[:, i, j] = rows[i][j]
-    return full
+    """Return the pieces of the reference of each run, shape (runs, pieces, 1 + inputs): see
+    `friso.equations.reference`."""
+    kind = motion_of(flat)
+    form, rows, tones = kind.form(flat), kind.pieces(flat), kind.tones(flat)
+    full = np.zeros((runs, len(rows), 1 + form.inputs))
+    for i, row in enumerate(rows):
+        for j, number in enumerate(row):
+            full[:, i, j] = number
+    return _with_tones(form, full, tones, flat[DURATION]) if tones else full
+
+
+def _with_tones(form: ReferenceForm, rows: np.ndarray, tones: Sequence[Tone], duration: Any) -> np.ndarray:
+    """Return pieces to which tones are added, with further corners where the reference turns round."""
+    ends = np.broadcast_to(np.asarray(duration, dtype=float), (len(rows),))
+    for number, tone in enumerate(tones):
+        for i, part in enumerate(tone):
+            rows[..., form.degree + 3 + 4 * number + i] = np.reshape(part, (-1, 1))
+    parts = [_turning(form, run, end) for run, end in zip(rows, ends, strict=True)]
+    most = max(map(len, parts))
+    return np.array([np.concatenate([part, np.repeat(part[-1:], most - len(part), axis=0)]) for part in parts])
+
+
+def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
+    """Return the pieces of one run with tones as they are at time 0, cut where the reference turns round."""
+    starts, first, per_period = rows[:, 0], form.degree + 3, MotionSettings.current().samples_per_period
+    tones = rows[0, first:].reshape(-1, 4)
+    fastest = np.max(np.maximum(np.abs(tones[:, 2]), np.abs(tones[:, 2] + tones[:, 3] * end)))
+    bare = rows.copy()
+    bare[:, first:] = 0.0
+
+    def rate(time: np.ndarray) -> np.ndarray:
+        """Velocity of the reference at times of the run [m/s]."""
+        piece = bare[np.searchsorted(starts, time, side="right") - 1]
+        of_tones = np.concatenate([np.zeros((1, first)), rows[:1, first:]], axis=1)
+        return value(form, piece, time - piece[:, 0], 1) + value(form, of_tones, time, 1)
+
+    grid = np.linspace(0.0, end, max(2, int(np.ceil(per_period * fastest * end)) + 1))
+    rates = rate(grid)
+    changes = np.flatnonzero(rates[1:] * rates[:-1] < 0)
+    low, high, before = grid[changes], grid[changes + 1], rates[changes]
+    while np.any(high - low > 4 * np.finfo(float).eps * high):
+        middle = (low + high) / 2
+        same = rate(middle) * before > 0
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    corners = np.unique(np.concatenate([starts, (low + high) / 2, grid[1:-1][rates[1:-1] == 0]]))
+    cut = bare[np.searchsorted(starts, corners, side="right") - 1]
+    cut = moved_on(form, cut, corners - cut[:, 0])
+    tones_only = np.repeat(np.concatenate([np.zeros((1, first)), rows[:1, first:]], axis=1), len(corners), axis=0)
+    cut[:, first:] = moved_on(form, tones_only, corners)[:, first:]
+    cut[:, first + 1 :: 4] %= 1.0
+    cut[:, form.degree + 2] = np.sign(rate((corners + np.append(corners[1:], end)) / 2))
+    return cut
 
 
 def reference(flat: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
     """Reference position [m] at the times [s], of one run."""
     rows = pieces(flat, 1)[0]
     row = rows[np.searchsorted(rows[:, 0], time, side="right") - 1]
-    elapsed = time - row[:, 0]
-    return row[:, 1] + row[:, 2] * elapsed + row[:, 3] * elapsed**2 / 2
+    return value(form_of(flat), row, time - row[:, 0])
 
 
 def size(flat: Mapping[str, Any]) -> Any:
     """Length of the motion [m]; 0 where the reference stands still from the start."""
-    return np.abs(_SIZES[flat["motion.kind"]](flat))
+    return motion_of(flat).motion_size(flat)
 
 
 def initial_displacement(flat: Mapping[str, Any]) -> Any:
     """Position of all masses at the start [m]."""
-    return flat["motion.displacement"] if flat["motion.kind"] == "release" else 0.0
+    return motion_of(flat).initial_displacement(flat)
 
 
-@dataclass(frozen=True)
-class Stand:
-    """A place where the reference comes to stand: from its `corner` [s] on, `until` [s] it leaves or the run ends."""
-
-    corner: Any
-    until: Any
+def stands(flat: Mapping[str, Any]) -> Sequence[Stand]:
+    """Return the places where the reference comes to stand, one after the other; of one that never stands, from its
+    last corner on."""
+    return motion_of(flat).stands(flat)
 
 
-def stands(flat: Mapping[str, Any]) -> list[Stand]:
-    """Return the places where the reference comes to stand, one after the other:
-    both ends of a motion there and back, and of any other motion where it ends; of one that never stands, from its last
-    corner on."""
-    last = Stand(last_corner(flat), flat["motion.duration"])
-    if flat["motion.kind"] != "there_and_back":
-        return [last]
-    rows = _there_and_back(flat)
-    return [Stand(rows[len(rows) // 2 - 1][0], flat["motion.return_at"]), last]
+def rests(flat: Mapping[str, Any]) -> bool:
+    """Tell whether the reference of some stages stands in the end, so that they may hunt about a place."""
+    form, rows = form_of(flat), pieces(flat, int(np.max([np.size(value) for value in flat.values()])))
+    return motion_of(flat).rests or bool(np.all(at_rest(form, rows[:, -1])))
+
+
+def returns(flat: Mapping[str, Any]) -> bool:
+    """Tell whether the references of some stages come to stand where they began."""
+    return motion_of(flat).rests and not np.any(motion_of(flat).pieces(flat)[-1][1])
 
 
 def last_corner(flat: Mapping[str, Any]) -> Any:
     """Time of the last corner of the reference [s]: from then on it stays as it is."""
-    return _PIECES[flat["motion.kind"]](flat)[-1][0]
+    return motion_of(flat).pieces(flat)[-1][0]
 
 
 def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
@@ -130,8 +125,12 @@ def standing(flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return the flat keys of a stage whose reference stands from the start.
 
     It stands where the reference of its own motion stands after the last corner. Magnitudes remain those of its own
-    motion.
+    motion, or of a step to where it ends.
     """
-    if flat["motion.kind"] != "there_and_back":
+    rows = motion_of(flat).pieces(flat)
+    if len(rows) == 1:
         return dict(flat)
+    end = rows[-1][1]
+    if np.any(end):
+        return {**without_motion(flat), "motion.kind": "step", "motion.size": end}
     return {**without_motion(flat), "motion.kind": "release", "motion.displacement": size(flat)}

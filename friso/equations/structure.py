@@ -4,7 +4,7 @@ stages of equal structure share them and differ in numbers only."""
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -22,6 +22,8 @@ from friso.stage.controllers import (
     controller_of,
 )
 from friso.stage.filters import FILTER_RULE, FilterForm, FilterRule, filter_forms
+from friso.stage.motion import KIND as MOTION_KIND
+from friso.stage.motion import QUADRATIC, ReferenceForm, motion_of
 from friso.stage.rig import LOOPS, IntegralRule
 from friso.stage.standstill import NO_SETTINGS, FrictionSettings, settings_of
 from friso.stage.tables import friction_law
@@ -90,7 +92,8 @@ class Structure:
 
     `masses` names those given, for a rigid stage, `biased` those on which a constant force acts; `friction_variant` is
     whatever else the friction law's equations depend on (the Stribeck exponent where it is a whole number);
-    `load_follows` whether its levels grow with the acceleration of the reference.
+    `load_follows` whether its levels grow with the acceleration of the reference; `reference` is of what its pieces are
+    made.
     """
 
     masses: tuple[str, ...]
@@ -102,6 +105,12 @@ class Structure:
     biased: tuple[str, ...] = ()
     load_follows: bool = False
     transmission: TransmissionForm | None = None
+    reference: ReferenceForm = QUADRATIC
+
+    @property
+    def standing(self) -> Structure:
+        """Return the structure with a reference that stands."""
+        return replace(self, reference=QUADRATIC)
 
     @property
     def plays(self) -> bool:
@@ -121,6 +130,8 @@ class Structure:
             "no friction" if self.friction == "none" else f"{self.friction} friction": True,
             "load that follows": self.load_follows,
             self.controller.title if self.controller else "": self.controller,
+            f"reference of degree {self.reference.degree}": self.reference.degree != QUADRATIC.degree,
+            f"{self.reference.tones} tones": self.reference.tones,
         }
         return ", ".join(word for word, present in words.items() if present)
 
@@ -138,6 +149,7 @@ def structure(flat: Mapping[str, Any]) -> Structure:
         biased=tuple(name for name in ("cart", "stage") if flat.get(f"bias.{name}", 0.0) != 0),
         load_follows=load_follows(flat),
         transmission=_transmission_form(flat) if MOTOR_MASS in flat else None,
+        reference=motion_of(flat).form(flat) if MOTION_KIND in flat else QUADRATIC,
     )
 
 

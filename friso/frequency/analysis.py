@@ -31,7 +31,8 @@ def linear(stage: Stage, case: str | Members | None = None, part: str = "plant",
 
     - "plant": from "force" on the stage and "disturbance on cart" [N] to "stage", "cart" and "joint deflection" [m];
     - "controller": from "reference" and "stage" [m] (and "stage velocity" [m/s] if it measures that) to "force" [N];
-      one with feedforward also from "reference velocity" [m/s] and "reference acceleration" [m/s^2], here and below;
+      one with feedforward also from "reference velocity" [m/s], "reference acceleration" [m/s^2] and "reference jerk"
+      [m/s^3], here and below;
     - "open": the loop cut at the actuator, from "force" to minus the "force" of the controller;
     - "closed": from "force", "reference", "disturbance on cart" and "sensor noise" [m] to "stage", "cart", "joint
       deflection" and "force".

@@ -28,20 +28,19 @@ from friso.frequency.system import System
 from friso.stage.transmission import MOTOR_STATES
 
 FORCE, DISTURBANCE, REFERENCE, NOISE = "force", "disturbance on cart", "reference", "sensor noise"
-REFERENCE_VELOCITY, REFERENCE_ACCELERATION = FEEDFORWARD = "reference velocity", "reference acceleration"
+FEEDFORWARD = "reference velocity", "reference acceleration", "reference jerk"
 STAGE, CART, DEFLECTION, VELOCITY = "stage", "cart", "joint deflection", "stage velocity"
 RATED = "velocity's encoder"
 """The position of which the velocity is the rate."""
 
-_REFERENCE, _POSITION, _VELOCITY, _SPEED, _ACCELERATION = (
-    sp.Symbol(f"measured_{name}", real=True) for name in ("r", "y", "v", "r_rate", "r_bend")
+_REFERENCE, _POSITION, _VELOCITY, *_DERIVATIVES = (
+    sp.Symbol(f"measured_{name}", real=True) for name in ("r", "y", "v", "r_rate", "r_bend", "r_jerk")
 )
 _CONTROLLER_INPUTS = {
     REFERENCE: _REFERENCE,
     STAGE: _POSITION,
     VELOCITY: _VELOCITY,
-    REFERENCE_VELOCITY: _SPEED,
-    REFERENCE_ACCELERATION: _ACCELERATION,
+    **dict(zip(FEEDFORWARD, _DERIVATIVES, strict=True)),
 }
 
 
@@ -52,7 +51,7 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
     position at the velocity's encoder [m], and the velocity of the stage [m/s]. `flat` may hold arrays of shape
     (members,).
     """
-    form = _plant(shared_structure(flat))
+    form = _plant(shared_structure(flat).standing)
     velocity = np.where(members.forward, members.speed, -members.speed)
     values = {**flat, **operating_point(flat, members)}
     values |= dict.fromkeys(form.velocities, velocity)
@@ -78,7 +77,7 @@ def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
     if drive is not None and (drive.backlash or drive.friction != "none"):
         actual = "a backlash" if drive.backlash else "friction at the motor"
         raise InputError("transmission", actual, "the friction of the guide alone", "friso check, which simulates")
-    declared = _plant(replace(shared_structure(flat), friction="none", friction_variant=None)).declared
+    declared = _plant(replace(shared_structure(flat).standing, friction="none", friction_variant=None)).declared
     return declared.at({**flat, **_limiter(touched)}, len(touched)).take((FORCE, DISTURBANCE), (STAGE, CART))
 
 
@@ -96,8 +95,8 @@ def _on_flank() -> dict[str, Any]:
 
 def compensator(flat: Mapping[str, Any], members: int) -> System:
     """Return the controller: from reference, position [m] and velocity [m/s] of the stage,
-    velocity [m/s] and acceleration [m/s^2] of the reference to the force [N]. Raises InputError for one that exerts
-    none."""
+    velocity [m/s], acceleration [m/s^2] and jerk [m/s^3] of the reference to the force [N]. Raises InputError for one
+    that exerts none."""
     form = shared_structure(flat).controller
     assert form is not None  # a stage file has a controller
     system = _compensator(replace(form, anti_windup=None)).at(flat, members)
@@ -148,12 +147,13 @@ def _plant(form: Structure) -> _Plant:
 def cart_states(flat: Mapping[str, Any]) -> tuple[str, str]:
     """Return names of position and velocity of what the friction acts on,
     in the plant's systems."""
-    return _plant(shared_structure(flat)).cart
+    return _plant(shared_structure(flat).standing).cart
 
 
 @cache
 def _compensator(form: ControllerForm) -> Declared:
-    loop = Loop(_REFERENCE - _POSITION, _POSITION, _VELOCITY, _SPEED, _ACCELERATION)
+    speed, acceleration, jerk = _DERIVATIVES
+    loop = Loop(_REFERENCE - _POSITION, _POSITION, _VELOCITY, speed, acceleration, reference_jerk=jerk)
     control = continuous_controller(form, loop, sp.S.One, sp.S.One)
     states = control.component.states
     within: dict[Any, Any] = {kink.beyond: sp.S.Zero for kink in control.component.kinks}  # of limits inside it

@@ -52,6 +52,7 @@ from friso.hunting.motions import Motions
 from friso.hunting.outward import AttractionEnd, BandwidthWindow
 from friso.hunting.parameter_margin import MarginEnd, ParameterMargin
 from friso.hunting.stage_margins import joint_margins
+from friso.hunting.tracking import Dwell, Reversal, Tracking, dwells, tracking
 from friso.hunting.verdict import CheckPart, Judgement
 from friso.hunting.what_attracts import search_alone
 
@@ -74,6 +75,7 @@ __all__ = [
     "Cycles",
     "Decline",
     "Diagram",
+    "Dwell",
     "Ensemble",
     "Feeding",
     "Hunting",
@@ -94,6 +96,7 @@ __all__ = [
     "Plane",
     "Point",
     "ReturnMap",
+    "Reversal",
     "SearchLimits",
     "Solver",
     "Space",
@@ -102,6 +105,7 @@ __all__ = [
     "Swing",
     "Swinging",
     "Target",
+    "Tracking",
     "can_hunt",
     "cannot_hunt",
     "check",
@@ -109,6 +113,7 @@ __all__ = [
     "cycle_derivatives",
     "diagram",
     "displacements_that_hunt",
+    "dwells",
     "edge_derivatives",
     "find_attractors",
     "find_cycles",
@@ -129,6 +134,7 @@ __all__ = [
     "search_alone",
     "sketch_attractors",
     "stuck",
+    "tracking",
     "unstable",
     "wait",
 ]

@@ -11,7 +11,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
-from friso.equations.motion import CRUISE, last_corner, standing, without_motion
+from friso.equations.motion import last_corner, standing, without_motion
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Target
 from friso.hunting.attractors.rounds import RTOL, TIGHT, typical_period
@@ -27,6 +27,7 @@ from friso.hunting.settings import BasinSettings
 from friso.shares import share_interval
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
+from friso.stage.motion import motion_of
 
 
 @dataclass(frozen=True)
@@ -51,17 +52,15 @@ class Kick:
 
 @dataclass(frozen=True)
 class MoveShare:
-    """Share of moves that end in the cycle, drawn evenly over acceleration [m/s^2] and
-    acceleration time [s].
+    """Share of moves that end in the cycle, drawn evenly over two keys of the motion.
 
-    `count` moves were drawn and run to their end, `hunting` of them hunt. `accelerations` and `times` are the ranges
+    `count` moves were drawn and run to their end, `hunting` of them hunt. `ranges` [SI] of these keys are those that
     they were drawn from.
     """
 
     count: int
     hunting: int
-    accelerations: tuple[float, float]
-    times: tuple[float, float]
+    ranges: Mapping[str, tuple[float, float]]
 
     @property
     def fraction(self) -> float:
@@ -285,25 +284,16 @@ def moves_that_hunt(
     that ends in the `target`.
 
     Swings wider than `widest`, peak to peak [m], are left out. A resolved return map saves long runs. Returns None for
-    motions without acceleration, or if every run fails.
+    motions that are no moves, or if every run fails.
     """
     settings = BasinSettings.current()
     flat = stage.flat()
-    if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
+    if not (ranges := motion_of(flat).varied(flat, SEARCH_LIMITS.move_shares)):
         return None
-    acceleration, time = flat["motion.acceleration"], flat["motion.acceleration_time"]
-    least, most = SEARCH_LIMITS.move_shares
-    accelerations = (least * acceleration, most * acceleration)
-    times = (least * time, min(most * time, flat["motion.return_at"] / (2 + flat.get(CRUISE, 0.0))))
-    (low, shortest), (high, longest) = zip(accelerations, times, strict=True)
-    across, along = evenly(settings.drawn_moves)
-    moved = {
-        **flat,
-        "motion.acceleration": low + across * (high - low),
-        "motion.acceleration_time": shortest + along * (longest - shortest),
-    }
+    drawn = zip(ranges.items(), evenly(settings.drawn_moves), strict=True)
+    moved = {**flat, **{key: low + places * (high - low) for (key, (low, high)), places in drawn}}
     ends, decided = _caught(moved, settings.drawn_moves, target, widest, landing_map)
-    return MoveShare(int(decided.sum()), int(ends[decided].sum()), accelerations, times) if decided.any() else None
+    return MoveShare(int(decided.sum()), int(ends[decided].sum()), ranges) if decided.any() else None
 
 
 def evenly(count: int) -> np.ndarray:

@@ -16,6 +16,7 @@ from friso.engine.kernel import KernelRequest, kernel, kernels
 from friso.engine.side_by_side import side_by_side
 from friso.engine.simulate import RTOL, sampled_outputs, simulate
 from friso.engine.tolerance import checked_rtol
+from friso.equations.motion import size, stands
 from friso.equations.structure import structure
 from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.criteria import Verdict
@@ -25,9 +26,11 @@ from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.loop import LoopState, unstable
 from friso.hunting.many_stages import kernels_to_judge
 from friso.hunting.measures import BANDS, measure_runs, measuring_options
+from friso.hunting.motions import keeps_moving
 from friso.hunting.parameter_margin import ParameterMargin
 from friso.hunting.settings import CheckSettings, ToleranceSettings
 from friso.hunting.stage_margins import friction_margin, keeps_friction_margin
+from friso.hunting.tracking import Dwell, Tracking, dwells, tracking
 from friso.hunting.verdict import PARTS, CheckPart, Judgement, judge
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
@@ -72,6 +75,8 @@ class Case:
     - `static_friction`: margin in static friction (None: not asked for, or see `friso.hunting.stage_margins`).
     - `advice_keeps_friction`: whether the advised bandwidth, a factor beyond the edge of hunting, still does not hunt
       with that factor more or less static friction (None: no such advice, or unknown).
+    - `dwells`: how the stage settles at each place, where its reference stands at more than two.
+    - `tracking`: how it follows a reference that keeps moving (None: one that stands in the end).
     - `trace`: the time response, if asked for.
     """
 
@@ -93,12 +98,14 @@ class Case:
     feeding: Feeding | None = None
     static_friction: ParameterMargin | None = None
     advice_keeps_friction: bool | None = None
+    dwells: tuple[Dwell, ...] = ()
+    tracking: Tracking | None = None
     trace: xr.Dataset | None = None
 
     @property
     def verdict(self) -> Verdict:
         """Return the verdict: "hunts", "bistable", "transient",
-        "settles" or "failed" (see `Judgement`)."""
+        "settles" or "failed" (see `Judgement`); "none" while the reference keeps moving."""
         return self.judgement.verdict
 
     @property
@@ -109,9 +116,14 @@ class Case:
 
     @property
     def unmoved(self) -> bool:
-        """Tell whether the motion exerts too little force to move the stage."""
+        """Tell whether the motion exerts too little force to move the stage.
+
+        A force that rises quickly breaks it away earlier, which a stage shows that settles after a longer motion.
+        """
         joint = self.stage.joint
-        return self.largest_force < self.breakaway and (joint is None or joint.locked)
+        settles = any(time is not None for time in self.settling_time.values())
+        moved = settles and size(self.stage.flat()) > 2 * max(self.settling_time)
+        return self.largest_force < self.breakaway and not moved and (joint is None or joint.locked)
 
 
 PART_COUNT = len(PARTS) + 1
@@ -243,6 +255,8 @@ def _case(
         force_limit=_holding_limit(flat, runs, judgement, breakaway) if status == Status.DONE else None,
         unstable=unstable(stage),
         feeding=fed,
+        dwells=dwells(stage, rtol) if len(stands(flat)) > 2 and status == Status.DONE else (),
+        tracking=tracking(stage, rtol) if keeps_moving(flat) else None,
         static_friction=static_friction,
         advice_keeps_friction=keeps,
         trace=simulate(stage, rtol) if traces else None,

@@ -89,8 +89,8 @@ def can_hunt(flat: Mapping[str, Any]) -> bool:
 def kernels_to_judge(form: Structure) -> set[KernelRequest]:
     """Return the kernels that a verdict on stages of a structure needs,
     so that several can be built at once."""
-    variational = set() if why_not(form) else {KernelRequest(form, variational=True)}
-    return {KernelRequest(form), *variational}
+    variational = set() if why_not(form) else {KernelRequest(form.standing, variational=True)}
+    return {KernelRequest(form), KernelRequest(form.standing), *variational}
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind

@@ -13,7 +13,7 @@ from friso.engine.allowance import Exhausted
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
-from friso.equations.motion import last_corner
+from friso.equations.motion import last_corner, rests
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors.rounds import loose_from
 from friso.hunting.attractors.settings import SurveySettings
@@ -146,4 +146,4 @@ def some_of(columns: Mapping[str, Any], which: np.ndarray) -> dict[str, Any]:
 
 def keeps_moving(flat: Mapping[str, Any]) -> bool:
     """Tell whether the reference of the stages never stands still."""
-    return flat["motion.kind"] == "ramp" and bool(np.any(flat["motion.velocity"]))
+    return not rests(flat)

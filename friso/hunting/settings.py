@@ -248,3 +248,23 @@ class CheckSettings(Settings):
 
     compiled_from_points: int = setting(100, "")
     """Loading the compiled loops takes as long as so many turning points in Python."""
+
+
+@dataclass(frozen=True)
+class TrackingSettings(Settings):
+    """Responses to references that keep moving."""
+
+    samples_of_a_period: int = setting(4000, "")
+    """Fewer samples miss the tip of an error behind a reversal; more take memory."""
+
+    closing_rounds: int = setting(30, "")
+    """Newton steps, or waits for as long, before a periodic response is given up."""
+
+    periods_waited: int = setting(4, "periods")
+    """Where a Newton step does not come closer, friction has kinks in between: the stage is run on for so long."""
+
+    derivative_step: float = setting(1e-4, "of the scales of the states")
+    """Smaller steps are lost in the tolerance of the runs; larger ones reach across kinks of friction."""
+
+    closed_distance: float = setting(1e-4, "of the scales of the states")
+    """How far the periodic response may be, and states from themselves a period later: three digits of it are told."""

@@ -175,6 +175,8 @@ def judge(
         )
     if not motions.completed[0]:
         return Judgement("failed", attraction, runs_away=bool(motions.away[0]) and leaves_for_good(stage))
+    if moves_on:
+        return Judgement("none", attraction)
     if attraction.target:
         return _with_a_target(stage, motions, attraction, attraction.target, begin, work - spent.used, tell)
     begin(CheckPart.BANDWIDTHS)

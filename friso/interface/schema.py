@@ -85,7 +85,7 @@ def _key(annotation: Any, metadata: Iterable[Any], path: str, described: Mapping
 def _numeric(item: Quantity | Number | Several | Span | OneOrMany) -> Node:
     """Return the schema of numbers: texts with a unit, bare numbers, or arrays of them."""
     if isinstance(item, Several):
-        return {
+        array: Node = {
             "type": "array",
             "items": _numeric(item.of),
             "minItems": item.least,
@@ -93,6 +93,7 @@ def _numeric(item: Quantity | Number | Several | Span | OneOrMany) -> Node:
             "description": item.expected,
             "examples": [[*item.examples]],
         }
+        return {"anyOf": [_numeric(item.of), array], "description": item.expected} if item.alone else array
     if isinstance(item, OneOrMany):
         single = _numeric(item.of) if item.of else {"type": "string"}
         return {"anyOf": [single, {"type": "array", "items": single}], "description": item.expected}

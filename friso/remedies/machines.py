@@ -15,11 +15,8 @@ from friso.remedies.settings import RemedySettings
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
+from friso.stage.motion import motion_of
 from friso.studies.compare.machines import LEAST, SPREADS, draw_machines
-
-TRAVEL = {"there_and_back": ("motion.acceleration_time", 0.5), "step": ("motion.size", 1.0)}
-TRAVEL |= {"release": ("motion.displacement", 1.0)}
-"""The key that decides on the travel of a motion, and the power of the travel with which it goes."""
 
 ADDED = int.from_bytes(b"joint")
 """Which of a seed's random numbers decide on a joint that the stage file does not have: they are the second half of
@@ -73,9 +70,7 @@ class Fleet:
             flat[key] = flat[key] * np.tile(ratio, points)
         for key, shift in self.shifts.items():
             flat[key] = flat.get(key, 0.0) + np.tile(shift, points)
-        key, power = TRAVEL[flat["motion.kind"]]
-        flat[key] = flat[key] * np.tile(self.travel, points) ** power
-        return flat
+        return {**flat, **motion_of(flat).stretched(flat, np.tile(self.travel, points))}
 
     def _of(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
         """Return the ratios of the keys that the stage has.

@@ -25,7 +25,7 @@ from friso.remedies.catalogue import Remedy, remedies, with_bandwidth
 from friso.remedies.change import ChangeSize, change_size
 from friso.remedies.goal import Goal
 from friso.remedies.least import least_changes, least_remedy
-from friso.remedies.machines import TRAVEL, Fleet, draw_fleet
+from friso.remedies.machines import Fleet, draw_fleet
 from friso.remedies.relax import RelaxedGoal, relaxations
 from friso.remedies.search import Budget, Search
 from friso.remedies.sensitivities import Sensitivities, edge_sensitivities
@@ -43,6 +43,7 @@ from friso.remedies.verified import (
 from friso.remedies.window import windows
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
+from friso.stage.motion import motion_of
 from friso.stage.rig import AS_BUILT
 from friso.studies.compare.options import linear_flat
 
@@ -418,7 +419,7 @@ def _moves(stage: Stage) -> None:
     flat = stage.flat()
     kind = flat["motion.kind"]
     corner, duration = float(last_corner(flat)), flat["motion.duration"]
-    if kind not in TRAVEL or not flat[TRAVEL[kind][0]] or corner >= duration:
+    if not motion_of(flat).stretched(flat, 1.0) or corner >= duration:
         example = '[motion] kind = "step", size = "1 mm", duration = "20 s"'
         raise InputError("motion.kind", f'"{kind}"', "a move whose reference stands in the end", example)
 

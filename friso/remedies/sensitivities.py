@@ -14,7 +14,7 @@ import numpy as np
 from friso.engine.arrays import STATISTICS, Results, Status
 from friso.engine.batch import MOST_TURNS
 from friso.equations.bandwidth import bandwidth
-from friso.equations.motion import Stand, initial_displacement, pieces, size, stands
+from friso.equations.motion import initial_displacement, rests, size, stands
 from friso.equations.roles import Steady
 from friso.equations.structure import decisive_keys
 from friso.errors import InputError
@@ -45,6 +45,9 @@ RTOL = 1e-11
 
 NOISE = 100 * RTOL
 """Share of the time since a run began by which runs with that tolerance may be off."""
+
+ENTERED = STATISTICS.index("inner_exit")
+"""Column of statistics with the time at which a run last entered the band."""
 
 START = "motion.displacement"
 """Where a release begins: of the motion's keys the one that is not in the reference."""
@@ -232,18 +235,21 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     A derivative is the change of position there over the speed of entry. Returns None if neighbouring motions do not
     follow.
     """
-    if pieces(flat, 1)[0, -1, 2]:
-        return None  # the reference never stands still
-    stages = Ensemble(flat, 1)
-    duration = np.array([float(flat["motion.duration"])])
-    start = _starts(stages, flat, 1)
-    results = stages.run(start, duration, RTOL, bands=(within, within))
+    if not rests(flat):
+        return None
+    places = stands(flat)
+    stages = Ensemble(flat, len(places))
+    untils = np.array([float(place.until) for place in places])
+    results = stages.run(_starts(stages, flat, len(places)), untils, RTOL, bands=(within, within))
     if not _all_done(results):
         return None
-    column, place = _longest(flat, results.statistics[0])
-    corner, entered = float(place.corner), results.statistics[:, column]
-    if not corner < entered[0] < place.until:
+    corners, entries = np.array([float(place.corner) for place in places]), results.statistics[:, ENTERED]
+    longest = int(np.argmax(entries - corners))
+    corner, until, entered = corners[longest], untils[longest], entries[longest : longest + 1]
+    if not corner < entered[0] < until:
         return None
+    stages, duration = Ensemble(flat, 1), untils[longest : longest + 1]
+    start = _starts(stages, flat, 1)
     flow = flow_derivatives(stages, keys, start, entered, RTOL)
     if flow is None:
         return None
@@ -251,7 +257,7 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     position = stages.kernel.position
     by = -(by_states @ _starts_by(stages, flat, keys) + by_keys)[position] / end[stages.kernel.velocity]
     settling = float(entered[0] - corner)
-    if not _is_smooth(flat, keys, column, float(entered[0]), settling, by, within):
+    if not _is_smooth(flat, keys, until, float(entered[0]), settling, by, within):
         return None
     results = stages.run(start, duration, RTOL, least_swing=0.0, room=MOST_TURNS)  # once, however many turns there are
     if not _all_done(results):
@@ -259,7 +265,7 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     turns = slice(int(results.turn_counts[0]))
     off, times = np.abs(results.turn_values[0, turns]) / within, results.turn_times[0, turns]
     last = off[(times > corner) & (times <= entered[0])][-1:]
-    jump = np.abs(np.append(last, off[(times > entered[0]) & (times < place.until)]) - 1).min(initial=np.inf)
+    jump = np.abs(np.append(last, off[(times > entered[0]) & (times < until)]) - 1).min(initial=np.inf)
     return SettlingDerivatives(within, settling, by, float(jump))
 
 
@@ -267,18 +273,10 @@ def _all_done(results: Results) -> bool:
     return bool(np.all(np.equal(results.statuses, Status.DONE)))
 
 
-def _longest(flat: Mapping[str, Any], statistics: np.ndarray) -> tuple[int, Stand]:
-    """Return where the stage settles last, and the column of statistics with its time of entry."""
-    columns = [STATISTICS.index(name) for name in ("inner_before", "inner_exit")]
-    places = stands(flat)
-    listed = [*zip(columns[-len(places) :], places, strict=True)]
-    return max(listed, key=lambda listed_one: statistics[listed_one[0]] - listed_one[1].corner)
-
-
 def _is_smooth(
     flat: Mapping[str, Any],
     keys: tuple[str, ...],
-    column: int,
+    until: float,
     entered: float,
     settling: float,
     by: np.ndarray,
@@ -286,7 +284,7 @@ def _is_smooth(
 ) -> bool:
     """Tell whether the settling time changes smoothly with each key.
 
-    The stage `entered` the band at a time [s] in a `column` of its statistics, after `settling` [s]. Keys are changed a
+    The stage `entered` the band at a time [s], after `settling` [s], in a run `until` [s]. Keys are changed a
     little either way, and the new times are compared with the derivatives. They differ if the stage bounces on its
     limiter so often that neighbouring motions part.
     """
@@ -295,9 +293,9 @@ def _is_smooth(
     changes = np.concatenate([-np.diag(step), np.diag(step)])
     beside = {name: flat[name] + values for name, values in zip(keys, changes.T, strict=True)}
     stages = Ensemble({**flat, **beside}, len(changes))
-    durations = np.full(len(changes), float(flat["motion.duration"]))
+    durations = np.full(len(changes), until)
     results = stages.run(_starts(stages, stages.flat, len(changes)), durations, RTOL, bands=(within, within))
-    moved = results.statistics[:, column] - entered
+    moved = results.statistics[:, ENTERED] - entered
     expected = np.concatenate([-step * by, step * by])
     allowed = settings.smooth_share * settings.loop_change * settling + NOISE * entered
     return bool(_all_done(results) and np.all(np.abs(moved - expected) <= allowed))

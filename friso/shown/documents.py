@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from friso.axis import axis_shown
+from friso.hunting.measures import BANDS
+
+if TYPE_CHECKING:
+    from friso.hunting import Dwell, Tracking
 
 
 def plain_json(value: Any) -> Any:
@@ -33,3 +38,32 @@ def plain_json(value: Any) -> Any:
 def unit_suffix(unit: str) -> str:
     """Return the suffix of a key for a unit: "_n_s_per_m" for "N*s/m", empty without a unit."""
     return f"_{unit.lower().replace('*', '_').replace('/', '_per_').replace('^', '')}" if unit else ""
+
+
+def dwells_document(dwells: Sequence[Dwell]) -> list[dict[str, Any]]:
+    """Return how a stage settles at each place where its reference stands, the slowest first."""
+    return [
+        {
+            "move": dwell.number,
+            "position_m": dwell.position,
+            "since_s": dwell.since,
+            "settling_time_s": dwell.settling[BANDS[0]],
+            "settling_time_10um_s": dwell.settling[BANDS[1]],
+        }
+        for dwell in dwells
+    ]
+
+
+def tracking_document(tracking: Tracking) -> dict[str, Any]:
+    """Return how a stage follows a reference that keeps moving."""
+    return {
+        "largest_error_m": tracking.largest,
+        "rms_error_m": tracking.rms,
+        "largest_force_n": tracking.largest_force,
+        "period_s": tracking.period,
+        "closed": tracking.closed,
+        "multiplier": tracking.multiplier,
+        "reversals": [
+            {"time_s": one.time, "position_m": one.position, "largest_error_m": one.error} for one in tracking.reversals
+        ],
+    }

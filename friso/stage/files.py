@@ -49,12 +49,12 @@ def load(path: str | os.PathLike[str]) -> Stage:
     >>> friso.load(friso.example("thesis_rig")).joint.stiffness.text
     '2.4 N/mm'
     """
-    return _hinted(path, lambda text: loads(text, origin=str(path)))
+    return _hinted(path, lambda text: _stage_of(text, str(path), Path(path).parent))
 
 
 def load_tables(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Return the tables of a stage file, which need not make a whole stage. Raises StageError."""
-    return _hinted(path, lambda text: parsed(text, _EXPECTED))
+    return _hinted(path, lambda text: _with_whole_paths(parsed(text, _EXPECTED), Path(path).parent))
 
 
 def _hinted(path: str | os.PathLike[str], read: Callable[[str], Read]) -> Read:
@@ -75,7 +75,7 @@ def load_changed(path: Path, changes: Mapping[str, Any]) -> Stage:
     """Return the stage of a file with dotted keys set, which the file may lack.
     Raises StageError."""
     try:
-        return changed(parsed(text_of(path, _EXPECTED), _EXPECTED), changes)
+        return changed(_with_whole_paths(parsed(text_of(path, _EXPECTED), _EXPECTED), path.parent), changes)
     except InputError as error:
         raise StageError.of(error).found_in(str(path)) from None
 
@@ -91,13 +91,27 @@ def loads(text: str, origin: str = "stage file") -> Stage:
     >>> friso.loads(stage.to_toml()) == stage
     True
     """
+    return _stage_of(text, origin)
+
+
+def _stage_of(text: str, origin: str, folder: Path | None = None) -> Stage:
+    """Return the stage of a TOML text, whose files stand beside it in a folder. Raises StageError."""
     try:
         tables = parsed(text, _EXPECTED)
         if "masses" not in tables or "controller" not in tables:
             _refuse_specification(tables)
-        return Stage(**tables)
+        return Stage(**_with_whole_paths(tables, folder))
     except InputError as error:
         raise StageError.of(error).found_in(origin) from None
+
+
+def _with_whole_paths(tables: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
+    """Return tables in which a `file`, which is beside the stage file in a folder, stands by its whole path."""
+    found: dict[str, Any] = dict(tables)
+    for name, table in tables.items():
+        if folder is not None and isinstance(table, dict) and isinstance(table.get("file"), str):
+            found[name] = {**table, "file": str((folder / table["file"]).absolute())}
+    return found
 
 
 def _refuse_specification(tables: Mapping[str, Any]) -> None:

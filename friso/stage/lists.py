@@ -40,12 +40,14 @@ class Rows(tuple[Any, ...]):
 
 @dataclass(frozen=True)
 class Several:
-    """A key that takes an array of at least `least` and, if stated, at most `most` values; the examples are theirs."""
+    """A key that takes an array of at least `least` and, if stated, at most `most` values; the examples are theirs.
+    A value `alone` may stand for an array of one."""
 
     of: Quantity | Number
     examples: tuple[str, ...]
     least: int = 2
     most: int | None = None
+    alone: bool = False
 
     def on(self, kind: AxisKind) -> Self:
         """Return the values that the key accepts on an axis of that kind."""
@@ -55,6 +57,8 @@ class Several:
     @property
     def expected(self) -> str:
         """Return the values that the key accepts, in words."""
+        if self.alone:
+            return f"one value or an array of up to {self.most}, each {self.of.expected}"
         count = f"{_WORDS[self.least]} or more" if self.most is None else f"{self.least} to {self.most}"
         return f"an array of {count}, each {self.of.expected}"
 
@@ -67,6 +71,8 @@ class Several:
     def read(self, raw: Any, read_one: Callable[[Any], Any] | None = None) -> Values:
         """Return the values of an array, each read by `read_one` or as the key's kind is.
         Raises InputError, under the number of the element that is wrong."""
+        if self.alone and not isinstance(raw, list | tuple):
+            raw = [raw]
         size = len(raw) if isinstance(raw, list | tuple) else None
         if size is None or size < self.least or size > (self.most or size):
             hint = "not an array" if size is None else f"of {size}"

@@ -73,6 +73,7 @@ def plug_ins(classes: Iterable[type]) -> tuple[PlugIn, ...]:
 FRISO = {
     "friso.controllers": ("friso.equations.controllers",),
     "friso.friction": ("friso.equations.friction",),
+    "friso.motions": ("friso.equations.motions", "friso.identification.recorded_motion"),
     "friso.derivations": ("friso.leaf_springs.joint", "friso.equations.conditions"),
 }
 """The modules that register what is friso's own, by group: they stand on floors above, and are imported when a stage

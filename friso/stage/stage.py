@@ -26,6 +26,7 @@ from friso.stage.controllers import (
 )
 from friso.stage.flexure import Flexure, derived, with_material
 from friso.stage.lists import element_keys
+from friso.stage.motion import MOTION, Motion, motion_of
 from friso.stage.rig import Cable, Drive, Floor, Rail
 from friso.stage.section import (
     Rule,
@@ -39,7 +40,6 @@ from friso.stage.section import (
 )
 from friso.stage.tables import (
     FRICTION,
-    MOTION,
     MOTOR_CONSTANT,
     Actuator,
     AxisTable,
@@ -47,7 +47,6 @@ from friso.stage.tables import (
     FrictionSection,
     Joint,
     Masses,
-    Motion,
     Parasitic,
     friction_law,
 )
@@ -440,7 +439,7 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
         "conditions": Conditions,
         "cable": Cable,
         **({CONTROLLER: controller_of(flat)} if KIND in flat else {}),
-        "motion": MOTION.classes[flat["motion.kind"]],
+        "motion": motion_of(flat),
     }
     present = {key.split(".")[0] for key in flat}
     return {name: cls for name, cls in classes.items() if name in present}
@@ -489,6 +488,8 @@ def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
         flat.setdefault(MOTOR_MASS, mass)
     for key, value in controller_of(flat).with_defaults(flat).items():
         flat.setdefault(key, value)
+    for key, value in motion_of(flat).with_defaults(flat).items():
+        flat.setdefault(key, value if np.ndim(value) else float(value))
     if FORCE_LIMIT in flat:
         flat.setdefault(ANTI_WINDUP, "clamp")
     return with_material(flat)

@@ -16,7 +16,7 @@ from friso.quantities import (
     non_negative,
     positive,
 )
-from friso.stage.section import Rule, Section, UncertainSection, Variants
+from friso.stage.section import Section, UncertainSection, Variants
 
 
 class AxisTable(UncertainSection):
@@ -178,76 +178,3 @@ class Bias(UncertainSection):
 
 ROUNDING = 1e-12
 """Relative slack of the limits on times, which are sums of decimal numbers."""
-
-
-class Motion(UncertainSection):
-    """Base of the motions: what the reference does."""
-
-    kind: Any
-    duration: Annotated[Value, Quantity("s", positive, "20 s")]
-
-
-MOTION = Variants("kind")
-
-
-def _time_there(flat: Mapping[str, Any]) -> Any:
-    """Time of the move there [s]."""
-    return (2 + flat.get("motion.cruise_ratio", 0.0)) * flat["motion.acceleration_time"]
-
-
-@MOTION.register
-class ThereAndBack(Motion):
-    """Two equal steps, there and back, each accelerating for acceleration_time and braking likewise; with a
-    cruise_ratio, at constant speed in between for so many times the acceleration_time."""
-
-    kind: Literal["there_and_back"]
-    acceleration: Annotated[Value, Quantity("m/s^2", non_negative, "100 m/s^2")]
-    acceleration_time: Annotated[Value, Quantity("s", non_negative, "30 ms")]
-    return_at: Annotated[Value, Quantity("s", non_negative, "5 s")]
-    cruise_ratio: Annotated[float | None, Number(positive, "1.0")] = None
-
-    rules: ClassVar[tuple[Rule, ...]] = (
-        Rule(
-            ("motion.acceleration_time", "motion.return_at"),
-            lambda f: _time_there(f) <= f["motion.return_at"] * (1 + ROUNDING),
-            "the move there (2 + cruise_ratio times acceleration_time) finished before return_at",
-            'acceleration_time = "30 ms", return_at = "5 s"',
-        ),
-        Rule(
-            ("motion.acceleration_time", "motion.return_at", "motion.duration"),
-            lambda f: f["motion.return_at"] + _time_there(f) <= f["motion.duration"] * (1 + ROUNDING),
-            "the move back (return_at + 2 + cruise_ratio times acceleration_time) finished within the duration",
-            'acceleration_time = "30 ms", return_at = "5 s", duration = "20 s"',
-        ),
-    )
-
-
-@MOTION.register
-class Release(Motion):
-    """Everything displaced and at rest, the reference 0."""
-
-    kind: Literal["release"]
-    displacement: Annotated[Value, Quantity("m", any_sign, "2 mm")]
-
-
-@MOTION.register
-class Step(Motion):
-    """The reference jumps at the start."""
-
-    kind: Literal["step"]
-    size: Annotated[Value, Quantity("m", any_sign, "1 mm")]
-
-
-@MOTION.register
-class Ramp(Motion):
-    """The reference moves at constant velocity."""
-
-    kind: Literal["ramp"]
-    velocity: Annotated[Value, Quantity("m/s", any_sign, "0.1 m/s")]
-
-
-@MOTION.register
-class Hold(Motion):
-    """The reference stays 0."""
-
-    kind: Literal["hold"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from friso.engine.batch import RunOptions, options_of, prepare, run_batch
 from friso.engine.kernel import Kernel, empty_results, kernel
 from friso.equations.as_built import COMMANDED, NEUTRAL, READING, AsBuilt, whole_samples
 from friso.equations.conditions import LEVELS, anywhere
+from friso.equations.reference import value
 from friso.equations.roles import Role, Steady
 from friso.errors import InputError
 from friso.stage import Stage
@@ -79,7 +80,8 @@ def run(
     flat = as_built_keys(stage, changes)
     _check(flat, interval)
     first_run = {key: value[0] if np.ndim(value) else value for key, value in flat.items()}
-    shape = kernel(AsBuilt.of(first_run), method=METHOD)
+    form = AsBuilt.of(first_run)
+    shape = kernel(replace(form, structure=replace(form.structure, reference=task.form)), method=METHOD)
     count = int(np.ceil(task.duration / interval * (1 - 1e-12)))
     chunk = max(8, int(settings.sample_memory / (8 * count * len(shape.full_state))))
     for first in range(0, len(seeds), chunk):
@@ -139,7 +141,8 @@ def _recorded(
     at_rest = Steady(-task.displacement, float(task.pieces[0, 1]) + task.displacement)
     starts = shape.unwound_at(shape.values(flat | motion, len(seeds)), at_rest, len(seeds))
     batch = prepare(shape, flat | motion, len(seeds), options, starts)
-    end = np.array([[task.duration, 0.0, 0.0, 0.0]])
+    end = np.zeros(task.pieces.shape[1])
+    end[0] = task.duration
     batch = batch._replace(
         segments=np.vstack([task.pieces, end])[None],
         windows=np.full(len(seeds), -1),
@@ -186,7 +189,7 @@ def reference(task: MoveTask, time: np.ndarray) -> np.ndarray:
     """Return the reference [m] at times [s]."""
     rows = task.pieces[np.searchsorted(task.pieces[:, 0], time * (1 + 1e-12), side="right") - 1]
     since = time - rows[:, 0]
-    return rows[:, 1] + rows[:, 2] * since + rows[:, 3] * since**2 / 2
+    return value(task.form, rows, since)
 
 
 def failures(recorded: RecordedRuns) -> list[tuple[int, str]]:

@@ -10,7 +10,9 @@ from itertools import pairwise
 import numpy as np
 
 from friso.equations import motion
+from friso.equations.reference import value
 from friso.stage import Stage
+from friso.stage.motion import QUADRATIC, ReferenceForm
 
 SAMPLE_TIME = 50e-6
 """Sample time of a drive that states none [s]: that of the thesis (Sec. 3.5.2)."""
@@ -18,11 +20,11 @@ SAMPLE_TIME = 50e-6
 
 @dataclass(frozen=True)
 class MoveTask:
-    """Pieces of the reference, shape (pieces, 4): start [s], position [m], velocity [m/s], acceleration [m/s^2] there;
-    its duration [s]; and the injected force [N] every `injected_each` [s], shape (n,), empty for none; the drive logs
-    it unless it is `unknown` to it.
+    """Pieces of the reference (see `friso.equations.reference`), shape (pieces, 1 + inputs), of a `form`.
 
-    The stage starts at rest where the reference does, but displaced from it by `displacement` [m].
+    Further fields are its duration [s], and the injected force [N] every `injected_each` [s], shape (n,), empty for
+    none; the drive logs it unless it is `unknown` to it. The stage starts at rest where the reference does, but
+    displaced from it by `displacement` [m].
     """
 
     pieces: np.ndarray
@@ -31,17 +33,17 @@ class MoveTask:
     injected_each: float = 1.0
     unknown: bool = False
     displacement: float = 0.0
+    form: ReferenceForm = QUADRATIC
 
     @property
     def span(self) -> tuple[float, float]:
         """Return the lowest and highest position of the reference [m]."""
-        ends = [*self.pieces[1:, 0], self.duration]
-        places = [*self.pieces[:, 1]]
-        for (start, place, velocity, acceleration), end in zip(self.pieces, ends, strict=True):
-            turn = -velocity / acceleration if acceleration else 0.0
-            for since in (end - start, min(max(turn, 0.0), end - start)):
-                places.append(place + velocity * since + acceleration * since**2 / 2)
-        return min(*places, places[0] + self.displacement), max(*places, places[0] + self.displacement)
+        lengths = np.append(self.pieces[1:, 0], self.duration) - self.pieces[:, 0]
+        velocity, acceleration = self.pieces[:, 2], self.pieces[:, 3]
+        turns = np.divide(-velocity, acceleration, out=np.zeros_like(velocity), where=acceleration != 0)
+        times = 0.0 * lengths, lengths, np.clip(turns, 0.0, lengths)
+        places = np.concatenate([value(self.form, self.pieces, time) for time in times])
+        return min(places.min(), places[0] + self.displacement), max(places.max(), places[0] + self.displacement)
 
 
 def own_motion(stage: Stage) -> MoveTask:
@@ -50,9 +52,10 @@ def own_motion(stage: Stage) -> MoveTask:
     flat = stage.flat()
     pieces, duration = motion.pieces(flat, 1)[0], flat["motion.duration"]
     if pieces[0, 1]:
-        pieces = np.vstack([np.zeros(4), pieces])
+        pieces = np.vstack([np.zeros(pieces.shape[1]), pieces])
         pieces[1:, 0] += flat.get("drive.sample_time", SAMPLE_TIME)
-    return MoveTask(pieces, duration, displacement=float(motion.initial_displacement(flat)))
+    displacement = float(motion.initial_displacement(flat))
+    return MoveTask(pieces, duration, displacement=displacement, form=motion.form_of(flat))
 
 
 def standing(place: float, duration: float) -> MoveTask:

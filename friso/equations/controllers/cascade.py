@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 from friso.equations.controllers.feedforward import SYMBOLS, fed_forward, feedforward_of_moves
-from friso.quantities import Number, Quantity, Value, non_negative, positive
+from friso.quantities import Number, Quantity, Value, any_sign, non_negative, positive
 from friso.stage import ControllerSection, Rule, register_controller
 from friso.stage.controllers import Gain
 
@@ -28,7 +28,10 @@ KP, POSITION_TIME, VELOCITY_TIME, PROPORTIONAL_ON, VELOCITY_FILTER = (
     for name in ("kp", "position_integral_time", "velocity_integral_time", "proportional_on", "velocity_filter")
 )
 
-FEEDFORWARD = ("velocity_feedforward", "acceleration_feedforward", "coulomb_feedforward", "viscous_feedforward")
+FEEDFORWARD = (
+    *("velocity_feedforward", "acceleration_feedforward", "coulomb_feedforward", "viscous_feedforward"),
+    "jerk_feedforward",
+)
 
 
 SLOWER = 4.0
@@ -66,6 +69,7 @@ class Cascade(ControllerSection):
     coulomb_feedforward: Annotated[Value, Quantity("N", non_negative, "1 N")] = Value(0, "0 N")
     """By the sign of the reference's velocity."""
     viscous_feedforward: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")] = Value(0, "0 N*s/m")
+    jerk_feedforward: Annotated[Value | None, Quantity("kg*s", any_sign, "0.5 g*s")] = None
 
     usual: ClassVar[Mapping[str, tuple[float, float, str, tuple[str, ...]]]] = MappingProxyType(
         {
@@ -119,7 +123,7 @@ class Cascade(ControllerSection):
             velocity_integral=VELOCITY_TIME in flat,
             proportional_on=flat[PROPORTIONAL_ON],
             filtered=bool(flat[VELOCITY_FILTER] > 0),
-            feedforward=tuple(name for name in FEEDFORWARD if flat[cls.key(name)] > 0),
+            feedforward=tuple(name for name in FEEDFORWARD if flat.get(cls.key(name), 0) != 0),
         )
 
     @classmethod
@@ -213,6 +217,7 @@ class Cascade(ControllerSection):
         feedforward = measured.reference_acceleration * ahead.get("acceleration_feedforward", 0)
         feedforward += measured.reference_velocity * ahead.get("viscous_feedforward", 0)
         feedforward += measured.reference_direction * ahead.get("coulomb_feedforward", 0)
+        feedforward += measured.reference_jerk * ahead.get("jerk_feedforward", 0)
         return {
             "p": wanted * kp if variant.proportional_on == "error" else blocks.nothing,
             "v": -(velocity * kp),

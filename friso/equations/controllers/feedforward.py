@@ -12,6 +12,7 @@ from friso.stage.transmission import moving_mass
 SYMBOLS: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "acceleration_feedforward": ("feedforward of acceleration", "m"),
+        "jerk_feedforward": ("feedforward of jerk", "mj"),
         "viscous_feedforward": ("feedforward of viscous friction", "d"),
         "coulomb_feedforward": ("feedforward of Coulomb friction", "Fc"),
     }
@@ -19,6 +20,7 @@ SYMBOLS: Mapping[str, tuple[str, str]] = MappingProxyType(
 
 TERMS = {
     "acceleration_feedforward": "m d²r/dt²",
+    "jerk_feedforward": "mj d³r/dt³",
     "viscous_feedforward": "d dr/dt",
     "coulomb_feedforward": "Fc sign(dr/dt)",
 }

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 KP, KI, KD, TAU, DERIVATIVE_ON = (f"controller.{name}" for name in ("kp", "ki", "kd", "tau", "derivative_on"))
 
-FEEDFORWARD = ("viscous_feedforward", "acceleration_feedforward", "coulomb_feedforward")
+FEEDFORWARD = ("viscous_feedforward", "acceleration_feedforward", "coulomb_feedforward", "jerk_feedforward")
 
 
 SLOWER = 4.0
@@ -55,6 +55,7 @@ class PidGains(Pid):
     acceleration_feedforward: Annotated[Value | None, Quantity("kg", any_sign, "1.7 kg")] = None
     coulomb_feedforward: Annotated[Value | None, Quantity("N", any_sign, "1 N")] = None
     """By the sign of the reference's velocity."""
+    jerk_feedforward: Annotated[Value | None, Quantity("kg*s", any_sign, "0.5 g*s")] = None
 
     written = "gains"
     needed = ("kp", "ki", "kd")
@@ -169,7 +170,12 @@ class PidGains(Pid):
             "d": derivative[variant.derivative_on](),
             "i": blocks.integral(measured.error, ki, rule="backward_euler") if variant.integral else blocks.nothing,
         }
-        references = (measured.reference_velocity, measured.reference_acceleration, measured.reference_direction)
+        references = (
+            measured.reference_velocity,
+            measured.reference_acceleration,
+            measured.reference_direction,
+            measured.reference_jerk,
+        )
         ahead = [
             reference * blocks.key(name)
             for name, reference in zip(FEEDFORWARD, references, strict=True)

@@ -26,7 +26,7 @@ def receptance(flat: Mapping[str, Any], frequencies: np.ndarray) -> tuple[np.nda
 
     The frequencies are in [Hz]. The reference rests, the limiter is not touched and the force is not limited.
     """
-    loop = _loop(shared_structure(flat)).at(flat, 1)
+    loop = _loop(shared_structure(flat).standing).at(flat, 1)
     (answer,) = loop.take((FORCE,), (CART, STAGE)).at(2j * np.pi * frequencies)
     return -answer[:, 0, 0], -answer[:, 1, 0]
 

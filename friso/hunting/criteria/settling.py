@@ -2,9 +2,9 @@
 `map` and `tune`.
 
 The time runs from the last corner of the reference until the deviation stays within a band while the reference stands
-there. For a motion there and back it is the longer of the times at both ends. It is infinite if the deviation is
-outside the band when the reference leaves, or when the run ends. So a stage that never leaves is in position once the
-reference is back, but it has not settled.
+there; of a motion that stands at several places it is the longest. It is infinite if the deviation is outside the band
+when the reference leaves, or when the run ends. So a stage that never leaves is in position once the reference is back,
+but it has not settled.
 """
 
 from __future__ import annotations
@@ -40,11 +40,10 @@ def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: BandName) -> 
 
 
 def _at_stands(flat: Mapping[str, Any], runs: Runs, band: BandName) -> list[np.ndarray]:
-    """Return settling times [s] of runs at each place where the reference stands."""
+    """Return settling times [s] of runs: the longest at places that the reference leaves again, and at the last."""
     last, before = runs.statistic(f"{band}_exit"), runs.statistic(f"{band}_before")
-    outside = [before, np.where(last < runs.statistic("ended"), last, np.inf)]
-    places = stands(flat)
-    return [_since(place, left) for place, left in zip(places, outside[-len(places) :], strict=True)]
+    in_the_end = _since(stands(flat)[-1], np.where(last < runs.statistic("ended"), last, np.inf))
+    return [np.maximum(before, 0.0), in_the_end]
 
 
 def settling_of_traces(places: list[Stand], time: np.ndarray, deviation: np.ndarray, within: float) -> np.ndarray:

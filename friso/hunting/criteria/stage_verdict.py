@@ -7,6 +7,7 @@
 | transient | no | has not come to rest at its end |
 | settles | no | has come to rest |
 | failed | | the run of the motion was not completed, or whether a cycle attracts is unknown |
+| none | unknown | has a reference that keeps moving: of a single stage there is no verdict then |
 
 Just one of them holds. A run alone gives no verdict (see `friso.hunting.criteria.run_outcome` for what a run did). What
 attracts is a cycle that was closed as an orbit, or else, and then it is said ("observed"), a swing that long
@@ -19,7 +20,7 @@ from typing import Literal
 
 import numpy as np
 
-Verdict = Literal["hunts", "bistable", "transient", "settles", "failed"]
+Verdict = Literal["hunts", "bistable", "transient", "settles", "failed", "none"]
 
 VERDICTS: tuple[Verdict, ...] = ("hunts", "bistable", "transient", "settles", "failed")
 """The words, the worst first."""

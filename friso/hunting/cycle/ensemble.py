@@ -43,6 +43,8 @@ class Ensemble:
     @classmethod
     def held(cls, flat: Mapping[str, Any], count: int, **options: Any) -> Ensemble:
         """Make an ensemble of stages with their reference held at 0 instead of their motion."""
+        if (form := options.get("form")) is not None:
+            options["form"] = form.standing
         return cls({**without_motion(flat), "motion.kind": "release"}, count, **options)
 
     def take(self, numbers: np.ndarray) -> Ensemble:

@@ -227,7 +227,7 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
         calm = bool(surely_calm(Ensemble.held(stage.flat(), 1))[0])
         return Hunting((), reason if calm or reason == DITHERS else BY_ITSELF, calm, None)
     flat = stage.flat()
-    kernels([KernelRequest(structure(flat), variational) for variational in (False, True)])
+    kernels([KernelRequest(structure(flat).standing, variational) for variational in (False, True)])
     stages = Ensemble.held(flat, 1)
     with allowance(work) as search:
         survey = attractors(stages, thorough=True, rtol=rtol)

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
-from friso.equations.motion import last_corner
+from friso.equations.motion import last_corner, returns
 from friso.equations.structure import shared_structure
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.return_map.landing_map import LandingMap
@@ -30,7 +30,7 @@ def motions_go_on(
     """
     if starts is not None:
         return _go_on(Ensemble.held(flat, count), starts, landing_map)
-    if flat["motion.kind"] not in ("there_and_back", "release", "hold"):
+    if not returns(flat):
         return np.zeros(count, bool), np.zeros(count, bool)
     shape = kernel(shared_structure(flat))
     long = {**flat, "motion.duration": np.broadcast_to(last_corner(flat) * (1 + 1e-9) + 1e-9, (count,))}

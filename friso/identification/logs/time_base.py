@@ -48,20 +48,20 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     if repeated:
         read.append(f"{name}: {repeated} samples repeated with the same time stamp left out")
     steps = np.diff(time)
-    gaps = _gaps(steps)
-    if gaps.mean() > settings.share_of_gaps:
+    long = gaps(steps)
+    if long.mean() > settings.share_of_gaps:
         usual = f"{settings.sample_times_of_a_gap} times the usual {np.median(steps):.4g} s"
-        actual = f"time stamps with {percent(gaps.mean())} of the steps over {usual}"
+        actual = f"time stamps with {percent(long.mean())} of the steps over {usual}"
         raise LogError(name, actual, "uniform sampling, or the true sample time", '--dt "1 ms"')
     period = usual_step(steps)
     lost = np.round(steps / period) - 1
     scatter = min(
-        max(settings.scatter_of_even_stamps, settings.deviations_of_a_gap * float(np.std(steps[~gaps])) / period),
+        max(settings.scatter_of_even_stamps, settings.deviations_of_a_gap * float(np.std(steps[~long])) / period),
         settings.error_of_a_whole_gap,
     )
     whole = np.abs(steps / period - 1 - lost) <= scatter  # else the clock began anew
-    bridged = gaps & whole & (lost >= 1) & (lost <= settings.samples_bridged)
-    edges = [0, *(np.flatnonzero(gaps & ~bridged) + 1).tolist(), time.size]
+    bridged = long & whole & (lost >= 1) & (lost <= settings.samples_bridged)
+    edges = [0, *(np.flatnonzero(long & ~bridged) + 1).tolist(), time.size]
     inserted = np.where(bridged, lost, 0).astype(int)
     parts = [_bridged(time[a:b], values[a:b], inserted[a : b - 1]) for a, b in pairwise(edges)]
     ends = np.cumsum([0, *(part[0].size for part in parts)]).tolist()
@@ -71,10 +71,10 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
 
 def usual_step(steps: np.ndarray) -> float:
     """Return the mean [s] of the steps of time, shape (n,), that are no gaps."""
-    return float(steps[~_gaps(steps)].mean())
+    return float(steps[~gaps(steps)].mean())
 
 
-def _gaps(steps: np.ndarray) -> np.ndarray:
+def gaps(steps: np.ndarray) -> np.ndarray:
     """Tell which steps of time, shape (n,), are gaps.
 
     The samples behind a gap stay late, while a step that only scatter made long has short ones beside it.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from friso.questions.check.laws import laws_document
 from friso.questions.check.words import answer
-from friso.shown.documents import plain_json, unit_suffix
+from friso.shown.documents import dwells_document, plain_json, tracking_document, unit_suffix
 from friso.stage.tables import passive_where
 
 if TYPE_CHECKING:
@@ -97,6 +97,8 @@ def _case(case: Case) -> dict[str, Any]:
         "given_up": judgement.given_up,
         "loop_unstable_while_it": case.unstable,
         **({"feeding": _feeding(case.feeding)} if case.feeding else {}),
+        **({"dwells": dwells_document(case.dwells)} if case.dwells else {}),
+        **({"tracking": tracking_document(case.tracking)} if case.tracking else {}),
         "observed_swings": [_swing(swing) for swing in judgement.hunting.observed],
         "certain": judgement.hunting.certain,
         "solver": {

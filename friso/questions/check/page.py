@@ -16,6 +16,7 @@ from friso.questions.check.table import rows, rows_behind
 from friso.questions.check.words import conclusion, verdict_sentence
 from friso.shown.cases import shown_cases
 from friso.shown.files import Content
+from friso.shown.motion_words import motion_sentences
 from friso.shown.pages import Report
 from friso.studies.draws import Draws
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 BASIS = (
     "The verdict is by everything that attracts the stage; peaks are also counted, as in the thesis (Fix, Univ. of "
     "Twente, Sec. 3.2.2). Settling times count from the last corner of the reference; "
-    "there and back, the longer one of both ends"
+    "where it stands at several places, the longest"
 )
 
 
@@ -63,6 +64,7 @@ def check_html(
         verdicts=[(item.colour, f"{item.label}: {verdict_sentence(item, cases)}") for item in in_order],
         sentences=[
             *filter(None, [conclusion(cases)]),
+            *motion_sentences(stage),
             *([isolator_sentence(isolator)] if isolator else []),
             *(draws_sentences(draws) if draws else []),
             *(laws_sentences(laws) if laws else []),

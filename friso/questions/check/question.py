@@ -67,7 +67,7 @@ class CheckAnswer(Answer):
     def verdict(self) -> str:
         """Return the verdict on the stage as given.
 
-        It is "hunts", "bistable", "transient", "settles" or "failed".
+        It is "hunts", "bistable", "transient", "settles", "failed", or "none" while the reference keeps moving.
         """
         return self.result["given"].verdict
 
@@ -85,10 +85,12 @@ class CheckAnswer(Answer):
         from friso.questions.check.isolator_words import isolator_sentence
         from friso.questions.check.laws import laws_sentences
         from friso.questions.check.words import answer
+        from friso.shown.motion_words import motion_sentences
 
         suggested = [isolator_sentence(self.isolator)] if self.isolator else []
         drawn = draws_sentences(self.draws) if self.draws else []
-        return [*answer(self.result), *suggested, *drawn, *(laws_sentences(self.laws) if self.laws else [])]
+        short = motion_sentences(self.stage)
+        return [*answer(self.result), *short, *suggested, *drawn, *(laws_sentences(self.laws) if self.laws else [])]
 
     def tables(self) -> Sequence[AnswerTable]:
         """Return the numbers of each case, of the stages drawn, and across friction laws."""

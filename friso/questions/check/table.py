@@ -23,7 +23,7 @@ from friso.shown.drawing.prefixes import (
 )
 
 if TYPE_CHECKING:
-    from friso.hunting import Case, Cycle, Kick
+    from friso.hunting import Case, Cycle, Kick, Tracking
 
 _WINDOWS = 4  # windows of kicks that are listed, at most
 UNKNOWN = "not determined: that takes more work than a check may"
@@ -159,10 +159,9 @@ def _peaks(case: Case) -> str:
 
     A run that ends too early has no peak count.
     """
-    if case.stage.motion.duration <= COUNTED_AFTER:
-        return (
-            f"{NOTHING} (counted from {COUNTED_AFTER:g} s on, and the run ends at {case.stage.motion.duration:.4g} s)"
-        )
+    duration = case.stage.flat()["motion.duration"]
+    if duration <= COUNTED_AFTER:
+        return f"{NOTHING} (counted from {COUNTED_AFTER:g} s on, and the run ends at {duration:.4g} s)"
     remarks = {
         ("hunts", False): f" (counted from {COUNTED_AFTER:g} s on, if higher than {with_unit(COUNTED_ABOVE, 'm')})",
         ("bistable", False): " (another motion hunts)",
@@ -179,6 +178,8 @@ def _settled_within(band: float) -> Callable[[Case], str]:
     def text(case: Case) -> str:
         """Write the settling time of a case, or why there is none."""
         time = case.settling_time.get(band)
+        if case.tracking:
+            return NOTHING
         if time is not None:
             return with_unit(time, "s")
         if case.in_the_end.get(band) is not None:
@@ -186,6 +187,11 @@ def _settled_within(band: float) -> Callable[[Case], str]:
         return "never" if case.verdict == "hunts" else "not in this run"
 
     return text
+
+
+def _tracked(size: Callable[[Tracking], float]) -> Callable[[Case], str]:
+    """Build the text of an error of a case whose reference keeps moving."""
+    return lambda case: with_unit(size(case.tracking), "m") if case.tracking else NOTHING
 
 
 _NUMBERS: dict[str, Callable[[Case], str]] = {
@@ -202,6 +208,8 @@ _NUMBERS: dict[str, Callable[[Case], str]] = {
     "Moves that end in hunting": _moves,
     "Peak to peak, last quarter": at_the_end,
     "Period, last quarter": lambda case: with_unit(case.period, "s"),
+    "Largest error on the way": _tracked(lambda tracking: tracking.largest),
+    "Error on the way, RMS": _tracked(lambda tracking: tracking.rms),
     **{f"Settling time into {text}": _settled_within(band) for band, text in BANDS.items()},
     "Largest actuator force": lambda case: with_unit(case.largest_force, "N"),
 }

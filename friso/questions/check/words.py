@@ -23,6 +23,7 @@ from friso.shown.drawing.prefixes import (
     with_unit,
 )
 from friso.shown.loop_words import unstable_where
+from friso.shown.motion_words import dwell_sentences, following_sentence
 from friso.stage.controllers import FORCE_LIMIT
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     case = item.case
     loop = _loop(case)
     says = {"hunts": _hunting, "bistable": _bistable, "transient": _transient, "settles": _settling}
+    says |= {"none": _following}
     if case.runs_away:
         return " ".join([*loop, "runs away from its reference for good."])
     if case.verdict not in says and case.solver.done:
@@ -77,7 +79,8 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     feeds += [f"{_too_much('What feeds it')}."] if CheckPart.FEEDING in case.judgement.given_up else []
     after = _remedy(item, cases) if case.verdict in ATTRACTED else _outlook(case)
     after += friction_sentences(case)
-    return " ".join([*loop, says[case.verdict](case), *feeds, *_doubts(case), *_running_away(case), *after])
+    stands = dwell_sentences(case.dwells) if case.verdict not in ATTRACTED else []
+    return " ".join([*loop, says[case.verdict](case), *stands, *feeds, *_doubts(case), *_running_away(case), *after])
 
 
 def _loop(case: Case) -> list[str]:
@@ -145,7 +148,8 @@ def _bistable(case: Case) -> str:
     starts = [_kick(name, kick, unit) for name, kick, unit in kicks if kick and kick.windows]
     if (moves := case.judgement.moves) and moves.hunting:
         least, most = SEARCH_LIMITS.move_shares
-        like = f"this move at {least:g} to {most:g} times its acceleration and acceleration time"
+        keys = listed([key.partition(".")[2].replace("_", " ") for key in moves.ranges], "and")
+        like = f"this move at {least:g} to {most:g} times its {keys}"
         starts.append(f"{percent(moves.fraction)} of the moves tried ({like})")
     first = f"settles after this move{_stuck(case)}"
     if not starts and CheckPart.STARTS in case.judgement.given_up:
@@ -157,6 +161,12 @@ def _bistable(case: Case) -> str:
         return f"{first}, and none of the kicks and moves tried starts hunting ({_swing(case)})."
     seen = " (observed in simulations; no orbit that attracts could be closed)" if case.judgement.observed else ""
     return f"{first}, but {listed(starts, 'or')} can start hunting, {_swing(case)}{seen}."
+
+
+def _following(case: Case) -> str:
+    """Describe a case whose reference keeps moving, of which there is no verdict on hunting."""
+    follows = following_sentence(case.tracking) if case.tracking else "could not be followed on its periodic response."
+    return f"{follows} There is no verdict on hunting, because {case.judgement.hunting.reason}."
 
 
 def _too_much(what: str) -> str:
@@ -177,6 +187,8 @@ def _transient(case: Case) -> str:
     """
     judgement, end = case.judgement, _end(case)
     if not judgement.hunting.possible:
+        if case.tracking:
+            return f"{following_sentence(case.tracking)} It cannot hunt, because {judgement.hunting.reason}."
         cannot = f"cannot hunt, because {judgement.hunting.reason}; but this motion "
         says = f"{cannot if judgement.hunting.certain else ''}has not settled at its end ({end})."
         return " ".join([says, *_held(case)])

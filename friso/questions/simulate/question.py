@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from friso.hunting import Dwell
     from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files
 
@@ -56,6 +57,15 @@ class SimulateAnswer(Answer):
         """Return measures of the run's end, such as outcome, swing and settling time."""
         return measured_run(self.stage, self.result.attrs["rtol"])
 
+    @cached_property
+    def dwells(self) -> Sequence[Dwell]:
+        """Return how the stage settles at each place where its reference stands, if these are more than two."""
+        from friso.equations.motion import stands
+        from friso.hunting import dwells
+
+        several = len(stands(self.stage.flat())) > 2 and not self.failure
+        return dwells(self.stage, self.result.attrs["rtol"]) if several else ()
+
     @property
     def failure(self) -> str:
         """Say that the run stopped early; empty if it did not."""
@@ -63,11 +73,15 @@ class SimulateAnswer(Answer):
         return "" if done else "the computation could not be completed; see the status above"
 
     def sentences(self) -> Sequence[str]:
-        """Return what the run does, in one sentence."""
+        """Return what the run does, how it settles at several places, and what its moves are too short for."""
+        from friso.equations.motion import rests
         from friso.questions.simulate.words import conclusion
+        from friso.shown.motion_words import dwell_sentences, motion_sentences
 
         deviation = (self.result["position"] - self.result["reference"]).to_numpy()
-        return [conclusion(self.name if self.of_cell else self.stage.name or self.name, self.measures, deviation)]
+        name, moves_on = self.name if self.of_cell else self.stage.name or self.name, not rests(self.stage.flat())
+        does = conclusion(name, self.measures, deviation, moves_on)
+        return [does, *dwell_sentences(self.dwells), *motion_sentences(self.stage)]
 
     def details(self) -> Sequence[str]:
         """Return how many steps the solver took."""
@@ -83,7 +97,7 @@ class SimulateAnswer(Answer):
         """Return what the run does, and how the solver fared, as a document."""
         from friso.questions.simulate.document import simulate_document
 
-        return simulate_document(self.result, self.measures, self.stage.name, self.sentences()[0])
+        return simulate_document(self.result, self.measures, self.stage.name, self.sentences()[0], self.dwells)
 
     def files(self) -> Files:
         """Return NetCDF, CSV and the figure; for a cell, its stage file as well."""

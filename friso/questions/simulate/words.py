@@ -8,17 +8,20 @@ from friso.engine.arrays import Status
 from friso.hunting.criteria import BAND, CREEPS, RESTS, SWINGS
 from friso.hunting.measures import BANDS, WINDOW, Measures
 from friso.shown.drawing.prefixes import plus_minus, with_unit
+from friso.shown.motion_words import off_its_reference
 
 GROWN = 1.1
 """How many times as far as before a run is off its reference in its last quarter that goes ever farther."""
 
 
-def conclusion(name: str, measures: Measures, deviation: np.ndarray) -> str:
-    """Say what the run of a stage does.
+def conclusion(name: str, measures: Measures, deviation: np.ndarray, moves_on: bool) -> str:
+    """Say what the run of a stage does, whose reference stands in the end, or else `moves_on`.
 
     `deviation` holds samples of its deviation [m], evenly over time, shape (n,).
     """
     before, late = np.split(np.abs(deviation), [int(WINDOW * len(deviation))])
+    if moves_on and measures.status[0] == Status.DONE:
+        return f"{name} {off_its_reference(float(late.max()), float(np.sqrt(np.mean(late**2))))}."
     grows = bool(late.max() > GROWN * before.max(initial=0.0))
     clauses = {
         SWINGS: lambda: (

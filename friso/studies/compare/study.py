@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.equations.motion import Stand, last_corner, stands
+from friso.equations.motion import Stand, last_corner, rests, stands
 from friso.equations.settings import settings_named
 from friso.errors import InputError
 from friso.progress import Progress, silent
@@ -215,13 +215,13 @@ def _places(stage: Stage) -> list[Stand]:
     or never."""
     flat = stage.flat()
     corner, duration = float(last_corner(flat)), flat["motion.duration"]
-    if flat["motion.kind"] == "ramp":
+    if not rests(flat):
         example = '[motion] kind = "step", size = "1 mm", duration = "20 s"'
-        raise InputError("motion.kind", '"ramp"', "a reference that stands in the end", example)
+        raise InputError("motion.kind", f'"{flat["motion.kind"]}"', "a reference that stands in the end", example)
     if corner > LATEST * duration:
         expected = f"at least {corner / LATEST:g} s: the reference stands by half of it"
         raise InputError("motion.duration", f"{duration:g} s", expected, f'duration = "{corner / LATEST:g} s"')
-    return stands(flat)
+    return [*stands(flat)]
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,7 @@
+"""Motions, one file each; every module in this folder is imported, and registers the motion it declares."""
+
+from importlib import import_module
+from pkgutil import iter_modules
+
+for _module in iter_modules(__path__):
+    import_module(f"{__name__}.{_module.name}")

@@ -1,0 +1,76 @@
+"""A reference that is the sum of several swings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from math import lcm, pi
+from typing import Annotated, Any, ClassVar, Literal
+
+from friso.quantities import Quantity, any_sign, positive
+from friso.stage.lists import Several, Values, element_keys
+from friso.stage.motion import DURATION, Motion, ReferenceForm, Tone, register_motion
+from friso.stage.section import Rule
+from friso.stage.tables import ROUNDING
+
+AMPLITUDE, FREQUENCY, PHASE = (f"motion.{name}" for name in ("amplitude", "frequency", "phase"))
+
+MOST_TONES = 24
+"""Tones of a reference: each adds to the code of every step."""
+
+
+def _numbers(flat: Mapping[str, Any], key: str) -> list[Any]:
+    return [flat[name] for name in element_keys(flat, key)]
+
+
+@register_motion
+class Multisine(Motion):
+    """The reference is a sum of sinusoids."""
+
+    kind: Literal["multisine"]
+    amplitude: Annotated[Values, Several(Quantity("m", positive, "1 mm"), ("1 mm", "0.5 mm"), 2, MOST_TONES)]
+    frequency: Annotated[Values, Several(Quantity("Hz", positive, "1 Hz"), ("1 Hz", "3 Hz"), 2, MOST_TONES)]
+    phase: Annotated[Values | None, Several(Quantity("rad", any_sign, "0 deg"), ("0 deg", "90 deg"), 2, MOST_TONES)] = (
+        None
+    )
+    """At time 0; default: 0."""
+
+    rests = False
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            (AMPLITUDE, FREQUENCY, PHASE),
+            lambda f: (
+                len(_numbers(f, AMPLITUDE)) == len(_numbers(f, FREQUENCY))
+                and len(_numbers(f, PHASE)) in (0, len(_numbers(f, FREQUENCY)))
+            ),
+            "as many amplitudes as frequencies, and as many phases, if any",
+            'amplitude = ["1 mm", "0.5 mm"], frequency = ["1 Hz", "3 Hz"]',
+        ),
+    )
+
+    @staticmethod
+    def form(flat: Mapping[str, Any]) -> ReferenceForm:
+        """Return a tone for each frequency."""
+        return ReferenceForm(tones=len(_numbers(flat, FREQUENCY)))
+
+    @staticmethod
+    def tones(flat: Mapping[str, Any]) -> Sequence[Tone]:
+        """Return the tones."""
+        amplitudes, frequencies = _numbers(flat, AMPLITUDE), _numbers(flat, FREQUENCY)
+        phases = _numbers(flat, PHASE) or [0.0] * len(frequencies)
+        return [Tone(a, phase / (2 * pi), f) for a, f, phase in zip(amplitudes, frequencies, phases, strict=True)]
+
+    @staticmethod
+    def motion_size(flat: Mapping[str, Any]) -> Any:
+        """Return the sum of the amplitudes [m]."""
+        return sum(_numbers(flat, AMPLITUDE))
+
+    @staticmethod
+    def period(flat: Mapping[str, Any]) -> float | None:
+        """Return the time after which all tones repeat themselves [s]; None if that exceeds the duration."""
+        first, *others = (float(frequency) for frequency in _numbers(flat, FREQUENCY))
+        most = max(1, int(first * flat[DURATION]))
+        ratios = [Fraction(other / first).limit_denominator(most) for other in others]
+        exact = all(abs(other / first - ratio) <= ROUNDING * ratio for other, ratio in zip(others, ratios, strict=True))
+        periods = lcm(*(ratio.denominator for ratio in ratios))
+        return periods / first if exact and periods <= most else None

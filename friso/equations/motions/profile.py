@@ -1,0 +1,232 @@
+"""Moves as drives plan them: every limit up to the jerk, or the snap, is reached as early as the others allow.
+
+A move of a distance is its step, smoothed by one moving average for each limit. With widths T1 >= T2 + T3 + ... of
+these averages the peaks of its derivatives are D/T1, D/(T1 T2), ...: the widths follow from the limits, the innermost
+first (Lambrechts, Boerlage and Steinbuch 2005, doi:10.1016/j.conengprac.2004.04.010, for the third and fourth order).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from friso.quantities import Bound, Quantity, Value, non_negative, positive
+from friso.stage.lists import Several, Values, element_keys
+from friso.stage.motion import (
+    DURATION,
+    Lowered,
+    Motion,
+    Piece,
+    ReferenceForm,
+    Stand,
+    register_motion,
+)
+from friso.stage.section import Rule
+from friso.stage.tables import ROUNDING
+
+LIMITS = {"velocity": "m/s", "acceleration": "m/s^2", "jerk": "m/s^3", "snap": "m/s^4"}
+"""Limits of a move, each of which bounds one derivative more, and their units."""
+
+DISTANCE, DWELL = "motion.distance", "motion.dwell"
+
+MOST_MOVES = 100
+"""Moves of a profile: settling is told for each."""
+
+not_zero = Bound("not 0", lambda value: value != 0)
+
+
+class Plan(NamedTuple):
+    """A move of a distance [m]: widths of its averages [s], shape (order, ...), and the highest derivative [SI]."""
+
+    distance: Any
+    widths: np.ndarray
+    top: Any
+
+    @property
+    def time(self) -> Any:
+        """Return how long the move takes [s]."""
+        return self.widths.sum(axis=0)
+
+    @property
+    def peaks(self) -> list[Any]:
+        """Return the largest velocity, acceleration, ... that the move reaches [SI]."""
+        return [np.abs(self.distance) / np.prod(self.widths[: k + 1], axis=0) for k in range(len(self.widths))]
+
+
+def plan(distance: Any, limits: Sequence[Any]) -> Plan:
+    """Plan a move of a distance [m] within limits of velocity, acceleration and so on [SI], numbers or arrays."""
+    peaks = np.broadcast_arrays(np.abs(distance), *limits)
+    order = len(limits)
+    widths: list[Any] = []
+    for k in range(order, 0, -1):
+        inner, scale = sum(widths), peaks[order] * np.prod(widths, axis=0)
+        reached = (_widest(peaks[m] / scale, k - 1 - m, inner) for m in range(k))
+        widths.insert(0, np.maximum(np.minimum.reduce([*reached]), inner))
+    return Plan(distance, np.array(widths), np.sign(distance) * peaks[order])
+
+
+def _widest(product_of_widths: Any, further: int, inner: Any) -> Any:
+    """Return the largest width x of an average for which a derivative stays within its limit.
+
+    That is the solution of x (x + inner)^p 2^(p (p - 1)/2) = limit, where the p `further` averages outside are as
+    narrow as they can be: as wide as all within. Newton's method comes from the right, where it cannot overshoot.
+    """
+    target = product_of_widths / 2 ** (further * (further - 1) // 2)
+    x = target ** (1 / (further + 1))
+    for _ in range(100 * further):
+        power = (x + inner) ** (further - 1)
+        change = (x * power * (x + inner) - target) / (power * (x + inner + further * x))
+        x = np.maximum(x - change, 0.0)
+        if np.all(np.abs(change) <= 4 * np.finfo(float).eps * x):
+            break
+    return x
+
+
+def corners(move: Plan, start: Any, position: Any) -> list[Piece]:
+    """Return the pieces of a move that begins at a time [s] and a position [m]; some may last no time at all.
+
+    The highest derivative changes where a subset of the widths has passed. The second half mirrors the first, so that
+    the move ends exactly where it should, at rest.
+    """
+    order = len(move.widths)
+    choices = np.array(list(product((0, 1), repeat=order)))
+    times = np.tensordot(choices, move.widths, axes=1)
+    which = np.argsort(times, axis=0, kind="stable")
+    times = np.take_along_axis(times, which, axis=0)
+    signs = np.reshape((-1.0) ** choices.sum(axis=1), (-1,) + (1,) * (times.ndim - 1)) * np.ones_like(times)
+    tops = np.cumsum(np.take_along_axis(signs, which, axis=0), axis=0) * move.top
+    half = len(times) // 2
+    states = [[0.0] * order]
+    for i in range(half - 1):
+        states.append(_later([*states[-1], tops[i]], times[i + 1] - times[i])[:order])
+    mirror = [(-1.0) ** (k + 1) for k in range(order)]
+    for row in reversed(states[:half]):
+        states.append([sign * number for sign, number in zip(mirror, row, strict=True)])
+        states[-1][0] = states[-1][0] + move.distance
+    tops[-1] = 0.0
+    return [
+        (start + time, position + state[0], *state[1:], top)
+        for time, state, top in zip(times, states, tops, strict=True)
+    ]
+
+
+def _later(derivatives: Sequence[Any], time: Any) -> list[Any]:
+    """Return the derivatives of a polynomial a time [s] later."""
+    later: list[Any] = []
+    for k in range(len(derivatives)):
+        total = derivatives[-1]
+        for m in range(len(derivatives) - 1, k, -1):
+            total = total * time / (m - k) + derivatives[m - 1]
+        later.append(total)
+    return later
+
+
+def _distances(flat: Mapping[str, Any]) -> list[Any]:
+    return [flat[key] for key in element_keys(flat, DISTANCE)]
+
+
+def _limits(flat: Mapping[str, Any]) -> list[Any]:
+    return [flat[f"motion.{name}"] for name in LIMITS if f"motion.{name}" in flat]
+
+
+def _moves(flat: Mapping[str, Any]) -> list[tuple[Plan, Any, Any]]:
+    """Return the moves, each with its start [s] and the position there [m]."""
+    moves, start, position, limits = [], 0.0, 0.0, _limits(flat)
+    for distance in _distances(flat):
+        move = plan(distance, limits)
+        moves.append((move, start, position))
+        start, position = start + move.time + flat[DWELL], position + distance
+    return moves
+
+
+def _end(flat: Mapping[str, Any]) -> Any:
+    """Return when the last move has ended [s]."""
+    move, start, _ = _moves(flat)[-1]
+    return start + move.time
+
+
+@register_motion
+class Profile(Motion):
+    """Moves planned as drives do, one after the other with a dwell after each: velocity, acceleration and, where given,
+    jerk and snap stay within their limits; a distance too short for a limit lowers its peak."""
+
+    kind: Literal["profile"]
+    distance: Annotated[
+        Values, Several(Quantity("m", not_zero, "5 mm"), ("5 mm", "-5 mm", "20 um"), 1, MOST_MOVES, alone=True)
+    ]
+    """Of the moves one after the other, forward or (negative) back."""
+    velocity: Annotated[Value, Quantity("m/s", positive, "0.5 m/s")]
+    acceleration: Annotated[Value, Quantity("m/s^2", positive, "10 m/s^2")]
+    jerk: Annotated[Value | None, Quantity("m/s^3", positive, "1000 m/s^3")] = None
+    snap: Annotated[Value | None, Quantity("m/s^4", positive, "1e5 m/s^4")] = None
+    dwell: Annotated[Value, Quantity("s", non_negative, "0.5 s")]
+    """For how long the reference stands after each move."""
+    duration: Annotated[Value | None, Quantity("s", positive, "20 s")] = None
+    """Default: of all moves with their dwells."""
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            ("motion.snap", "motion.jerk"),
+            lambda f: "motion.snap" not in f or "motion.jerk" in f,
+            "a limit of jerk beside one of snap",
+            'jerk = "1000 m/s^3", snap = "1e5 m/s^4"',
+        ),
+        Rule(
+            (DISTANCE, DURATION),
+            lambda f: _end(f) <= f[DURATION] * (1 + ROUNDING),
+            "a duration in which all moves end; left out, it is that of all moves with their dwells",
+            'duration = "20 s"',
+        ),
+    )
+
+    @staticmethod
+    def form(flat: Mapping[str, Any]) -> ReferenceForm:
+        """Return polynomials of as high a degree as there are limits."""
+        return ReferenceForm(len(_limits(flat)))
+
+    @staticmethod
+    def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
+        """Return the pieces of all moves; the last one stands."""
+        return [piece for move, start, position in _moves(flat) for piece in corners(move, start, position)]
+
+    @staticmethod
+    def motion_size(flat: Mapping[str, Any]) -> Any:
+        """Return the distance between the outermost places at which the reference stands [m]."""
+        places = np.cumsum([np.zeros_like(_distances(flat)[0]), *_distances(flat)], axis=0)
+        return places.max(axis=0) - places.min(axis=0)
+
+    @classmethod
+    def stands(cls, flat: Mapping[str, Any]) -> Sequence[Stand]:
+        """Return the place at the end of each move."""
+        moves = _moves(flat)
+        leaves = [*(start for _, start, _ in moves[1:]), flat[DURATION]]
+        return [Stand(start + move.time, until) for (move, start, _), until in zip(moves, leaves, strict=True)]
+
+    @staticmethod
+    def lowered(flat: Mapping[str, Any]) -> Sequence[Lowered]:
+        """Return the peaks that moves are too short to reach."""
+        return [
+            Lowered(float(move.distance), name, float(flat[f"motion.{name}"]), float(peak), unit)
+            for move, _, _ in _moves(flat)
+            for (name, unit), peak in zip(LIMITS.items(), move.peaks, strict=False)
+            if peak < flat[f"motion.{name}"] * (1 - ROUNDING)
+        ]
+
+    @staticmethod
+    def with_defaults(flat: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return the duration of all moves with their dwells."""
+        return {} if DURATION in flat else {DURATION: _end(flat) + flat[DWELL]}
+
+    @staticmethod
+    def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
+        """Return the distances of longer moves, within the same limits."""
+        return {key: flat[key] * factor for key in element_keys(flat, DISTANCE)}
+
+    @staticmethod
+    def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:
+        """Return ranges of acceleration and velocity."""
+        keys = ("motion.acceleration", "motion.velocity")
+        return {key: (shares[0] * flat[key], shares[1] * flat[key]) for key in keys}

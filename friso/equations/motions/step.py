@@ -1,0 +1,36 @@
+"""The reference jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from friso.quantities import Quantity, Value, any_sign
+from friso.stage.motion import Motion, Piece, register_motion
+
+SIZE = "motion.size"
+
+
+@register_motion
+class Step(Motion):
+    """The reference jumps at the start."""
+
+    kind: Literal["step"]
+    size: Annotated[Value, Quantity("m", any_sign, "1 mm")]
+
+    @staticmethod
+    def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
+        """Return the place at which the reference stands from the start."""
+        return [(0.0, flat[SIZE], 0.0, 0.0)]
+
+    @staticmethod
+    def motion_size(flat: Mapping[str, Any]) -> Any:
+        """Return the size of the step [m]."""
+        return np.abs(flat[SIZE])
+
+    @staticmethod
+    def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
+        """Return the size of a longer one."""
+        return {SIZE: flat[SIZE] * factor} if np.any(flat[SIZE]) else {}

@@ -1,0 +1,101 @@
+"""Two equal steps, there and back, with bounded acceleration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+
+from friso.quantities import Number, Quantity, Value, non_negative, positive
+from friso.stage.motion import DURATION, Motion, Piece, Stand, register_motion
+from friso.stage.section import Rule
+from friso.stage.tables import ROUNDING
+
+ACCELERATION, TIME, RETURN, CRUISE = (
+    f"motion.{name}" for name in ("acceleration", "acceleration_time", "return_at", "cruise_ratio")
+)
+
+
+def _time_there(flat: Mapping[str, Any]) -> Any:
+    """Return the time of the move there [s]."""
+    return (2 + flat.get(CRUISE, 0.0)) * flat[TIME]
+
+
+@register_motion
+class ThereAndBack(Motion):
+    """Two equal steps, there and back, each accelerating for acceleration_time and braking likewise; with a
+    cruise_ratio, at constant speed in between for so many times the acceleration_time."""
+
+    kind: Literal["there_and_back"]
+    acceleration: Annotated[Value, Quantity("m/s^2", non_negative, "100 m/s^2")]
+    acceleration_time: Annotated[Value, Quantity("s", non_negative, "30 ms")]
+    return_at: Annotated[Value, Quantity("s", non_negative, "5 s")]
+    cruise_ratio: Annotated[float | None, Number(positive, "1.0")] = None
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            (TIME, RETURN),
+            lambda f: _time_there(f) <= f[RETURN] * (1 + ROUNDING),
+            "the move there (2 + cruise_ratio times acceleration_time) finished before return_at",
+            'acceleration_time = "30 ms", return_at = "5 s"',
+        ),
+        Rule(
+            (TIME, RETURN, DURATION),
+            lambda f: f[RETURN] + _time_there(f) <= f[DURATION] * (1 + ROUNDING),
+            "the move back (return_at + 2 + cruise_ratio times acceleration_time) finished within the duration",
+            'acceleration_time = "30 ms", return_at = "5 s", duration = "20 s"',
+        ),
+    )
+
+    @staticmethod
+    def motion_size(flat: Mapping[str, Any]) -> Any:
+        """Return the length of the step there [m]."""
+        return flat[ACCELERATION] * flat[TIME] ** 2 * (1 + flat.get(CRUISE, 0.0))
+
+    @staticmethod
+    def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
+        """Return the pieces of the motion there and back: time, position, velocity and acceleration at each corner."""
+        a, ramp, back = (flat[key] for key in (ACCELERATION, TIME, RETURN))
+        size, top, cruise = ThereAndBack.motion_size(flat), a * ramp, flat.get(CRUISE)
+        if cruise is not None:
+            middle = size - top * ramp / 2
+            return [
+                (0.0, 0.0, 0.0, a),
+                (ramp, top * ramp / 2, top, 0.0),
+                ((1 + cruise) * ramp, middle, top, -a),
+                ((2 + cruise) * ramp, size, 0.0, 0.0),
+                (back, size, 0.0, -a),
+                (back + ramp, middle, -top, 0.0),
+                (back + (1 + cruise) * ramp, top * ramp / 2, -top, a),
+                (back + (2 + cruise) * ramp, 0.0, 0.0, 0.0),
+            ]
+        return [
+            (0.0, 0.0, 0.0, a),
+            (ramp, size / 2, top, -a),
+            (2 * ramp, size, 0.0, 0.0),
+            (back, size, 0.0, -a),
+            (back + ramp, size / 2, -top, a),
+            (back + 2 * ramp, 0.0, 0.0, 0.0),
+        ]
+
+    @classmethod
+    def stands(cls, flat: Mapping[str, Any]) -> Sequence[Stand]:
+        """Return both ends of the motion."""
+        rows = cls.pieces(flat)
+        return [Stand(rows[len(rows) // 2 - 1][0], flat[RETURN]), Stand(rows[-1][0], flat[DURATION])]
+
+    @staticmethod
+    def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
+        """Return the acceleration time of a longer move."""
+        return {TIME: flat[TIME] * factor**0.5} if np.any(flat[TIME]) else {}
+
+    @staticmethod
+    def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:
+        """Return ranges of acceleration and acceleration time; the move there ends before the stage returns."""
+        least, most = shares
+        acceleration, time = flat[ACCELERATION], flat[TIME]
+        if not acceleration * time:
+            return {}
+        longest = min(most * time, flat[RETURN] / (2 + flat.get(CRUISE, 0.0)))
+        return {ACCELERATION: (least * acceleration, most * acceleration), TIME: (least * time, longest)}

@@ -1,0 +1,110 @@
+"""The reference within a piece, a polynomial and tones: in symbols for the equations, in numbers for everything else.
+
+A row of numbers describes a piece: its start [s], the derivatives of the polynomial there, and, where there are tones,
+the direction in which the reference moves (1, -1) and for each tone amplitude [m], phase [turns], frequency [Hz] and
+sweep [Hz/s]. The tones' phases and frequencies are those at the start of the piece, so that they stay small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import factorial, pi
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.stage.motion import QUADRATIC, ReferenceForm
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+DERIVATIVES = ("position", "velocity", "acceleration", "jerk", "snap")
+"""Names of the derivatives of the polynomial."""
+
+TONE = ("amplitude", "turns", "frequency", "sweep")
+"""Names of the numbers of a tone."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A reference in symbols: the inputs that each piece brings, and the derivatives in terms of these and `TIME`.
+
+    `direction` is 1 ahead, -1 back and 0 at rest, and stays through a piece. `acceleration_size` is the absolute value
+    of the acceleration.
+    """
+
+    inputs: tuple[sp.Symbol, ...]
+    position: sp.Expr
+    velocity: sp.Expr
+    acceleration: sp.Expr
+    jerk: sp.Expr
+    direction: sp.Expr
+    acceleration_size: sp.Expr
+
+
+def declared(form: ReferenceForm = QUADRATIC) -> Reference:
+    """Return the reference of a form in symbols."""
+    import sympy as sp
+
+    from friso.equations.blocks import sign_of_motion
+    from friso.equations.cases import Piecewise
+    from friso.equations.component import TIME, key, sine
+
+    names = [f"reference.{name}" for name in DERIVATIVES[: form.degree + 1]]
+    names += ["reference.direction"] if form.tones else []
+    names += [f"reference.{name}_{number + 1}" for number in range(form.tones) for name in TONE]
+    inputs = tuple(map(key, names))
+    derivatives, tones = inputs[: form.degree + 1], inputs[form.degree + 2 :]
+    position = sum((d * TIME**k / sp.factorial(k) for k, d in enumerate(derivatives)), start=sp.S.Zero)
+    for first in range(0, len(tones), len(TONE)):
+        amplitude, turns, frequency, sweep = tones[first : first + len(TONE)]
+        position += amplitude * sine(turns + frequency * TIME + sweep * TIME**2 / 2)
+    velocity = sp.diff(position, TIME)
+    acceleration = sp.diff(velocity, TIME)
+    smooth = form != QUADRATIC
+    size = Piecewise((acceleration, acceleration > 0), (-acceleration, True)) if smooth else sp.Abs(acceleration)
+    direction = inputs[form.degree + 1] if form.tones else sign_of_motion(*derivatives[1:])
+    return Reference(inputs, position, velocity, acceleration, sp.diff(acceleration, TIME), direction, size)
+
+
+def value(form: ReferenceForm, rows: np.ndarray, elapsed: Any, order: int = 0) -> np.ndarray:
+    """Return a derivative, up to the second, a time [s] after the starts of the pieces, shape of these."""
+    total = rows[..., 1 + order] + 0.0 * elapsed
+    for power in range(1, form.degree - order + 1):
+        total = total + rows[..., 1 + order + power] * elapsed**power / factorial(power)
+    for amplitude, turns, frequency, sweep in _tones(form, rows):
+        phase = 2 * pi * np.mod(turns + (frequency + sweep * elapsed / 2) * elapsed, 1.0)
+        rate = 2 * pi * (frequency + sweep * elapsed)
+        parts = np.sin(phase), rate * np.cos(phase), 2 * pi * sweep * np.cos(phase) - rate**2 * np.sin(phase)
+        total = total + amplitude * parts[order]
+    return total
+
+
+def moved_on(form: ReferenceForm, rows: np.ndarray, elapsed: Any) -> np.ndarray:
+    """Return the rows of pieces that begin a time [s] later, and go on as these do."""
+    later = rows.copy()
+    later[..., 0] += elapsed
+    bare = ReferenceForm(form.degree)
+    for k in range(form.degree + 1):
+        later[..., 1 + k] = value(bare, rows, elapsed, k)
+    for tone in _tones(form, later):
+        _, turns, frequency, sweep = tone
+        turns += (frequency + sweep * elapsed / 2) * elapsed
+        frequency += sweep * elapsed
+    return later
+
+
+def at_rest(form: ReferenceForm, rows: np.ndarray) -> np.ndarray:
+    """Tell which pieces stand still, shape of the rows."""
+    rests = np.all(rows[..., 2 : form.degree + 2] == 0, axis=-1)
+    for amplitude, *_ in _tones(form, rows):
+        rests &= amplitude == 0
+    return rests
+
+
+def _tones(form: ReferenceForm, rows: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
+    """Yield the numbers of each tone, as views of the rows."""
+    first = form.degree + 3
+    for number in range(form.tones):
+        yield tuple(rows[..., first + len(TONE) * number + i] for i in range(len(TONE)))

@@ -1,0 +1,193 @@
+"""How a stage follows a reference that keeps moving, and how it settles at each place where another one stands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.engine.arrays import Status
+from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.kernel import Kernel, columns, kernel
+from friso.equations import motion
+from friso.equations.structure import structure
+from friso.hunting.criteria import BAND
+from friso.hunting.measures import BANDS, WINDOW, measuring_options
+from friso.hunting.settings import TrackingSettings
+from friso.stage import Stage
+from friso.stage.motion import DURATION, motion_of
+
+
+@dataclass(frozen=True)
+class Dwell:
+    """A place at which the reference stands: its `number` from 1, the position [m], and since when [s].
+
+    `settling`: for each band [m] the time [s] until the stage stays within it; None: it does not while it stands.
+    """
+
+    number: int
+    position: float
+    since: float
+    settling: Mapping[float, float | None]
+
+    @property
+    def slowness(self) -> float:
+        """Return the time of settling within 10 um [s], infinite where it does not."""
+        time = self.settling[BAND]
+        return np.inf if time is None else time
+
+
+@dataclass(frozen=True)
+class Reversal:
+    """A turning point of the reference: when [s], where [m], and the largest error [m] half-way to the next one."""
+
+    time: float
+    position: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """How far a stage is off a reference that keeps moving: at most, and as root mean square [m].
+
+    Over a `period` [s] the response has been `closed` as a periodic orbit; else it is over the last quarter of the
+    run. `multiplier`: by how much small deviations from that orbit grow in a period, None where it was not closed.
+    """
+
+    largest: float
+    rms: float
+    largest_force: float
+    reversals: tuple[Reversal, ...]
+    period: float | None
+    multiplier: float | None
+
+    @property
+    def closed(self) -> bool:
+        """Tell whether the response was closed as a periodic orbit."""
+        return self.multiplier is not None
+
+    @property
+    def attracts(self) -> bool:
+        """Tell whether neighbouring motions come to the periodic orbit."""
+        return self.multiplier is not None and self.multiplier < 1
+
+
+def dwells(stage: Stage, rtol: float) -> tuple[Dwell, ...]:
+    """Return how a stage settles at each place where its reference stands, the slowest first.
+
+    The motion is run as far as the end of each stand, side by side.
+    """
+    flat = stage.flat()
+    places = motion.stands(flat)
+    until = np.array([float(place.until) for place in places])
+    since = np.array([float(place.corner) for place in places])
+    entered = np.full((len(places), len(BANDS)), np.inf)
+    for runs in run_chunks(kernel(structure(flat)), {**flat, DURATION: until}, len(places), measuring_options(rtol)):
+        done = runs.results.statuses == Status.DONE
+        for column, band in enumerate(("inner", "outer")):
+            times = runs.statistic(f"{band}_exit")
+            entered[runs.numbers, column] = np.where(done & (times < runs.statistic("ended")), times, np.inf)
+    settled = np.maximum(entered - since[:, None], 0.0)
+    positions = motion.reference(flat, since)
+    found = [
+        Dwell(
+            number + 1,
+            float(positions[number]),
+            float(since[number]),
+            {band: float(t) if np.isfinite(t) else None for band, t in zip(BANDS, settled[number], strict=True)},
+        )
+        for number in range(len(places))
+    ]
+    return tuple(sorted(found, key=lambda dwell: dwell.slowness, reverse=True))
+
+
+def tracking(stage: Stage, rtol: float) -> Tracking | None:
+    """Return how a stage follows a reference that keeps moving; None if its run was not completed.
+
+    A periodic reference gets the response of the same period, which is closed by Newton's method on the states a
+    period later (with derivatives from runs side by side), from the end of the stage's own motion.
+    """
+    flat, settings = stage.flat(), TrackingSettings.current()
+    shape, period = kernel(structure(flat)), motion_of(flat).period(flat)
+    start, multiplier = None, None
+    begins, ends = WINDOW * flat[DURATION], flat[DURATION]
+    end = ends
+    if period is not None and period <= end and (orbit := _closed(shape, flat, period, rtol)) is not None:
+        start, multiplier = orbit
+        begins, ends, end = 0.0, period, 2 * period  # the error behind the last reversal reaches into the next period
+    interval = (ends - begins) / settings.samples_of_a_period
+    options = RunOptions(rtol=rtol, interval=interval, record_from=np.inf, least_swing=np.inf)
+    (runs,) = run_chunks(shape, {**flat, DURATION: end}, 1, options, start)
+    if runs.results.statuses[0] != Status.DONE:
+        return None
+    time = np.arange(runs.results.samples.shape[1]) * interval
+    error = motion.reference(flat, time) - runs.results.samples[0, :, shape.position]
+    counted = (time >= begins) & (time < ends - interval / 2)
+    return Tracking(
+        float(np.abs(error[counted]).max()),
+        float(np.sqrt(np.mean(error[counted] ** 2))),
+        float(runs.statistic("force_peak")[0]),
+        _reversals({**flat, DURATION: end}, time, error, (begins, ends)),
+        period,
+        multiplier,
+    )
+
+
+def _reversals(
+    flat: Mapping[str, Any], time: np.ndarray, error: np.ndarray, span: tuple[float, float]
+) -> tuple[Reversal, ...]:
+    """Return the turning points of a reference in a span of time, each with the error behind it."""
+    corners = motion.pieces(flat, 1)[0, 1:, 0] if motion.form_of(flat).tones else np.zeros(0)
+    found = []
+    for corner, following in zip(corners, np.append(corners, flat[DURATION])[1:], strict=True):
+        if not span[0] <= corner < span[1]:
+            continue
+        behind = (time >= corner) & (time <= (corner + following) / 2)
+        if behind.any():
+            position = float(motion.reference(flat, np.array([corner]))[0])
+            found.append(Reversal(float(corner), position, float(np.abs(error[behind]).max())))
+    return tuple(found)
+
+
+def _closed(shape: Kernel, flat: Mapping[str, Any], period: float, rtol: float) -> tuple[np.ndarray, float] | None:
+    """Return the states at the start of a periodic response, shape (1, kept), and its multiplier.
+
+    Returns None where none could be closed.
+    """
+    settings = TrackingSettings.current()
+    values = shape.values({**flat, "motion.size": motion.size(flat)}, 1)
+    scales = columns(shape.module.scales(values), 1)[0]
+    size = len(shape.states)
+
+    def later(starts: np.ndarray | None, periods: int = 1) -> np.ndarray | None:
+        """Return the states some periods later, shape (runs, kept); None where a run fails."""
+        count = 1 if starts is None else len(starts)
+        options = RunOptions(rtol=rtol, record_from=np.inf, least_swing=np.inf)
+        ends = np.zeros((count, len(shape.full_state)))
+        for runs in run_chunks(shape, {**flat, DURATION: periods * period}, count, options, starts):
+            if np.any(runs.results.statuses != Status.DONE):
+                return None
+            ends[runs.numbers] = runs.results.ends
+        return ends
+
+    state = later(None, max(1, int(flat[DURATION] / period)))
+    for _ in range(settings.closing_rounds):
+        if state is None:
+            return None
+        beside = np.vstack([state, state + np.eye(size, state.shape[1]) * settings.derivative_step * scales[:, None]])
+        ends = later(beside)
+        if ends is None:
+            return None
+        gap = (ends[0, :size] - state[0, :size]) / scales
+        by = (ends[1:, :size] - ends[0, :size]).T / (settings.derivative_step * scales[:, None])
+        step = np.linalg.lstsq(np.eye(size) - by, gap, rcond=None)[0]
+        if max(np.abs(gap).max(), np.abs(step).max()) <= settings.closed_distance:
+            return state, float(np.abs(np.linalg.eigvals(by)).max())
+        tried = ends[:1].copy()
+        tried[0, :size] = state[0, :size] + step * scales
+        after = later(tried)
+        closer = after is not None and np.abs((after - tried)[0, :size] / scales).max() < np.abs(gap).max() / 2
+        state = tried if closer else later(ends[:1], settings.periods_waited)
+    return None

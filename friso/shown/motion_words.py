@@ -1,0 +1,77 @@
+"""Say how a stage follows its reference, where that stands, and what moves are too short for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from friso.axis import axis_shown
+from friso.hunting.criteria import BAND
+from friso.hunting.measures import BANDS
+from friso.shown.drawing.prefixes import listed, with_unit
+from friso.stage.motion import motion_of
+
+if TYPE_CHECKING:
+    from friso.hunting import Dwell, Tracking
+    from friso.stage import Stage
+
+MOST_PLACES = 4
+"""Places at which settling is told in a sentence; the document has all."""
+
+
+def following_sentence(tracking: Tracking) -> str:
+    """Say how far a stage is off a reference that keeps moving."""
+    if not tracking.closed:
+        why = " (no response of the period of its reference was closed)" if tracking.period else ""
+        return f"{off_its_reference(tracking.largest, tracking.rms)}{why}."
+    size = f"{with_unit(tracking.largest, 'm')} (RMS {with_unit(tracking.rms, 'm')})"
+    says = f"follows its reference with an error of up to {size} that repeats every {with_unit(tracking.period, 's')}"
+    if tracking.reversals:
+        worst = max(tracking.reversals, key=lambda reversal: reversal.error)
+        says += f", at most {with_unit(worst.error, 'm')} behind a reversal"
+    ends = "" if tracking.attracts else ". Other motions do not come to this response: it repels"
+    return f"{says}{ends}."
+
+
+def off_its_reference(largest: float, rms: float) -> str:
+    """Say how far a stage is off its reference in the end, at most and as root mean square [m]."""
+    size = f"{with_unit(largest, 'm')} (RMS {with_unit(rms, 'm')})"
+    return f"is off its reference, which keeps moving, by up to {size} in the last quarter of the run"
+
+
+def dwell_sentences(dwells: Sequence[Dwell]) -> list[str]:
+    """Say how a stage settles at each of several places where its reference stands, the slowest first."""
+    if not dwells:
+        return []
+    texts = [f"{_place(dwell)} {_settling(dwell)}" for dwell in dwells[:MOST_PLACES]]
+    more = [f"sooner at {len(dwells) - MOST_PLACES} others"] if len(dwells) > MOST_PLACES else []
+    band = with_unit(BAND, "m")
+    return [f"Where its reference stands it is within {band}, the slowest first, {listed([*texts, *more], 'and')}."]
+
+
+def _place(dwell: Dwell) -> str:
+    """Name a place where the reference stands."""
+    return f"at {with_unit(dwell.position, 'm')} (move {dwell.number})"
+
+
+def _settling(dwell: Dwell) -> str:
+    """Say how long a stage takes to settle at a place."""
+    coarse, fine = dwell.settling[BAND], dwell.settling[BANDS[0]]
+    if coarse is None:
+        return "not before it leaves"
+    finer = f" ({with_unit(BANDS[0], 'm')}: {with_unit(fine, 's')})" if fine is not None else ""
+    return f"after {with_unit(coarse, 's')}{finer}"
+
+
+def motion_sentences(stage: Stage) -> list[str]:
+    """Say which peaks the moves of a stage are too short to reach; nothing if they reach all."""
+    flat, kind = stage.flat(), axis_shown()
+    by_move: dict[float, list[str]] = {}
+    for peak in motion_of(flat).lowered(flat):
+        unit = kind.unit(peak.unit)
+        text = f"{with_unit(peak.reached, unit)} instead of {with_unit(peak.limit, unit)}"
+        by_move.setdefault(abs(peak.distance), [])
+        if text not in by_move[abs(peak.distance)]:
+            by_move[abs(peak.distance)].append(text)
+    moves = [f"one of {with_unit(distance, 'm')} reaches {listed(texts, 'and')}" for distance, texts in by_move.items()]
+    return [f"Moves are too short for their limits: {'; '.join(moves)}."] if moves else []

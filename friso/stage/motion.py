@@ -1,0 +1,135 @@
+"""[motion]: what the reference does. Each kind is one file in `friso/equations/motions/`, or comes from a package."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, ClassVar, NamedTuple, cast
+
+from friso.quantities import Quantity, positive
+from friso.stage.section import UncertainSection, Variants
+
+KIND, DURATION = "motion.kind", "motion.duration"
+"""Flat keys of every motion."""
+
+
+class ReferenceForm(NamedTuple):
+    """Form of a reference: within a piece, a polynomial of some `degree`, 2 to 4, and a number of `tones`."""
+
+    degree: int = 2
+    tones: int = 0
+
+    @property
+    def inputs(self) -> int:
+        """Return how many numbers describe a piece: derivatives, then the direction and four numbers of each tone."""
+        return 1 + self.degree + (1 + 4 * self.tones if self.tones else 0)
+
+
+QUADRATIC = ReferenceForm()
+"""Pieces of parabola, which any motion with bounded acceleration is made of; and a reference that stands."""
+
+
+class Tone(NamedTuple):
+    """A sinusoid: amplitude [m], phase at the start [turns], frequency there [Hz], and how fast that rises [Hz/s]."""
+
+    amplitude: Any
+    turns: Any
+    frequency: Any
+    sweep: Any = 0.0
+
+
+class Stand(NamedTuple):
+    """A place where the reference comes to stand: from its `corner` [s] on, `until` [s] it leaves or the run ends."""
+
+    corner: Any
+    until: Any
+
+
+class Lowered(NamedTuple):
+    """A peak that a move is too short to reach: its distance [m], name and unit of its limit, limit and peak [SI]."""
+
+    distance: float
+    name: str
+    limit: float
+    reached: float
+    unit: str
+
+
+Piece = tuple[Any, ...]
+"""Start time [s], and position [m], velocity [m/s], acceleration [m/s^2] there, then jerk and snap as far as needed."""
+
+
+class Motion(UncertainSection):
+    """Base of the motions: a kind declares its keys, and its reference as pieces of polynomials, tones, or both.
+
+    The functions take the stage as flat keys to SI numbers, or arrays with one entry per run.
+    """
+
+    kind: Any
+    duration: Annotated[Any, Quantity("s", positive, "20 s")]
+
+    rests: ClassVar[bool] = True
+    """Whether the reference stands in the end, so that the stage may hunt about a place."""
+
+    @staticmethod
+    def form(flat: Mapping[str, Any]) -> ReferenceForm:
+        """Return the degree of the polynomials and the number of tones."""
+        return QUADRATIC
+
+    @staticmethod
+    def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
+        """Return the pieces of the polynomial part, from time 0 on; the last one goes on to the end."""
+        return [(0.0, 0.0, 0.0, 0.0)]
+
+    @staticmethod
+    def tones(flat: Mapping[str, Any]) -> Sequence[Tone]:
+        """Return the sinusoids that are added to the polynomials."""
+        return ()
+
+    @staticmethod
+    def motion_size(flat: Mapping[str, Any]) -> Any:
+        """Return the length of the motion [m]; 0 where the reference stands still from the start."""
+        return 0.0
+
+    @staticmethod
+    def initial_displacement(flat: Mapping[str, Any]) -> Any:
+        """Return the position of all masses at the start [m]."""
+        return 0.0
+
+    @classmethod
+    def stands(cls, flat: Mapping[str, Any]) -> Sequence[Stand]:
+        """Return the places where the reference comes to stand; of one that never stands, from its last corner on."""
+        return [Stand(cls.pieces(flat)[-1][0], flat[DURATION])]
+
+    @staticmethod
+    def period(flat: Mapping[str, Any]) -> float | None:
+        """Return the period of a reference that repeats itself for ever [s]; None for any other."""
+        return None
+
+    @staticmethod
+    def lowered(flat: Mapping[str, Any]) -> Sequence[Lowered]:
+        """Return the peaks that moves are too short to reach, of a single stage."""
+        return ()
+
+    @staticmethod
+    def with_defaults(flat: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return the values of keys that follow from others where they are not given."""
+        return {}
+
+    @staticmethod
+    def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
+        """Return the keys that change in a move that is longer by a factor; none if the motion is no move."""
+        return {}
+
+    @staticmethod
+    def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:
+        """Return ranges of two keys for moves around this one, from and to shares of each; none if it is no move."""
+        return {}
+
+
+MOTION = Variants("kind", "friso.motions")
+register_motion = MOTION.register
+
+
+def motion_of(flat: Mapping[str, Any]) -> type[Motion]:
+    """Return the class of the motion of a stage given as flat keys."""
+    return cast(type[Motion], MOTION.named(flat[KIND]))
