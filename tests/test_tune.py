@@ -26,6 +26,7 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.engine.simulate import simulate
 from friso.equations.breakaway import breakaway, least_breakaway, sliding
+from friso.equations.motion import size
 from friso.equations.settings import settings_named
 from friso.equations.structure import shared_structure
 from friso.errors import InputError
@@ -64,7 +65,7 @@ from friso.remedies.catalogue import Remedy, remedies
 from friso.remedies.change import ChangeSize, change_size
 from friso.remedies.goal import Goal
 from friso.remedies.least import LEAST, candidates, change_costs, least_changes, least_remedy
-from friso.remedies.machines import Fleet, draw_fleet
+from friso.remedies.machines import Fleet, MoveRange, draw_fleet
 from friso.remedies.method import Advice, _not_seen, _Session, pairs, tune
 from friso.remedies.relax import _tolerances, relaxations
 from friso.remedies.search import Budget, Search, TriedPoints, _evolve
@@ -617,7 +618,7 @@ def test_what_attracts_is_surveyed_only_where_the_rest_of_the_goal_is_met(
 
 def test_a_pair_is_tried_only_where_no_change_of_the_controller_works(rigid: Stage, goal: Goal) -> None:
     limit = next(remedy for remedy in remedies(rigid, goal) if remedy.name == "integral limit")
-    points = TriedPoints(np.zeros((1, 1)), *np.full((8, 1), np.inf))
+    points = TriedPoints(np.zeros((1, 1)), *np.full((9, 1), np.inf))
     closest = RemedyOutcome(limit, None, None, None, (), (), points)
     assert [pair.name for pair in pairs([closest], goal)] == ["integral limit, and bandwidth"]
     assert not pairs([closest, working(Remedy.settled_on("bandwidth", rigid), rigid)], goal)
@@ -656,7 +657,7 @@ def test_a_cut_search_is_told_with_what_it_tried(tuning: Advice, wording: Wordin
 def test_settings_that_were_not_looked_at_leave_it_open(tuning: Advice) -> None:
     """Of gains some settings met the goal on the machines of the search, and one of 59 had been surveyed: "does not
     work" was said, and 13 % faster ones do."""
-    met, missed = TriedPoints(np.zeros((2, 1)), *np.ones((8, 2))), TriedPoints(np.zeros((2, 1)), *np.zeros((8, 2)))
+    met, missed = TriedPoints(np.zeros((2, 1)), *np.ones((9, 2))), TriedPoints(np.zeros((2, 1)), *np.zeros((9, 2)))
     outcome = RemedyOutcome(Remedy("gains", tuning.stage, ()), None, None, None, ())
     some, none = (failing(replace(tuning, outcomes=(replace(outcome, points=points),)))[0] for points in (met, missed))
     assert some.startswith("gains: none was found")
@@ -744,7 +745,8 @@ def test_no_limit_of_the_bandwidth_is_relaxed_beyond_reason(rigid: Stage, machin
 
 def test_what_changes_nothing_costs_nothing(tuning: Advice) -> None:
     """The stage as it is, is measured on the machines on which what works is."""
-    unseen = _not_seen(tuning.stage, Correlations(), TINY.fresh, tuning.seed + RemedySettings.current().unseen_seed)
+    seed = tuning.seed + RemedySettings.current().unseen_seed
+    unseen = _not_seen(tuning.stage, Correlations(), TINY.fresh, seed, tuning.goal.moves)
     assert (
         tuning.present.moves.force
         == moves_of_points(AS_IS(tuning.stage), ONE, unseen, tuning.goal, rtol=RemedySettings.current().move_rtol).force
@@ -808,8 +810,96 @@ def test_no_other_point_is_verified_once_one_took_too_long(
         assert session.outcomes == [unsure]
 
 
+def test_moves_fill_their_range_evenly_and_are_what_the_stage_makes(rigid: Stage) -> None:
+    """However few there are: twelve of them leave no tenth of the range, in the logarithm, without any by much."""
+    stage = rigid.replace({"moves": {"smallest": "10 um", "largest": "10 mm", **ACCELERATIONS}})
+    moves = MoveRange.of_stage(stage, 1e-6)
+    assert moves == MoveRange(1e-5, 1e-2, (1.0, 10.0))
+    fleet = draw_fleet(stage, Correlations(), 25, 1, moves)
+    assert fleet.sizes[0] == 1e-2  # the file's own is larger
+    for some in (fleet.sizes[1:13], fleet.sizes[13:]):
+        assert np.diff(np.sort(np.log(some / 1e-5) / np.log(1000.0))).max() < 0.2
+    flat = fleet.laid_over(stage, {}, 2)
+    assert np.asarray(size(flat)) == pytest.approx(np.tile(fleet.sizes, 2))
+    assert flat["motion.acceleration"][:25] == pytest.approx(fleet.accelerations)
+    assert (fleet.accelerations.min(), fleet.accelerations.max()) == pytest.approx((1, 10), rel=0.2)
+    large = fleet.with_moves_from(1e-3)
+    assert large.sizes.argsort().tolist() == fleet.sizes.argsort().tolist()
+    assert (large.sizes.min() >= 1e-3, large.moves.smallest) == (True, 1e-3)
+    own = MoveRange.of_stage(rigid, 1e-6)
+    assert (own.smallest, own.largest) == pytest.approx((1e-5, 0.09))
+    step = rigid.replace({"motion": {"kind": "step", "size": "-1 mm", "duration": "1 s"}})
+    assert draw_fleet(step, Correlations(), 3, 1, MoveRange(1e-5, 1e-4)).laid_over(step, {}, 1)["motion.size"].max() < 0
+
+
+ACCELERATIONS = {"lowest_acceleration": "1 m/s^2", "highest_acceleration": "10 m/s^2"}
+
+
+@pytest.mark.parametrize(
+    ("table", "named"),
+    [
+        ({"smallest": "10 mm", "largest": "1 mm"}, "largest"),
+        ({"smallest": "1 mm", "largest": "2 mm", "lowest_acceleration": "1 m/s^2"}, "highest_acceleration"),
+        ({"smallest": "0 mm", "largest": "2 mm"}, "smallest"),
+    ],
+)
+def test_moves_that_are_no_range_are_refused(rigid: Stage, table: dict[str, str], named: str) -> None:
+    with pytest.raises(InputError) as raised:
+        rigid.replace({"moves": table})
+    assert raised.value.key == f"moves.{named}"
+
+
+def test_a_largest_move_that_the_motion_has_no_time_for_is_refused(rigid: Stage) -> None:
+    with pytest.raises(InputError, match="which takes"):
+        tune(rigid, Goal(moves=MoveRange(1e-3, 1e4)), budget=TINY)
+
+
+@pytest.mark.parametrize(
+    ("missed", "held"),
+    [
+        ([], (1e-5, 1e-1)),
+        (range(30), (30, 99)),
+        ([*range(30), 50], (30, 99)),
+        ([*range(45), *range(55, 100)], None),
+        ([50], (0, 99)),
+        (range(80, 100), (0, 79)),
+    ],
+)
+def test_the_goal_holds_between_the_moves_next_to_which_enough_meet_it(missed: Any, held: Any) -> None:
+    """Of the moves next to either end, as many as one likes; of fewer than 20 that is not known."""
+    sizes = np.geomspace(1e-5, 1e-1, 102)[1:-1]
+    moves = Moves(*(np.where(np.isin(np.arange(100), missed), np.inf, 1.0)[None] for _ in range(3)))
+    measured = Performance(moves, np.ones((1, 100)), Attraction.none(100), 1.0, 1.0, np.zeros(0, bool), sizes)
+    between = replace(measured, moves_drawn=MoveRange(1e-5, 1e-1)).held_moves(Goal())
+    ends = {0: 1e-5, 99: 1e-1}
+    expected = held and tuple(ends.get(end, sizes[end] if isinstance(end, int) else end) for end in held)
+    assert between == (None if held is None else pytest.approx(expected))
+
+
+def test_settings_for_large_moves_alone_are_told_as_that(tuning: Advice) -> None:
+    """Neither refused nor praised: they are no least change, and their file says what they are for."""
+    (works,) = tuning.working
+    large = replace(works, moves_from=2e-3)
+    advice = replace(tuning, outcomes=(large,), interrupted=False)
+    assert (large.certainty, advice.working, advice.least) == ("large moves", (), None)
+    assert any(line.startswith("For moves of 2.00 mm and more alone: set") for line in answer(advice))
+    files = tune_files(advice)
+    assert "tuned-bandwidth-for-large-moves.toml" in files
+    assert files["tuned.toml"] is None
+    assert TuneAnswer(advice, stage=advice.stage).failure.endswith("for large ones alone some do")
+
+
+def test_points_that_serve_large_moves_are_found_by_the_smallest_of_these(machines: Fleet, rigid: Stage) -> None:
+    inf = np.inf
+    columns: dict[str, Any] = {"settling": [inf] * 3 + [1.0], "looser": [1.0] * 4, "slower": [inf] * 4}
+    columns |= {"force": [1.0] * 4, "margin": [0.6, 0.6, 0.4, 0.6], "bandwidth": [8.0] * 4, "nearness": [0.5] * 4}
+    columns |= {"whole": [True] * 4, "moves_from": [2e-3, 1e-3, 1e-4, inf]}
+    points = TriedPoints(np.zeros((4, 1)), *(np.array(column) for column in columns.values()))
+    assert points.for_large_moves(Goal(), 0.09).tolist() == [1, 0]
+
+
 def test_machines_not_seen_are_drawn_alone(rigid: Stage) -> None:
-    assert (_not_seen(rigid, Correlations(), 6, 1).travel < 1).all()
+    assert (_not_seen(rigid, Correlations(), 6, 1, MoveRange(1e-5, 0.09)).sizes < 0.09).all()
 
 
 DRIVE = {"sample_time": "1 ms", "delay": "3 ms", "current_bandwidth": "40 Hz .. 400 Hz"}
@@ -891,7 +981,9 @@ DITHER = {"dither_amplitude": "0.5 N", "dither_frequency": "100 Hz"}
 def test_a_force_that_is_not_finite_warns_of_nothing() -> None:
     """With a force limit below 1 N the library warned of an overflow, on the user's screen."""
     column = np.ones(1)
-    points = TriedPoints(np.zeros((1, 1)), column, column, column, np.array([np.inf]), column, column, column, column)
+    points = TriedPoints(
+        np.zeros((1, 1)), column, column, column, np.array([np.inf]), column, column, column, column, column
+    )
     with catch_warnings(action="error"):
         assert np.isfinite(points.cost(Goal(force_limit=0.2))).all()
 
@@ -900,13 +992,13 @@ def test_reasons_say_nothing_of_settings_that_were_left_out_before() -> None:
     """One setting settles without the margin, the other has it and does not settle."""
     columns: dict[str, Any] = {name: [1.0, np.inf] for name in ("settling", "looser", "slower")}
     columns |= {"force": [1.0] * 2, "margin": [0.4, 0.6], "bandwidth": [8.0] * 2, "nearness": [1.0, 0.0]}
-    columns["whole"] = [True, True]
+    columns |= {"whole": [True, True], "moves_from": [np.inf] * 2}
     points = TriedPoints(np.zeros((2, 1)), *(np.array(column) for column in columns.values()))
     outcome: Any = SimpleNamespace(cut=False)
     both, one = (next(_reasons(some, outcome, Goal())) for some in (points, points.take(np.array([1]))))
     assert "0.5" in both
     assert "0.5" not in one
-    outcome.attracted, kept = 24, TriedPoints(np.zeros((2, 1)), *np.ones((8, 2)))
+    outcome.attracted, kept = 24, TriedPoints(np.zeros((2, 1)), *np.ones((9, 2)))
     assert "2 settings tried 2 meet the rest" in next(_reasons(kept, outcome, Goal()))
     outcome.cut, outcome.attracted = True, 0  # none was surveyed: nothing is said of these
     assert "none surely meets it" not in next(_reasons(kept, outcome, Goal()))
@@ -917,7 +1009,7 @@ def test_a_narrow_range_in_which_nothing_attracts_is_found(first: float, machine
     """Of settings that settle the sooner the lower they are, a range of 6 % anywhere; next to those with which
     something attracts, none is surveyed."""
     shares = np.linspace(0, 1, 60)
-    points = TriedPoints(shares[:, None], 1 + shares, *np.ones((7, 60)))
+    points = TriedPoints(shares[:, None], 1 + shares, *np.ones((8, 60)))
     search = Search(Remedy.settled_on("", rigid), Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
     attracted: list[float] = []
 
@@ -939,7 +1031,7 @@ def test_settings_next_to_the_best_are_taken_where_those_miss_the_goal_on_fresh_
     """The settings that settle soonest lie at the edge of the margin: 92 % of fresh machines met the goal with them,
     98 % with a crossover lower by 4 %, and the remedy was said not to be sure."""
     shares = np.linspace(0, 1, 201)
-    points = TriedPoints(shares[:, None], 1 + shares, *np.ones((7, 201)))
+    points = TriedPoints(shares[:, None], 1 + shares, *np.ones((8, 201)))
     search = Search(Remedy.settled_on("", rigid), Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
     search.clear = lambda batch: np.ones(len(batch), bool)  # pyright: ignore[reportAttributeAccessIssue]
     search.share = lambda batch: 0.92 + 0.5 * batch[:, 0]  # pyright: ignore[reportAttributeAccessIssue]
@@ -954,7 +1046,7 @@ def test_points_next_to_one_beyond_the_edge_of_what_works_are_tried(machines: Fl
     shares = np.array([0.0, 0.02, 0.04, 0.5, 0.6])
 
     def measured(points: np.ndarray) -> TriedPoints:
-        return TriedPoints(points, 1 + points[:, 0], *np.ones((7, len(points))))
+        return TriedPoints(points, 1 + points[:, 0], *np.ones((8, len(points))))
 
     remedy = Remedy("", rigid, (of_key("controller.crossover", 1, 50, 8),))
     tried = [measured(shares[:, None])]
@@ -977,9 +1069,9 @@ def test_the_least_change_is_sought_off_the_line_where_something_attracts_all_al
         "gains", rigid.replace({"controller.crossover": "40 Hz"}), (of_key("controller.crossover", 10, 160, 10),)
     )
     shares = np.linspace(0.02, 1, 50)
-    points = TriedPoints(shares[:, None], *np.ones((8, 50)))
+    points = TriedPoints(shares[:, None], *np.ones((9, 50)))
     search = Search(remedy, Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
-    search.measured = lambda batch: TriedPoints(batch, *np.ones((8, len(batch))))  # pyright: ignore[reportAttributeAccessIssue]
+    search.measured = lambda batch: TriedPoints(batch, *np.ones((9, len(batch))))  # pyright: ignore[reportAttributeAccessIssue]
     search.share = lambda batch: np.ones(len(batch))  # pyright: ignore[reportAttributeAccessIssue]
     search.clear = lambda batch: batch[:, 0] > 0.6  # pyright: ignore[reportAttributeAccessIssue]
     search._closer = lambda point, wanted: []  # pyright: ignore[reportAttributeAccessIssue]
@@ -1023,7 +1115,7 @@ def test_a_change_of_one_key_is_less_than_any_of_two(machines: Fleet, rigid: Sta
         tried.extend(points)
         meets = remedy.variables[faster].at(points[:, faster]) > 13.0
         one, settling = np.ones(len(points)), np.where(meets, 1.0, np.inf)
-        return TriedPoints(points, settling, one, one, one, one, one, one, one > 0)
+        return TriedPoints(points, settling, one, one, one, one, one, one, one > 0, one)
 
     search = Search(remedy, Goal(), machines, machines, rigid, TINY, lambda label: None)
     search.measured = measured  # pyright: ignore[reportAttributeAccessIssue]
@@ -1043,7 +1135,7 @@ def test_a_stage_that_never_leaves_does_not_settle(rigid: Stage, machines: Fleet
     assert not np.isfinite(moves.looser).any()
 
 
-def test_windows_end_where_settings_no_longer_meet_the_goal(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_windows_end_where_settings_no_longer_meet_the_goal() -> None:
     """One between two values of the grid, one that goes on to an end of the range, but for what attracts machines:
     moves alone told a window of ADRC at the end of which something attracted a third of the machines."""
     variables = of_key("first", 1.0, np.e), of_key("second", 1.0, np.e)
@@ -1053,14 +1145,10 @@ def test_windows_end_where_settings_no_longer_meet_the_goal(monkeypatch: pytest.
         return SimpleNamespace(meets=lambda goal: good)
 
     def attracted_above(share: float) -> None:
-        def survey(remedy: Any, shares: np.ndarray, machines: Any, goal: Goal) -> Any:
-            return SimpleNamespace(clear=shares[:, [1]] < [share, 2.0, 2.0])  # the first of three machines
+        search.clear = lambda shares: shares[:, 1] < share
 
-        monkeypatch.setattr("friso.remedies.window.attraction", survey)
-
-    search: Any = SimpleNamespace(
-        remedy=SimpleNamespace(variables=variables), measured=measured, machines=None, goal=Goal()
-    )
+    stage: Any = SimpleNamespace(flat=dict)
+    search: Any = SimpleNamespace(remedy=Remedy("", stage, variables), measured=measured, machines=None, goal=Goal())
     attracted_above(2.0)
     first, second = windows(search, np.array([0.5, 0.4]))
     ends = np.log([first.low, first.high, second.low, second.high])
@@ -1075,7 +1163,35 @@ def test_windows_end_where_settings_no_longer_meet_the_goal(monkeypatch: pytest.
     assert again == first
     assert closer.low == second.low
     assert not closer.open_above
-    assert 0.7 - 1.01 * 0.6 / 2 ** RemedySettings.current().window_halvings < np.log(closer.high) < 0.7
+    assert 0.7 - 1.01 * 0.6 / 2 ** RemedySettings.current().surveyed_halvings < np.log(closer.high) < 0.7
+
+
+@pytest.mark.parametrize("kind", ["van Dijk", *CONTROLLERS])
+def test_every_range_told_contains_its_value_and_lies_in_its_search_range(rigid: Stage, kind: str) -> None:
+    """Of gains that the bandwidth scales as well, ranges were told without that: ki from 397 to 413 kN/(m s) around a
+    tuned 56.5 MN/(m s), and a tau of 62 us below the least tried of 125 us."""
+    stage = rigid if kind == "van Dijk" else Stage(**{**rigid.as_written(), "controller": CONTROLLERS[kind]})
+    random = np.random.default_rng(5)
+    for remedy in remedies(stage, Goal()):
+        count = len(remedy.variables)
+        for shares in random.random((4, count)):
+            near = random.uniform(0.001, 0.6, count)
+
+            def measured(points: np.ndarray, at: np.ndarray = shares, near: np.ndarray = near) -> Any:
+                good = (np.abs(points - at) <= near).all(axis=1)
+                return SimpleNamespace(meets=lambda goal: good)
+
+            clear = lambda points: np.ones(len(points), bool)  # noqa: E731
+            search: Any = SimpleNamespace(remedy=remedy, measured=measured, clear=clear, goal=Goal())
+            around, flat = windows(search, shares), remedy.tuned(shares).flat()
+            assert [window.name for window in around] == [variable.name for variable in remedy.variables]
+            for number, window in enumerate(around):
+                ends = np.repeat(shares[None], 2, axis=0)
+                ends[:, number] = 0.0, 1.0
+                least, most = sorted(remedy.values(ends)[:, number])
+                assert least * (1 - 1e-9) <= window.low <= window.value <= window.high <= most * (1 + 1e-9)
+                if window.name in flat:
+                    assert window.value == pytest.approx(flat[window.name], rel=1e-3)
 
 
 def test_that_there_is_no_window_is_said() -> None:
@@ -1318,7 +1434,7 @@ def test_costs_order_settings() -> None:
     settle, the more the fewer do."""
     columns: dict[str, Any] = {"settling": [1.0, 2.0, 1.0, np.inf, np.inf], "looser": [1.0] * 5, "slower": [1.0] * 5}
     columns |= {"force": [1.0] * 5, "margin": [0.6, 0.6, 0.4, 0.6, 0.6], "bandwidth": [8.0] * 5}
-    columns |= {"nearness": [1.0, 1.0, 1.0, 0.75, 0.25], "whole": [True] * 5}
+    columns |= {"nearness": [1.0, 1.0, 1.0, 0.75, 0.25], "whole": [True] * 5, "moves_from": [1e-5] * 5}
     points = TriedPoints(np.zeros((5, 1)), *(np.array(column) for column in columns.values()))
     assert points.cost(Goal()).argsort().tolist() == [0, 1, 2, 3, 4]
 
@@ -1399,4 +1515,4 @@ def test_a_rare_machine_does_not_stand_for_a_twentieth(
     monkeypatch.setattr(method, "modulus_margins", of)
     with RemedySettings(machine_factor=1).in_use():
         machines = method.machines_of_search(rigid, Correlations(), Budget(machines=3), 1, Goal(), rigid)
-        assert np.array_equal(machines.travel, drawn.travel[kept])
+        assert np.array_equal(machines.sizes, drawn.sizes[kept])

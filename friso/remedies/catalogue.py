@@ -9,17 +9,21 @@ from typing import Any
 import numpy as np
 
 from friso.design_method.isolator import isolated
+from friso.equations.bandwidth import bandwidth
 from friso.equations.breakaway import breakaway, least_breakaway
 from friso.equations.motion import pieces
 from friso.equations.settings import SETTINGS
 from friso.errors import InputError
+from friso.frequency.bandwidth import bandwidths_at
+from friso.frequency.crossover import WANTED, limits
 from friso.quantities import exactly
 from friso.remedies import variables
 from friso.remedies.goal import Goal
-from friso.remedies.variables import Variable, bandwidth_factor, of_key
+from friso.remedies.variables import BANDWIDTH, Variable, bandwidth_factor, of_key
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import FILTERS_KEY, controller_of
 from friso.stage.standstill import settings_of
+from friso.studies.compare.options import linear_flat
 
 WIDTHS, DEPTH = (0.1, 1.5), 0.9
 """Range of the width of a notch, as a share of its frequency, and its depth."""
@@ -49,6 +53,15 @@ class Remedy:
             change = variable.change({**flat, **changed}, variable.at(share))
             changed |= change
         return changed
+
+    def values(self, shares: np.ndarray) -> np.ndarray:
+        """Return the numbers that the variables stand for at points, both of shape (points, variables).
+
+        A key has its value in the stage, after all variables that change it, such as the bandwidth.
+        """
+        changed = self.changes(shares)
+        columns = [changed.get(v.name, v.at(share)) for v, share in zip(self.variables, shares.T, strict=True)]
+        return np.stack(columns, axis=1)
 
     @property
     def verifiable(self) -> bool:
@@ -84,8 +97,8 @@ def remedies(stage: Stage, goal: Goal) -> list[Remedy]:
     """Return the remedies that a goal allows, the least change first."""
     listed: list[Remedy] = []
     if goal.controller:
-        listed += [Remedy("bandwidth", stage, (bandwidth_factor(),)), *_gains("gains", stage)]
-        listed += [*_notch(stage), *_against_friction(stage, goal), *_structures(stage)]
+        listed += [Remedy(BANDWIDTH, stage, (bandwidth_factor(1.0),)), *_gains("gains", stage)]
+        listed += [*_notch(stage, goal), *_against_friction(stage, goal), *_structures(stage)]
     if goal.joint and least_breakaway(stage.flat()) > 0:
         listed += _isolators(stage, goal)
     return listed
@@ -102,10 +115,10 @@ def _gains(name: str, stage: Stage, first: tuple[Variable, ...] = (), buys_joint
     return [Remedy(name, stage, several, buys_joint)] if len(several) > 1 else []
 
 
-def _notch(stage: Stage) -> Iterator[Remedy]:
-    """Return a notch filter at the parasitic mode, which allows a higher bandwidth."""
+def _notch(stage: Stage, goal: Goal) -> Iterator[Remedy]:
+    """Return a notch filter at the parasitic mode, if margins without it do not allow the bandwidth of the goal."""
     flat = stage.flat()
-    if "parasitic.frequency" not in flat:
+    if "parasitic.frequency" not in flat or _reaches(stage, goal):
         return
     frequency = flat["parasitic.frequency"]
     filters = [*stage.as_written()["controller"].get("filters", [])]
@@ -122,6 +135,15 @@ def _notch(stage: Stage) -> Iterator[Remedy]:
     key = f"{FILTERS_KEY}.{len(filters) + 1}.width"
     width = of_key(key, WIDTHS[0] * frequency, WIDTHS[1] * frequency)
     yield Remedy("notch at the parasitic mode, and bandwidth", with_notch, (width, bandwidth_factor()))
+
+
+def _reaches(stage: Stage, goal: Goal) -> bool:
+    """Tell whether the controller made faster reaches the limit of the bandwidth with the margin wanted."""
+    if goal.bandwidth_limit is None or goal.margin > WANTED:
+        return False
+    flat = stage.flat()
+    highest, own = limits(linear_flat(stage, flat)).highest_comfortable, bandwidth(flat) or 1.0
+    return highest is not None and bool(bandwidths_at(stage, [highest / own])[0] >= goal.bandwidth_limit)
 
 
 def _structures(stage: Stage) -> Iterator[Remedy]:

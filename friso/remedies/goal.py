@@ -8,6 +8,8 @@ import numpy as np
 
 from friso.frequency.crossover import WANTED
 from friso.hunting import SEARCH_LIMITS
+from friso.remedies.machines import MoveRange
+from friso.stage import Stage
 
 SHARE = 0.95
 """Share of the machines, each with a move of its own, that have to meet the goal."""
@@ -22,6 +24,8 @@ class Goal:
     [N]; None means any force. The bandwidth must not exceed `bandwidth_limit` [Hz]; None means that only the stage file
     limits it.
 
+    The `moves` are those of the stage if none are given.
+
     All settled states must keep the modulus `margin` and the `distance` from hunting. `controller` and `joint` tell
     what may be changed.
     """
@@ -35,6 +39,11 @@ class Goal:
     share: float = SHARE
     controller: bool = True
     joint: bool = True
+    moves: MoveRange | None = None
+
+    def moves_of(self, stage: Stage) -> MoveRange:
+        """Return the moves that machines like a stage make: those of the goal, or else of the stage."""
+        return self.moves or MoveRange.of_stage(stage, self.within)
 
     def surely(self, machines: int) -> float:
         """Return the share of a sample of machines that must meet the goal.

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from itertools import product
+from itertools import islice, product
+from typing import Any
 
 import numpy as np
 
@@ -70,48 +71,54 @@ def _possible(tuned: Stage, key: str, value: float, otherwise: float) -> float:
     return value
 
 
-def least_changes(search: Search) -> Iterator[np.ndarray]:
+def least_changes(search: Search, most: float = np.inf) -> Iterator[np.ndarray]:
     """Return the least changes found for a remedy of `least_remedy`, each of shape (variables,).
 
     Fewer keys come first, then smaller factors. Single keys are tried before all else, because any such change is
-    smaller than a change of several keys.
+    smaller than a change of several keys. Only changes smaller than `most` are returned (see `change_costs`).
     """
-    yield from _of_one_key(search)
-    search.optimise(partial(change_costs, search.remedy), _beginnings(search.remedy))
-    yield from candidates(search)
+    yield from of_one_key(search, most)
+    if most >= min(2, len(search.remedy.variables)):
+        wanted = partial(change_costs, search.remedy)
+        search.optimise(wanted, _beginnings(search.remedy))
+        yield from (point for point in candidates(search) if wanted(point[None])[0] < most)
 
 
-def _of_one_key(search: Search) -> Iterator[np.ndarray]:
-    """Return changes of a single key that work, the least first.
+def of_one_key(search: Search, most: float = np.inf, enough: float | None = None) -> Iterator[np.ndarray]:
+    """Return changes of a single variable that work, the least first, and all smaller than `most`.
 
-    They break no constraint, enough fresh machines meet the goal, and nothing attracts the machines.
+    They break no constraint, `enough` of the fresh machines (a share) meet the goal, and nothing attracts the machines.
     """
     settings = RemedySettings.current()
     wanted = partial(change_costs, search.remedy)
-    home, _ = _ends(search.remedy).T
+    home = np.array([variable.share(variable.present) for variable in search.remedy.variables])
     ways = np.concatenate([np.diag(end - home) for end in (1.0, 0.0)]) / settings.values_alone
 
     def changed(points: np.ndarray) -> np.ndarray:
-        points = points[wanted(points) >= 1]
+        points = points[(wanted(points) >= 1) & (wanted(points) < most)]
         return points[np.argsort(wanted(points), kind="stable")]
 
     alone = changed(np.concatenate([home + step * ways for step in range(1, settings.values_alone + 1)]))
+    closest = settings.finer_values + 1
     for few in search.tries(alone):
-        for one in _robust(search, few):
+        for one in _robust(search, few, enough):
             way = ways[(ways @ (one - home)).argmax()]
-            finer = changed(one - way * np.linspace(0, 1, settings.finer_values + 1)[1:-1, None])
+            finer = changed(one - way * np.linspace(0, 1, closest)[1:-1, None])
+            closest = 2  # what fails on other machines is taken on in larger steps
             for some in search.tries(finer) if len(finer) else ():
-                yield from _robust(search, some)
+                yield from islice(_robust(search, some, enough), 1)
             yield one
 
 
-def _robust(search: Search, points: np.ndarray) -> Iterator[np.ndarray]:
+def _robust(search: Search, points: np.ndarray, enough: float | None = None) -> Iterator[np.ndarray]:
     """Return the points (points, variables) that work on fresh machines.
 
-    Enough of them meet the goal by their moves and margins, and nothing attracts the machines.
+    `enough` of them, a share, meet the goal by their moves and margins, and nothing attracts the machines. Without it,
+    the share is the least that surely meets the goal.
     """
     settings = RemedySettings.current()
-    robust = points[search.share(points) >= search.goal.surely(search.fresh.count)] if len(points) else points
+    least = search.goal.surely(search.fresh.count) if enough is None else enough
+    robust = points[search.share(points) >= least] if len(points) else points
     for few in np.array_split(robust, -(-len(robust) // settings.survey_batch)) if len(robust) else ():
         yield from few[search.clear(few)]
 
@@ -127,8 +134,12 @@ def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
             for variable, share in zip(remedy.variables, shares.T, strict=True)
         ]
     )
-    total = logarithms.sum(axis=0)
-    return np.asarray(np.count_nonzero(logarithms, axis=0) + total / (1 + total))
+    return size_cost(np.count_nonzero(logarithms, axis=0), logarithms.sum(axis=0))
+
+
+def size_cost(keys: Any, logarithm: Any) -> np.ndarray:
+    """Return the number by which changes are compared: so many keys, and the logarithm of the factor of all."""
+    return np.asarray(keys + logarithm / (1 + logarithm))
 
 
 def _beginnings(remedy: Remedy) -> np.ndarray:

@@ -10,13 +10,23 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.constants import golden
 
+from friso.equations.motion import size
+from friso.errors import InputError, StageError
+from friso.quantities import exactly
 from friso.remedies.settings import RemedySettings
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
 from friso.stage.motion import motion_of
 from friso.studies.compare.machines import LEAST, SPREADS, draw_machines
+
+ACCELERATION = "motion.acceleration"
+
+SPREAD_EVENLY = (golden - 1, np.sqrt(2) - 1)
+"""Steps, modulo 1, of sequences that fill the range from 0 to 1 evenly, however short they are: the golden and the
+silver section, whose continued fractions have the smallest terms, 1 and 2 (Kuipers, Niederreiter 1974, Sec. 2.3)."""
 
 ADDED = int.from_bytes(b"joint")
 """Which of a seed's random numbers decide on a joint that the stage file does not have: they are the second half of
@@ -29,32 +39,85 @@ ADDED_KEYS = ("joint.stiffness", "joint.damping")
 
 
 @dataclass(frozen=True)
+class MoveRange:
+    """The moves that machines make: from `smallest` to `largest` [m], uniform in the logarithm.
+
+    `accelerations` [m/s^2] are drawn likewise; None means that of the stage file.
+    """
+
+    smallest: float
+    largest: float
+    accelerations: tuple[float, float] | None = None
+
+    @classmethod
+    def of_stage(cls, stage: Stage, within: float) -> MoveRange:
+        """Return the moves that a stage file states in [moves].
+
+        Without them, they go from ten times the tolerance `within` [m] to the file's own move.
+        """
+        own, stated = float(size(stage.flat())), stage.moves
+        if stated is None:
+            return cls(min(own, RemedySettings.current().smallest_move * within), own)
+        low, high = stated.lowest_acceleration, stated.highest_acceleration
+        accelerations = None if low is None or high is None else (float(low), float(high))
+        return cls(float(stated.smallest), float(stated.largest), accelerations)
+
+    def check(self, stage: Stage) -> None:
+        """Check that the motion of a stage leaves time for the largest move with the least acceleration.
+
+        Raises InputError.
+        """
+        flat = stage.flat()
+        slow = {ACCELERATION: self.accelerations[0]} if self.accelerations and ACCELERATION in flat else {}
+        moved = {**flat, **slow}
+        try:
+            largest = motion_of(flat).stretched(moved, self.largest / float(size(moved)))
+            stage.with_numbers({key: float(value) for key, value in {**slow, **largest}.items()})
+        except StageError as error:
+            unit = stage.axis_kind.unit("m")
+            least = exactly(self.smallest, unit)
+            actual = f"a largest move of {exactly(self.largest, unit)}"
+            raise InputError("moves", actual, error.expected, f'"{least}..{least}"') from None
+
+
+@dataclass(frozen=True)
 class Fleet:
     """Machines drawn around a stage, as changes of its keys, all of shape (count,).
 
-    `ratios` multiply a key on each machine, and `shifts` are added to keys that are 0. `travel` is each machine's share
-    of the travel. `from_file` lists the keys that the file calls uncertain, and `spreads` [%] the default spreads of
+    `ratios` multiply a key on each machine, and `shifts` are added to keys that are 0. `sizes` [m] are the moves that
+    they make, with `accelerations` [m/s^2] where these differ from that of the file. `moves` says from which range both
+    were drawn. `from_file` lists the keys that the file calls uncertain, and `spreads` [%] the default spreads of
     others. `left_out` counts invalid draws, which were replaced.
     """
 
     ratios: Mapping[str, np.ndarray]
     shifts: Mapping[str, np.ndarray]
-    travel: np.ndarray
+    sizes: np.ndarray
+    moves: MoveRange
     from_file: tuple[str, ...]
     spreads: Mapping[str, float]
     left_out: int = 0
+    accelerations: np.ndarray | None = None
 
     @property
     def count(self) -> int:
         """Return the number of machines."""
-        return len(self.travel)
+        return len(self.sizes)
 
     def take(self, numbers: np.ndarray) -> Fleet:
         """Return the machines with these numbers."""
         ratios, shifts = (
             {key: value[numbers] for key, value in column.items()} for column in (self.ratios, self.shifts)
         )
-        return replace(self, ratios=ratios, shifts=shifts, travel=self.travel[numbers])
+        faster = None if self.accelerations is None else self.accelerations[numbers]
+        return replace(self, ratios=ratios, shifts=shifts, sizes=self.sizes[numbers], accelerations=faster)
+
+    def with_moves_from(self, smallest: float) -> Fleet:
+        """Return the machines with moves from `smallest` [m] to the largest, in the order of those that they make."""
+        low, high = np.log([self.moves.smallest, self.moves.largest])
+        share = (np.log(self.sizes) - low) / (high - low) if high > low else np.ones(self.count)
+        sizes = smallest * (self.moves.largest / smallest) ** share
+        return replace(self, sizes=sizes, moves=replace(self.moves, smallest=smallest))
 
     def laid_over(self, stage: Stage, changes: Mapping[str, Any], points: int) -> dict[str, Any]:
         """Return flat keys of all machines at all `points`, whose arrays have shape (points,).
@@ -70,7 +133,13 @@ class Fleet:
             flat[key] = flat[key] * np.tile(ratio, points)
         for key, shift in self.shifts.items():
             flat[key] = flat.get(key, 0.0) + np.tile(shift, points)
-        return {**flat, **motion_of(flat).stretched(flat, np.tile(self.travel, points))}
+        return {**flat, **self._motion(flat, points)}
+
+    def _motion(self, flat: Mapping[str, Any], points: int) -> dict[str, Any]:
+        """Return the keys of the motion with which the machines make their moves at all points."""
+        faster = {} if self.accelerations is None else {ACCELERATION: np.tile(self.accelerations, points)}
+        moved = {**flat, **{key: value for key, value in faster.items() if key in flat}}
+        return {**moved, **motion_of(flat).stretched(moved, np.tile(self.sizes, points) / size(moved))}
 
     def _of(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
         """Return the ratios of the keys that the stage has.
@@ -85,13 +154,17 @@ class Fleet:
         return ratios
 
 
-def draw_fleet(stage: Stage, correlations: Correlations, count: int, seed: int) -> Fleet:
-    """Draw machines around a stage as `friso compare` does.
+def draw_fleet(
+    stage: Stage, correlations: Correlations, count: int, seed: int, moves: MoveRange | None = None
+) -> Fleet:
+    """Draw machines around a stage as `friso compare` does, each with one of the `moves`.
 
-    The first is the stage file's own, with its own move. Joints that the file does not have vary by the default
+    The first is the stage file's own, with its own move, or the nearest of the range. The sizes of the others fill the
+    range evenly. Without `moves`, all make the file's own. Joints that the file does not have vary by the default
     spreads. Raises InputError.
     """
-    settings = RemedySettings.current()
+    own = float(size(stage.flat()))
+    moves = moves or MoveRange(own, own)
     sample, flat = draw_machines(stage, correlations, max(count, LEAST), seed), stage.flat()
     keys = {key: values[:count] for key, values in sample.keys.items() if key in flat and not key.startswith("rail.")}
     ratios = {key: values / flat[key] for key, values in keys.items() if flat[key]}
@@ -100,9 +173,16 @@ def draw_fleet(stage: Stage, correlations: Correlations, count: int, seed: int) 
     for key in ADDED_KEYS:
         spread = SPREADS[key] / 100 / HALF_WIDTHS * random.standard_normal(count)
         ratios.setdefault(key, np.maximum(1 + spread, 1 - SPREADS[key] / 100))
-    travel = settings.shortest_travel ** random.random(count)
-    for values in (*ratios.values(), travel):
+    even = (random.random((2, 1)) + np.outer(SPREAD_EVENLY, np.arange(count))) % 1
+    sizes = moves.smallest * (moves.largest / moves.smallest) ** even[0]
+    sizes[0] = min(max(own, moves.smallest), moves.largest)
+    accelerations = None
+    if moves.accelerations is not None and ACCELERATION in flat:
+        low, high = moves.accelerations
+        accelerations = low * (high / low) ** even[1]
+    for values in ratios.values():
         values[0] = 1.0
     for values in shifts.values():
         values[0] = 0.0
-    return Fleet(ratios, shifts, travel, sample.from_file, dict(sample.spreads), sample.sample.left_out)
+    left_out = sample.sample.left_out
+    return Fleet(ratios, shifts, sizes, moves, sample.from_file, dict(sample.spreads), left_out, accelerations)

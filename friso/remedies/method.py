@@ -24,17 +24,19 @@ from friso.progress import Progress, silent
 from friso.remedies.catalogue import Remedy, remedies, with_bandwidth
 from friso.remedies.change import ChangeSize, change_size
 from friso.remedies.goal import Goal
-from friso.remedies.least import least_changes, least_remedy
-from friso.remedies.machines import Fleet, draw_fleet
+from friso.remedies.least import least_changes, least_remedy, of_one_key, size_cost
+from friso.remedies.machines import Fleet, MoveRange, draw_fleet
 from friso.remedies.relax import RelaxedGoal, relaxations
-from friso.remedies.search import Budget, Search
+from friso.remedies.search import Budget, Search, TriedPoints
 from friso.remedies.sensitivities import Sensitivities, edge_sensitivities
 from friso.remedies.settings import RemedySettings
 from friso.remedies.trials import modulus_margins
+from friso.remedies.variables import BANDWIDTH
 from friso.remedies.verified import (
     Performance,
     RemedyOutcome,
     missed_parts,
+    moving,
     performance_of,
     unmet_goals,
     unsettled_parts,
@@ -58,7 +60,8 @@ class Advice:
 
     `case` is the check of the stage, and `present` its performance on machines. `limits` gives the bandwidths with
     enough margin, and `sensitivities` what the edge of hunting depends on. `relaxed` says what to relax if nothing
-    works, and `interrupted` whether the search was ended early.
+    works, `interrupted` whether the search was ended early, and `least_sought` whether the least change was sought
+    before that.
 
     The tables `as_built` are not used in the search; they and the `correlations` are added to stage files that are
     written. `unmade` gives the reason why no leaf springs make the joint of a remedy.
@@ -74,6 +77,7 @@ class Advice:
     machines: Fleet
     seed: int
     interrupted: bool = False
+    least_sought: bool = True
     sensitivities: Sensitivities | None = None
     as_built: Mapping[str, Any] = field(default_factory=dict)
     correlations: Correlations = field(default_factory=Correlations)
@@ -103,6 +107,12 @@ class Advice:
         """Return how large the change of a remedy with settings is."""
         assert outcome.stage is not None
         return change_size(self.stage, outcome.stage)
+
+    @property
+    def for_large_moves(self) -> tuple[RemedyOutcome, ...]:
+        """Return the remedies that work for large moves alone, the one that serves the smallest moves first."""
+        some = (outcome for outcome in self.outcomes if outcome.certainty == "large moves")
+        return tuple(sorted(some, key=lambda outcome: outcome.moves_from or 0.0))
 
     @property
     def working(self) -> tuple[RemedyOutcome, ...]:
@@ -137,14 +147,19 @@ def tune(
     chosen: Collection[str] | None = None,
     progress: Progress = silent,
     begins: Callable[[], None] = lambda: None,
+    answered: Callable[[RemedyOutcome], None] = lambda outcome: None,
 ) -> Advice:
     """Optimise and verify every remedy that the goal allows, or those named in `chosen`.
 
-    `begins` is called before the work starts. Raises InputError for a motion after which nothing has to settle.
+    `begins` is called before the work starts, and `answered` with the outcome of the first remedy. Raises InputError
+    for a motion after which nothing has to settle.
     """
     settings = RemedySettings.current()
     goal, budget, correlations = goal or Goal(), budget or Budget(), correlations or Correlations()
-    _moves(stage)
+    _check_motion(stage)
+    moves = goal.moves_of(stage)
+    moves.check(stage)
+    goal = replace(goal, moves=moves)
     begins()
     ideal = stage.replace({table: None for table in AS_BUILT if getattr(stage, table)})
     listed = [remedy for remedy in remedies(ideal, goal) if chosen is None or remedy.name in chosen]
@@ -156,30 +171,43 @@ def tune(
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
     of_ideal = correlations.among(ideal.uncertain())
     fresh, unseen = (
-        _not_seen(ideal, of_ideal, budget.fresh, seed + added) for added in (settings.fresh_seed, settings.unseen_seed)
+        _not_seen(ideal, of_ideal, budget.fresh, seed + added, moves)
+        for added in (settings.fresh_seed, settings.unseen_seed)
     )
-    further = _not_seen(ideal, of_ideal, budget.further, seed + settings.further_seed)
+    further = _not_seen(ideal, of_ideal, budget.further, seed + settings.further_seed, moves)
     machines = machines_of_search(ideal, of_ideal, budget, seed, goal, stage)
     progress(0, 0, "the stage as it is")
-    case, present = verified(ideal), performance_of(ideal, unseen, goal, stage)
-    if not unmet_goals(case, present, goal):
-        listed = []  # nothing has to change
+    present, case = moving(ideal, unseen, goal, stage), None
     session = _Session(ideal, stage, goal, machines, fresh, unseen, further, budget, report)
     relaxed: tuple[RelaxedGoal, ...] = ()
     sensitivities: Sensitivities | None = None
     interrupted = False
     try:
-        own = [remedy for remedy in listed if remedy.stage is ideal]
+        if missed_parts(present, goal) and listed and listed[0].name == BANDWIDTH:
+            session.tries_one_factor(listed.pop(0), len(listed) > 0)
+            answered(session.outcomes[0])
+            session.adds_windows()
+        progress(0, 0, "the stage as it is")
+        case = verified(ideal)
+        present = present.surveyed(ideal, unseen, goal)
+        if not unmet_goals(case, present, goal):
+            listed = []  # nothing has to change
+        own = [remedy for remedy in listed if remedy.stage is ideal and remedy.verifiable]
+        later = [remedy for remedy in listed if remedy not in own and remedy.verifiable]
         for remedy in own:
             session.tries(remedy)
         session.tries_less()
-        for remedy in listed:
-            if remedy not in own:
-                session.tries(remedy)
+        for remedy in later:
+            session.tries(remedy)
         for remedy in pairs(session.outcomes, goal) if chosen is None else ():
             session.tries(remedy)
         session.tries_less()
-        if listed and not any(outcome.certainty == "works" for outcome in session.outcomes):
+        for remedy in listed:
+            if not remedy.verifiable and not session.works:
+                session.tries(remedy)
+        session.adds_windows()
+        if session.outcomes and not session.works:
+            session.tries_large_moves()
             report("which part of the goal to relax")
             relaxed = relaxations(session.outcomes, goal, machines.take(np.arange(budget.machines)))
         sensitivities = edge_sensitivities(ideal, case.judgement.margin)
@@ -189,7 +217,7 @@ def tune(
     return Advice(
         ideal,
         goal,
-        case,
+        case or verified(ideal),
         present,
         limits(linear_flat(stage, stage.flat())),
         tuple(session.outcomes),
@@ -197,6 +225,7 @@ def tune(
         fresh,
         seed,
         interrupted,
+        session.tried_less or not interrupted,
         sensitivities,
         {name: table for name, table in stage.as_written().items() if name in AS_BUILT},
         correlations,
@@ -204,9 +233,9 @@ def tune(
     )
 
 
-def _not_seen(stage: Stage, correlations: Correlations, count: int, seed: int) -> Fleet:
+def _not_seen(stage: Stage, correlations: Correlations, count: int, seed: int, moves: MoveRange | None = None) -> Fleet:
     """Draw machines around a stage, without the stage file's own machine."""
-    return draw_fleet(stage, correlations, count + 1, seed).take(np.arange(1, count + 1))
+    return draw_fleet(stage, correlations, count + 1, seed, moves).take(np.arange(1, count + 1))
 
 
 def machines_of_search(
@@ -218,7 +247,7 @@ def machines_of_search(
     out, and another one counts twice. Sampling and delay are taken from the stage `drive`.
     """
     settings = RemedySettings.current()
-    machines = draw_fleet(stage, correlations, settings.machine_factor * budget.machines, seed)
+    machines = draw_fleet(stage, correlations, settings.machine_factor * budget.machines, seed, goal.moves)
     many = draw_fleet(stage, correlations, settings.usual_machines, seed + settings.usual_seed)
     own, flat = Remedy.settled_on("", stage), drive.flat()
     robust = limits(linear_flat(drive, flat)).highest_comfortable
@@ -234,7 +263,8 @@ def machines_of_search(
 class _Session:
     """The remedies of a stage, tried one after the other, with the `outcomes` so far.
 
-    `searching` is the search under way.
+    `searching` is the search under way, `searches` has all by the names of their remedies, and `least_factor` tells
+    that the bandwidth that works is the least.
     """
 
     stage: Stage
@@ -249,7 +279,41 @@ class _Session:
     outcomes: list[RemedyOutcome] = field(default_factory=list)
     searching: Search | None = None
     tried_less: bool = False
+    least_factor: bool = False
+    searches: dict[str, Search] = field(default_factory=dict)
     unmade: dict[str, Unmade] = field(default_factory=dict)
+
+    @property
+    def works(self) -> bool:
+        """Tell whether any remedy works so far."""
+        return any(outcome.certainty == "works" for outcome in self.outcomes)
+
+    def tries_one_factor(self, remedy: Remedy, others: bool) -> None:
+        """Try the least factor on the bandwidth that works: the first answer, which further remedies improve on.
+
+        If there is none, or there are no `others` to improve on it, the factor that settles soonest is sought.
+        """
+        search = self._begun(remedy, self.budget.machines)
+
+        def points() -> Iterator[np.ndarray]:
+            if others:
+                self.least_factor = True
+                yield from of_one_key(search, enough=1.0)
+            self.least_factor = False
+            search.optimise()
+            yield from search.surveyed()
+
+        self._ended(search, points())
+
+    def adds_windows(self) -> None:
+        """Find how far each number of what is told first may vary: of the least change, and of what settles soonest."""
+        working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes]
+        shown = [min(working, key=rank) for rank in (self._size, lambda one: slowest(one, self.goal)) if working]
+        for place, outcome in enumerate(self.outcomes):
+            if any(outcome is one for one in shown) and not outcome.windows:
+                self.report(f"{outcome.remedy.name}: how far each number may vary")
+                around = windows(self.searches[outcome.remedy.name], outcome.shares)
+                self.outcomes[place] = replace(outcome, windows=around)
 
     def tries(self, remedy: Remedy) -> None:
         """Try a remedy for the settings that settle soonest."""
@@ -290,7 +354,8 @@ class _Session:
         most = others[-1] if own and others else least
         self.tried_less = self._tries_less_than(most)
         works = [outcome for outcome in self.outcomes if outcome.certainty == "works"]
-        if least is not most and min(works, key=self._size, default=None) is least:
+        is_least = self.least_factor and least.remedy.name == BANDWIDTH and self._size(least).keys == 1
+        if least is not most and not is_least and min(works, key=self._size, default=None) is least:
             self.tried_less |= self._tries_less_than(least)
         for place in range(first, len(self.outcomes)):
             outcome = self.outcomes[place]
@@ -310,9 +375,35 @@ class _Session:
         less = least_remedy(self.stage, outcome.stage, outcome.remedy)
         if less is None:
             return False
+        works = (one for one in self.outcomes if one.certainty == "works" and one.remedy.buys_joint == less.buys_joint)
+        least = min(works, key=self._size, default=outcome)
+        size = self._size(least)
         search = self._begun(less, settings.machine_factor * self.budget.machines)
-        self._ended(search, least_changes(search))
+        self._ended(
+            search, least_changes(search, float(size_cost(size.keys, settings.worthwhile_share * np.log(size.factor))))
+        )
+        if self.outcomes[-1].stage is None and least.certainty == "works" and not search.cut:
+            self.outcomes.pop()  # none is smaller than what works already
         return True
+
+    def tries_large_moves(self) -> None:
+        """Verify the settings that serve large moves alone, those that serve the smallest moves first."""
+        largest, listed = self.unseen.moves.largest, list[tuple[float, int, np.ndarray, TriedPoints]]()
+        for place, outcome in enumerate(self.outcomes):
+            points = outcome.points if outcome.remedy.verifiable else None
+            if points is None:
+                continue
+            for number in points.for_large_moves(self.goal, largest)[:1]:
+                listed.append((float(points.moves_from[number]), place, points.shares[number], points))
+        for smallest, place, shares, points in sorted(listed, key=lambda item: item[:2])[
+            : RemedySettings.current().most_tries
+        ]:
+            remedy = self.outcomes[place].remedy
+            search = Search(remedy, self.goal, self.machines, self.fresh, self.drive, self.budget, self.report)
+            search.tried.append(points)
+            outcome = self._verified(search, shares, smallest)
+            if outcome.certainty == "large moves":
+                self.outcomes[place] = outcome
 
     def interrupted(self) -> None:
         """Record the best point so far of the remedy under way, which is not verified."""
@@ -329,7 +420,7 @@ class _Session:
         several = self.machines.take(np.arange(machines))
         search = Search(remedy, self.goal, several, self.fresh, self.drive, self.budget, self.report)
         self.outcomes.append(RemedyOutcome(remedy, None, None, None, (), interrupted=True))  # until it has ended
-        self.searching = search
+        self.searching = self.searches[remedy.name] = search
         return search
 
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
@@ -360,8 +451,10 @@ class _Session:
         if last.remedy.buys_joint and not last.remedy.makes and last.certainty == "works":
             self._made_of_leaves(last)
 
-    def _verified(self, search: Search, shares: np.ndarray) -> RemedyOutcome:
+    def _verified(self, search: Search, shares: np.ndarray, moves_from: float | None = None) -> RemedyOutcome:
         """Measure a point on fresh machines, and verify it by its cycles if they meet the goal.
+
+        The machines make all moves, or those from `moves_from` [m] on.
 
         The interval of the share of machines that meet the goal must lie at the share wanted or above. While it leaves
         that open, further machines are measured.
@@ -369,8 +462,11 @@ class _Session:
         settings = RemedySettings.current()
         remedy, goal = search.remedy, search.goal
         tuned = remedy.tuned(shares)
+        unseen, further = (
+            fleet if moves_from is None else fleet.with_moves_from(moves_from) for fleet in (self.unseen, self.further)
+        )
         self.report(f"{remedy.name}: verified on machines not tuned for")
-        measured = performance_of(tuned, self.unseen, goal, self.drive)
+        measured = performance_of(tuned, unseen, goal, self.drive)
         doubted, case = missed_parts(measured, goal), None
         if not doubted:
             self.report(f"{remedy.name}: verified by its hunting cycles")
@@ -378,13 +474,12 @@ class _Session:
             doubted = unsettled_parts(case, measured, goal)
         if not doubted:
             self.report(f"{remedy.name}: verified on more machines", settings.progress_steps)
-            for part in np.split(np.arange(self.further.count), [self.further.count // 3]):
+            for part in np.split(np.arange(further.count), [further.count // 3]):
                 if measured.decides(goal) is None:
-                    measured = measured.with_further(tuned, self.further.take(part), goal, self.drive)
+                    measured = measured.with_further(tuned, further.take(part), goal, self.drive)
             doubted = () if measured.decides(goal) else ("together",)
-        around = () if doubted else windows(search, shares)
         tried = search.points, search.attracted
-        return RemedyOutcome(remedy, tuned, measured, case, doubted, around, *tried, shares=shares)
+        return RemedyOutcome(remedy, tuned, measured, case, doubted, (), *tried, shares=shares, moves_from=moves_from)
 
 
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
@@ -414,7 +509,7 @@ def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
     return replace(outcome, stage=search.remedy.tuned(shares), points=points, shares=shares)
 
 
-def _moves(stage: Stage) -> None:
+def _check_motion(stage: Stage) -> None:
     """Check the motion. Raises InputError if nothing has to settle after it."""
     flat = stage.flat()
     kind = flat["motion.kind"]

@@ -51,7 +51,8 @@ class TriedPoints:
     the slowest 5 %: within the tolerance, within the looser one, and with the bandwidth lower by the distance from
     hunting. Largest force [N] and least modulus margin hold for 95 % of the machines. The bandwidth [Hz] is that of the
     stage file's machine (see `loop_bandwidth`). How near machines are to settling runs from 0 to 1 (see
-    `Search.measured`).
+    `Search.measured`). `moves_from` [m] is the smallest move such that all machines that move at least so far settle;
+    infinite if the one that moves farthest does not.
 
     Points that are not `whole` were given up early, and the missing moves count as the best possible.
     """
@@ -65,6 +66,7 @@ class TriedPoints:
     bandwidth: np.ndarray
     nearness: np.ndarray
     whole: np.ndarray
+    moves_from: np.ndarray
 
     def take(self, numbers: np.ndarray) -> TriedPoints:
         """Return the points with these numbers."""
@@ -84,6 +86,16 @@ class TriedPoints:
     def meets(self, goal: Goal) -> np.ndarray:
         """Return which points break no constraint."""
         return ~np.any([*self.broken(goal).values()], axis=0)
+
+    def for_large_moves(self, goal: Goal, largest: float) -> np.ndarray:
+        """Return the numbers of points that serve moves up to the `largest` [m] but not the small ones.
+
+        They break no constraint on margin, bandwidth and force. The point that serves the smallest moves comes first.
+        """
+        broken = self.broken(goal)
+        some = self.moves_from <= largest / RemedySettings.current().large_share
+        some &= ~np.any([broken[name] for name in ("bandwidth", "margin", "force")], axis=0) & ~self.meets(goal)
+        return np.lexsort((self.looser, np.where(some, self.moves_from, np.inf)))[: np.count_nonzero(some)]
 
     def cost(self, goal: Goal, wanted: np.ndarray | None = None) -> np.ndarray:
         """Return what the search minimises: the settling time, or what is `wanted` small instead.
@@ -229,9 +241,11 @@ class Search:
         if start is not None:
             few = start[: size // 2]
             drawn[: len(few)] = few
-        _evolve(cost, drawn, [(0.0, 1.0)] * variables, self.budget.generations)
+        _evolve(cost, drawn, [(0.0, 1.0)] * variables, self.budget.generations, self._is_hopeless)
         for away in tuning.near_ranges:
             points = self.points
+            if not points.meets(self.goal).any() and points.nearness.max() < tuning.hopeful_nearness:
+                return
             costs = points.cost(self.goal, None if wanted is None else wanted(points.shares))
             best = points.shares[int(costs.argmin())]
             ends = [(max(0.0, at - away), min(1.0, at + away)) for at in best]
@@ -239,6 +253,11 @@ class Search:
             near = low + (high - low) * drawn
             near[0] = best
             _evolve(cost, near, ends, self.budget.refined)
+
+    def _is_hopeless(self, generation: int) -> bool:
+        """Tell whether no point is anywhere near to settling after some generations."""
+        tuning, points = RemedySettings.current(), self.points
+        return generation >= tuning.hopeless_generations and points.nearness.max() < tuning.hopeless_nearness
 
     def _at_the_limit(self, grid: np.ndarray) -> list[float]:
         """Return where between grid points one variable reaches the bandwidth limit from below."""
@@ -286,7 +305,9 @@ class Search:
         def so_far() -> TriedPoints:
             nearness = np.mean(np.isfinite(columns[:3]), axis=(0, 2))
             times, loosely, slowly, forces = (quantile(column, goal.share) for column in columns)
-            return TriedPoints(shares, times, loosely, slowly, forces, margin, bandwidth, nearness, whole)
+            settles = np.isfinite(settling) & (settling <= _most(goal.settle)) & np.isfinite(slower)
+            reach = _smallest_move(settles, self.machines.sizes)
+            return TriedPoints(shares, times, loosely, slowly, forces, margin, bandwidth, nearness, whole, reach)
 
         def worth_it(left: np.ndarray) -> np.ndarray:
             goes_on = (so_far().cost(goal, wanted) <= most)[left]
@@ -431,6 +452,16 @@ class Search:
         return closer
 
 
+def _smallest_move(settles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Return the smallest move from which on all machines settle (points, machines), shape (points,).
+
+    It is infinite where the machine with the largest move does not settle.
+    """
+    order = np.argsort(-sizes, kind="stable")
+    count = np.logical_and.accumulate(settles[:, order], axis=1).sum(axis=1)
+    return np.where(count > 0, sizes[order][count - 1], np.inf)
+
+
 def _order(points: TriedPoints, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
     """Return the measure by which points are sorted, shape (n,).
 
@@ -457,11 +488,12 @@ def _evolve(
     start: np.ndarray,
     ends: list[tuple[float, float]],
     generations: int,
+    is_hopeless: Callable[[int], bool] = lambda generation: False,
 ) -> None:
     """Run differential evolution from points (points, variables) between `ends`.
 
-    A new point replaces its rival only if it costs less; `cost` is told the rival's cost so that it can give up
-    early.
+    A new point replaces its rival only if it costs less; `cost` is told the rival's cost so that it can give up early.
+    After each generation, whose number it is told, `is_hopeless` may end the search.
     """
     settings = RemedySettings.current()
     most: np.ndarray | float = np.inf
@@ -476,7 +508,7 @@ def _evolve(
     def ended(intermediate_result: Any) -> bool:
         nonlocal most
         most = intermediate_result.population_energies.copy()
-        return _agree(intermediate_result)
+        return _agree(intermediate_result) or is_hopeless(intermediate_result.nit)
 
     differential_evolution(
         bounded,

@@ -35,8 +35,12 @@ class RemedySettings(Settings):
     machine_factor: int = setting(2, "")
     """The least change is at the edge of what works: with the usual number of machines it often fails."""
 
-    shortest_travel: float = setting(0.25, "")
-    """Machines also make short moves; shorter ones are no longer moves of this stage."""
+    smallest_move: float = setting(10.0, "")
+    """In tolerances: the smallest move without [moves]; shorter ones are hardly left by a stage that is in position."""
+
+    large_share: float = setting(4.0, "")
+    """Ratio of largest to smallest move from which settings are told that serve large moves alone; with less of the
+    range there is hardly a stroke that they serve."""
 
     most_tries: int = setting(3, "")
     """Remedies whose three best points fail on fresh machines have not worked at all."""
@@ -119,6 +123,17 @@ class RemedySettings(Settings):
     near_ranges: tuple[float, ...] = setting((0.12, 0.12, 0.03), "")
     """Shares of the ranges in which the search goes on about its best point, one after the other."""
 
+    hopeless_generations: int = setting(4, "")
+    """Generations after which a search may be hopeless; fewer end one whose first points lie badly."""
+
+    hopeless_nearness: float = setting(0.5, "")
+    """Share of machines that settle with the best point below which a search is hopeless: more generations rarely bring
+    the others to rest, and runs that do not settle cost most."""
+
+    hopeful_nearness: float = setting(0.9, "")
+    """Share of machines that settle with the best point from which on a search goes on around it; below it, none of the
+    axes of the benchmark found a setting there."""
+
     agreed_cost: float = setting(0.01, "")
     """Generations whose costs agree this closely move no more."""
 
@@ -193,3 +208,10 @@ class RemedySettings(Settings):
 
     window_halvings: int = setting(4, "")
     """Locates an end to a sixteenth of a step; finer is below the spread of machines."""
+
+    surveyed_halvings: int = setting(2, "")
+    """The same for the ends at which something attracts machines: each halving costs surveys of all of them."""
+
+    worthwhile_share: float = setting(0.9, "")
+    """A change counts as smaller than another if its logarithm is below this share of the other's: to verify one that
+    is hardly smaller costs seconds and brings nothing."""

@@ -56,10 +56,10 @@ def of_key(key: str, low: float, high: float, present: float = float("nan")) -> 
     return Variable(key, low, high, lambda flat, value: {key: value}, present)
 
 
-def bandwidth_factor() -> Variable:
+def bandwidth_factor(present: float = float("nan")) -> Variable:
     """Return the speed of the whole controller as a factor of the present one."""
     settings = RemedySettings.current()
-    return Variable(BANDWIDTH, settings.slowest_factor, settings.fastest_factor, sped_up)
+    return Variable(BANDWIDTH, settings.slowest_factor, settings.fastest_factor, sped_up, present)
 
 
 def gains(stage: Stage) -> tuple[Variable, ...]:

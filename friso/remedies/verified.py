@@ -16,7 +16,7 @@ from friso.frequency.stiffness import in_series
 from friso.hunting import Case, CheckPart, check_given
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
-from friso.remedies.machines import Fleet
+from friso.remedies.machines import Fleet, MoveRange
 from friso.remedies.search import TriedPoints
 from friso.remedies.settings import RemedySettings
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile, timing
@@ -29,7 +29,7 @@ from friso.studies.compare.statistics import quantile_interval
 ONE = np.zeros((1, 0))
 """The shares of the one point of a remedy without variables."""
 
-Certainty = Literal["works", "unsure", "given up", "does not work"]
+Certainty = Literal["works", "large moves", "unsure", "given up", "does not work"]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,8 @@ class Performance:
 
     They are its `moves`, the modulus margins, and what attracts the machines. `own_margin` is the least modulus margin
     of the stage itself in all settled states. `stiffness` [N/m] is its stiffness against a load. For `further`
-    machines, shape (n,), it is only known whether they meet the whole goal.
+    machines, shape (n,), it is only known whether they meet the whole goal. `sizes` [m] are the moves of all machines,
+    the further ones last, which were drawn from the range `moves_drawn`.
     """
 
     moves: Moves
@@ -47,6 +48,8 @@ class Performance:
     own_margin: float
     stiffness: float
     further: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
+    sizes: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    moves_drawn: MoveRange | None = None
 
     @property
     def count(self) -> int:
@@ -88,8 +91,28 @@ class Performance:
 
     def share(self, goal: Goal) -> Share:
         """Return the probability that a machine meets the whole goal, with its interval."""
-        meets = np.append(self._meets_all(goal), self.further)
+        meets = self._all_meeting(goal)
         return share(meets, np.ones(meets.shape, bool))
+
+    def held_moves(self, goal: Goal) -> tuple[float, float] | None:
+        """Return the smallest and largest move [m] between which the goal holds; None if there are none.
+
+        Of the moves next to either end, as many as one likes, at least the share wanted meet the goal.
+        """
+        order = np.argsort(self.sizes, kind="stable")
+        if self.moves_drawn is None or not order.size:
+            return None
+        held = longest_run(self._all_meeting(goal)[order], goal.share)
+        if held is None:
+            return None
+        first, last = held
+        low = self.moves_drawn.smallest if first == 0 else self.sizes[order[first]]
+        high = self.moves_drawn.largest if last == order.size - 1 else self.sizes[order[last]]
+        return float(low), float(high)
+
+    def _all_meeting(self, goal: Goal) -> np.ndarray:
+        """Return which machines meet the whole goal, the further ones last."""
+        return np.append(self._meets_all(goal), self.further)
 
     def _meets_all(self, goal: Goal) -> np.ndarray:
         return np.all([*self.meets(goal).values()], axis=0)
@@ -99,10 +122,35 @@ class Performance:
         meeting = self.share(goal)
         return True if meeting.low >= goal.share else False if meeting.high < goal.share else None
 
+    def surveyed(self, stage: Stage, machines: Fleet, goal: Goal) -> Performance:
+        """Return the performance with a survey of what attracts the machines that meet the rest of the goal."""
+        some = np.flatnonzero(self._meets_all(goal))
+        if not some.size:
+            return self
+        surveyed = attraction(Remedy.settled_on("", stage), ONE, machines.take(some), goal)
+        return replace(self, attraction=self.attraction.of_some(surveyed, some))
+
     def with_further(self, stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
         """Return the performance with further machines measured."""
         meets = performance_of(stage, machines, goal, drive)._meets_all(goal)
-        return replace(self, further=np.append(self.further, meets))
+        sizes = np.append(self.sizes, machines.sizes)
+        return replace(self, further=np.append(self.further, meets), sizes=sizes)
+
+
+def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
+    """Return the first and last place of the run of places that gains most.
+
+    A place that meets the goal gains as much as makes up for those that do not at the `share` wanted, so that of each
+    part next to an end of the run at least that share meets it. Returns None if none gains as much as the fewest places
+    that can show such a share.
+    """
+    if meets.all():
+        return 0, len(meets) - 1
+    sums = np.cumsum(np.append(0.0, np.where(meets, 1 - share, -share)))
+    gains = np.where(np.tri(len(meets), dtype=bool).T, sums[1:] - sums[:-1, None], -np.inf)
+    first, last = np.unravel_index(int(gains.argmax()), gains.shape)
+    in_places, fewest = gains[first, last] / (1 - share), 1 / (1 - share)
+    return (int(first), int(last)) if round(in_places) >= round(fewest) else None
 
 
 @dataclass(frozen=True)
@@ -113,7 +161,8 @@ class RemedyOutcome:
     reasons why it is not sure to work; it works if there are none. `windows` tell how far each number may vary.
 
     `points` are all settings tried; `attracted` counts those given up because something attracted machines. `shares`
-    locate the stage in the remedy's ranges. `cut` tells that the search took too much work.
+    locate the stage in the remedy's ranges. `cut` tells that the search took too much work. `moves_from` [m] is the
+    smallest move of those for which the stage was verified, if it serves large moves alone.
     """
 
     remedy: Remedy
@@ -127,6 +176,7 @@ class RemedyOutcome:
     interrupted: bool = False
     shares: np.ndarray = field(default_factory=lambda: np.zeros(0))
     cut: bool = False
+    moves_from: float | None = None
 
     @property
     def certainty(self) -> Certainty:
@@ -138,34 +188,33 @@ class RemedyOutcome:
             return "unsure"
         if self.stage is None:
             return "given up" if self.cut or self.points is None else "does not work"
-        return "unsure" if self.doubts else "works"
+        return "unsure" if self.doubts else "works" if self.moves_from is None else "large moves"
 
     def least_cost(self, goal: Goal) -> float:
         """Return the least cost of the points tried (see `TriedPoints.cost`); infinite without any."""
         return np.inf if self.points is None else float(self.points.cost(goal).min())
 
 
-@np.errstate(all="ignore")
 def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
-    """Measure a stage on machines, with sampling and delay of the stage `drive` for its margins.
+    """Measure a stage on machines, with sampling and delay of the stage `drive` for its margins."""
+    return moving(stage, machines, goal, drive).surveyed(stage, machines, goal)
 
-    What attracts is surveyed only for machines that meet the rest of the goal; for others nothing is reported.
-    """
+
+@np.errstate(all="ignore")
+def moving(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
+    """Measure the moves and margins of a stage on machines; what attracts these is not surveyed (see `surveyed`)."""
     settings = RemedySettings.current()
     remedy = Remedy.settled_on("", stage)
     flat = stage.flat()
-    measured = Performance(
+    return Performance(
         moves_of_points(remedy, ONE, machines, goal, rtol=settings.move_rtol),
         modulus_margins(remedy, ONE, machines, drive),
         Attraction.none(machines.count),
         min(settled_margin(linear_flat(drive, state)) for state in gain_states({**flat, **timing(drive)})),
         _stiffness(flat),
+        sizes=machines.sizes,
+        moves_drawn=machines.moves,
     )
-    some = np.flatnonzero(measured._meets_all(goal))
-    if not some.size:
-        return measured
-    surveyed = attraction(remedy, ONE, machines.take(some), goal)
-    return replace(measured, attraction=measured.attraction.of_some(surveyed, some))
 
 
 def _stiffness(flat: Mapping[str, Any]) -> float:

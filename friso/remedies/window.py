@@ -11,19 +11,19 @@ import numpy as np
 from friso.engine.allowance import Exhausted, allowance
 from friso.remedies.search import Search
 from friso.remedies.settings import RemedySettings
-from friso.remedies.trials import attraction
 
 
 @dataclass(frozen=True)
 class VariableWindow:
-    """The range from `low` to `high` of a variable in which machines meet the goal.
+    """The range from `low` to `high` of a variable around its tuned `value` in which machines meet the goal.
 
-    Its ends are in SI, or factors. All else is as tuned. `open_below` and `open_above` tell that the range reaches an
+    All three are in SI, or factors. All else is as tuned. `open_below` and `open_above` tell that the range reaches an
     end of the search.
     """
 
     name: str
     low: float
+    value: float
     high: float
     open_below: bool
     open_above: bool
@@ -53,32 +53,38 @@ def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
             outside[number, 0] = places[first - 1]
         if above.size:
             outside[number, 1] = places[last + 1]
-    _halve(inside, outside, np.argwhere(np.isfinite(outside)), partial(_meets, search, shares))
+    _halve(
+        inside, outside, np.argwhere(np.isfinite(outside)), partial(_meets, search, shares), settings.window_halvings
+    )
     try:
         with allowance(settings.search_work):
             ends = np.argwhere(inside != shares[:, None])
             attracted = ends[~_clear(search, shares, ends[:, 0], inside[*ends.T])]
             outside[*attracted.T], inside[*attracted.T] = inside[*attracted.T], shares[attracted[:, 0]]
-            _halve(inside, outside, attracted, partial(_clear, search, shares))
+            _halve(inside, outside, attracted, partial(_clear, search, shares), settings.surveyed_halvings)
     except Exhausted:
         return ()
-    ends_of = [[float(value) for value in variable.at(row)] for variable, row in zip(variables, inside, strict=True)]
-    return tuple(
-        VariableWindow(variable.name, low, high, *np.isnan(row).tolist())
-        for variable, (low, high), row in zip(variables, ends_of, outside, strict=True)
-    )
+    listed = []
+    for number, variable in enumerate(variables):
+        places = np.array([inside[number, 0], shares[number], inside[number, 1]])
+        low, value, high = search.remedy.values(_moved(shares, np.full(3, number), places))[:, number].tolist()
+        listed.append(VariableWindow(variable.name, low, value, high, *np.isnan(outside[number]).tolist()))
+    return tuple(listed)
 
 
 def _halve(
-    inside: np.ndarray, outside: np.ndarray, ends: np.ndarray, does: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    inside: np.ndarray,
+    outside: np.ndarray,
+    ends: np.ndarray,
+    does: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    halvings: int,
 ) -> None:
     """Bisect between the last places that work and the next ones that do not, (variables, 2).
 
     `ends` selects some of the ends by numbers of variables and sides, (n, 2).
     """
-    settings = RemedySettings.current()
     rows, sides = ends.T
-    for _ in range(settings.window_halvings if len(ends) else 0):
+    for _ in range(halvings if len(ends) else 0):
         middle = (inside[rows, sides] + outside[rows, sides]) / 2
         good = does(rows, middle)
         inside[rows[good], sides[good]], outside[rows[~good], sides[~good]] = middle[good], middle[~good]
@@ -96,8 +102,7 @@ def _clear(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.n
     """Tell whether nothing attracts the machines at points with one variable each moved."""
     if not len(places):
         return np.ones(0, bool)
-    survey = attraction(search.remedy, _moved(shares, numbers, places), search.machines, search.goal)
-    return np.asarray(survey.clear.mean(axis=1) >= search.goal.share)
+    return search.clear(_moved(shares, numbers, places))
 
 
 def _moved(shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -26,6 +26,7 @@ TEXT_KINDS = {
     "AxisRange": 'KEY="FIRST..LAST"',
     "AxisPoints": 'KEY="FIRST..LAST:POINTS"',
     "FrequencyBand": '"FIRST..LAST"',
+    "LengthRange": '"SMALLEST..LARGEST"',
     "Changeable": "PART",
     "LawName": "LAW",
     "KindName": "KIND",

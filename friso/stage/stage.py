@@ -48,6 +48,7 @@ from friso.stage.tables import (
     Joint,
     Masses,
     Parasitic,
+    StatedMoves,
     friction_law,
 )
 from friso.stage.transmission import MOTOR_FRICTION, MOTOR_MASS, Encoder, Transmission, motor_mass, of_motor
@@ -69,6 +70,7 @@ _CONDITIONS = Table(lambda _: Conditions, "[conditions] load = 1.3, load_share =
 _CABLE = Table(lambda _: Cable, '[cable] stiffness = "50 N/m"')
 _FLOOR = Table(lambda _: Floor, '[floor] frequency = ["1 Hz", "100 Hz"] ...')
 _MOTION = Table(MOTION.pick, '[motion] kind = "step", size = "1 mm", duration = "20 s"')
+_MOVES = Table(lambda _: StatedMoves, '[moves] smallest = "10 um", largest = "32 mm"')
 
 
 class Stage(Section):
@@ -105,6 +107,7 @@ class Stage(Section):
     cable: Annotated[Cable | None, _CABLE] = None
     floor: Annotated[Floor | None, _FLOOR] = None
     motion: Annotated[Motion, _MOTION]
+    moves: Annotated[StatedMoves | None, _MOVES] = None
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(

@@ -15,6 +15,7 @@ from friso.quantities import (
     any_sign,
     non_negative,
     positive,
+    quoted,
 )
 from friso.stage.section import Section, UncertainSection, Variants
 
@@ -178,3 +179,30 @@ class Bias(UncertainSection):
 
 ROUNDING = 1e-12
 """Relative slack of the limits on times, which are sums of decimal numbers."""
+
+
+class StatedMoves(Section):
+    """The moves that the machine makes, uniform in the logarithm: friso tune draws one for each machine.
+
+    Without accelerations, all moves have that of [motion].
+    """
+
+    smallest: Annotated[Value, Quantity("m", positive, "10 um")]
+    largest: Annotated[Value, Quantity("m", positive, "32 mm")]
+    lowest_acceleration: Annotated[Value | None, Quantity("m/s^2", positive, "1 m/s^2")] = None
+    highest_acceleration: Annotated[Value | None, Quantity("m/s^2", positive, "10 m/s^2")] = None
+
+    @model_validator(mode="after")
+    def _are_ranges(self) -> Self:
+        lowest, highest = self.lowest_acceleration, self.highest_acceleration
+        if (lowest is None) != (highest is None):
+            key, example = ("lowest", "1 m/s^2") if lowest is None else ("highest", "10 m/s^2")
+            expected = "both ends of the accelerations, or neither"
+            raise StageError(f"{key}_acceleration", "nothing", expected, f'{key}_acceleration = "{example}"')
+        ends = [("smallest", "largest", '"10 um"', '"32 mm"')]
+        ends += [("lowest_acceleration", "highest_acceleration", '"1 m/s^2"', '"10 m/s^2"')] * (lowest is not None)
+        for low, high, first, last in ends:
+            if getattr(self, low) > getattr(self, high):
+                actual = f"{quoted(getattr(self, high).text)} with {low} = {quoted(getattr(self, low).text)}"
+                raise StageError(high, actual, f"at least the {low}", f"{low} = {first}, {high} = {last}")
+        return self

@@ -15,18 +15,19 @@ LITTLE = 0.5
 
 
 def isolator_sentence(suggestion: Suggestion) -> str:
-    """Say whether the stage would settle on the suggested isolator."""
+    """Say whether the stage would stop hunting on the suggested isolator; in which time it settles is not said."""
     flat = suggestion.stage.flat()
     joint = (
         f"an isolator of k_j = {with_unit(flat['joint.stiffness'], 'N/m')}, stroke "
         f"{with_unit(flat['joint.stroke'], 'm')} and damping {with_unit(flat['joint.damping'], 'N*s/m')}"
     )
     if not suggestion.settles:
-        return f"It would not surely settle on {joint}, or on any shorter stroke tried."
+        return f"It would not surely stop hunting on {joint}, or on any shorter stroke tried."
     low = "" if suggestion.margin >= LITTLE else ": too little, so that the controller has to be tuned as well"
     masses = [with_unit(flat[f"masses.{part}"], "kg") for part in ("cart", "stage")]
     return (
-        f"On {joint} between {masses[0]} on the cart and {masses[1]} on the stage it would settle: nothing was found "
+        f"On {joint} between {masses[0]} on the cart and {masses[1]} on the stage it would not hunt: nothing was found "
         f"to attract it down to 1/{SEARCH_LIMITS.edge_distance:g} of this bandwidth. Its modulus margin would be "
-        f"{suggestion.margin:.2f}{low}. This is a first estimate: friso tune finds the best isolator and verifies it."
+        f"{suggestion.margin:.2f}{low}. How soon moves settle on it was not computed: friso tune finds the best "
+        "isolator and tells for which moves it holds."
     )

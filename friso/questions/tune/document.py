@@ -31,6 +31,7 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
             "machines": tuning.machines.count,
             "goal": {
                 "within_m": goal.within,
+                "moves": None if goal.moves is None else asdict(goal.moves),
                 "settle_s": goal.settle,
                 "force_limit_n": goal.force_limit,
                 "bandwidth_limit_hz": goal.bandwidth_limit,
@@ -78,6 +79,7 @@ def _performance(measured: Performance, tuning: Advice) -> dict[str, Any]:
     """Return shares, settling times, force and margin of machines."""
     goal = tuning.goal
     return {
+        "moves_m": measured.held_moves(goal),
         "meets_goal": asdict(measured.share(goal)),
         "slowest_twentieth_s": measured.slowest(goal),
         "slowest_twentieth_interval_s": measured.slowest_interval(goal),

@@ -104,7 +104,8 @@ def _shown(tuning: Advice) -> list[RemedyOutcome]:
 
 def _name(outcome: RemedyOutcome) -> str:
     """Return the name of a remedy, marked if it is not sure to work."""
-    return outcome.remedy.name if outcome.certainty == "works" else f"{outcome.remedy.name} (not sure)"
+    marks = {"works": "", "large moves": " (large moves)"}
+    return f"{outcome.remedy.name}{marks.get(outcome.certainty, ' (not sure)')}"
 
 
 def _response(tuning: Advice, lines: Lines) -> Panel:
@@ -159,8 +160,7 @@ def _windows(tuning: Advice) -> list[Panel]:
     least = tuning.least
     if least is None or not least.windows:
         return []
-    tuned = [float(v.at(share)) for v, share in zip(least.remedy.variables, least.shares, strict=True)]
-    ends = [(window.low / at, window.high / at) for window, at in zip(least.windows, tuned, strict=True)]
+    ends = [(window.low / window.value, window.high / window.value) for window in least.windows]
     rows = tuple(window.name.removeprefix(f"{CONTROLLER}.") for window in least.windows)
     series = tuple(
         Series(np.array(pair), np.full(2, float(row)), "works" * (row == 0), BLUE, width=6)

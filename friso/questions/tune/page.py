@@ -17,8 +17,8 @@ from friso.shown.pages import Report
 from friso.stage import Stage
 from friso.stage.correlations import correlations_file, correlations_text
 
-NOT_SURE = "-not-sure"
-"""End of the names of stage files with remedies that are not sure to work."""
+NOT_SURE, LARGE_MOVES = "-not-sure", "-for-large-moves"
+"""Ends of the names of stage files with remedies that are not sure to work, or that work for large moves alone."""
 
 OF_LEAVES = "-of-leaf-springs"
 """End of the names of stage files with joints made of leaf springs."""
@@ -41,7 +41,7 @@ def stage_files(tuning: Advice) -> dict[str, Content]:
         if outcome.stage is None:
             continue
         slug = outcome.remedy.name.replace(",", "").replace(":", "").replace(" ", "-")
-        unsure = "" if outcome.certainty == "works" else NOT_SURE
+        unsure = {"works": "", "large moves": LARGE_MOVES}.get(outcome.certainty, NOT_SURE)
         files |= _stage_file(tuning, f"tuned-{slug}{unsure}.toml", outcome.stage)
     least = tuning.least
     return {**_stage_file(tuning, "tuned.toml", least.stage if least else None), **files}

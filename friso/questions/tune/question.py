@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import get_args
@@ -17,6 +18,7 @@ from friso.interface.inputs import (
     ForceLike,
     FrequencyLike,
     LengthLike,
+    LengthRange,
     RatioLike,
     Seed,
     StageLike,
@@ -34,6 +36,7 @@ from friso.progress import Progress, silent
 from friso.quantities import Bound, Quantity, positive, quoted
 from friso.remedies import Changeable
 from friso.remedies.goal import Goal
+from friso.remedies.machines import MoveRange
 from friso.stage import Stage
 
 _IN_POSITION = Bound("greater than 0 and at most 1", lambda value: (value > 0) & (value <= 1))
@@ -51,6 +54,8 @@ class TuneAnswer(Answer):
         if not self.result.needed or self.result.working:
             return ""
         so_far = "before it was interrupted, " if self.result.interrupted else ""
+        if self.result.for_large_moves:
+            return f"{so_far}no change that was tried works for all moves, for large ones alone some do"
         return f"{so_far}no change that was tried works for certain"
 
     @property
@@ -96,6 +101,7 @@ def tune(
     *,
     within: LengthLike | None = None,
     settle: TimeLike | None = None,
+    moves: LengthRange | None = None,
     force_limit: ForceLike | None = None,
     bandwidth_limit: FrequencyLike | None = None,
     margin: RatioLike | None = None,
@@ -111,6 +117,9 @@ def tune(
     ----------
     settle : str or float, optional
         Time after the move in which 95 % of the machines are in position, "0.3 s" or a number [s].
+    moves : str, optional
+        Smallest and largest move, "10 um..32 mm"; default: [moves] of the file, or from ten times the tolerance to the
+        file's own move.
     force_limit : str or float, optional
         Largest force of the actuator during the moves, "50 N" or a number [N].
     bandwidth_limit : str or float, optional
@@ -138,7 +147,7 @@ def tune(
     >>> friso.tune(friso.example("thesis_rig"), only="controller", within="2 um")  # doctest: +SKIP
     """
     chosen = read_stage(stage, set, leaves_out=("rail", "cable", "floor"), uncertain_too=True)
-    goal = _goal(chosen, within, settle, force_limit, bandwidth_limit, margin, only, keep)
+    goal = _goal(chosen, within, settle, moves, force_limit, bandwidth_limit, margin, only, keep)
     correlations = correlations_of(stage, chosen)
     if missing("design"):
         LOGGER.warning(f"no leaf springs are sized for a joint: that takes {install('design')}")
@@ -152,6 +161,7 @@ def _goal(
     stage: Stage,
     within: float | str | None,
     settle: float | str | None,
+    moves: str | None,
     force_limit: float | str | None,
     bandwidth_limit: float | str | None,
     margin: float | str | None,
@@ -182,7 +192,23 @@ def _goal(
         margin=Goal.margin if margin is None else _margin(margin),
         controller=only != "joint" and keep != "controller",
         joint=only != "controller" and keep != "joint",
+        moves=None if moves is None else _moves(moves, stage),
     )
+
+
+def _moves(text: str, stage: Stage) -> MoveRange:
+    """Read the range of moves, with the accelerations of [moves]. Raises InputError."""
+    length, stated = Quantity("m", positive, "10 um").on(stage.axis_kind), MoveRange.of_stage(stage, 0.0)
+    first, _, last = text.partition("..")
+    largest = Quantity("m", positive, "32 mm").on(stage.axis_kind).example
+    example = f'"{length.example}..{largest}"'
+    try:
+        low, high = (float(length.read(part.strip())) for part in (first, last))
+    except InputError:
+        raise wrong("moves", quoted(text), "smallest and largest move, FIRST..LAST, with units", example) from None
+    if low > high:
+        raise wrong("moves", quoted(text), "the smallest move first", example)
+    return replace(stated, smallest=low, largest=high)
 
 
 def _margin(number: float | str) -> float:

@@ -65,6 +65,7 @@ DOUBTS = {
 COLUMNS = (
     "Works",
     "Machines that meet the goal",
+    "For moves of",
     "Slowest twentieth settles in",
     "Median",
     "Largest force",
@@ -151,12 +152,27 @@ def answer(tuning: Advice) -> list[str]:
         return [*lines, *_nothing(tuning)]
     least, fastest = tuning.least, tuning.fastest
     assert least is not None
+    lines += _in_short(tuning)
     lines += _works(least, tuning, _least_words(tuning))
     if fastest is not None and fastest is not least:
         lines += _works(fastest, tuning, "What settles soonest")
     elif len(tuning.working) > 1:
         lines += _works(tuning.working[1], tuning, "The next best")
     return [*lines, f"The goal: {goal_words(tuning.goal)}.{_of_the_drive(tuning)}", *unknown(tuning)]
+
+
+def _in_short(tuning: Advice) -> Iterator[str]:
+    """Yield the least change and what settles soonest, each with its time; nothing if they are the same."""
+    least, fastest = tuning.least, tuning.fastest
+    if least is None or fastest is None or least is fastest:
+        return
+    times = [slowest_time(outcome.measured, tuning.goal) for outcome in (least, fastest) if outcome.measured]
+    if len(times) == 2:
+        before = slowest_time(tuning.present, tuning.goal)
+        yield (
+            f"Least change: {least.remedy.name.removesuffix(LEAST)}, in position after {times[0]}. Soonest: "
+            f"{fastest.remedy.name}, after {times[1]}. As it is: {before}."
+        )
 
 
 def _least_words(tuning: Advice) -> str:
@@ -169,7 +185,7 @@ def _least_words(tuning: Advice) -> str:
         given_up = any(outcome.certainty == "given up" for outcome in sought)
         smaller = " (the search for a smaller one was given up, as it takes too much computing)" * given_up
         return f"The least change that works{smaller}"
-    if any(not outcome.interrupted for outcome in sought):
+    if tuning.least_sought or any(not outcome.interrupted for outcome in sought):
         return "The least change so far that works"
     return "This works, but was tuned to settle soonest and is not the least change, which was not sought yet"
 
@@ -201,12 +217,15 @@ def goal_words(goal: Goal) -> str:
     """Describe the goal in words."""
     late = "" if goal.settle is None else f", in {with_unit(goal.settle, 's')}"
     force = "" if goal.force_limit is None else f" with at most {with_unit(goal.force_limit, 'N')}"
-    most = goal.bandwidth_limit
+    most, moves = goal.bandwidth_limit, goal.moves
+    moving = "" if moves is None else f" after moves of {range_with_unit(moves.smallest, moves.largest, 'm')}"
+    if moves is not None and moves.accelerations is not None:
+        moving += f" with {range_with_unit(*moves.accelerations, 'm/s^2')}"
     limit = "" if most is None else f" and a bandwidth of at most {with_unit(most, 'Hz')}"
     return (
-        f"{percent(goal.share)} of the machines in position within {with_unit(goal.within, 'm')}{late}{force}, with a "
-        f"modulus margin of {goal.margin:g}{limit}, and nothing that attracts them down to {1 / goal.distance:.2f} of "
-        "their bandwidth"
+        f"{percent(goal.share)} of the machines in position within {with_unit(goal.within, 'm')}{late}{moving}{force}, "
+        f"with a modulus margin of {goal.margin:g}{limit}, and nothing that attracts them down to "
+        f"{1 / goal.distance:.2f} of their bandwidth"
     )
 
 
@@ -309,9 +328,21 @@ def _brings(measured: Performance, tuning: Advice) -> str:
         f"after {slowest_time(measured, tuning.goal)}" if measured.slowest(tuning.goal) else "once the reference stands"
     )
     return (
-        f"Of {measured.count} fresh machines and moves, {meet} meet the goal; "
+        f"Of {measured.count} fresh machines and moves, {meet} meet the goal, {_holds(measured, tuning.goal)}; "
         f"the slowest twentieth is in position {when}{as_is}"
     )
+
+
+def held_range(measured: Performance, goal: Goal) -> str:
+    """Write the smallest and largest move for which the goal holds; a dash if it holds for none."""
+    held = measured.held_moves(goal)
+    return NOTHING if held is None else range_with_unit(*held, "m")
+
+
+def _holds(measured: Performance, goal: Goal) -> str:
+    """Say for which moves the goal holds."""
+    moves = held_range(measured, goal)
+    return "for no range of moves" if moves == NOTHING else f"which holds for moves of {moves}"
 
 
 def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
@@ -349,6 +380,8 @@ def _nothing(tuning: Advice) -> list[str]:
     """Say that no remedy surely works, which ones might, and what to relax."""
     unsure = [outcome for outcome in tuning.outcomes if outcome.certainty == "unsure"]
     lines = [f"No option was found that certainly meets the goal: {goal_words(tuning.goal)}."]
+    for outcome in tuning.for_large_moves:
+        lines += _works(outcome, tuning, f"For moves of {length_from(outcome)} and more alone")
     lines += [
         f"{outcome.remedy.name} might work ({listed(changes(tuning.stage, outcome.stage), 'and')}), but "
         f"{unsure_why(outcome)}."
@@ -361,6 +394,11 @@ def _nothing(tuning: Advice) -> list[str]:
     if not tuning.relaxed and not tuning.interrupted:
         lines.append(_no_relaxation(tuning))
     return lines
+
+
+def length_from(outcome: RemedyOutcome) -> str:
+    """Write the smallest move for which a remedy was verified that serves large moves alone."""
+    return with_unit(outcome.moves_from or 0.0, "m")
 
 
 def _no_relaxation(tuning: Advice) -> str:
@@ -442,6 +480,10 @@ def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
         return "Its motions take too much computing."
     points, goal = outcome.points, tuning.goal
     sentence = next(_reasons(points, outcome, goal))
+    largest = goal.moves.largest if goal.moves else np.inf
+    for number in points.for_large_moves(goal, largest)[:1]:
+        smallest = with_unit(float(points.moves_from[number]), "m")
+        sentence += f" For moves of {smallest} and more alone, one does on the machines of the search."
     edges = _edges(tuning) if [v.name for v in outcome.remedy.variables] == [BANDWIDTH] else ""
     cut = " The search was given up there, as it takes too much computing: others may work." if outcome.cut else ""
     return f"{sentence}{edges}{cut}"
@@ -515,7 +557,13 @@ def _edges(tuning: Advice) -> str:
 def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
     """Return the remedies side by side, the stage as it is first."""
     shown = [("as it is", tuning.present, "no" if tuning.needed else "yes")]
-    words = {"works": "yes", "unsure": "not sure", NONE_FOUND: "none found", "does not work": "no"}
+    words = {
+        "works": "yes",
+        "large moves": "large moves",
+        "unsure": "not sure",
+        NONE_FOUND: "none found",
+        "does not work": "no",
+    }
     table = [(name, _row(measured, tuning, works)) for name, measured, works in shown]
     for outcome in tuning.outcomes:
         works = words.get(verdict := _verdict(outcome, tuning), verdict)
@@ -533,6 +581,7 @@ def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
     return [
         works,
         share_with_interval(measured.share(goal)),
+        held_range(measured, goal),
         slowest_time(measured, goal),
         time(measured.median),
         with_unit(measured.force(goal), "N"),
@@ -549,10 +598,8 @@ def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
     stage, name, ends = outcome.stage, window.name, np.array([window.low, window.high])
     assert stage is not None
     if name == BANDWIDTH:
-        pairs = zip(outcome.remedy.variables, outcome.shares, strict=True)
-        tuned = next(variable.at(share) for variable, share in pairs if variable.name == name)
-        stated = bandwidth(stage.flat())
-        ends = bandwidths_at(stage, ends / tuned) if stated is None else stated * ends / tuned
+        stated, factors = bandwidth(stage.flat()), ends / window.value
+        ends = bandwidths_at(stage, factors) if stated is None else stated * factors
         name = stage.controller.bandwidth_key or name
     keys = stage.numeric_keys()
     unit = "Hz" if name == BANDWIDTH else keys[name].unit if name in keys else ""
@@ -612,7 +659,7 @@ def assumptions(tuning: Advice) -> list[str]:
     lines.append(
         "Margins include sampling, delay and current loop of the file; hunting and moves are those of a controller in "
         f"continuous time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), "
-        "each with a move of a quarter of the travel or more."
+        "each with a move of its own."
     )
     lines += spread_sentences(machines.from_file, machines.spreads)
     held = [key for key in tuning.complete(stage).uncertain() if key.startswith("drive.")]
