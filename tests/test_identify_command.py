@@ -206,7 +206,7 @@ def _stopped(*arguments: Any, **named: Any) -> None:
 def test_one_message_holds_the_command_that_tells_all(
     log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is copied, and the log is read; what was said before is kept, and need not be said again."""
+    """It is copied, and the log is read; a run that was refused keeps nothing, neither what was said nor a guess."""
     bare = pd.DataFrame({"t": log.time[:COUNT], "x": log["position"][:COUNT] * 1e3, "u": log["force"][:COUNT]})
     bare.to_csv(tmp_path / "bare.csv", index=False)
     monkeypatch.setattr(method, "identify", _stopped)
@@ -214,13 +214,11 @@ def test_one_message_holds_the_command_that_tells_all(
     monkeypatch.chdir(tmp_path)
     status, _, text = run(capsys, *first)
     assert status == 2
-    assert '"u" = "N"' in (tmp_path / "bare.csv.friso.toml").read_text()
-    assert "kept for the next time" in text
-    assert "bare.csv.friso.toml" in text
+    assert "--unit u=N" in text
     assert not (tmp_path / "out").exists()
     command = next(line for line in text.splitlines() if "friso identify" in line).partition("friso identify")[2]
     assert run(capsys, *shlex.split(command))[0] == 130
-    assert run(capsys, "bare.csv", "--out", "out")[0] == 130
+    assert [file.name for file in tmp_path.iterdir()] == ["bare.csv"]
 
 
 def test_ctrl_c_leaves_nothing(

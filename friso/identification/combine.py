@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -140,14 +141,18 @@ def _intersection(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bo
     agrees = low <= high
     if not agrees:
         low, high = min(estimate.low for estimate in bounding), max(estimate.high for estimate in bounding)
-    method, reason = (
-        joint.join(dict.fromkeys(texts))
-        for joint, texts in (
-            (", ", [estimate.method for estimate in bounding]),
-            ("; ", [estimate.reason for estimate in bounding]),
-        )
-    )
+    method = ", ".join(dict.fromkeys(estimate.method for estimate in bounding))
+    reason = _reasons([estimate.reason for estimate in bounding])
     return Estimate.unknown(key, estimates[0].unit, method, reason, low, high), agrees
+
+
+def _reasons(reasons: Sequence[str]) -> str:
+    """Join reasons; of those that differ in numbers alone the first one stands for all."""
+    alike: dict[str, list[str]] = {}
+    for reason in dict.fromkeys(reasons):
+        alike.setdefault(re.sub(r"\d[\d.e+-]*", "#", reason), []).append(reason)
+    parts = [first + (f", and the like {len(others)} times" if others else "") for first, *others in alike.values()]
+    return "; ".join(parts)
 
 
 def _text(estimate: Estimate) -> str:

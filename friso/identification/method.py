@@ -98,7 +98,7 @@ def identify(
         result = KINDS[kind].analyse(group, prior, replace(settings, progress=part))
         experiments.append(Experiment(kind, group, result, KINDS[kind].estimates(result, stage)))
     estimates, warnings = combined(_every_estimate(experiments))
-    doubts = tuple(doubt for experiment in experiments for doubt in KINDS[experiment.kind].doubts(experiment.result))
+    doubts = _doubts(experiments)
     failed = any(KINDS[experiment.kind].failed(experiment.result) for experiment in experiments)
     if stage is None or nothing_learnt(estimates, failed):
         return Identification(
@@ -206,6 +206,15 @@ def _unpredictable(log: Log) -> InputError:
     needs = [predictor.needs for name in reversed(in_order()) if (predictor := KINDS[name].predictor)]
     expected = ", or ".join(needs)
     return InputError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
+
+
+def _doubts(experiments: Sequence[Experiment]) -> tuple[str, ...]:
+    """Return the doubts about the results: one by one of a single experiment, else a line for each with its logs."""
+    doubts_by_log = [KINDS[experiment.kind].doubts(experiment.result) for experiment in experiments]
+    if len(experiments) == 1:
+        return tuple(doubts_by_log[0])
+    named = [", ".join(log.name for log in experiment.logs) for experiment in experiments]
+    return tuple(f"{name}: {'; '.join(doubts)}" for name, doubts in zip(named, doubts_by_log, strict=True) if doubts)
 
 
 def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:

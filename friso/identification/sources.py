@@ -27,7 +27,7 @@ class LogFile:
     """A file with what it holds, its kind of experiment and why it counts as one.
 
     `mapping` says how it was read, `mapping_file` where that is kept (None: not yet, or nothing had to be said about
-    it), and `earlier` what of it was kept from an earlier time.
+    it), `earlier` what of it was kept from an earlier time, and `replaced` what was kept and is now said otherwise.
     """
 
     path: Path
@@ -37,49 +37,63 @@ class LogFile:
     mapping: Mapping = Mapping()  # noqa: RUF009 (frozen)
     mapping_file: Path | None = None
     earlier: Mapping = Mapping()  # noqa: RUF009 (frozen)
+    replaced: str = ""
 
     @property
     def reused(self) -> str:
-        """A sentence on what nobody said this time; "" for nothing."""
+        """A sentence on what nobody said this time, and on what was kept otherwise; "" for nothing."""
         words, place = self.earlier.words, self.mapping_file or sidecar(self.path)
-        return f"{self.path.name}: read as kept in {place.name}: {words}" if words else ""
+        parts = [f"read as kept in {place.name}: {words}"] if words else []
+        parts += [f"in place of {self.replaced}, as kept"] if self.replaced else []
+        return f"{self.path.name}: {'; '.join(parts)}" if parts else ""
 
 
 class OpenQuestions(GapsError):
-    """What several logs do not tell; `mappings` are what was said of them, by file, kept beside
-    or not.
-    """
-
-    def __init__(self, gaps: Sequence[LogError], mappings: dict[Path, Mapping]) -> None:
-        """Keep the gaps of all files with their mappings."""
-        super().__init__(gaps)
-        self.mappings = mappings
+    """What several logs do not tell, of all of them."""
 
 
 def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogFile]:
     """Read the files, mapped as the options say, or as kept from an earlier time beside them or
     in `folder`.
 
-    Of several files, each takes what the options say about channels that it has. Raises OpenQuestions for all that they
-    do not tell, InputError for what cannot be read.
+    Raises OpenQuestions for all that they do not tell, InputError for what cannot be read.
+    """
+    files, wrong = read_usable(paths, options, folder)
+    if wrong:
+        raise wrong[0]
+    return files
+
+
+def read_usable(
+    paths: Sequence[Path], options: Mapping, folder: Path, others: Sequence[Path] = ()
+) -> tuple[list[LogFile], list[InputError]]:
+    """Read the files as `read_all` does, and leave out those that cannot be used, as long as one can.
+
+    Returns the files and the errors of those left out. Of several files, and of `others` that are read beside them,
+    each takes what the options say about channels that it has. Raises OpenQuestions for all that they do not tell, and
+    InputError where no file can be used.
     """
     if options.experiment is not None:
         KINDS.checked(options.experiment, "--as", "--as {}")
     files: list[LogFile] = []
     gaps: list[LogError] = []
-    mappings: dict[Path, Mapping] = {}
-    for path in paths:
-        mapping = _applicable(options, path, paths)
+    wrong: list[InputError] = []
+    everything = [*paths, *others]
+    holders = _holders(options, everything) if len(everything) > 1 else {}
+    for number, path in enumerate(paths):
+        mapping = options if is_frequency_response(path) else _applicable(options, number, holders)
         try:
             file = _read(path, mapping, folder)
             files.append(replace(file, mapping_file=kept_at(path, file.mapping, folder)))
-            mappings[path] = file.mapping
         except GapsError as error:
             gaps += error.gaps
-            mappings[path] = mapping.over(load_mapping(path, folder) or Mapping())
+        except InputError as error:
+            wrong.append(error)
     if gaps:
-        raise OpenQuestions(gaps, mappings)
-    return _recognised_together(files)
+        raise OpenQuestions(gaps)
+    if wrong and not files:
+        raise wrong[0]
+    return _recognised_together(files), wrong
 
 
 def _recognised_together(files: list[LogFile]) -> list[LogFile]:
@@ -115,17 +129,19 @@ def per_unit_of_force(file: LogFile, beside: AxisKind | None) -> LogFile:
     return replace(file, source=file.source.per_unit_of_force())
 
 
-def _applicable(options: Mapping, path: Path, paths: Sequence[Path]) -> Mapping:
-    """Return what of the options this file can use.
+def _holders(options: Mapping, paths: Sequence[Path]) -> dict[str, list[bool]]:
+    """Tell for each channel that the options name which of the files have it."""
+    return {name: [_has(path, name) for path in paths] for name in {*options.roles.values(), *options.units}}
+
+
+def _applicable(options: Mapping, place: int, holders: dict[str, list[bool]]) -> Mapping:
+    """Return what of the options the file of a place can use, by which files have the channels.
 
     What no file can use stays, to be answered where it is read.
     """
-    if len(paths) < 2 or is_frequency_response(path):
-        return options
-    names = {*options.roles.values(), *options.units}
-    holders = {name: [_has(other, name) for other in paths] for name in names}
-    place = paths.index(path)
     lacking = {name for name, held in holders.items() if any(held) and not held[place]}
+    if not lacking:
+        return options
     roles = {role: name for role, name in options.roles.items() if name not in lacking}
     units = {name: unit for name, unit in options.units.items() if name not in lacking}
     scales = {k: v for k, v in options.scales.items() if k in roles or k not in options.roles}
@@ -152,13 +168,14 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
     if stored.experiment is not None:
         KINDS.checked(stored.experiment, f"{path}{SUFFIX}: experiment", 'experiment = "{}"')
     mapping = options.over(stored)
+    said = {"earlier": stored.beside(options), "replaced": stored.replaced_by(options)}
     if mapping.experiment is not None:
         KINDS.checked(mapping.experiment, "--as", "--as {}")
         log = log_with_signals(path, mapping, mapping.experiment)
         before = "" if stored.experiment in (None, mapping.experiment) else f", in place of {stored.experiment} as kept"
-        return LogFile(path, log, mapping.experiment, f"as specified{before}", mapping, earlier=stored.beside(options))
+        return LogFile(path, log, mapping.experiment, f"as specified{before}", mapping, **said)
     log, kind, reason = unnamed(path, mapping)
-    return LogFile(path, log, kind, reason, mapping, earlier=stored.beside(options))
+    return LogFile(path, log, kind, reason, mapping, **said)
 
 
 def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:

@@ -48,7 +48,6 @@ def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], show
                 progress=progress,
             )
         except OpenQuestions as error:
-            _keep(error.mappings, target)
             raise InputError(error.key, error.actual, error.expected, _command(error.options), error.origin) from None
         speak_of(answer.axis_kind)
         progress(0, 0, DRAWING)

@@ -30,8 +30,8 @@ WITHOUT_CONTROLLER = (
 def _claims(course: Course) -> str | None:
     """Claim a log whose reference moves, or in which nothing repeats as an excitation does.
 
-    It is no series of constant speeds or force ramps; the position rests in between, or the force turns seldom and
-    holds few frequencies.
+    It is no series of constant speeds or force ramps; the position rests in between, or the force holds few
+    frequencies, as with sines.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if course.reference_moves:
@@ -44,11 +44,8 @@ def _claims(course: Course) -> str | None:
         return None if standing else f"the {course.signal} does not repeat, and there is no reference that moves"
     if repetition.rests > experiment_settings.rests_of_moves:
         return f"{course.repeats}, but the position rests in between"
-    if (
-        repetition.harmonics < experiment_settings.harmonics_of_an_excitation
-        and repetition.turns < experiment_settings.harmonics_of_an_excitation
-    ):
-        return f"{course.repeats}, but rarely reverses and contains few frequencies"
+    if repetition.harmonics < experiment_settings.harmonics_of_an_excitation:
+        return f"{course.repeats}, but contains few frequencies"
     return None
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from friso.errors import InputError, LogError
 from friso.identification.logs import checks, delays
 from friso.identification.logs.format import FORMATS
-from friso.identification.logs.gaps import check_gaps
+from friso.identification.logs.gaps import check_gaps, told_by_mechanics
 from friso.identification.logs.integrated import NOTE, integrated, is_needed
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.logs.mapping import Mapping, option
@@ -41,10 +41,11 @@ def read_log(
     table = with_user_units(form.read(path), mapping, form.times, str(path))
     reading = Reading(table, mapping, strict, not form.units, str(path), tuple(foreign))
     proposal = propose(table, mapping.roles, str(path))
-    by_velocity = is_needed(table, proposal, needed)
+    readings = told_by_mechanics(table, proposal, needed)
+    by_velocity = is_needed(table, proposal, needed, readings[0] if readings else None)
     if by_velocity:
-        needed = [*(role for role in needed if role != "position"), "velocity"]
-    check_gaps(reading, proposal, needed)
+        needed = ["velocity" if role == "position" else role for role in needed]
+    check_gaps(reading, proposal, needed, readings)
     chosen = proposal.chosen
     unused(mapping, chosen, str(path))
     notes = Notes(list(table.read), _undecided(proposal))

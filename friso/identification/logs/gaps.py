@@ -10,9 +10,10 @@ import numpy as np
 from friso.axis import FORCE, ROTARY
 from friso.errors import InputError, LogError
 from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.checks import rises_evenly, samples_held
+from friso.identification.logs.checks import samples_held
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.mapping import guess, option
+from friso.identification.logs.physics import KINDS, MotionReading, is_ramp, leads, motion_readings
 from friso.identification.logs.roles import (
     MEASURED,
     AssignedRole,
@@ -21,6 +22,7 @@ from friso.identification.logs.roles import (
     listing,
     of_no_signal,
     role_of,
+    wanted_of,
     words,
 )
 from friso.identification.logs.settings import LogSettings
@@ -65,10 +67,41 @@ class GapsError(LogError):
         return tuple(dict.fromkeys(gap.example for gap in self.gaps if gap.example))
 
 
-def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> None:
+def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[str]) -> list[MotionReading]:
+    """Read channels without a role as force and motion, as far as names leave these open.
+
+    Returns the best reading, and behind it those that explain the force about as well; [] where nothing is open, or
+    where no reading explains it.
+    """
+    settings = LogSettings.current()
+    chosen, rivals = proposal.chosen, proposal.rivals
+    if "position" not in needed or {"position", *({"force"} & {*needed})} <= chosen.keys():
+        return []
+    taken = [choice.channel for choice in chosen.values()]
+
+    def candidates(role: str) -> list[Channel]:
+        """The channels that may have a role: the one that has it, its rivals, or those that fit it."""
+        if role in chosen:
+            return [chosen[role].channel]
+        every = rivals.get(role) or [channel for channel, _ in _fitting(role, table, taken)]
+        return [channel for channel in every if not is_ramp(channel) and not wanted_of(channel.name, channel.unit)]
+
+    kinds = KINDS if "position" not in {*chosen, *rivals} else KINDS[:1]
+    kinds = KINDS[1:] if "velocity" in chosen and chosen["velocity"].by_user and "position" not in chosen else kinds
+    motions = [(channel, kind) for kind in kinds for channel in candidates(kind)]
+    readings = [one for one in motion_readings(candidates("force"), motions) if not _are_alike(one.force, one.motion)]
+    if not readings or readings[0].unexplained > settings.share_left_by_a_reading:
+        return []
+    most = max(settings.ratio_of_rival_readings * readings[0].unexplained, readings[0].unexplained + 0.01)
+    return [reading for reading in readings if reading.unexplained <= most and reading.doubt == readings[0].doubt]
+
+
+def check_gaps(
+    reading: Reading, proposal: Proposal, needed: Sequence[str], readings: Sequence[MotionReading] = ()
+) -> None:
     """Check that all is told before a log can be read as one with the roles that are `needed`.
 
-    Raises GapsError for all that is not, at once.
+    `readings` are those of its channels by mechanics. Raises GapsError for all that is not, at once.
     """
     table, origin = reading.table, reading.origin
     named = {id(choice.channel) for role, choice in proposal.chosen.items() if choice.by_user and role != "time"}
@@ -84,7 +117,7 @@ def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> N
         if role in OPTIONAL and role not in needed:
             continue
         names = " and ".join(quoted(channel.name) for channel in channels)
-        likely, why = _of_alike(role, channels[0], channels)
+        likely, why = _by_mechanics(role, readings, channels) or _of_alike(role, channels[0], channels)
         example = option("--map", role, likely.name) if likely else ""
         expected = "one channel" + (guess(likely.name) if likely else "")
         gaps.append(LogError(role, f"{len(channels)} candidates: {names}{why}", expected, example, origin))
@@ -92,7 +125,8 @@ def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> N
             chosen[role] = AssignedRole(role, likely, "", True)
     for role in [role for role in needed if role not in chosen and role not in proposal.rivals]:
         taken = {name: choice.channel for name, choice in (proposal.chosen | chosen).items()}
-        likely, why = _likeliest(role, table, taken)
+        free = [channel for channel, _ in _fitting(role, table, taken.values()) if not is_ramp(channel)]
+        likely, why = _by_mechanics(role, readings, free) or _likeliest(role, table, taken)
         example = option("--map", role, likely.name) if likely else ""
         left = listing(table, [choice.channel for choice in proposal.chosen.values()])
         expected = left + (guess(likely.name) if likely else "")
@@ -110,10 +144,32 @@ def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> N
         raise GapsError(gaps, proposed)
 
 
+def _by_mechanics(
+    role: str, readings: Sequence[MotionReading], channels: Sequence[Channel]
+) -> tuple[Channel | None, str] | None:
+    """Return the channel of those that may have a role that mechanics gives it, and why; None where it tells nothing.
+
+    There is no channel where two readings are about as good.
+    """
+    named = {channel.name: channel for one in readings if (channel := one.channel(role)) is not None}
+    if not named:
+        return None
+    best, *others = named.values()
+    alike = [channel for channel in channels if channel is not best and _are_alike(channel, best)]
+    if role in KINDS and alike:
+        return _of_alike(role, best, [best, *alike])
+    others = [channel for channel in others if not _are_alike(channel, best)]
+    if others:
+        either = " or ".join(option("--map", role, channel.name) for channel in (best, others[0]))
+        return None, f"; by force, inertia and friction it is {either}"
+    follows = "accelerates a mass" if role == "force" else "follows from the force as that of a mass with friction"
+    return best, f"; {quoted(best.name)} {follows}"
+
+
 def _of_units(units: Mapping[str, LogError | None], chosen: Mapping[str, AssignedRole]) -> list[LogError]:
     """Return the gaps of units by role; where an axis turns, a torque needs no scale to newtons."""
     gaps = {role: gap for role, gap in units.items() if gap is not None}
-    if any(gap.example == TURNS for gap in gaps.values()):
+    if any(TURNS in gap.example for gap in gaps.values()):
         turned = ROTARY.unit(FORCE)
         gaps = {
             role: gap
@@ -180,14 +236,19 @@ def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Ch
     None where that cannot be told.
     """
     alike = [channel for channel in channels if channel is best or _are_alike(channel, best)]
-    if role != "position" or len(alike) == 1:
+    if role not in KINDS or len(alike) == 1:
         return best, ""
     said = [channel for channel in alike if MEASURED.intersection(words(channel.name))]
     if len(said) == 1:
         return said[0], f"; the name of {quoted(said[0].name)} says that it was measured"
+    last = [one for one in alike if all(leads(other, one) for other in alike if other is not one)]
     (most, noisiest), (next_most, _) = sorted(((_noise(c), c) for c in alike), key=lambda pair: -pair[0])[:2]
     others = " and ".join(quoted(channel.name) for channel in alike if channel is not noisiest)
-    if most < 2 * next_most or any(samples_held(channel.values) > 1 for channel in alike):
+    held = any(samples_held(channel.values) > 1 for channel in alike)
+    if last and (held or most < 2 * next_most or noisiest is last[0]):
+        ahead = " and ".join(quoted(channel.name) for channel in alike if channel is not last[0])
+        return last[0], f"; {ahead} goes ahead of {quoted(last[0].name)}, as a reference does"
+    if last or most < 2 * next_most or held:
         names = " and ".join(quoted(channel.name) for channel in alike)
         return None, f"; {names} are alike: one of them may be a reference"
     return noisiest, f"; {quoted(noisiest.name)} is like {others} with more noise, as what is measured has"
@@ -222,7 +283,7 @@ def _fit(role: str, channel: Channel) -> tuple[bool, int, bool, bool]:
     It changes, and not as a clock does; its unit, whether it is what was wanted, and its first letter count.
     """
     finite = channel.values[np.isfinite(channel.values)]
-    changes = bool(finite.size and np.ptp(finite) > 0) and not rises_evenly(finite)
+    changes = bool(finite.size and np.ptp(finite) > 0) and not is_ramp(channel)
     fits = bool(channel.unit) and any(unit_factor(channel.unit, kind) is not None for kind in _kinds(role))
     unit = 2 if fits else 1 if not channel.unit else 0
     first = next(iter(words(channel.name)), " ")[0]

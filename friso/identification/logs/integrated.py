@@ -8,7 +8,8 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.roles import Proposal, role_of
+from friso.identification.logs.physics import MotionReading, is_ramp
+from friso.identification.logs.roles import Proposal, role_of, wanted_of
 from friso.identification.logs.units import unit_factor
 
 NOTE = (
@@ -21,13 +22,20 @@ LENGTHS = ("m", "rad")
 """Units of which that of a position is."""
 
 
-def is_needed(table: ChannelTable, proposal: Proposal, needed: Sequence[str]) -> bool:
+def is_needed(
+    table: ChannelTable, proposal: Proposal, needed: Sequence[str], best: MotionReading | None = None
+) -> bool:
     """Tell whether the position that is needed has to be the integral of the velocity.
 
-    No channel has that role or could have it, unless the user assigned the velocity and no position.
+    No channel has that role or could have it, unless the user assigned the velocity and no position, or the
+    `best` reading by mechanics has a velocity.
     """
     velocity = proposal.chosen.get("velocity")
-    if velocity is None or "position" not in needed or "position" in {*proposal.chosen, *proposal.rivals}:
+    if "position" not in needed or "position" in {*proposal.chosen, *proposal.rivals}:
+        return False
+    if best is not None:
+        return best.kind == "velocity"
+    if velocity is None:
         return False
     taken = {id(choice.channel) for choice in proposal.chosen.values()}
     others = [channel for channel in table.channels if id(channel) not in taken]
@@ -39,7 +47,9 @@ def _may_be_a_position(channel: Channel) -> bool:
     changes.
     """
     finite = channel.values[np.isfinite(channel.values)]
-    if not finite.size or not np.ptp(finite) > 0 or role_of(channel.name) is not None:
+    if not finite.size or not np.ptp(finite) > 0 or role_of(channel.name) is not None or is_ramp(channel):
+        return False
+    if wanted_of(channel.name, channel.unit):
         return False
     return not channel.unit or any(unit_factor(channel.unit, unit) is not None for unit in LENGTHS)
 

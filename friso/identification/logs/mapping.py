@@ -66,14 +66,16 @@ class Mapping:
     def beside(self, newer: Mapping) -> Mapping:
         """Return what this mapping says about which a newer one is silent.
 
-        A sample time is silenced by a channel of times or the unit of one, a channel of times by a sample time, and a
-        scale by another channel for its role.
+        A sample time is silenced by a channel of times or the unit of one, a channel of times by a sample time, a
+        scale by another channel for its role, and a role by another role for its channel.
         """
         timed = "time" in newer.roles or any((role_of(name) or ("",))[0] == "time" for name in newer.units)
-        roles = {role: name for role, name in self.roles.items() if role not in newer.roles}
+        used = {*newer.roles.values()}
+        roles = {role: name for role, name in self.roles.items() if role not in newer.roles and name not in used}
         if newer.sample_time is not None:
             roles.pop("time", None)
         other = {role for role, name in newer.roles.items() if self.roles.get(role, name) != name}
+        other |= {role for role, name in self.roles.items() if role not in newer.roles and name in used}
         return Mapping(
             roles,
             {name: unit for name, unit in self.units.items() if name not in newer.units},
@@ -83,6 +85,17 @@ class Mapping:
             self.axis if newer.axis is None else None,
             {key: text for key, text in self.setup.items() if key not in newer.setup},
         )
+
+    def replaced_by(self, newer: Mapping) -> str:
+        """Say which roles and units of this mapping a newer one contradicts; "" for none."""
+        used = {name: role for role, name in newer.roles.items()}
+        roles = [
+            f"{role} is {name}"
+            for role, name in self.roles.items()
+            if newer.roles.get(role, name) != name or used.get(name, role) != role
+        ]
+        units = [f"{name} in {unit}" for name, unit in self.units.items() if newer.units.get(name, unit) != unit]
+        return ", ".join([*roles, *units])
 
     @property
     def words(self) -> str:

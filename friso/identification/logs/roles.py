@@ -117,6 +117,13 @@ def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
     return next(named, _of_symbol(parts, unit))
 
 
+def wanted_of(name: str, unit: str = "") -> bool:
+    """Tell whether a name is that of a speed, an acceleration or a force that was wanted: rpm_ref, no position."""
+    parts = words(name)
+    rate = any(part in _KEYS[role] for part in parts for role in ("velocity", "acceleration"))
+    return bool({*parts} & _SET) and (rate or _has_unit_of(unit, _RATES)) and role_of(name, unit) is None
+
+
 def _of_symbol(parts: Sequence[str], unit: str) -> tuple[str, str] | None:
     """Return role and letter of a name that is a symbol and the word of what is, in a unit of
     that symbol; else None.
@@ -206,6 +213,11 @@ def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") ->
         role: AssignedRole(role, find(table, name, role, origin), "as specified", True)
         for role, name in assigned.items()
     }
+    for role, name in assigned.items():
+        others = [other for other in assigned if other != role and chosen[other].channel is chosen[role].channel]
+        if others:
+            actual = f"{quoted(name)} for two roles, {role} and {others[0]}"
+            raise LogError("--map", actual, "one role for a channel", f'--map {role}="{name}"', origin)
     by_user = {id(choice.channel) for choice in chosen.values()}
     candidates: dict[str, list[tuple[Channel, str]]] = {}
     for channel in table.channels:

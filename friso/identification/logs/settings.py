@@ -77,6 +77,28 @@ class LogSettings(Settings):
     samples_of_a_pair: int = setting(20, "")
     """Samples at least to say so."""
 
+    # Channels read by mechanics.
+    samples_of_a_reading: int = setting(64, "")
+    """Samples of a record, or of a coarser one of its means, from which on it is read: fewer fit any four columns."""
+
+    samples_of_a_scale: float = setting(2.0, "")
+    """Width over which each time scale is smoothed before it is differentiated: narrower, noise counts."""
+
+    rows_of_a_scale: int = setting(4000, "")
+    """Rows that are fitted of each scale: more change nothing and take time."""
+
+    speed_share_of_a_rest: float = setting(0.03, "")
+    """Share of the highest speed below which a body may rest, where friction is not known."""
+
+    share_left_by_a_reading: float = setting(0.5, "")
+    """Share of a force that its reading leaves at most: with more, mechanics tells nothing."""
+
+    ratio_of_rival_readings: float = setting(2.0, "")
+    """A reading that leaves so many times the share of the best one is none of two that may both be right."""
+
+    range_share_off_a_clock: float = setting(0.01, "")
+    """Share of its range by which a clock is off a straight line at most: gaps and jitter are smaller."""
+
     # Logs joined to one.
     sample_time_tolerance: float = setting(1e-3, "")
     """Share by which the sample times of logs that are joined may differ, as clocks do."""

@@ -11,15 +11,18 @@ import numpy as np
 from friso.axis import LENGTH, ROTARY
 from friso.errors import InputError, LogError
 from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.checks import rises_evenly, unwrapped
+from friso.identification.logs.checks import unwrapped
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.mapping import Mapping, guess, option
+from friso.identification.logs.physics import is_counter, is_ramp
 from friso.identification.logs.preamble import RATES, STEPS
 from friso.identification.logs.roles import AssignedRole, find, is_clock, words
 from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.text import with_times
 from friso.identification.logs.units import FOREIGN, RMS, in_si, is_unit, likely_unit, read_scale, unit_factor
 from friso.quantities import quoted
+
+SPEED = ROLES["velocity"]
 
 TURNS = f"--axis {ROTARY.name}"
 """The option that tells a rotary axis."""
@@ -163,15 +166,20 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
     """The error for a channel whose unit is none of the role's kind, or that has none."""
     role, name, wanted = choice.role, choice.channel.name, reading.unit(choice.role)
     if not unit:
-        usual, travel = _likely_length(choice.channel) if wanted == LENGTH else (wanted, "")
+        usual, travel = _likely_length(choice.channel, wanted)
         actual = f"{quoted(name)}, which has no unit{_span(choice.channel.values)}"
         expected = f"a unit convertible to {wanted}"
         example, electric = option("--unit", name, usual), _electric_unit(choice)
+        if wanted == SPEED and "rpm" in words(name):
+            usual, travel, example = "rpm", "", f"{option('--unit', name, 'rpm')} {TURNS}"
         if role == "force":
             scale = f"{wanted}/{electric or 'V'}"
             expected += f", or a scale such as {option('--scale', role, f'35 {scale}')}"
             example = f'--scale {role}="NUMBER {scale}"' if electric else example
-        if not electric:
+        if electric and role in reading.foreign:
+            usual, example = electric, option("--unit", name, electric)
+            expected += f"; without one, all is told per {electric}"
+        if not electric or role in reading.foreign:
             expected += guess(usual, travel)
         return LogError(role, actual, expected, example, reading.origin)
     number = "35.1507" if role in ("force", "disturbance") else "5e-7" if si == "count" else "1.5"
@@ -183,16 +191,20 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
     return LogError(role, f"{quoted(name)} in {unit}", expected, example, reading.origin)
 
 
-def _likely_length(place: Channel) -> tuple[str, str]:
-    """Return the unit of length in which the travel of a position is likely, and what the travel
-    is then, in words.
+def _likely_length(channel: Channel, wanted: str) -> tuple[str, str]:
+    """Return the likely unit of a position or a velocity, and how far or fast that is, in words; `wanted` for others.
 
-    It is between 0.5 mm and 0.5 m, or nearest to that.
+    A travel is between 0.5 mm and 0.5 m, or nearest to that, and a speed between 5 mm/s and 5 m/s.
     """
-    finite = place.values[np.isfinite(place.values)]
-    travel = float(np.ptp(finite)) if finite.size else 0.0
-    unit, size = ("m", 1.0) if travel <= 0.5 else ("mm", 1e-3) if travel <= 500 else ("um", 1e-6)
-    return unit, f"a travel of {1e3 * size * travel:.3g} mm"
+    most = {LENGTH: 0.5, SPEED: 5.0}.get(wanted)
+    if most is None:
+        return wanted, ""
+    finite = channel.values[np.isfinite(channel.values)]
+    fast = float(np.abs(finite).max()) if wanted == SPEED and finite.size else 0.0
+    size = float(np.ptp(finite)) if wanted == LENGTH and finite.size else fast
+    unit, factor = ("m", 1.0) if size <= most else ("mm", 1e-3) if size <= 1e3 * most else ("um", 1e-6)
+    rate, what = ("/s", "speeds up to") if wanted == SPEED else ("", "a travel of")
+    return f"{unit}{rate}", f"{what} {1e3 * factor * size:.3g} mm{rate}"
 
 
 def _span(values: np.ndarray) -> str:
@@ -258,20 +270,22 @@ def no_time(channel: Channel, reading: Reading) -> LogError:
     expected = "; or ".join(text for text in ("a time channel or a sample time", offers) if text)
     offer = re.match(r'--dt "[^"]*"', offers)
     clocks = [other for other in reading.table.channels if other is not channel and _may_be_a_clock(other)]
-    example = offer[0] if offer else option("--map", "time", clocks[0].name) if clocks else '--dt "NUMBER ms"'
+    counters = [other.name for other in reading.table.channels if is_counter(other)]
+    example = offer[0] if offer else '--dt "NUMBER ms"'
     if clocks and not offer:
         expected += guess(clocks[0].name, "it rises evenly")
+        likely, step = ("", "") if clocks[0].unit else _likely_unit(clocks[0])
+        expected += guess(likely, step) if likely else ""
+        units = [option("--unit", clocks[0].name, likely)] if likely and not reading.bare else []
+        example = " ".join([option("--map", "time", clocks[0].name), *units])
+    elif counters:
+        expected += f" ({quoted(counters[0])} counts samples)"
     return LogError("time", f"no time stamps for {quoted(channel.name)}", expected, example, reading.origin)
 
 
 def _may_be_a_clock(channel: Channel) -> bool:
-    """Tell whether a channel is in a unit of time and rises, or in none and rises evenly, and
-    not as a counter by 1.
-    """
-    if is_clock(channel):
-        return True
-    steps = np.diff(channel.values)
-    return not channel.unit and rises_evenly(channel.values) and not np.isclose(steps[0], 1, rtol=1e-6, atol=0)
+    """Tell whether a channel is in a unit of time and rises, or in none and rises evenly, and not as a counter."""
+    return is_clock(channel) or (not channel.unit and is_ramp(channel) and not is_counter(channel))
 
 
 def _offers(table: ChannelTable) -> str:

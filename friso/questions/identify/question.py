@@ -14,7 +14,7 @@ from friso.identification.kind import AnalysisSettings
 from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import Mapping
 from friso.identification.method import Prediction, around, axis_of_all, check_predictions
-from friso.identification.sources import LogFile, per_unit_of_force, read_all
+from friso.identification.sources import LogFile, per_unit_of_force, read_all, read_usable
 from friso.identification.stage_file import TOLD_BY_LOGS, completed
 from friso.interface.answer import Answer, AnswerTable, question
 from friso.interface.inputs import (
@@ -155,7 +155,7 @@ def identify(
     folder : Path
         Where what was said of channels is looked for, if not beside the logs.
     keep : callable, optional
-        Called with what was said of the channels of each file, to keep it.
+        Called with what was said of the channels of each file, to keep it, where the logs were identified.
 
     Returns
     -------
@@ -187,11 +187,11 @@ def identify(
         axis = beside.name
     settings, options = _settings(bandwidth, band, period), options_of(map, unit, scale, dt, as_, axis)
     paths, other_paths = paths_of(logs), paths_of(predict)
-    inputs = read_all([*paths, *other_paths], options, folder)
-    if keep is not None:
-        keep({file.path: file.mapping for file in inputs})
+    inputs, unusable = read_usable(paths, options, folder, other_paths)
+    predicted_files = [per_unit_of_force(file, beside) for file in read_all(other_paths, options, folder)]
     inputs = [per_unit_of_force(file, beside) for file in inputs]
-    sources = [(file.source, file.kind) for file in inputs[: len(paths)]]
+    sources = [(file.source, file.kind) for file in inputs]
+    inputs = [*inputs, *predicted_files]
     made_up: list[str] = []
     if stage is not None and lacking:
         made = around(sources)
@@ -199,7 +199,7 @@ def identify(
         made_up = [] if made is None else _made_up(lacking, made, set)
     axis_kind = axis_of_all([file.source for file in inputs], assumed)
     speak_of(axis_kind)
-    others = _logs_to_predict(inputs[len(paths) :])
+    others = _logs_to_predict(predicted_files)
     check_predictions(sources, others, assumed)
     from friso.identification.method import identify as identification
     from friso.identification.method import predict as predicted
@@ -208,10 +208,18 @@ def identify(
     result = identification(sources, assumed, settings, progress, made_up)
     if laws and assumed is not None:
         result = with_laws(result, [source for source, _ in sources], assumed, progress)
-    reused = tuple(file.reused for file in inputs if file.reused)
-    result = replace(result, warnings=(*reused, *_taken_from_logs(made_up), *result.warnings))
+    reused = [file.reused for file in inputs if file.reused]
+    left_out = [f"left out: {_in_one_line(error)}" for error in unusable]
+    result = replace(result, warnings=(*left_out, *reused, *_taken_from_logs(made_up), *result.warnings))
     predictions = [predicted(result, log, settings, assumed) for log in others]
+    if keep is not None and not result.failed:
+        keep({file.path: file.mapping for file in inputs})
     return IdentifyAnswer(result, inputs=inputs, predictions=predictions, axis_kind=axis_kind)
+
+
+def _in_one_line(error: InputError) -> str:
+    """Return what is wrong with a file in one line."""
+    return f"{error.origin}: {error.key or 'log'}: {error.actual}; expected {error.expected}"
 
 
 def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Changes) -> Stage:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
@@ -83,7 +82,8 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
     headlines = [sentence for sentence in headlines if sentence]
     bounded = [one for one in estimates if not one.determined and 0 < one.low < one.high < np.inf]
     doubts = [(VERMILLION if identification.failed else ORANGE, f"{doubt}.") for doubt in identification.doubts]
-    lines = doubts if identification.failed else []
+    first = identification.failed and not (effects and len(identification.experiments) > 1)
+    lines = doubts if first else []
     if effects:
         values = "; ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in effects)
         lines.append((GREEN, f"Identified: {values}."))
@@ -93,7 +93,7 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
     elif not headlines:
         lines.append((VERMILLION, "These logs determine no key of the stage file."))
     lines += [(GREEN, sentence) for sentence in headlines]
-    lines += [] if identification.failed else doubts
+    lines += [] if first else doubts
     if len(effects) < len(visible):
         absent = ", ".join(f"{within(one.name)} ({interval_text(one)})" for one in visible if _absent(one))
         lines.append((GREEN, f"None found: {absent}."))
@@ -122,18 +122,25 @@ def _why_no_stage(identification: Identification) -> str:
 ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
 """Keys that are usually 0: an interval that holds that shows no such effect."""
 
-SHOWN_BY = {
-    "masses": "a frequency response (--as frequency; rehearsed by friso rig frf)",
-    "friction.coulomb": "moves in both directions at several speeds",
-    "friction.viscous": "constant speeds (--as constant-speed; rehearsed by friso rig constant-speed)",
-    "friction.static": "force ramps from rest (--as break-away) or slow motion that sticks and slips (--as stick-slip; "
-    "rehearsed by friso rig stiction)",
-    "friction.stribeck_velocity": "slow sliding (--as slow-sliding; rehearsed by friso rig constant-speed)",
-    "friction.bristle_stiffness": "small motion before sliding (--as presliding; rehearsed by friso rig presliding)",
-    "friction.bristle_damping": "small motion before sliding (--as presliding; rehearsed by friso rig presliding)",
-    "joint.stiffness": "steps with the cart fixed (--as steps; rehearsed by friso rig stiffness)",
+_OF_BRISTLES = (("presliding",), "small motion before sliding (--as presliding; rehearsed by friso rig presliding)")
+_OF_SLOW_SLIDING = (("slow-sliding",), "slow sliding (--as slow-sliding; rehearsed by friso rig constant-speed)")
+
+SHOWN_BY: dict[str, tuple[tuple[tuple[str, ...], str], ...]] = {
+    "masses": ((("frequency",), "a frequency response (--as frequency; rehearsed by friso rig frf)"),),
+    "friction.coulomb": ((("moves", "constant-speed"), "moves in both directions at several speeds"),),
+    "friction.viscous": (
+        (("constant-speed",), "constant speeds (--as constant-speed; rehearsed by friso rig constant-speed)"),
+    ),
+    "friction.static": (
+        (("break-away",), "force ramps from rest (--as break-away)"),
+        (("stick-slip",), "slow motion that sticks and slips (--as stick-slip; rehearsed by friso rig stiction)"),
+    ),
+    "friction.stribeck_velocity": (_OF_SLOW_SLIDING,),
+    "friction.bristle_stiffness": (_OF_BRISTLES,),
+    "friction.bristle_damping": (_OF_BRISTLES,),
+    "joint.stiffness": ((("steps",), "steps with the cart fixed (--as steps; rehearsed by friso rig stiffness)"),),
 }
-"""The experiment that shows a key, or one of a table."""
+"""The experiments that show a key, or one of a table: the kinds of which a log would be one, and what to do."""
 
 
 def _absent(estimate: Estimate) -> bool:
@@ -144,13 +151,14 @@ def _absent(estimate: Estimate) -> bool:
 def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
     """Name the experiments that would show what is not identified.
 
-    A kind that alone was `done` is left out: what that lacked is in the reasons.
+    A kind that was `done` is left out: what those logs lacked is in the reasons.
     """
     names: dict[str, list[str]] = {}
     for estimate in estimates:
-        way = SHOWN_BY.get(estimate.name) or SHOWN_BY.get(estimate.name.split(".")[0])
-        if way and not estimate.determined and done != {*re.findall(r"--as ([\w-]+)", way)}:
-            names.setdefault(way, []).append(within(estimate.name))
+        ways = SHOWN_BY.get(estimate.name) or SHOWN_BY.get(estimate.name.split(".")[0]) or ()
+        left = " or ".join(text for kinds, text in ways if not {*kinds} & done)
+        if left and not estimate.determined:
+            names.setdefault(left, []).append(within(estimate.name))
     return "; ".join(f"{', '.join(group)}: {way}" for way, group in names.items())
 
 

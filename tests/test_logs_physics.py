@@ -1,0 +1,163 @@
+"""Roles of channels by mechanics: what is a force, a position, a velocity, a reference, a clock and a counter."""
+
+from pathlib import Path
+
+import log_files
+import numpy as np
+import pytest
+
+from friso.errors import LogError
+from friso.identification.contents import log_content
+from friso.identification.logs.gaps import GapsError
+from friso.identification.logs.mapping import Mapping, from_options
+from friso.identification.sources import OpenQuestions, read_all, read_usable
+
+STEP = 1e-3
+LEVELS = (0, 12, 0, -12, 0, 18, 0, -18, 0, 25)
+
+
+def pushed(force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Position [m] and velocity [m/s] of 3 kg with 5 N of Coulomb and 10 N s/m of viscous friction."""
+    velocity, position, parts = np.zeros(len(force)), np.zeros(len(force)), 10
+    speed = place = 0.0
+    for k, push in enumerate(force):
+        position[k], velocity[k] = place, speed
+        for _ in range(parts):
+            free = speed + STEP / parts * (push - 10 * speed) / 3
+            speed = np.sign(free) * max(abs(free) - STEP / parts * 5 / 3, 0.0)
+            place += STEP / parts * speed
+    return position, velocity
+
+
+def steps() -> dict[str, np.ndarray]:
+    """A step test: time, force in steps, position and velocity with noise."""
+    rng = np.random.default_rng(1)
+    force = np.repeat(LEVELS, 600).astype(float)
+    position, velocity = pushed(force)
+    time = STEP * np.arange(len(force))
+    force = force + rng.normal(0, 0.02, len(force))
+    return {"time": time, "force": force, "position": position, "velocity": velocity + rng.normal(0, 4e-3, len(force))}
+
+
+def servo(sign: float = 1.0) -> dict[str, np.ndarray]:
+    """Moves on a reference, which the position follows late: time that jitters, reference, position and force."""
+    rng = np.random.default_rng(2)
+    time = STEP * np.arange(5000)
+    reference = sum(
+        way * np.clip((time - start) / 0.6, 0, 1) ** 2 * (3 - 2 * np.clip((time - start) / 0.6, 0, 1))
+        for start, way in ((0.2, 0.1), (1.2, -0.2), (2.2, 0.3), (3.4, -0.15))
+    )
+    position, speed, force = np.zeros(len(time)), 0.0, np.zeros(len(time))
+    place = 0.0
+    for k in range(len(time)):
+        position[k] = place
+        force[k] = 8000 * (reference[k] - place) - 200 * speed
+        for _ in range(10):
+            free = speed + STEP / 10 * (force[k] - 10 * speed) / 3
+            speed = np.sign(free) * max(abs(free) - STEP / 10 * 5 / 3, 0.0)
+            place += STEP / 10 * speed
+    jitter = time + rng.uniform(-1e-4, 1e-4, len(time))
+    position += rng.normal(0, 1e-5, len(time))
+    return {"time": jitter, "reference": reference, "position": position, "force": sign * force}
+
+
+def options(path: Path) -> tuple[str, ...]:
+    """The options that the first message about a log offers."""
+    with pytest.raises(OpenQuestions) as caught:
+        read_all([path], Mapping(), path.parent)
+    return caught.value.options
+
+
+def test_force_and_velocity_without_a_unit(tmp_path: Path) -> None:
+    """The one of two columns that is the derivative of nothing is no position; the copied line reads the log."""
+    log = steps()
+    path = log_files.write_text(tmp_path / "a.csv", ["t", "u", "v"], [log["time"], log["force"], log["velocity"]])
+    offered = options(path)
+    assert {*offered} == {"--map velocity=v", "--map force=u", "--unit t=s", "--unit v=m/s", "--unit u=N"}
+    said = from_options(["velocity=v", "force=u"], ["t=s", "v=m/s", "u=N"])
+    (file,) = read_all([path], said, tmp_path)
+    assert file.kind == "moves"
+    assert isinstance(file.source.signals, dict)  # pyright: ignore[reportAttributeAccessIssue]
+    assert np.ptp(file.source["position"] - log["position"]) < 0.01  # pyright: ignore[reportIndexIssue]
+
+
+def test_a_ramp_of_whole_numbers_counts(tmp_path: Path) -> None:
+    log = steps()
+    count = np.arange(len(log["time"]))
+    path = log_files.write_text(tmp_path / "a.csv", ["n", "y", "u"], [count, 1e3 * log["velocity"], log["force"]])
+    offered = options(path)
+    assert {"--map velocity=y", "--map force=u", "--unit y=mm/s", '--dt "NUMBER ms"'} <= {*offered}
+    with pytest.raises(OpenQuestions, match='"n" counts samples'):
+        read_all([path], Mapping(), tmp_path)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (2, 3, 1, 0), (3, 2, 0, 1)])
+def test_no_role_follows_from_the_place_of_a_column(order: tuple[int, ...], tmp_path: Path) -> None:
+    """A time that jitters is no position, and the column that leads is the reference."""
+    columns = [*servo().values()]
+    path = log_files.write_text(tmp_path / "a.txt", [], [columns[place] for place in order], " ")
+    names = [f"column {1 + order.index(place)}" for place in range(4)]
+    offered = " ".join(options(path))
+    assert f'--map position="{names[2]}"' in offered
+    assert f'--map force="{names[3]}"' in offered
+    assert f'--map time="{names[0]}"' in offered
+    assert f'"{names[1]}" goes ahead of "{names[2]}"' in str(log_content(path, Mapping()).gaps[0])
+
+
+def test_rpm_and_amperes(tmp_path: Path) -> None:
+    """A speed that was wanted is no position, and all that is open is told at once."""
+    log = steps()
+    wanted = np.repeat(np.array(LEVELS) / 25, 600) * 600
+    columns = [log["time"], wanted, 300 * log["velocity"], log["force"] / 35]
+    path = log_files.write_text(tmp_path / "a.csv", ["time", "rpm_ref", "rpm", "current"], columns)
+    offered = options(path)
+    assert {*offered} == {"--unit time=s", "--unit rpm=rpm --axis rotary", "--unit current=A"}
+    (file,) = read_all([path], from_options([], ["time=s", "rpm=rpm", "current=A"], axis="rotary"), tmp_path)
+    assert file.source["velocity"].max() == pytest.approx(np.pi / 30 * columns[2].max())  # pyright: ignore
+
+
+def test_two_readings_are_asked(tmp_path: Path) -> None:
+    """Two forces that explain the motion about as well: neither is offered, and both are named."""
+    log = servo()
+    twice = log["force"] * 2 + np.random.default_rng(3).normal(0, 0.1, len(log["force"]))
+    columns = [log["time"], log["position"], log["force"], twice + 7 * np.sign(np.gradient(log["position"]))]
+    path = log_files.write_text(tmp_path / "a.csv", ["time [s]", "pos [m]", "a", "b"], columns)
+    with pytest.raises(GapsError) as caught:
+        read_all([path], Mapping(), tmp_path)
+    assert not any("--map force" in option for option in caught.value.options)
+    assert "--map force=b or --map force=a" in str(caught.value)
+
+
+def test_one_channel_has_one_role(tmp_path: Path) -> None:
+    log = servo()
+    path = log_files.write_text(
+        tmp_path / "a.csv", ["time [s]", "x [m]", "F [N]"], [*[*log.values()][::2], log["force"]]
+    )
+    with pytest.raises(LogError, match="for two roles"):
+        read_all([path], from_options(["position=x", "velocity=x"]), tmp_path)
+
+
+def test_a_bad_stamp_costs_its_file_alone(tmp_path: Path) -> None:
+    log = servo()
+    paths = []
+    for number in range(3):
+        time = STEP * np.arange(5000)
+        time[2500] = 1.0 if number == 1 else time[2500]
+        columns = [time, log["position"], log["force"]]
+        paths.append(log_files.write_text(tmp_path / f"{number}.csv", ["time [s]", "pos [m]", "force [N]"], columns))
+    files, wrong = read_usable(paths, Mapping(), tmp_path)
+    assert [file.path for file in files] == [paths[0], paths[2]]
+    assert [error.origin for error in wrong] == [str(paths[1])]
+    with pytest.raises(LogError, match="time that decreases"):
+        read_all([paths[1]], Mapping(), tmp_path)
+
+
+def test_what_was_kept_and_is_said_otherwise_is_told(tmp_path: Path) -> None:
+    log = servo()
+    names = ["time [s]", "a [m]", "b [m]", "force [N]"]
+    path = log_files.write_text(tmp_path / "a.csv", names, [*log.values()])
+    (tmp_path / "a.csv.friso.toml").write_text('[roles]\nposition = "a"\n')
+    (file,) = read_all([path], from_options(["position=b", "reference=a"]), tmp_path)
+    assert "in place of position is a, as kept" in file.reused
+    (file,) = read_all([path], from_options(["reference=a", "position=b"]), tmp_path)
+    assert file.mapping.roles == {"reference": "a", "position": "b"}
