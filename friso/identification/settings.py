@@ -243,6 +243,9 @@ class IdentificationSettings(Settings):
 class ExperimentSettings(Settings):
     """What analyses of kinds of experiment look for in their logs."""
 
+    hysteresis_of_swings: float = setting(0.3, "of half the swing")
+    """With less, noise is counted as cycles of hunting; with more, cycles that lean to one side are missed."""
+
     # Excitations and moves, told apart by what repeats.
 
     # Moves.

@@ -97,7 +97,7 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
     if len(effects) < len(visible):
         absent = ", ".join(f"{within(one.name)} ({interval_text(one)})" for one in visible if _absent(one))
         lines.append((GREEN, f"None found: {absent}."))
-    if identification.stage is None:
+    if identification.stage is None and (estimates or not headlines):
         lines.append((ORANGE, _why_no_stage(identification)))
     if len(visible) < len(estimates):
         lines.append((ORANGE, f"Not identified: {missing(estimates)}."))

@@ -1,0 +1,122 @@
+"""A log of hunting: how often the stage swings, how fast, how far and how evenly, beside the cycle that friso predicts.
+
+Thesis, Sec. 3.2.2 and 4.3.2, Fig. 24 to 27.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.hunting import hunting
+from friso.identification.estimate import Estimate
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.logs.log import Log
+from friso.identification.readings.common import channel
+from friso.identification.settings import ExperimentSettings
+from friso.stage import Stage
+
+
+@dataclass(frozen=True)
+class PredictedCycle:
+    """The cycle of a stage as friso predicts it: amplitude [m] and period [s]."""
+
+    amplitude: float
+    period: float
+
+
+@dataclass(frozen=True)
+class HuntingLog:
+    """Swings of a stage about its reference.
+
+    `count` is the number of whole cycles. `period` [s] and `amplitude` [m], half of peak to peak, are means over them,
+    with their standard deviations. `above` and `below` [m] are the mean peaks on either side of the reference.
+    `predicted` is the cycle of the stage file (None: no file, or it does not hunt). `time` [s] and `deviation` [m] have
+    the shape (n,), and `peaks` are the numbers of the highest samples.
+    """
+
+    count: int
+    period: float
+    period_deviation: float
+    amplitude: float
+    amplitude_deviation: float
+    above: float
+    below: float
+    predicted: PredictedCycle | None
+    time: np.ndarray
+    deviation: np.ndarray
+    peaks: np.ndarray
+    warnings: tuple[str, ...] = ()
+
+
+def swings_of(log: Log) -> HuntingLog:
+    """Return the swings in a log, from the last change of its reference on.
+
+    A cycle goes from one crossing upwards to the next, through the middle of the swing, with a hysteresis so that noise
+    is not counted. Raises InputError for a log without a position in SI units, and with less than two cycles.
+    """
+    part = log.longest
+    position = channel(log, "position")[part]
+    time, reference = log.time[part], np.zeros(len(position))
+    if "reference" in log:
+        reference = channel(log, "reference")[part]
+        changes = np.flatnonzero(np.abs(np.diff(reference)) > np.finfo(np.float32).eps * np.ptp(reference))
+        start = int(changes[-1]) + 1 if changes.size else 0
+        time, position, reference = time[start:], position[start:], reference[start:]
+    deviation = position - (reference if "reference" in log else np.median(position))
+    low, high = np.percentile(deviation[len(deviation) // 2 :], [1, 99])  # by then the transient is over
+    side = _sides(deviation - (low + high) / 2, ExperimentSettings.current().hysteresis_of_swings * (high - low) / 2)
+    ups = np.flatnonzero((side[1:] > 0) & (side[:-1] < 0)) + 1
+    if len(ups) < 3:
+        actual = f"{max(len(ups) - 1, 0)} whole cycles after the reference stands"
+        raise InputError(f"{log.name}, position", actual, "two cycles of hunting or more", "a longer log")
+    cycles = [slice(first, last) for first, last in pairwise(ups.tolist())]
+    above, below = (np.array([way * (way * deviation[one]).max() for one in cycles]) for way in (1, -1))
+    periods, sizes = np.diff(time[ups]), (above - below) / 2
+    peaks = np.array([one.start + int(np.argmax(deviation[one])) for one in cycles])
+    return HuntingLog(
+        len(cycles),
+        float(periods.mean()),
+        float(periods.std(ddof=1)),
+        float(sizes.mean()),
+        float(sizes.std(ddof=1)),
+        float(above.mean()),
+        float(-below.mean()),
+        None,
+        time,
+        deviation,
+        peaks,
+    )
+
+
+def _sides(values: np.ndarray, hysteresis: float) -> np.ndarray:
+    """Return on which side of 0 values are, 1 or -1, the last side being kept within the hysteresis; shape (n,)."""
+    side = np.where(np.abs(values) > hysteresis, np.sign(values), 0.0)
+    last = np.maximum.accumulate(np.where(side != 0, np.arange(len(side)), 0))
+    return side[last]
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> HuntingLog:
+    """Analyse a log of hunting, and predict the cycle of the stage, if there is one."""
+    (log,) = logs
+    assert isinstance(log, Log)
+    shown = swings_of(log)
+    if prior.stage is None or not prior.from_user:
+        return shown
+    cycle = next(iter(hunting(prior.stage).attracting), None)
+    if cycle is None:
+        warning = "The stage file does not hunt, whatever the move: its friction or its controller is another."
+        return replace(shown, warnings=(warning,))
+    return replace(shown, predicted=PredictedCycle(float(cycle.amplitude), float(cycle.period)))
+
+
+def _estimates(result: HuntingLog, stage: Stage | None) -> tuple[Estimate, ...]:
+    """Return nothing: a cycle depends on many keys at once."""
+    return ()
+
+
+KIND = ExperimentKind[HuntingLog](_analyse, _estimates, roles=("position",))

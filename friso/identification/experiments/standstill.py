@@ -1,0 +1,84 @@
+"""Standstill in position: how far the stage wanders while its reference stands, and how logs of it compare.
+
+Thesis, Sec. 4.3.2, Fig. 28.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.identification.estimate import Estimate
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.logs.log import Log
+from friso.identification.readings.common import channel
+from friso.identification.readings.course import Course
+from friso.stage import Stage
+
+
+@dataclass(frozen=True)
+class Wandering:
+    """How far the stage wanders in one log: RMS about the mean and largest deviation from it [m], its drift over the
+    log [m] by a straight line, and the deviation [m] over time [s], both of shape (n,)."""
+
+    name: str
+    rms: float
+    peak: float
+    drift: float
+    time: np.ndarray
+    deviation: np.ndarray
+
+
+@dataclass(frozen=True)
+class StandstillResult:
+    """Logs at standstill, the first of which the others are compared with."""
+
+    logs: tuple[Wandering, ...]
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def ratios(self) -> tuple[tuple[float, float], ...]:
+        """Return RMS and peak of every log over those of the first; NaN where that does not wander."""
+        first = self.logs[0]
+        pairs = ((log.rms / first.rms if first.rms else np.nan, log.peak, first.peak) for log in self.logs)
+        return tuple((rms, peak / least if least else np.nan) for rms, peak, least in pairs)
+
+
+def wandering(log: Log) -> Wandering:
+    """Return how far the stage wanders in a log, about the reference if there is one, without its mean.
+
+    Raises InputError for a log without a position in SI units.
+    """
+    part = log.longest
+    time = log.time[part]
+    away = channel(log, "position")[part] - (channel(log, "reference")[part] if "reference" in log else 0.0)
+    deviation = away - away.mean()
+    drift = float(np.polyfit(time - time.mean(), deviation, 1)[0] * np.ptp(time)) if len(time) > 1 else 0.0
+    size = np.abs(deviation)
+    return Wandering(log.name, float(np.sqrt(np.mean(deviation**2))), float(size.max()), drift, time, deviation)
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StandstillResult:
+    """Analyse logs at standstill together."""
+    rows = tuple(wandering(log) for log in logs if isinstance(log, Log))
+    moved = [row.name for row in rows if abs(row.drift) > row.rms]
+    warnings = (f"{', '.join(moved)}: most of the deviation is a drift.",) if moved else ()
+    return StandstillResult(rows, warnings)
+
+
+def _estimates(result: StandstillResult, stage: Stage | None) -> tuple[Estimate, ...]:
+    """Return nothing: standstill shows no key of a stage."""
+    return ()
+
+
+def _claims(course: Course) -> str | None:
+    """Claim a log whose reference is there and stands still, with a body that neither swings nor goes anywhere."""
+    log = course.log
+    if "reference" not in log or course.reference_moves or "force" in log:
+        return None
+    return "the reference stands still, and no force is logged"
+
+
+KIND = ExperimentKind[StandstillResult](_analyse, _estimates, roles=("position",), together=True, claims=_claims)
