@@ -744,12 +744,13 @@ def test_values_that_do_not_enter_are_not_ranked() -> None:
     needs = {claim: entry.needs for claim, entry in registered().items()}
     entering = {claim: {v.name for v in OPEN if enters(v, own, RESPONSES, PARTS)} for claim, own in needs.items()}
     every = {value.name for value in OPEN}
-    control, path = {"alpha", "beta"}, {"acceleration", "distance", "cruise over acceleration time"}
+    control = {"alpha", "beta", "low-pass on the derivative alone"}
+    path = {"acceleration", "distance", "cruise over acceleration time"}
     assert entering["E1"] == entering["F7"] == every - control - path
     assert entering["F8"] == every - path
     assert entering["F24"] == entering["F26"] == every - path
     assert entering["F27"] == every - path - {"joint damping"}
-    assert entering["F12B"] == every - control - {"joint damping"}
+    assert entering["F12B"] == every - {"alpha", "beta", "joint damping"}
     assert entering["F11A"] == every - {"acceleration", "distance", "joint damping"}
     assert entering["F16B"] == every - {"stroke"}
     assert entering["S35"] == set()

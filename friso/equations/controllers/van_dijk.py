@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from friso.equations.controllers.pid import Pid
 from friso.quantities import Number, Quantity, Value, at_least_1, inside_0_1, positive
@@ -18,18 +18,22 @@ if TYPE_CHECKING:
 
     from friso.equations.blocks import Blocks, Measured, Signal
 
-CROSSOVER, ALPHA, BETA, TUNED_MASS = (f"controller.{name}" for name in ("crossover", "alpha", "beta", "tuned_mass"))
+CROSSOVER, ALPHA, BETA, TUNED_MASS, LOW_PASS = (
+    f"controller.{name}" for name in ("crossover", "alpha", "beta", "tuned_mass", "low_pass")
+)
 
 
 @register_controller
 class VanDijk(Pid):
     """PID by van Dijk's tuning rules (thesis, Eq. 7, 8): the low-pass comes first, and the three terms act on what it
-    lets through."""
+    lets through. With `low_pass` on the derivative alone, proportional and integral term act on the error itself."""
 
     crossover: Annotated[Value, Quantity("Hz", positive, "8 Hz")]
     alpha: Annotated[float, Number(inside_0_1, "0.1")]
     beta: Annotated[float, Number(at_least_1, "2")]
     tuned_mass: Annotated[Value | None, Quantity("kg", positive, "1.7 kg")] = None
+    low_pass: Literal["all", "derivative"] | None = None
+    """On which terms the low-pass of the rules acts."""
 
     written = "van Dijk's rules"
     needed = ("crossover", "alpha", "beta", "tuned_mass")
@@ -53,6 +57,11 @@ class VanDijk(Pid):
             '[drive] sample_time = "50 us" (20 kHz) with crossover = "8 Hz"',
         ),
     )
+
+    @classmethod
+    def variant(cls, flat: Mapping[str, Any]) -> str | None:
+        """Return "derivative" if the low-pass acts on that alone, else None."""
+        return "derivative" if flat.get(LOW_PASS) == "derivative" else None
 
     @classmethod
     def with_defaults(cls, flat: Mapping[str, Any]) -> dict[str, Any]:
@@ -81,7 +90,10 @@ class VanDijk(Pid):
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """The low-pass, then the three terms."""
+        """The low-pass, then the three terms; or these, their derivative filtered."""
+        if cls.variant(flat):
+            canvas.box("k_p (1 + tau_z/tau_i + 1/(tau_i s) + tau_z s/(1 + tau_p s))")
+            return
         canvas.box("1/(1 + tau_p s)")
         canvas.box("k_p (1 + tau_z s)(1 + 1/(tau_i s))")
 
@@ -91,14 +103,20 @@ class VanDijk(Pid):
         return True
 
     @classmethod
-    def stiffness(cls, blocks: Blocks, variant: None) -> sp.Expr:
+    def stiffness(cls, blocks: Blocks, variant: str | None) -> sp.Expr:
         """Return the gain k_p of Eq. 8 [N/m]."""
         return rules(blocks)["k_p"]
 
     @classmethod
-    def declare(cls, measured: Measured, blocks: Blocks, variant: None) -> Mapping[str, Signal]:
-        """Return the three shares [N] of Eq. 7."""
+    def declare(cls, measured: Measured, blocks: Blocks, variant: str | None) -> Mapping[str, Signal]:
+        """Return the three shares [N] of Eq. 7, or with the filter of Eq. 6."""
         k_p, tau_z, tau_i, tau_p = rules(blocks).values()
+        if variant:
+            return {
+                "p": measured.error * (k_p * (1 + tau_z / tau_i)),
+                "i": blocks.integral(measured.error, k_p / tau_i),
+                "d": blocks.derivative(measured.error, "error", tau_p) * (k_p * tau_z),
+            }
         passed = blocks.low_pass(measured.error, tau_p, "error")
         return {
             "p": passed * (k_p * (1 + tau_z / tau_i)),

@@ -51,7 +51,7 @@ OTHER_REASON = (
 
 SLIPS = (
     Remark(
-        "F7", 4, True,
+        "F7", 3, True,
         "Table 1 prints the joint and the touched limiter in series; they carry the force side by side. With the "
         "formula as printed there is no second pair of modes.",
     ),
@@ -60,7 +60,7 @@ SLIPS = (
         "The limiter sets which mass line is seen, and not whether the cart sticks.",
     ),
     Remark(
-        "F18", 2, False,
+        "F18", 1, False,
         "2.5 kg instead of 1.7, and 0.75 instead of 0.5, are one slip: a motor that gives 0.68 and 0.67 of the force "
         "assumed shows both.",
     ),
@@ -88,6 +88,12 @@ def remarks(of: Iterable[Remark], verdicts: Mapping[str, ClaimVerdict]) -> list[
         if finding and remark.part < len(finding.stated) and finding.stated[remark.part].holds == remark.met:
             rows.append(RemarkRow(remark, short(finding.stated[remark.part].number)))
     return rows
+
+
+def as_far(verdict: ClaimVerdict) -> str:
+    """Return how far a claim that holds could be judged, in brackets; "" if all of it was."""
+    beyond = None in verdict.finding.pattern if verdict.finding else False
+    return " (as far as simulation decides)" if beyond else ""
 
 
 def right(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:

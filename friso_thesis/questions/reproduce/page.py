@@ -14,6 +14,7 @@ from friso.shown.drawing import plotly_renderer
 from friso.shown.drawing.figure import BLUE, GREEN, GREY, ORANGE, PINK, VERMILLION, Figure
 from friso.shown.files import Content, pictures
 from friso.shown.pages import Report, print_image
+from friso.version import VERSION
 from friso_thesis.questions.reproduce import first_screen, words
 from friso_thesis.questions.reproduce.document import conclusion, reproduce_document
 from friso_thesis.questions.reproduce.figures import reproduction_figures
@@ -54,6 +55,7 @@ def reproduce_files(reproduction: Reproduction, laws: ConclusionsByLaw | None = 
     figures = pictures(reproduction_figures(reproduction).values(), ("png", "svg"))
     return {
         "reproduction.html": reproduce_html(reproduction, laws),
+        "claims.md": claims_markdown(reproduction),
         "summary.pdf": partial(save_summary, reproduction.verdicts, conclusion(reproduction), COLOURS),
         "claims.json": text + "\n",
         **{f"figures/{name}": content for name, content in figures.items()},
@@ -79,6 +81,7 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
         values={
             "verdicts": verdicts,
             "right": first_screen.right(verdicts),
+            "as_far": first_screen.as_far,
             "other_reason": first_screen.remarks(first_screen.OTHER_REASON, by_claim),
             "slips": first_screen.remarks(first_screen.SLIPS, by_claim),
             "counts": _counts(verdicts),
@@ -108,6 +111,34 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
             "rtol": f"{reproduction.rtol:g}",
         },
     ).html()
+
+
+def claims_markdown(reproduction: Reproduction) -> str:
+    """Return all claims as a Markdown page, as the documentation shows a finished run."""
+    heads = ("Claim", "Where", "What the thesis claims, in short", "By its count", "By what attracts", "Holds in draws")
+    rows = [heads, ("---",) * len(heads)]
+    rows += [
+        (
+            item.claim.id,
+            item.claim.where,
+            item.claim.text,
+            words.AGREEMENT[item.judgement],
+            words.attracts(item),
+            words.share(item) + (f": {item.depends_on}" if item.depends_on else ""),
+        )
+        for item in words.in_order(reproduction.verdicts)
+    ]
+    draws = len(reproduction.plausible.draws)
+    how = f"`friso reproduce`, friso {VERSION}: {reproduction.judged_points} values per axis, {draws} joint draws."
+    parts = ["# The thesis, claim by claim", conclusion(reproduction), how]
+    parts.append("\n".join("| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in rows))
+    for item in words.in_order(reproduction.verdicts):
+        if item.finding:
+            said = f"{item.claim.text[:1].upper()}{item.claim.text[1:]} ({item.claim.where})."
+            lines = [f"## {item.claim.id}: {words.AGREEMENT[item.judgement]}", "", said, ""]
+            lines += [f"- {words.criterion_word(part)}: {part.number}" for part in item.finding.stated]
+            parts.append("\n".join([*lines, "", item.dependence]))
+    return "\n\n".join(parts) + "\n"
 
 
 def sections(figures: Mapping[str, Figure], verdicts: Iterable[ClaimVerdict]) -> tuple[FigureSection, ...]:

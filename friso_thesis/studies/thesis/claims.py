@@ -162,27 +162,31 @@ Judge = Callable[[Evidence], Finding]
 @dataclass(frozen=True)
 class Registered:
     """A judge, the figure (or equation) that shows its evidence, and the names of the maps, responses, parts of the
-    linear analysis and experiments that it needs; and on what it hangs that no draw changes (`undrawn`)."""
+    linear analysis and experiments that it needs; on what it hangs that no draw changes (`undrawn`); and whether it is
+    about runs alone (`of_runs`), so that what attracts does not enter."""
 
     judge: Judge
     figure: str
     needs: frozenset[str]
     undrawn: str = ""
+    of_runs: bool = False
 
 
 _JUDGES: dict[str, Registered] = {}
 
 
-def judges(claim: str, figure: str, needs: tuple[str, ...] = (), undrawn: str = "") -> Callable[[Judge], Judge]:
+def judges(
+    claim: str, figure: str, needs: tuple[str, ...] = (), undrawn: str = "", of_runs: bool = False
+) -> Callable[[Judge], Judge]:
     """Register the decorated function as judge of a claim; `undrawn` are assumed values that decide on it and are in no
-    draw. Raises ValueError for an unknown or taken claim."""
+    draw, and a claim `of_runs` is not judged by what attracts. Raises ValueError for an unknown or taken claim."""
     if claim not in {entry.id for entry in claims()}:
         raise ValueError(f"judge of {claim!r}: expected a claim of claims.toml, such as 'F11A'")
     if claim in _JUDGES:
         raise ValueError(f"judge of {claim!r}: the claim has one already, {_JUDGES[claim].judge.__qualname__}")
 
     def register(judge: Judge) -> Judge:
-        _JUDGES[claim] = Registered(judge, figure, frozenset(needs), undrawn)
+        _JUDGES[claim] = Registered(judge, figure, frozenset(needs), undrawn, of_runs)
         return judge
 
     return register

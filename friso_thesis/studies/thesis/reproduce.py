@@ -199,10 +199,10 @@ def _left_out(claim: Claim, chosen: Mapping[str, ThesisStudy]) -> ClaimVerdict:
 
 
 def _by_attraction(entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed]) -> Finding | None:
-    """Return the finding by what attracts the stages; None for a claim without maps, and for one on paths alone, on
-    which what attracts does not depend."""
+    """Return the finding by what attracts the stages; None for a claim without maps, for one on runs, and for one on
+    paths alone, on which what attracts does not depend."""
     maps = entry.needs & STUDIES.keys()
-    if not maps or not maps <= surveyed.keys() or all(STUDIES[name].of_motion for name in maps):
+    if entry.of_runs or not maps or not maps <= surveyed.keys() or all(STUDIES[name].of_motion for name in maps):
         return None
     lasting = by_way(replace(base, maps={}), by_peak_count)
     return entry.judge(replace(lasting, maps={name: surveyed[name].attracted for name in maps}))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.equations.controllers.van_dijk import ALPHA, BETA, TUNED_MASS
+from friso.equations.controllers.van_dijk import ALPHA, BETA, LOW_PASS, TUNED_MASS
 from friso.equations.motions.there_and_back import CRUISE
 from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy
 
@@ -91,8 +91,9 @@ OPEN: tuple[OpenValue, ...] = (
         "Sec. 4.3.2 prescribes 100 m/s^2 to the rig; for the simulations none is printed, and slower starts are usual",
     ),
     _value(
-        "distance", 0.05, 0.16, "m", "even", _TIMES, 0.09,
-        "Sec. 3.5: about 160 mm of travel; Sec. 4.3.2 moves 100 mm; for the simulations none is printed",
+        "distance", 0.01, 0.16, "m", "log", _TIMES, 0.09,
+        "Sec. 3.5: about 160 mm of travel; Sec. 4.3.2 moves 100 mm; for the simulations none is printed, and moves of "
+        "10 mm are usual too",
     ),
     _value(
         "cruise over acceleration time", 0.0, 1.0, "", "either", (*_TIMES, CRUISE), 0.0,
@@ -106,6 +107,10 @@ OPEN: tuple[OpenValue, ...] = (
     _value(
         "mass", 1.7, 2.5, "kg", "either", _MASSES, 1.7,
         "Sec. 4.2.1: 1.7 kg weighed, 2.5 kg identified; cart and stage in the same proportion",
+    ),
+    _value(
+        "low-pass on the derivative alone", 0.0, 1.0, "", "either", (LOW_PASS,), 0.0,
+        "Eq. 6 has it there, as Simulink's PID block; Eq. 7 has it before all terms",
     ),
 )  # fmt: skip
 """All of them."""
@@ -148,7 +153,8 @@ class Draw:
             "parasitic.mass": f"{v['parasitic mass over stage mass'] * stage!r} kg",
             TUNED_MASS: f"{mass!r} kg",
         }
-        return changes | ({CRUISE: ratio} if ratio else {})
+        changes |= {CRUISE: ratio} if ratio else {}
+        return changes | ({LOW_PASS: "derivative"} if v["low-pass on the derivative alone"] else {})
 
 
 def draw(number: int) -> Draw:

@@ -17,6 +17,7 @@ from friso_thesis.studies.thesis.judges.shares import slow_spells
 from friso_thesis.studies.thesis.linear import FREE
 from friso_thesis.studies.thesis.maps import overlap, trend, trend_text, verdict_table
 from friso_thesis.studies.thesis.reading import about, reading
+from friso_thesis.studies.thesis.settings import JudgeSettings
 from friso_thesis.studies.thesis.studies import STUDIES
 
 LIGHT, HEAVY = "1.7 kg", "2.5 kg"
@@ -73,15 +74,12 @@ def force_at_full_stroke(evidence: Evidence) -> Finding:
     )
 
 
-TUNED_MASSES = 9
-"""Masses for which the controller is tuned, from that of the stage to the whole."""
-
-
 @lru_cache(maxsize=256)
 def _margins(stage_file: str) -> dict[float, float]:
     """Modulus margin of the settled states (0: not stable), by the mass [kg] that the controller is tuned for."""
     flat = {**loads(stage_file).flat(), "joint.locked": False}
-    masses = np.geomspace(flat["masses.stage"], flat["masses.cart"] + flat["masses.stage"], TUNED_MASSES)
+    whole = flat["masses.cart"] + flat["masses.stage"]
+    masses = np.geomspace(flat["masses.stage"], whole, JudgeSettings.current().tuned_masses)
     return {float(mass): settled_margin({**flat, TUNED_MASS: float(mass)}) for mass in masses}
 
 
@@ -183,7 +181,7 @@ def _overshooting_slip(response: Response) -> tuple[float, float]:
     return np.nan, np.nan
 
 
-@judges("F25O", figure="25", needs=("system",))
+@judges("F25O", figure="25", needs=("system",), of_runs=True)
 def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
     """Return the swing at the end over the crossover, at every mass of the map."""
     words = reading()

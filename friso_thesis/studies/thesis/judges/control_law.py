@@ -19,17 +19,12 @@ from friso_thesis.studies.thesis.judges.identified_responses import CONSTANTS
 from friso_thesis.studies.thesis.linear import PLANT
 from friso_thesis.studies.thesis.maps import trend, trend_text, verdict_table
 from friso_thesis.studies.thesis.reading import reading
+from friso_thesis.studies.thesis.settings import JudgeSettings
 
 S, K_P, TAU_Z, TAU_I, TAU_P = sp.symbols("s k_p tau_z tau_i tau_p", positive=True)
 
 LAW_OF_RULES = K_P * (1 + TAU_Z / TAU_I + 1 / (TAU_I * S) + TAU_Z * S) / (TAU_P * S + 1)
 """Eq. 7 as printed."""
-
-_FAR = 3.0
-"""Factor between a crossover and the first eigenfrequency from which one is significantly larger than the other."""
-
-_EXACT = 1e-9
-"""Share by which numbers that follow from one equation may differ."""
 
 
 def law_of_gains(gains: tuple[sp.Expr, sp.Expr, sp.Expr]) -> sp.Expr:
@@ -87,11 +82,12 @@ def margins_over_crossover(stage_file: str, first: float) -> dict[float, float]:
     """Return the modulus margin of the settled states with the joint free (0: not stable) by the crossover over the
     `first` eigenfrequency [Hz]."""
     flat = {**loads(stage_file).flat(), "joint.locked": False}
-    ratios = np.geomspace(1 / (2 * _FAR), 2 * _FAR, 25)
+    reach = 2 * JudgeSettings.current().far_crossover_factor
+    ratios = np.geomspace(1 / reach, reach, 25)
     return {float(ratio): settled_margin({**flat, CROSSOVER: float(ratio) * first}) for ratio in ratios}
 
 
-@judges("S342F", figure="Sec. 3.4.2, crossover and first mode", needs=(PLANT, "isolator-crossover"))
+@judges("S342F", figure="Sec. 3.4.2, crossover and first mode", needs=(PLANT, "isolator-crossover"), of_runs=True)
 def crossover_beside_the_first_mode(evidence: Evidence) -> Finding:
     """Return the margin of the free joint's loop over its crossover, and forces and settling times of the runs."""
     first = evidence.analysis.plants["stuck"].first
@@ -109,14 +105,14 @@ def crossover_beside_the_first_mode(evidence: Evidence) -> Finding:
 def judged_crossovers(margins: dict[float, float], first: float, force: float, settling: float) -> Finding:
     """Return the finding from margins over the crossover, in `first` eigenfrequencies [Hz], and from the rank
     correlations of force and settling time with it."""
-    words = reading()
-    near = {ratio: margin for ratio, margin in margins.items() if 1 / _FAR < ratio < _FAR}
+    words, far = reading(), JudgeSettings.current().far_crossover_factor
+    near = {ratio: margin for ratio, margin in margins.items() if 1 / far < ratio < far}
     worst = min(near, key=lambda ratio: near[ratio])
     apart = min(margin for ratio, margin in margins.items() if ratio not in near)
     return Finding(
         (
             Part(
-                f"a crossover within a factor of {_FAR:g} of the first eigenfrequency is not stable somewhere, and "
+                f"a crossover within a factor of {far:g} of the first eigenfrequency is not stable somewhere, and "
                 "farther from it every one is",
                 near[worst] <= 0 < apart,
                 f"first eigenfrequency {first:.3g} Hz; least modulus margin {near[worst]:.2g} within, at "
@@ -154,7 +150,7 @@ def motor_constant_cancels(evidence: Evidence) -> Finding:
             Part(
                 "the open loop is the one of the true mass, if the controller is tuned for the mass that a wrong motor "
                 "constant shows, with that motor",
-                max(changes) <= _EXACT,
+                max(changes) <= JudgeSettings.current().exact_share,
                 f"it differs by at most {percent(max(changes), 2)} with motors of "
                 f"{' and '.join(f'{1 / factor:.2g}' for factor in CONSTANTS)} of the force assumed, as Fig. 17 and 18 "
                 "ask for",

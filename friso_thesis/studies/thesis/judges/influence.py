@@ -13,13 +13,9 @@ from friso.stage import loads
 from friso.studies.samples import Samples
 from friso.studies.sweep import sweep
 from friso_thesis.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges
+from friso_thesis.studies.thesis.settings import JudgeSettings
 from friso_thesis.studies.thesis.space import SEED
 from friso_thesis.studies.thesis.studies import STUDIES
-
-_RUNS = 1024
-"""Stages drawn: a correlation is then known to about 0.06 (two standard errors)."""
-
-_RTOL = 1e-5
 
 _LOCKED, _FREE = ("system", "friction", "control"), ("isolator-stiffness", "isolator-masses", "isolator-friction")
 _NAMES: Mapping[str, str] = MappingProxyType(
@@ -58,8 +54,9 @@ def _influence(stage_file: str, studies: list, locked: bool) -> dict[str, float]
     spans = {span.key: span for study in studies for span in study.spans}
     links = {key: text for study in studies for key, text in study.links.items()}
     ranges = {key: span.text(2).rsplit(":", 2)[0] + (":log" if span.log else "") for key, span in spans.items()}
-    stage = loads(stage_file).replace({"joint.locked": locked})
-    runs = sweep(stage, {}, Samples(ranges, count=_RUNS, seed=SEED), links, ["peaks", "outcome"], _RTOL)
+    settings, stage = JudgeSettings.current(), loads(stage_file).replace({"joint.locked": locked})
+    samples = Samples(ranges, count=settings.influence_draws, seed=SEED)
+    runs = sweep(stage, {}, samples, links, ["peaks", "outcome"], settings.influence_rtol)
     valid = ~runs["outcome"].isin(["invalid", "failed"]).values
     hunts = runs["peaks"].values[valid] > 0
     return {_NAMES[key]: _rank_biserial(runs[key].values[valid], hunts) for key in spans}

@@ -13,12 +13,10 @@ from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
 from friso_thesis.studies.thesis.judges.leaf_springs import STROKE, mechanism
 from friso_thesis.studies.thesis.reading import reading
+from friso_thesis.studies.thesis.settings import JudgeSettings
 
-_YOUNG, _SPACING, _LARGER = 195e9, 0.06, 1.1
-"""Young's modulus [Pa] of tempered strip, spacing of the leaves [m], and the factor by which a dimension grows."""
-
-_WITHIN = 1e-2
-"""Share up to which a spring is linear, and a motion of no account; and by which stiffnesses rise alike."""
+_YOUNG, _SPACING = 195e9, 0.06
+"""Young's modulus [Pa] of tempered strip, and spacing of the leaves [m]."""
 
 
 _STIFFNESSES = "drive", "support_x", "support_y"
@@ -39,18 +37,18 @@ def shortening_is_negligible(evidence: Evidence) -> Finding:
 
 def judged_shortening(leaves: Evaluation) -> Finding:
     """Return the finding from leaf springs at full stroke."""
-    share = leaves.shortening / leaves.stroke
+    share, least = leaves.shortening / leaves.stroke, JudgeSettings.current().negligible_share
     return Finding(
         (
             Part(
-                f"at full stroke the force is linear in the deflection (within {percent(_WITHIN)})",
-                leaves.nonlinearity <= _WITHIN,
+                f"at full stroke the force is linear in the deflection (within {percent(least)})",
+                leaves.nonlinearity <= least,
                 f"off by {percent(leaves.nonlinearity, 2)} at {leaves.stroke * 1e3:g} mm",
                 why="The leaves stretch.",
             ),
             Part(
-                f"the motion in height is negligible: at most {percent(_WITHIN)} of the stroke",
-                share <= _WITHIN,
+                f"the motion in height is negligible: at most {percent(least)} of the stroke",
+                share <= least,
                 f"the leaves shorten by {leaves.shortening * 1e6:.2g} um, {percent(share, 2)} of the stroke",
                 why="It rises with the square of the deflection.",
             ),
@@ -66,22 +64,23 @@ def width_against_length(evidence: Evidence) -> Finding:
 
 def _ratios(dimension: str) -> tuple[float, float, float]:
     """Return the factors by which drive stiffness, and the support along the leaves and along their width, change."""
-    own, other = evaluated(), evaluated(dimension, _LARGER)
+    own, other = evaluated(), evaluated(dimension, JudgeSettings.current().leaf_change_factor)
     drive, along, across = (float(getattr(other, name)[0] / getattr(own, name)[0]) for name in _STIFFNESSES)
     return drive, along, across
 
 
 def judged_dimensions(wider: tuple[float, float, float], longer: tuple[float, float, float]) -> Finding:
     """Return the finding from the factors of the stiffnesses of wider and of longer leaves."""
-    words = reading()
+    words, settings = reading(), JudgeSettings.current()
+    alike, larger = settings.negligible_share, settings.leaf_change_factor
     drive, along, across = wider
     return Finding(
         (
             Part(
                 "wider leaves gain more stiffness in a supporting direction than in the direction of the drive, and "
-                f"less in none (within {percent(_WITHIN)})",
-                across > (1 + _WITHIN) * drive and along >= (1 - _WITHIN) * drive,
-                f"{_LARGER:g} times the width: {across:.3g} times the support along the width, {along:.3g} times that "
+                f"less in none (within {percent(alike)})",
+                across > (1 + alike) * drive and along >= (1 - alike) * drive,
+                f"{larger:g} times the width: {across:.3g} times the support along the width, {along:.3g} times that "
                 f"along the leaves, {drive:.3g} times the drive stiffness",
                 why="The supports gain no more than the drive.",
             ),
@@ -89,7 +88,7 @@ def judged_dimensions(wider: tuple[float, float, float], longer: tuple[float, fl
                 "longer leaves lose support along their width, in proportion significantly: by more than what is the "
                 f"same ({percent(words.same)})",
                 longer[2] < 1 - words.same,
-                f"{_LARGER:g} times the length: {longer[2]:.3g} times the support along the width, {longer[1]:.3g} "
+                f"{larger:g} times the length: {longer[2]:.3g} times the support along the width, {longer[1]:.3g} "
                 f"times that along the leaves, {longer[0]:.3g} times the drive stiffness",
                 why="They lose less.",
             ),

@@ -9,6 +9,7 @@ import sympy as sp
 from friso.frequency.stiffness import in_series
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges
 from friso_thesis.studies.thesis.linear import PLANT, Springs
+from friso_thesis.studies.thesis.settings import JudgeSettings
 
 K_F, K_J = sp.symbols("k_f k_j", positive=True)
 
@@ -17,9 +18,6 @@ PRINTED_STIFFNESS = in_series(K_F, K_J)
 
 PRINTED_SENSITIVITY = (K_J / K_F / (1 + K_J / K_F)) ** 2
 """Eq. 2 as printed, with eta = K_J/K_F: how the stiffness of both in series changes with that of the friction."""
-
-_EXACT = 1e-9
-"""Share by which numbers that follow from one equation may differ."""
 
 
 @judges("E1", figure="Eq. 1, 2", needs=(PLANT,))
@@ -77,7 +75,7 @@ def in_the_plant(stiffness: sp.Expr, springs: Springs) -> Part:
     return Part(
         "Eq. 1 with k_f = sigma_0 is the force over displacement at rest of the plant linearised with a stuck cart, "
         "its limiter free",
-        abs(springs.both / expected - 1) <= _EXACT,
+        abs(springs.both / expected - 1) <= JudgeSettings.current().exact_share,
         f"plant {springs.both:.6g} N/m, Eq. 1 {expected:.6g} N/m; eta {eta:.3g}: an error of 1 % in k_f changes k_e by "
         f"{eta / (1 + eta):.2g} %",
     )

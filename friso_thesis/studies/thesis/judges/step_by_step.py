@@ -137,7 +137,7 @@ def _seconds(time: float) -> str:
     return f"{time:.2f} s"
 
 
-@judges("F25R", figure="25", needs=("system",))
+@judges("F25R", figure="25", needs=("system",), of_runs=True)
 def response_time_falls_with_crossover(evidence: Evidence) -> Finding:
     """Return the period of lasting cycles over the crossover, at every mass of the map."""
     words = reading()
@@ -161,7 +161,7 @@ def response_time_falls_with_crossover(evidence: Evidence) -> Finding:
     )
 
 
-@judges("S5P", figure="Sec. 5, peaks and cycles", needs=_ISOLATED)
+@judges("S5P", figure="Sec. 5, peaks and cycles", needs=_ISOLATED, of_runs=True)
 def more_peaks_than_cycles(evidence: Evidence) -> Finding:
     """Return the isolated runs that swing to their end with more counted peaks than cycles."""
     swinging, more = 0, 0
