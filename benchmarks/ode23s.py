@@ -177,8 +177,8 @@ def other_solvers() -> dict[str, float]:
         runs |= {name: _of_scipy(name, numbers, end) for name in ("ode15s", "ode45")}
         for name, (position, steps, evaluations) in runs.items():
             swing = float(np.ptp(position[3 * len(position) // 4 :]))
-            found = {"peaks": counted_peaks(position), "swing_m": swing, "steps": steps, "evaluations": evaluations}
-            values |= {f"{joint}_{name}_{key}": value for key, value in found.items()}
+            shown = {"peaks": counted_peaks(position), "swing_m": swing, "steps": steps, "evaluations": evaluations}
+            values |= {f"{joint}_{name}_{key}": value for key, value in shown.items()}
     return values
 
 

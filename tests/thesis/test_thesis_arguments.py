@@ -17,7 +17,7 @@ from friso_thesis.studies.thesis.judges.influence import judged_ranks
 from friso_thesis.studies.thesis.judges.joint_shape import evaluated, judged_dimensions, judged_place, judged_shortening
 from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE, Sticking
 from friso_thesis.studies.thesis.judges.solver import judged_runs, judged_solvers
-from friso_thesis.studies.thesis.judges.step_by_step import HEAVIEST, HIGH_ALPHA, LOW_ALPHA, Cycle
+from friso_thesis.studies.thesis.judges.step_by_step import HEAVIEST, HIGH_ALPHA, LOW_ALPHA, ArguedCycle
 from friso_thesis.studies.thesis.space import draw
 from friso_thesis.studies.thesis.ways import by_attraction, by_peak_count
 
@@ -207,9 +207,9 @@ def test_other_solvers() -> None:
 
 def cycle(
     overshoot: float = 1e-3, build_up: float = 5.0, time: float = 1.0, integral: float = 0.7, both: bool = True
-) -> Cycle:
+) -> ArguedCycle:
     directions = np.array([1, -1] if both else [1, 1])
-    return Cycle(overshoot, build_up, Sticking(np.full(2, time), np.full(2, integral), directions))
+    return ArguedCycle(overshoot, build_up, Sticking(np.full(2, time), np.full(2, integral), directions))
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ NOTHING_TO_COMPARE = "One of the two does not hunt: there is nothing to compare.
 
 
 @dataclass(frozen=True)
-class Cycle:
+class ArguedCycle:
     """A motion after the return, as far as the arguments go: the overshoot beyond the reference [m] of a cycle (NaN if
     there is none), the mean rate [N/s] at which the integral action changes until peaks are counted, and the sticks."""
 
@@ -40,7 +40,7 @@ class Cycle:
     stick: Sticking
 
 
-def cycle_of(response: Response) -> Cycle:
+def cycle_of(response: Response) -> ArguedCycle:
     """Return the cycle of a response; its overshoot and sticks are those after the time from which peaks count."""
     trace = response.trace
     time, integral = (np.asarray(trace[name].values) for name in ("time", "force_i"))
@@ -50,7 +50,7 @@ def cycle_of(response: Response) -> Cycle:
     rate = float(np.abs(np.diff(integral[still])).sum() / np.ptp(time[still]))
     sticks = sticking(response)
     late = np.abs(deviation[time >= COUNTED_AFTER])
-    return Cycle(float(late.max()) if sticks.both else np.nan, rate, sticks)
+    return ArguedCycle(float(late.max()) if sticks.both else np.nan, rate, sticks)
 
 
 def _against(first: float, second: float, unit: str, names: tuple[str, str]) -> str:
