@@ -54,7 +54,7 @@ from friso_thesis.studies.thesis import (
 )
 from friso_thesis.studies.thesis.as_built import _prescribed, rig_with_drive
 from friso_thesis.studies.thesis.claims import _JUDGES, BESIDE, beside, judges, registered
-from friso_thesis.studies.thesis.cycles import map_cycles, survey
+from friso_thesis.studies.thesis.cycles import Edge, Surveyed, map_cycles, survey
 from friso_thesis.studies.thesis.evidence import RESPONSES
 from friso_thesis.studies.thesis.experiments import (
     _RUNS,
@@ -800,11 +800,27 @@ def test_runs_read_by_what_attracts() -> None:
             }
         )
     )
-    read = by_attraction(runs, np.array([True, False, True, True]), np.array([True, True, True, False]))
+    flags = np.array([True, False, True, True]), np.array([True, True, True, False])
+    read = by_attraction(runs, *flags, np.full(4, np.inf))
     assert read.keeps_moving.values.tolist() == [True, False, True, False]
     assert read["outcome"].values.tolist() == ["swings", "rests", "rests", "failed"]
     assert read["count"].values[[0, 1]].tolist() == [5.0, 0.0]
     assert np.isnan(read["count"].values[2])
+
+
+def test_limits_of_attraction_lie_on_the_curves() -> None:
+    """A limit between two cells is that of the curve that runs between them; without one, it is halfway."""
+    runs = made("system", lambda f, m: 3 * (f < 20) + 0 * m, 14)
+    axes = tuple(runs.dims)
+    crossover, mass = (runs[name].values for name in axes)
+    curve = Edge("flip", True, np.array([18.0, 21.0]), mass[[0, -1]])
+    attracts = crossover[:, None] < 18 + 3 * (mass - mass[0])[None, :] / np.ptp(mass)
+    surveyed = Surveyed(runs, attracts, np.ones(attracts.shape, bool))
+    for edges, precise in (((curve,), 0.02), ((), 1.5)):
+        read = surveyed.attracted(edges)
+        _, _, moving, _ = verdict_table(read, *axes)
+        limits = ends(crossover, moving, sizes(read, *axes))
+        assert np.abs(limits - np.interp(mass, mass[[0, -1]], curve.x)).max() <= precise
 
 
 def test_a_part_of_the_studies_covers_its_claims_only() -> None:

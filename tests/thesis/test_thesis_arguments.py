@@ -133,8 +133,10 @@ def test_by_what_attracts_the_decided_cells_count() -> None:
     attracts = np.ones(shape, bool)
     attracts[3:] = False
     decided = attracts.copy()
-    assert judged("S5", {"control": by_attraction(runs, attracts, decided)}).pattern == (Y,)
-    assert judged("S5", {"control": by_attraction(runs, attracts, np.ones(shape, bool))}).pattern == (N,)
+    assert judged("S5", {"control": by_attraction(runs, attracts, decided, np.full(shape, np.inf))}).pattern == (Y,)
+    assert judged(
+        "S5", {"control": by_attraction(runs, attracts, np.ones(shape, bool), np.full(shape, np.inf))}
+    ).pattern == (N,)
 
 
 def test_the_solver_is_accurate_where_it_counts_and_swings_alike() -> None:

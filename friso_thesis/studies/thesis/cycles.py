@@ -6,8 +6,9 @@ The curves on which cycles stop attracting are drawn as well.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -77,10 +78,27 @@ class Surveyed:
     attracts: np.ndarray
     decided: np.ndarray
 
-    @property
-    def attracted(self) -> xr.Dataset:
-        """Return the runs by what attracts their stages."""
-        return by_attraction(by_peak_count(self.runs), self.attracts, self.decided)
+    def attracted(self, edges: Sequence[Edge]) -> xr.Dataset:
+        """Return the runs by what attracts their stages, with their distances from the edges of attraction."""
+        return by_attraction(by_peak_count(self.runs), self.attracts, self.decided, cells_apart(self.runs, edges))
+
+
+def cells_apart(runs: xr.Dataset, edges: Sequence[Edge]) -> np.ndarray:
+    """Return the distances of the cells of a map from the nearest of some curves, in cells, of the shape of the runs;
+    infinite without a curve."""
+    axes = [runs[name].values for name in runs.dims]
+    rows, columns = np.meshgrid(*(np.arange(len(axis), dtype=float) for axis in axes), indexing="ij")
+    nearest = np.full(rows.shape, np.inf)
+    for edge in edges:
+        line = [
+            np.interp(values, axis, np.arange(len(axis))) for values, axis in zip((edge.x, edge.y), axes, strict=True)
+        ]
+        points = np.stack(line, axis=1)
+        for first, last in pairwise(points):
+            along, away = last - first, np.stack([rows - first[0], columns - first[1]], axis=-1)
+            share = np.clip(away @ along / max(float(along @ along), np.finfo(float).tiny), 0.0, 1.0)
+            nearest = np.minimum(nearest, np.hypot(*np.moveaxis(away - share[..., None] * along, -1, 0)))
+    return nearest
 
 
 def map_cycles(study: ThesisStudy, runs: xr.Dataset, surveyed: Surveyed, kept: Kept = NOT_KEPT) -> CyclesOnMap:

@@ -153,7 +153,7 @@ def reproduce(
         with words_read() as words:
             by_count[name] = counted(entry, base)
         readings[name] = _read_otherwise(entry, base, words)
-        if (attracts := _by_attraction(entry, base, surveyed)) is not None:
+        if (attracts := _by_attraction(entry, base, surveyed, cycles)) is not None:
             attracting[name] = attracts
     space = plausible(entries, draws, kept, tally)
     others = _others(entries, base, loose)
@@ -198,14 +198,17 @@ def _left_out(claim: Claim, chosen: Mapping[str, ThesisStudy]) -> ClaimVerdict:
     return not_covered(claim, f"not computed in this run: {', '.join(missing) or 'this claim was not asked for'}")
 
 
-def _by_attraction(entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed]) -> Finding | None:
+def _by_attraction(
+    entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed], cycles: Mapping[str, CyclesOnMap]
+) -> Finding | None:
     """Return the finding by what attracts the stages; None for a claim without maps, for one on runs, and for one on
     paths alone, on which what attracts does not depend."""
     maps = entry.needs & STUDIES.keys()
     if entry.of_runs or not maps or not maps <= surveyed.keys() or all(STUDIES[name].of_motion for name in maps):
         return None
     lasting = by_way(replace(base, maps={}), by_peak_count)
-    return entry.judge(replace(lasting, maps={name: surveyed[name].attracted for name in maps}))
+    attracted = {name: surveyed[name].attracted(cycles[name].edges) for name in maps}
+    return entry.judge(replace(lasting, maps=attracted))
 
 
 def _read_otherwise(entry: Registered, base: Evidence, words: Set[str]) -> dict[str, Finding]:

@@ -34,19 +34,19 @@ def by_peak_count(runs: xr.Dataset) -> xr.Dataset:
     )
 
 
-def by_attraction(runs: xr.Dataset, attracts: np.ndarray, decided: np.ndarray) -> xr.Dataset:
+def by_attraction(runs: xr.Dataset, attracts: np.ndarray, decided: np.ndarray, apart: np.ndarray) -> xr.Dataset:
     """Return the runs with the numbers that judges read,
     by whether something attracts the stage of each cell.
 
-    The flags have the runs' shape; uncertain cells are left out. A stage with an attractor also `lasts`. How often a
-    cycle repeats in a run is known only if the move ended in it.
+    The arrays have the runs' shape; uncertain cells are left out. A stage with an attractor also `lasts`. How often a
+    cycle repeats in a run is known only if the move ended in it. `apart` are the distances of the cells from the curves
+    on which cycles stop attracting, in cells: limits are interpolated by them.
     """
     moving = runs["keeps_moving"].copy(data=attracts & decided).assign_attrs(criterion="a cycle attracts the stage")
     outcome = runs["outcome"].where(runs["keeps_moving"].copy(data=decided) | (runs["outcome"] == "invalid"), FAILED)
     count = runs["peaks"].where(moving & (runs["peaks"] > 0)).where(moving, 0.0)
-    return runs.assign(keeps_moving=moving, count=count, outcome=outcome, lasts=moving).drop_vars(
-        "size", errors="ignore"
-    )
+    size = runs["peaks"].copy(data=np.exp(np.where(attracts, apart, -apart)))
+    return runs.assign(keeps_moving=moving, count=count, outcome=outcome, lasts=moving, size=size)
 
 
 def by_way(evidence: Evidence, read: Callable[[xr.Dataset], xr.Dataset]) -> Evidence:

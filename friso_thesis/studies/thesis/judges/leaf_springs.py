@@ -37,8 +37,8 @@ def _evaluated() -> tuple[Evaluation, ...]:
 
 
 def mechanism(young: float, spacing: float, height: float) -> Mechanism:
-    """Return the rig's leaf springs for a Young's modulus [Pa], a spacing of the leaves [m], and a height of the stage's
-    centre of mass above their ends [m]."""
+    """Return the rig's leaf springs for a Young's modulus [Pa], a spacing of the leaves [m], and a height [m] of the
+    stage's centre of mass above their ends."""
     steel, mass, length = materials()["stainless 1.4310"], thesis_rig().flat()["masses.stage"], 70e-3
     centre = (length + height, 0.0, 0.0)
     return Mechanism(
