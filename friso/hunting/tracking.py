@@ -91,7 +91,7 @@ def dwells(stage: Stage, rtol: float) -> tuple[Dwell, ...]:
             entered[runs.numbers, column] = np.where(done & (times < runs.statistic("ended")), times, np.inf)
     settled = np.maximum(entered - since[:, None], 0.0)
     positions = motion.reference(flat, since)
-    found = [
+    places_told = [
         Dwell(
             number + 1,
             float(positions[number]),
@@ -100,7 +100,7 @@ def dwells(stage: Stage, rtol: float) -> tuple[Dwell, ...]:
         )
         for number in range(len(places))
     ]
-    return tuple(sorted(found, key=lambda dwell: dwell.slowness, reverse=True))
+    return tuple(sorted(places_told, key=lambda dwell: dwell.slowness, reverse=True))
 
 
 def tracking(stage: Stage, rtol: float) -> Tracking | None:
@@ -140,15 +140,15 @@ def _reversals(
 ) -> tuple[Reversal, ...]:
     """Return the turning points of a reference in a span of time, each with the error behind it."""
     corners = motion.pieces(flat, 1)[0, 1:, 0] if motion.form_of(flat).tones else np.zeros(0)
-    found = []
+    reversals = []
     for corner, following in zip(corners, np.append(corners, flat[DURATION])[1:], strict=True):
         if not span[0] <= corner < span[1]:
             continue
         behind = (time >= corner) & (time <= (corner + following) / 2)
         if behind.any():
             position = float(motion.reference(flat, np.array([corner]))[0])
-            found.append(Reversal(float(corner), position, float(np.abs(error[behind]).max())))
-    return tuple(found)
+            reversals.append(Reversal(float(corner), position, float(np.abs(error[behind]).max())))
+    return tuple(reversals)
 
 
 def _closed(shape: Kernel, flat: Mapping[str, Any], period: float, rtol: float) -> tuple[np.ndarray, float] | None:

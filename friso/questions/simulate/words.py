@@ -20,8 +20,6 @@ def conclusion(name: str, measures: Measures, deviation: np.ndarray, moves_on: b
     `deviation` holds samples of its deviation [m], evenly over time, shape (n,).
     """
     before, late = np.split(np.abs(deviation), [int(WINDOW * len(deviation))])
-    if moves_on and measures.status[0] == Status.DONE:
-        return f"{name} {off_its_reference(float(late.max()), float(np.sqrt(np.mean(late**2))))}."
     grows = bool(late.max() > GROWN * before.max(initial=0.0))
     clauses = {
         SWINGS: lambda: (
@@ -34,6 +32,9 @@ def conclusion(name: str, measures: Measures, deviation: np.ndarray, moves_on: b
     outcome = str(measures.outcome[0])
     if outcome not in clauses:
         return f"{name}: the run was not completed ({Status(int(measures.status[0])).text})."
+    if moves_on:
+        swings = f"; its deviation {clauses[SWINGS]()}" if outcome == SWINGS else ""
+        return f"{name} {off_its_reference(float(late.max()), float(np.sqrt(np.mean(late**2))))}{swings}."
     return f"{name}: {clauses[outcome]()}."
 
 
