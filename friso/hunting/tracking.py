@@ -13,7 +13,7 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, columns, kernel
 from friso.equations import motion
 from friso.equations.structure import structure
-from friso.hunting.criteria import BAND
+from friso.hunting.criteria import BAND, settling_of_traces
 from friso.hunting.measures import BANDS, WINDOW, measuring_options
 from friso.hunting.settings import TrackingSettings
 from friso.stage import Stage
@@ -101,6 +101,22 @@ def dwells(stage: Stage, rtol: float) -> tuple[Dwell, ...]:
         for number in range(len(places))
     ]
     return tuple(sorted(places_told, key=lambda dwell: dwell.slowness, reverse=True))
+
+
+def dwells_of_trace(stage: Stage, time: np.ndarray, deviation: np.ndarray) -> tuple[Dwell, ...]:
+    """Return how a sampled run settles at each place where its reference stands, the slowest first.
+
+    The deviations [m] are those at the times [s], both of shape (n,).
+    """
+    flat, places = stage.flat(), motion.stands(stage.flat())
+    positions = motion.reference(flat, np.array([float(place.corner) for place in places]))
+    listed = []
+    for number, (place, position) in enumerate(zip(places, positions, strict=True), start=1):
+        within = time <= place.until
+        times = {band: settling_of_traces([place], time[within], deviation[None, within], band)[0] for band in BANDS}
+        settling = {band: float(t) if np.isfinite(t) else None for band, t in times.items()}
+        listed.append(Dwell(number, float(position), float(place.corner), settling))
+    return tuple(sorted(listed, key=lambda dwell: dwell.slowness, reverse=True))
 
 
 def tracking(stage: Stage, rtol: float) -> Tracking | None:

@@ -7,14 +7,16 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.hunting.criteria import BAND, CREEPS, RESTS, SWINGS
 from friso.hunting.measures import BANDS, WINDOW, Measures
-from friso.shown.drawing.prefixes import plus_minus, with_unit
+from friso.shown.drawing.prefixes import listed, plus_minus, with_unit
 from friso.shown.motion_words import off_its_reference
+from friso.stage import Stage
+from friso.stage.rig import AS_BUILT
 
 GROWN = 1.1
 """How many times as far as before a run is off its reference in its last quarter that goes ever farther."""
 
 
-def conclusion(name: str, measures: Measures, deviation: np.ndarray, moves_on: bool) -> str:
+def conclusion(name: str, measures: Measures, deviation: np.ndarray, moves_on: bool = False) -> str:
     """Say what the run of a stage does, whose reference stands in the end, or else `moves_on`.
 
     `deviation` holds samples of its deviation [m], evenly over time, shape (n,).
@@ -36,6 +38,12 @@ def conclusion(name: str, measures: Measures, deviation: np.ndarray, moves_on: b
         swings = f"; its deviation {clauses[SWINGS]()}" if outcome == SWINGS else ""
         return f"{name} {off_its_reference(float(late.max()), float(np.sqrt(np.mean(late**2))))}{swings}."
     return f"{name}: {clauses[outcome]()}."
+
+
+def built_sentence(stage: Stage) -> str:
+    """Say what of the machine as built the run has taken into account."""
+    tables = listed([f"[{name}]" for name in AS_BUILT if getattr(stage, name)], "and")
+    return f"The drive ran as built, sample by sample, with {tables}; --continuous leaves that out."
 
 
 def _restless(farthest: float, final: float, moved: float, grows: bool) -> str:
