@@ -67,9 +67,10 @@ def test_friction_varies_along_the_rail_and_the_cable_pulls(stage: Stage) -> Non
     assert np.ptp(factors) > 0.2
     steady = flat["friction.bristle_damping"] * np.abs(speed) + flat["friction.static"]
     assert np.all(np.abs(force - by_hand) < 1e-3 * steady)  # between the points of the table of the rail
-    moving = response["force"].to_numpy() - force - 50 * place - 0.5 * speed
-    gained = np.cumsum(moving)[:-1] * 2e-4 / 1.7
-    assert speed[1:] == pytest.approx(gained, abs=0.03 * np.abs(speed).max())
+    resisting = force + 50 * place + 0.5 * speed
+    pushes = response["force"].to_numpy()[:-1] - (resisting[1:] + resisting[:-1]) / 2  # the force is held in between
+    off = np.abs(np.diff(speed) * 1.7 / 2e-4 - pushes)  # friction's levels are held from sample to sample
+    assert np.percentile(off, 95) < 0.02 * np.abs(pushes).max()
 
 
 def test_settling_at_every_dwell_is_read_off_the_samples(stage: Stage) -> None:

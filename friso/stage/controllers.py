@@ -167,6 +167,11 @@ class ControllerSection(AgainstFriction):
         canvas.box(flat[KIND])
 
     @classmethod
+    def note(cls, flat: Mapping[str, Any]) -> str:
+        """Return what a verdict on a stage with this controller takes for granted, in a sentence."""
+        return ""
+
+    @classmethod
     def key(cls, name: str) -> str:
         """Return the stage-file key of a name in the table."""
         return f"{CONTROLLER}.{name}"

@@ -38,8 +38,8 @@ CONVERSIONS = frozenset({"machine_unit", "force_per_output", "velocity_per_outpu
 
 
 def is_as_built(stage: Any) -> bool:
-    """Tell whether a stage says how its drive is carried out, or what surrounds the machine."""
-    if any(getattr(stage, table) for table in AS_BUILT[1:]):
+    """Tell whether a stage says how its drive is carried out, at which samples for one, or what surrounds it."""
+    if any(getattr(stage, table) for table in AS_BUILT[1:]) or getattr(stage.controller, "sample_time", None):
         return True
     return stage.drive is not None and bool({*stage.drive.as_written()} - CONVERSIONS)
 

@@ -43,7 +43,8 @@ def conclusion(name: str, measures: Measures, deviation: np.ndarray, moves_on: b
 def built_sentence(stage: Stage) -> str:
     """Say what of the machine as built the run has taken into account."""
     tables = listed([f"[{name}]" for name in AS_BUILT if getattr(stage, name)], "and")
-    return f"The drive ran as built, sample by sample, with {tables}; --continuous leaves that out."
+    what = f", with {tables}" if tables else ""
+    return f"The drive ran as built, sample by sample{what}; --continuous leaves that out."
 
 
 def _restless(farthest: float, final: float, moved: float, grows: bool) -> str:
