@@ -35,7 +35,7 @@ def response(flat: Mapping[str, Any], s: np.ndarray) -> np.ndarray:
     """The controller in continuous time, from the error, as friso's own equations have it."""
     system = compensator(flat, 1).take((REFERENCE,), (FORCE,))
     a, b, c, d = (np.asarray(part)[0] for part in (system.a, system.b, system.c, system.d))
-    return np.array([(c @ np.linalg.solve(each * np.eye(len(a)) - a, b) + d)[0, 0] for each in s])
+    return np.array([(c @ np.linalg.solve(place * np.eye(len(a)) - a, b) + d)[0, 0] for place in s])
 
 
 def matlab(matrix: np.ndarray) -> str:

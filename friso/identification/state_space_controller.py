@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import field_validator
 
-from friso.equations.controllers.rational import RationalController, Roots
+from friso.equations.controllers.rational import RationalController, TransferRoots
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage import register_controller
@@ -36,13 +36,13 @@ class StateSpace(RationalController):
         return None if file is None else str(Path(file).absolute())
 
     @classmethod
-    def roots(cls, flat: Mapping[str, Any]) -> Roots:
+    def roots(cls, flat: Mapping[str, Any]) -> TransferRoots:
         """Return the zeros and poles of the matrices. Raises InputError."""
         a, b, c, d = _matrices(flat)
         size = len(a)
         poles = np.linalg.eigvals(a)
         if (through := float(d[0, 0])) != 0:
-            return Roots(np.linalg.eigvals(a - b @ c / through), poles, through)
+            return TransferRoots(np.linalg.eigvals(a - b @ c / through), poles, through)
         moments = [float((c @ np.linalg.matrix_power(a, k) @ b)[0, 0]) for k in range(size)]
         scale = np.abs(c).max() * np.abs(b).max()
         first = next(
@@ -56,7 +56,7 @@ class StateSpace(RationalController):
         mass[:size, :size] = np.eye(size)
         inverse = np.linalg.eigvals(np.linalg.solve(pencil - shift * mass, mass))
         finite = sorted(inverse, key=abs, reverse=True)[: size - first - 1]
-        return Roots(shift + 1 / np.array(finite, complex), poles, moments[first])
+        return TransferRoots(shift + 1 / np.array(finite, complex), poles, moments[first])
 
 
 def _matrices(flat: Mapping[str, Any]) -> list[np.ndarray]:

@@ -238,4 +238,6 @@ def controller_of(flat: Mapping[str, Any]) -> type[ControllerSection]:
 def as_tuned(flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keys of a controller that follow other keys of the stage,
     with their present values: it is tuned once, for the machine of the stage file."""
-    return {key: flat[key] for key in controller_of(flat).with_defaults(flat)}
+    controller = controller_of(flat)
+    of_file = {*map(controller.key, numeric_fields(controller))}
+    return {key: flat[key] for key in controller.with_defaults(flat) if key in of_file}

@@ -61,7 +61,7 @@ def measured_recording(flat: Any, recorded: RecordedRuns) -> Measures:
 
 def measured_response(stage: Stage, response: xr.Dataset) -> Measures:
     """Measure the run of a `response`."""
-    time, status = response["time"].to_numpy(), {each.text: each for each in Status}[response.attrs["status"]]
+    time, status = response["time"].to_numpy(), {one.text: one for one in Status}[response.attrs["status"]]
     deviation = (response["position"] - response["reference"]).to_numpy()[None]
     counts = (np.array([value]) for value in (status, response.attrs["steps"], response.attrs["rejected"]))
     return measure_traces(stage.flat(), time, deviation, response["command"].to_numpy()[None], SampledSolver(*counts))

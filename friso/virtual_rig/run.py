@@ -181,7 +181,7 @@ def _recorded(
     if not with_outputs:
         return recorded
     outputs = [_outputs(shape, results.samples[k], values, batch, interval, k) for k in range(len(seeds))]
-    return replace(recorded, outputs={name: np.array([each[name] for each in outputs]) for name in shape.outputs})
+    return replace(recorded, outputs={name: np.array([one[name] for one in outputs]) for name in shape.outputs})
 
 
 def _outputs(
@@ -195,10 +195,10 @@ def _outputs(
     grid, places, times = (part[min(number, len(part) - 1)] for part in (over.grid, over.places, over.times))
     looked_up = [_interpolated(table, (states[x] - grid[0]) * grid[1]) for table, x in zip(places, at, strict=True)]
     looked_up += [_interpolated(table, time * over.per_second[0]) for table in times]
-    given = np.vstack([active[:, 1:].T, states[len(shape.states) :], *looked_up])
+    inputs = np.vstack([active[:, 1:].T, states[len(shape.states) :], *looked_up])
     elapsed, parameters = time - active[:, 0], [value[number] for value in values]
-    modes = shape.modes(states, elapsed, given, parameters)
-    outputs = shape.module.outputs(states[: len(shape.states)], modes, elapsed, given, parameters)
+    modes = shape.modes(states, elapsed, inputs, parameters)
+    outputs = shape.module.outputs(states[: len(shape.states)], modes, elapsed, inputs, parameters)
     return {
         name: np.broadcast_to(np.asarray(output, dtype=float), time.shape)
         for name, output in zip(shape.outputs, outputs, strict=True)

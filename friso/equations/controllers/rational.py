@@ -32,7 +32,7 @@ AT_ZERO = 1e3 * ROUNDING
 """Share of the largest pole (or of 1, in z) up to which a pole is one at 0 (at z = 1), moved by rounding."""
 
 
-class Roots(NamedTuple):
+class TransferRoots(NamedTuple):
     """A transfer function gain prod(x - zeros)/prod(x - poles), in s [1/s] or in z."""
 
     zeros: np.ndarray
@@ -85,7 +85,7 @@ class RationalController(ControllerSection):
     )
 
     @classmethod
-    def roots(cls, flat: Mapping[str, Any]) -> Roots:
+    def roots(cls, flat: Mapping[str, Any]) -> TransferRoots:
         """Return zeros, poles and gain of the transfer function, in s or in z. Raises InputError."""
         raise NotImplementedError
 
@@ -95,8 +95,8 @@ class RationalController(ControllerSection):
         roots, times = cls.roots(flat), flat.get(SAMPLE_TIME)
         if times is None or not np.ndim(times):
             return {**_coefficients(roots, times), **_timing(flat)}
-        each = [_coefficients(roots, time) for time in np.asarray(times)]
-        return {**{key: np.array([one[key] for one in each]) for key in each[0]}, **_timing(flat)}
+        by_time = [_coefficients(roots, time) for time in np.asarray(times)]
+        return {**{key: np.array([one[key] for one in by_time]) for key in by_time[0]}, **_timing(flat)}
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> RationalTerms:
@@ -164,7 +164,7 @@ def _timing(flat: Mapping[str, Any]) -> dict[str, Any]:
     return {LOOP_TIME: flat[SAMPLE_TIME]} if slower else {}
 
 
-def _coefficients(roots: Roots, sample_time: float | None) -> dict[str, float]:
+def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, float]:
     """Return the flat keys of integral, static stiffness and sections. Raises InputError."""
     zeros, poles, scale = _times(roots, sample_time)
     infinite = np.isinf(poles)
@@ -195,16 +195,16 @@ def _coefficients(roots: Roots, sample_time: float | None) -> dict[str, float]:
     return {ControllerSection.key(name): float(value) for name, value in keys.items()}
 
 
-def _times(roots: Roots, sample_time: float | None) -> tuple[np.ndarray, np.ndarray, float]:
+def _times(roots: TransferRoots, sample_time: float | None) -> tuple[np.ndarray, np.ndarray, float]:
     """Return zeros and poles as times t of factors 1 + t s, infinite for a pole at s = 0, and the gain before them.
 
     A root r in z becomes, with z = (1 + s T/2)/(1 - s T/2), the factor (1 - r) + (1 + r) s T/2.
     """
     zeros, poles = np.asarray(roots.zeros, complex), np.asarray(roots.poles, complex)
     if sample_time is None:
-        pairs = [(-each, np.ones(len(each))) for each in (zeros, poles)]
+        pairs = [(-part, np.ones(len(part))) for part in (zeros, poles)]
     else:
-        pairs = [(1 - each, (1 + each) * sample_time / 2) for each in (zeros, poles)]
+        pairs = [(1 - part, (1 + part) * sample_time / 2) for part in (zeros, poles)]
         lacking = np.ones(len(poles) - len(zeros))  # a zero at z = infinity is the factor 1 - s T/2
         pairs[0] = np.append(pairs[0][0], lacking), np.append(pairs[0][1], -lacking * sample_time / 2)
     (upper, upper_rate), (lower, lower_rate) = pairs
@@ -216,7 +216,7 @@ def _times(roots: Roots, sample_time: float | None) -> tuple[np.ndarray, np.ndar
     with np.errstate(divide="ignore", invalid="ignore"):
         times = upper_rate / upper, np.where(free, np.inf, lower_rate / lower)
     scale = roots.gain * np.prod(upper) / np.prod(lower[~free]) / np.prod(lower_rate[free])
-    kept = [each[each != 0] for each in times]
+    kept = [part[part != 0] for part in times]
     return kept[0], kept[1], float(np.real(scale))
 
 
@@ -241,13 +241,13 @@ def _wrong(actual: str, expected: str) -> InputError:
     return InputError(CONTROLLER, actual, expected)
 
 
-def polynomial_roots(numerator: Sequence[float], denominator: Sequence[float]) -> Roots:
+def polynomial_roots(numerator: Sequence[float], denominator: Sequence[float]) -> TransferRoots:
     """Return the roots of a quotient of polynomials, their highest powers first. Raises InputError."""
-    upper, lower = (np.trim_zeros(np.asarray(each, float), "f") for each in (numerator, denominator))
+    upper, lower = (np.trim_zeros(np.asarray(part, float), "f") for part in (numerator, denominator))
     if not upper.size or not lower.size:
         raise _wrong("coefficients that are all 0", "a transfer function")
     if len(upper) > len(lower):
         raise _wrong(
             f"a numerator of degree {len(upper) - 1} over a denominator of degree {len(lower) - 1}", "a proper one"
         )
-    return Roots(np.roots(upper), np.roots(lower), float(upper[0] / lower[0]))
+    return TransferRoots(np.roots(upper), np.roots(lower), float(upper[0] / lower[0]))

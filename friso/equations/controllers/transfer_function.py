@@ -7,15 +7,14 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
-from friso.equations.controllers.rational import RationalController, Roots, polynomial_roots
+from friso.equations.controllers.rational import RationalController, TransferRoots, polynomial_roots
 from friso.stage import Rule, register_controller
+from friso.stage.filters import FILTER_ARRAY
 from friso.stage.lists import Coefficients, Rows, Values, element_keys, row_keys
 from friso.stage.section import OneTable, TableArray, UncertainSection
 
 WAYS = ("denominator", "poles", "sections")
 """Keys that each belong to one way of giving a transfer function."""
-
-MOST_SECTIONS = 12
 
 
 class TransferSection(UncertainSection):
@@ -26,7 +25,7 @@ class TransferSection(UncertainSection):
 
 
 _SECTIONS = TableArray(
-    OneTable(TransferSection), "[[controller.sections]] numerator = [1, 20], denominator = [1, 400]", MOST_SECTIONS
+    OneTable(TransferSection), "[[controller.sections]] numerator = [1, 20], denominator = [1, 400]", FILTER_ARRAY.most
 )
 
 
@@ -52,7 +51,7 @@ class TransferFunction(RationalController):
     rules: ClassVar[tuple[Rule, ...]] = RationalController.rules
 
     @classmethod
-    def roots(cls, flat: Mapping[str, Any]) -> Roots:
+    def roots(cls, flat: Mapping[str, Any]) -> TransferRoots:
         """Return zeros, poles and gain, whichever way they are given. Raises InputError."""
         if _ways(flat) != 1:
             actual = "none of them" if not _ways(flat) else "several of them"
@@ -63,14 +62,14 @@ class TransferFunction(RationalController):
         if row_keys(flat, cls.key("sections")):
             parts = [_quotient(flat, place) for place in row_keys(flat, cls.key("sections"))]
             zeros, poles, gains = zip(*parts, strict=True)
-            return Roots(np.concatenate(zeros), np.concatenate(poles), float(np.prod(gains)))
+            return TransferRoots(np.concatenate(zeros), np.concatenate(poles), float(np.prod(gains)))
         if element_keys(flat, cls.key("poles")):
             zeros, poles = (_roots(flat, cls.key(name)) for name in ("zeros", "poles"))
-            return Roots(zeros, poles, 1.0)
+            return TransferRoots(zeros, poles, 1.0)
         return _quotient(flat, "controller")
 
 
-def _quotient(flat: Mapping[str, Any], place: str) -> Roots:
+def _quotient(flat: Mapping[str, Any], place: str) -> TransferRoots:
     """Return the roots of numerator and denominator at a place of a stage file."""
     numerator, denominator = (
         [flat[key] for key in element_keys(flat, f"{place}.{name}")] for name in ("numerator", "denominator")
@@ -80,5 +79,5 @@ def _quotient(flat: Mapping[str, Any], place: str) -> Roots:
 
 def _roots(flat: Mapping[str, Any], key: str) -> np.ndarray:
     """Return roots, with the conjugates of complex ones."""
-    given = [complex(flat[name]) for name in element_keys(flat, key)]
-    return np.array([each for root in given for each in ((root, root.conjugate()) if root.imag else (root,))])
+    roots = [complex(flat[name]) for name in element_keys(flat, key)]
+    return np.array([one for root in roots for one in ((root, root.conjugate()) if root.imag else (root,))])
