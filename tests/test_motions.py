@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import plain
 import pytest
+from log_files import write_twincat
 from own_motion import Spiral as Spiral
 from scipy.integrate import solve_ivp
 from scipy.io import savemat
@@ -33,6 +34,7 @@ PROFILE = {
     "jerk": "100 m/s^3",
     "dwell": "50 ms",
 }
+JERKLESS = {key: entry for key, entry in PROFILE.items() if key != "jerk"}
 SINE = {"kind": "sine", "amplitude": "1 mm", "frequency": "4 Hz", "duration": "1 s"}
 MULTISINE = {
     "kind": "multisine",
@@ -319,3 +321,22 @@ def test_a_motion_from_outside_is_run_checked_and_named() -> None:
         1e-3 * response["time"].to_numpy() + 1e-3 * np.sin(8 * np.pi * response["time"].to_numpy()), abs=1e-13
     )
     assert friso.check(stage).verdict == "none"
+
+
+def test_a_recorded_reference_is_read_from_a_scope_of_twincat(tmp_path: Path) -> None:
+    channels = [("SetPos", "mm", 1e3 * PLACE), ("ActPos", "mm", 1e3 * PLACE)]
+    path = write_twincat(tmp_path / "scope.csv", [(1.0, channels)])
+    assert motion.reference(moved({"kind": "recorded", "file": str(path)}).flat(), TIME) == pytest.approx(
+        PLACE - PLACE[0], abs=1e-14
+    )
+
+
+def test_moves_of_a_rotary_axis_are_in_its_units() -> None:
+    stage = Stage(
+        axis={"kind": "rotary"},
+        masses={"stage": "0.01 kg*m^2"},
+        controller={"kind": "pid", "kp": "600 N*m/rad", "jerk_feedforward": "5e-6 kg*m^2*s"},
+        motion={**JERKLESS, "distance": "5 deg", "velocity": "1 rad/s", "acceleration": "20 rad/s^2"},
+    )
+    assert motion.reference(stage.flat(), np.array([1.0])) == pytest.approx(np.deg2rad(5))
+    assert stage.numeric_keys()["motion.jerk"].unit == "rad/s^3"
