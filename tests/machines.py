@@ -79,7 +79,7 @@ class Machine:
 
     def log(self, name: str, stage: friso.Stage, bare: bool = False) -> Log:
         """The log of a run of a stage like this one, with noise and digits unless `bare`."""
-        run = friso.simulate(stage, 1e-7, self.sample_time)
+        run = friso.simulate(stage, 1e-7, self.sample_time, continuous=True)
         roles = ("reference", "position", "force", *(("cart_position",) if self.jointed else ()))
         signals = {role: np.array(run[role].values) for role in roles}
         return self.measured(record(name, self.sample_time, **signals), bare)

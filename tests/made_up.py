@@ -130,7 +130,7 @@ def fake_stage(
             speeds_up=PidGains.speeds_up,
         ),
         motion=SimpleNamespace(duration=duration),
-        flat=lambda: {"motion.kind": "hold"},
+        flat=lambda: {"motion.kind": "hold", "motion.duration": duration},
         to_toml=lambda: f"name = {json.dumps(name)}\n",
     )
 

@@ -435,7 +435,8 @@ def motions() -> dict[str, np.ndarray]:
 def commanded(form: AsBuilt) -> tuple[sp.Expr, tuple[Held, ...]]:
     """What the drive commands and holds, of a reference and its speed."""
     position = state("position")
-    seen = Loop(sp.Symbol("reference", real=True) - position, position, state("velocity"), SEEN.reference_velocity)
+    error, acceleration = sp.Symbol("reference", real=True) - position, sp.Symbol("reference.acceleration", real=True)
+    seen = Loop(error, position, state("velocity"), SEEN.reference_velocity, acceleration)
     return _command(form, seen)[1:]
 
 

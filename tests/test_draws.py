@@ -91,7 +91,8 @@ def test_a_stage_that_cannot_hunt_settles(rig: Stage) -> None:
     ramp = {"motion": {"kind": "ramp", "velocity": "0.1 m/s", "duration": "20 s"}}
     stage = locked(rig, "8 Hz +/- 1 %")
     outcome, drawn = fate(stage.replace(ramp), 8)
-    assert outcome.verdicts[0] == friso.check(stage.replace(ramp)).popitem()[1].verdict
+    assert outcome.verdicts[0] in ("settles", "transient")
+    assert friso.check(stage.replace(ramp)).verdict == "none"
     assert outcome.share(ATTRACTED).probability == 0
     assert drawn.count == 8
 

@@ -25,9 +25,12 @@ PACKAGE, THESIS = (Path(str(package.__file__)).parent for package in (friso, fri
 ROOT = Path(__file__).parents[1]
 GUIDE = ROOT / "CONTRIBUTING.md"
 
-KNOW_CONTROLLERS = ("equations/controllers/", "drives/formats/", "stage/stage.py", "stage/standstill.py", "templates/")
-"""Where keys of a controller may be named: its own files, the stage file's schema, the template of one, and parameter
-files of drives, which are translated into friso's controllers."""
+KNOW_CONTROLLERS = (
+    *("equations/controllers/", "drives/formats/", "stage/stage.py", "stage/standstill.py", "templates/"),
+    "identification/state_space_controller.py",
+)
+"""Where keys of a controller may be named: its own files (one that reads logs stands beside their readers), the stage
+file's schema, the template of one, and parameter files of drives, which are translated into friso's controllers."""
 
 ABOUT_TUNING = (
     *(

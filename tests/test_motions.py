@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import plain
 import pytest
+from log_files import write_twincat
 from own_motion import Spiral as Spiral
 from scipy.integrate import solve_ivp
 from scipy.io import savemat
@@ -33,6 +34,7 @@ PROFILE = {
     "jerk": "100 m/s^3",
     "dwell": "50 ms",
 }
+JERKLESS = {key: entry for key, entry in PROFILE.items() if key != "jerk"}
 SINE = {"kind": "sine", "amplitude": "1 mm", "frequency": "4 Hz", "duration": "1 s"}
 MULTISINE = {
     "kind": "multisine",
@@ -69,14 +71,14 @@ def test_the_trace_is_that_of_scipy_to_a_millionth_of_the_break_away_deflection(
     names = ["position", "velocity", "bristle_deflection", "integral"]
     rates, x, last = plain.rates(flat, names), np.zeros(4), 0.0
     corners = [c for c in np.unique(motion.pieces(flat, 1)[0, :, 0]) if 0 < c < flat["motion.duration"]]
-    time, found = response["time"].to_numpy(), []
+    time, result = response["time"].to_numpy(), []
     for end in [*corners, flat["motion.duration"] * (1 + 1e-12)]:
         inside = time[(time >= last) & (time < end)]
         part = solve_ivp(rates, (last, end), x, "Radau", inside, rtol=1e-11, atol=1e-15, dense_output=True)
-        found += [*part.sol(inside)[0]] if inside.size else []
+        result += [*part.sol(inside)[0]] if inside.size else []
         x, last = part.sol(end), end
     deflection = flat["friction.static"] / flat["controller.kp"]
-    assert response["position"].to_numpy()[: len(found)] == pytest.approx(np.array(found), abs=1e-6 * deflection)
+    assert response["position"].to_numpy()[: len(result)] == pytest.approx(np.array(result), abs=1e-6 * deflection)
 
 
 @pytest.mark.parametrize("keys", MOVING.values(), ids=MOVING)
@@ -149,10 +151,10 @@ def test_settling_is_told_at_every_dwell_the_slowest_first(dwell: str) -> None:
     flat, response = stage.flat(), simulate(stage, 1e-10, 1e-5)
     time = response["time"].to_numpy()
     deviation = (response["position"] - response["reference"]).to_numpy()
-    found = dwells(stage, 1e-10)
-    assert [place.slowness for place in found] == sorted((place.slowness for place in found), reverse=True)
-    assert sorted(place.number for place in found) == [1, 2, 3]
-    for place_told in found:
+    result = dwells(stage, 1e-10)
+    assert [place.slowness for place in result] == sorted((place.slowness for place in result), reverse=True)
+    assert sorted(place.number for place in result) == [1, 2, 3]
+    for place_told in result:
         place = motion.stands(flat)[place_told.number - 1]
         stand = (time >= place.corner) & (time <= place.until)
         outside = np.flatnonzero(np.abs(deviation[stand]) > 1e-5)
@@ -170,15 +172,15 @@ def test_settling_of_a_run_is_the_longest_at_any_of_its_dwells() -> None:
 
 def test_a_periodic_response_is_that_in_which_long_simulation_ends() -> None:
     stage = moved({**SINE, "duration": "2 s"})
-    found = tracking(stage, 1e-9)
-    assert found is not None
-    assert found.closed
-    assert found.attracts
+    result = tracking(stage, 1e-9)
+    assert result is not None
+    assert result.closed
+    assert result.attracts
     response = simulate(stage.replace({"motion.duration": "60 s"}), 1e-9, 1e-4)
     error = (response["reference"] - response["position"]).to_numpy()[-2500:]
-    assert found.largest == pytest.approx(np.abs(error).max(), rel=1e-4)
-    assert found.rms == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-4)
-    assert [round(reversal.time * 4, 9) for reversal in found.reversals] == [0.25, 0.75]
+    assert result.largest == pytest.approx(np.abs(error).max(), rel=1e-4)
+    assert result.rms == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-4)
+    assert [round(reversal.time * 4, 9) for reversal in result.reversals] == [0.25, 0.75]
 
 
 def test_a_stage_whose_reference_keeps_moving_gets_no_verdict() -> None:
@@ -191,10 +193,10 @@ def test_a_stage_whose_reference_keeps_moving_gets_no_verdict() -> None:
 def test_tones_without_a_common_period_are_followed_to_the_end() -> None:
     stage = moved({**MULTISINE, "frequency": ["2 Hz", "4.7 Hz"]})
     assert motion_of(stage.flat()).period(stage.flat()) is None
-    found = tracking(stage, 1e-8)
-    assert found is not None
-    assert not found.closed
-    assert found.period is None
+    result = tracking(stage, 1e-8)
+    assert result is not None
+    assert not result.closed
+    assert result.period is None
 
 
 @pytest.mark.parametrize(("frequency", "period"), [(["2 Hz", "5 Hz"], 1.0), (["0.3 Hz", "0.4 Hz"], 10.0)])
@@ -264,7 +266,7 @@ GAP, BACK, HOLE = np.r_[0:300, 330:1000], TIME - 0.2 * (TIME > 0.6), np.where(np
 
 
 @pytest.mark.parametrize(
-    ("time", "place", "told"),
+    ("time", "place", "words"),
     [
         (TIME[GAP], PLACE[GAP], "a gap of 0.031 s behind 0.299 s"),
         (BACK, PLACE, "time that goes from 0.6 s to 0.401 s behind sample 601"),
@@ -273,15 +275,15 @@ GAP, BACK, HOLE = np.r_[0:300, 330:1000], TIME - 0.2 * (TIME > 0.6), np.where(np
     ],
     ids=["gap", "back", "hole", "one"],
 )
-def test_a_record_that_is_not_whole_is_refused(tmp_path: Path, time: np.ndarray, place: np.ndarray, told: str) -> None:
+def test_a_record_that_is_not_whole_is_refused(tmp_path: Path, time: np.ndarray, place: np.ndarray, words: str) -> None:
     with pytest.raises(friso.InputError) as caught:
         moved({"kind": "recorded", "file": record(tmp_path, time, place)})
     assert caught.value.key == "motion.file"
-    assert told in caught.value.actual
+    assert words in caught.value.actual
 
 
 @pytest.mark.parametrize(
-    ("keys", "key", "told"),
+    ("keys", "key", "words"),
     [
         ({**PROFILE, "distance": ["1 mm", "0 mm"]}, "motion.distance.2", "not 0"),
         ({**PROFILE, "distance": []}, "motion.distance", "array"),
@@ -297,11 +299,11 @@ def test_a_record_that_is_not_whole_is_refused(tmp_path: Path, time: np.ndarray,
         ({"kind": "recorded", "file": "nowhere.csv"}, "motion.file", "a file with the reference"),
     ],
 )
-def test_a_motion_that_cannot_be_is_refused(keys: dict[str, Any], key: str, told: str) -> None:
+def test_a_motion_that_cannot_be_is_refused(keys: dict[str, Any], key: str, words: str) -> None:
     with pytest.raises(friso.InputError) as caught:
         moved(keys)
     assert key in caught.value.key
-    assert told in caught.value.expected
+    assert words in caught.value.expected
 
 
 def test_limits_of_a_profile_are_its_keys() -> None:
@@ -319,3 +321,22 @@ def test_a_motion_from_outside_is_run_checked_and_named() -> None:
         1e-3 * response["time"].to_numpy() + 1e-3 * np.sin(8 * np.pi * response["time"].to_numpy()), abs=1e-13
     )
     assert friso.check(stage).verdict == "none"
+
+
+def test_a_recorded_reference_is_read_from_a_scope_of_twincat(tmp_path: Path) -> None:
+    channels = [("SetPos", "mm", 1e3 * PLACE), ("ActPos", "mm", 1e3 * PLACE)]
+    path = write_twincat(tmp_path / "scope.csv", [(1.0, channels)])
+    assert motion.reference(moved({"kind": "recorded", "file": str(path)}).flat(), TIME) == pytest.approx(
+        PLACE - PLACE[0], abs=1e-14
+    )
+
+
+def test_moves_of_a_rotary_axis_are_in_its_units() -> None:
+    stage = Stage(
+        axis={"kind": "rotary"},
+        masses={"stage": "0.01 kg*m^2"},
+        controller={"kind": "pid", "kp": "600 N*m/rad", "jerk_feedforward": "5e-6 kg*m^2*s"},
+        motion={**JERKLESS, "distance": "5 deg", "velocity": "1 rad/s", "acceleration": "20 rad/s^2"},
+    )
+    assert motion.reference(stage.flat(), np.array([1.0])) == pytest.approx(np.deg2rad(5))
+    assert stage.numeric_keys()["motion.jerk"].unit == "rad/s^3"

@@ -65,7 +65,7 @@ def test_its_slow_gains_are_those_of_its_formula(whole: Stage) -> None:
 
 def test_both_realisations_agree_on_a_slow_motion(whole: Stage) -> None:
     """What the drive commands at its samples, and the force in continuous time."""
-    run = friso.simulate(whole.replace({"joint.locked": True, "motion": {**SLOW}}), 1e-8, 250e-6)
+    run = friso.simulate(whole.replace({"joint.locked": True, "motion": {**SLOW}}), 1e-8, 250e-6, continuous=True)
     names = {"reference", "position", "force", "force_p", "force_i", "force_d"}
     assert names <= {*map(str, run)}
     assert run.attrs["status"] == Status.DONE.text

@@ -4,17 +4,20 @@ Compiled once per machine (`friso.engine.scalar_code`) for models of any size: s
 its `layout`, with the addresses of its step (`friso.engine.layout.Layout`).
 """
 
+from math import pi
+
 import numpy as np
 
 from friso.engine.arrays import STATISTICS, Status
 from friso.engine.layout import AXES, ROW
 from friso.engine.scalar_code import call_at, take_next
 from friso.engine.simd_math import sine
+from friso.equations.reference import TONE
 
 NOT_RUN, DONE, BUDGET = int(Status.NOT_RUN), int(Status.DONE), int(Status.BUDGET)
 UNDERFLOW, DIVERGED = int(Status.UNDERFLOW), int(Status.DIVERGED)
 AXIS_ROWS = len(AXES)
-TONE_ROWS, TURN = 4, 6.283185307179586
+TONE_ROWS, TURN = len(TONE), 2 * pi
 FOLLOWED = STATISTICS.index("attempted")
 """So many statistics are what the step itself keeps, in rows from `force_peak` on."""
 

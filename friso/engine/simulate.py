@@ -42,14 +42,19 @@ def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None)
     """
     flat = stage.flat()
     duration = flat["motion.duration"]
-    interval = duration / SAMPLES if sample_time is None else sample_time
-    if not duration / MOST_SAMPLES <= interval <= duration:
-        text, expected = f"{interval:g} s", f"from {duration / MOST_SAMPLES:g} s to the duration, {duration:g} s"
-        raise InputError("sample_time", text, expected, "1 ms")
+    interval = duration / SAMPLES if sample_time is None else checked_interval(sample_time, duration)
     shape = kernel(structure(flat))
     (runs,) = run_chunks(shape, flat, 1, RunOptions(rtol=checked_rtol(rtol), interval=interval))
     time = np.arange(runs.results.samples.shape[1]) * interval
     return _dataset(stage, shape, flat, runs, time, rtol)
+
+
+def checked_interval(interval: float, duration: float) -> float:
+    """Return the interval between samples [s]. Raises InputError where a run would have too many of them, or none."""
+    if not duration / MOST_SAMPLES <= interval <= duration:
+        text, expected = f"{interval:g} s", f"from {duration / MOST_SAMPLES:g} s to the duration, {duration:g} s"
+        raise InputError("sample_time", text, expected, "1 ms")
+    return interval
 
 
 def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> list[np.ndarray]:

@@ -45,8 +45,8 @@ def range_example(flat: Mapping[str, Any]) -> str:
     controller = controller_of(flat) if KIND in flat else None
     gains = [controller.bandwidth_key, *map(controller.key, controller.speeds_up)] if controller else []
     key = next(key for key in [*gains, "masses.stage", "masses.cart"] if key and flat.get(key))
-    low, high, unit = flat[key] / 8, flat[key] * 5, numeric_keys(flat)[key].unit
-    return f'{key}="{low:.3g} {unit}..{high:.3g} {unit}"'
+    low, high, unit = flat[key] / 8, flat[key] * 5, getattr(numeric_keys(flat)[key], "unit", "")
+    return f'{key}="{low:.3g} {unit}..{high:.3g} {unit}"' if unit else f'{key}="{low:.3g}..{high:.3g}"'
 
 
 @dataclass(frozen=True)

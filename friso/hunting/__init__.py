@@ -52,7 +52,7 @@ from friso.hunting.motions import Motions
 from friso.hunting.outward import AttractionEnd, BandwidthWindow
 from friso.hunting.parameter_margin import MarginEnd, ParameterMargin
 from friso.hunting.stage_margins import joint_margins
-from friso.hunting.tracking import Dwell, Reversal, Tracking, dwells, tracking
+from friso.hunting.tracking import Dwell, Reversal, Tracking, dwells, dwells_of_trace, tracking
 from friso.hunting.verdict import CheckPart, Judgement
 from friso.hunting.what_attracts import search_alone
 
@@ -114,6 +114,7 @@ __all__ = [
     "diagram",
     "displacements_that_hunt",
     "dwells",
+    "dwells_of_trace",
     "edge_derivatives",
     "find_attractors",
     "find_cycles",

@@ -14,9 +14,10 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.engine.kernel import kernel
+from friso.equations.motion import Stand, stands
 from friso.equations.structure import structure
-from friso.hunting.criteria.run_outcome import BAND, End, outcomes
-from friso.hunting.criteria.settling import settling_in_the_end, settling_of_runs
+from friso.hunting.criteria.run_outcome import BAND, End, end_of_traces, last_outside, outcomes
+from friso.hunting.criteria.settling import settling_in_the_end, settling_of_runs, settling_of_traces
 from friso.hunting.turning import COUNTED_AFTER, DISTINCT, HALF, WINDOW, zigzag
 from friso.hunting.turns import Turns, scan_turning_points
 from friso.stage import Stage
@@ -27,8 +28,10 @@ __all__ = [
     "RESOLVED",
     "WINDOW",
     "Measures",
+    "SampledSolver",
     "Turns",
     "measure_runs",
+    "measure_traces",
     "measured_run",
     "measuring_options",
     "run_ends",
@@ -148,6 +151,55 @@ def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
         rejected=runs.statistic("rejected").astype(np.int64),
         turns=turns.peaks,
     )
+
+
+@np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
+def measure_traces(
+    flat: Mapping[str, Any], time: np.ndarray, deviation: np.ndarray, force: np.ndarray, solver: SampledSolver
+) -> Measures:
+    """Measure sampled runs of the stages `flat`, such as those of a drive as built.
+
+    Deviations [m] and forces [N] have the shape (runs, n), the times [s] (n,).
+    """
+    done, places = solver.status == Status.DONE, [*stands(flat)]
+    end = end_of_traces(time, deviation, BAND, done)
+    samples, swings = np.full(len(deviation), len(time)), np.nan_to_num(end.swing)
+    values = np.ascontiguousarray(deviation)
+    turns = scan_turning_points(np.tile(time, (len(deviation), 1)), values, samples, swings, end.ended)
+    passing = np.nan_to_num(turns.period) / 2
+    stays = [last_outside(time, deviation, band) + passing < time[-1] for band in BANDS]
+
+    def settled(where: list[Stand], number: int) -> np.ndarray:
+        """Return the longest settling time at some places into a band; NaN where it is not reached."""
+        times = np.zeros(len(deviation))
+        for run, row in enumerate(deviation[:, None]):
+            own = [Stand(*(np.ravel(part)[min(run, np.size(part) - 1)] for part in place)) for place in where]
+            times[run] = settling_of_traces(own, time, row, BANDS[number])[0]
+        return np.where(done & stays[number] & np.isfinite(times), times, np.nan)
+
+    return Measures(
+        peaks=np.where(done, turns.peaks.sum(axis=1), 0),
+        distinct_peaks=np.where(done, turns.distinct.sum(axis=1), 0),
+        peak_to_peak=np.where(done, end.swing, np.nan),
+        period=np.where(done, turns.period, np.nan),
+        settling_time=(settled(places, 0), settled(places, 1)),
+        in_the_end=(settled(places[-1:], 0), settled(places[-1:], 1)),
+        outcome=outcomes(end, BAND, passing),
+        largest_force=np.where(done, np.abs(force).max(axis=1), np.nan),
+        status=solver.status,
+        steps=solver.steps,
+        rejected=solver.rejected,
+        turns=turns.peaks,
+    )
+
+
+@dataclass(frozen=True)
+class SampledSolver:
+    """What the solver says of sampled runs: status, and steps attempted and rejected, arrays of shape (runs,)."""
+
+    status: np.ndarray
+    steps: np.ndarray
+    rejected: np.ndarray
 
 
 def measured_run(stage: Stage, rtol: float = 1e-6) -> Measures:

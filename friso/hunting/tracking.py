@@ -13,7 +13,7 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, columns, kernel
 from friso.equations import motion
 from friso.equations.structure import structure
-from friso.hunting.criteria import BAND
+from friso.hunting.criteria import BAND, settling_of_traces
 from friso.hunting.measures import BANDS, WINDOW, measuring_options
 from friso.hunting.settings import TrackingSettings
 from friso.stage import Stage
@@ -91,7 +91,7 @@ def dwells(stage: Stage, rtol: float) -> tuple[Dwell, ...]:
             entered[runs.numbers, column] = np.where(done & (times < runs.statistic("ended")), times, np.inf)
     settled = np.maximum(entered - since[:, None], 0.0)
     positions = motion.reference(flat, since)
-    found = [
+    places_told = [
         Dwell(
             number + 1,
             float(positions[number]),
@@ -100,7 +100,23 @@ def dwells(stage: Stage, rtol: float) -> tuple[Dwell, ...]:
         )
         for number in range(len(places))
     ]
-    return tuple(sorted(found, key=lambda dwell: dwell.slowness, reverse=True))
+    return tuple(sorted(places_told, key=lambda dwell: dwell.slowness, reverse=True))
+
+
+def dwells_of_trace(stage: Stage, time: np.ndarray, deviation: np.ndarray) -> tuple[Dwell, ...]:
+    """Return how a sampled run settles at each place where its reference stands, the slowest first.
+
+    The deviations [m] are those at the times [s], both of shape (n,).
+    """
+    flat, places = stage.flat(), motion.stands(stage.flat())
+    positions = motion.reference(flat, np.array([float(place.corner) for place in places]))
+    listed = []
+    for number, (place, position) in enumerate(zip(places, positions, strict=True), start=1):
+        within = time <= place.until
+        times = {band: settling_of_traces([place], time[within], deviation[None, within], band)[0] for band in BANDS}
+        settling = {band: float(t) if np.isfinite(t) else None for band, t in times.items()}
+        listed.append(Dwell(number, float(position), float(place.corner), settling))
+    return tuple(sorted(listed, key=lambda dwell: dwell.slowness, reverse=True))
 
 
 def tracking(stage: Stage, rtol: float) -> Tracking | None:
@@ -140,15 +156,15 @@ def _reversals(
 ) -> tuple[Reversal, ...]:
     """Return the turning points of a reference in a span of time, each with the error behind it."""
     corners = motion.pieces(flat, 1)[0, 1:, 0] if motion.form_of(flat).tones else np.zeros(0)
-    found = []
+    reversals = []
     for corner, following in zip(corners, np.append(corners, flat[DURATION])[1:], strict=True):
         if not span[0] <= corner < span[1]:
             continue
         behind = (time >= corner) & (time <= (corner + following) / 2)
         if behind.any():
             position = float(motion.reference(flat, np.array([corner]))[0])
-            found.append(Reversal(float(corner), position, float(np.abs(error[behind]).max())))
-    return tuple(found)
+            reversals.append(Reversal(float(corner), position, float(np.abs(error[behind]).max())))
+    return tuple(reversals)
 
 
 def _closed(shape: Kernel, flat: Mapping[str, Any], period: float, rtol: float) -> tuple[np.ndarray, float] | None:

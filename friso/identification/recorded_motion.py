@@ -22,7 +22,7 @@ FILE, REFERENCE, TIME, UNIT, SAMPLE_TIME, SCALE, BETWEEN = (
     f"motion.{name}" for name in ("file", "reference", "time", "unit", "sample_time", "scale", "between")
 )
 
-Samples = tuple[np.ndarray, np.ndarray]
+RecordedSamples = tuple[np.ndarray, np.ndarray]
 """Instants [s] from 0 on, and the reference there [m] from 0 on."""
 
 
@@ -82,7 +82,7 @@ class Recorded(Motion):
         return {} if DURATION in flat else {DURATION: _samples(flat)[0][-1]}
 
 
-def _samples(flat: Mapping[str, Any]) -> Samples:
+def _samples(flat: Mapping[str, Any]) -> RecordedSamples:
     """Return the samples of a record. Raises InputError for a file that has none, or gaps."""
     path = Path(flat[FILE])
     try:
@@ -97,7 +97,7 @@ def _samples(flat: Mapping[str, Any]) -> Samples:
 @lru_cache(maxsize=8)
 def _read(
     path: Path, changed: int, size: int, names: tuple[str | None, ...], sample_time: float | None, axis: str
-) -> Samples:
+) -> RecordedSamples:
     """Read the samples of a record, once for each state of its file."""
     try:
         times, values = _signals(path, names, sample_time, axis)
@@ -107,7 +107,7 @@ def _read(
     return times - times[0], values - values[0]
 
 
-def _signals(path: Path, names: tuple[str | None, ...], sample_time: float | None, axis: str) -> Samples:
+def _signals(path: Path, names: tuple[str | None, ...], sample_time: float | None, axis: str) -> RecordedSamples:
     """Return instants [s] and reference [m] as they stand in a file. Raises LogError."""
     from friso.identification.logs.format import FORMATS
     from friso.identification.logs.gaps import check_gaps
@@ -125,9 +125,9 @@ def _signals(path: Path, names: tuple[str | None, ...], sample_time: float | Non
         roles["reference"] = signals[0]
     chosen = propose(table, roles, origin).chosen
     units = {chosen["reference"].channel.name: unit} if unit is not None and "reference" in chosen else {}
-    told = Told(roles=roles, units=units, sample_time=sample_time, axis=axis)
-    table = with_user_units(table, told, form.times, origin)
-    reading, proposal = Reading(table, told, True, not form.units, origin), propose(table, roles, origin)
+    mapping = Told(roles=roles, units=units, sample_time=sample_time, axis=axis)
+    table = with_user_units(table, mapping, form.times, origin)
+    reading, proposal = Reading(table, mapping, True, not form.units, origin), propose(table, roles, origin)
     check_gaps(reading, proposal, ("reference",))
     choice, notes = proposal.chosen["reference"], Notes()
     values = signal(choice, reading, notes)

@@ -21,7 +21,7 @@ from friso.intervals import Span
 from friso.quantities import Number, Quantity
 from friso.stage import Stage
 from friso.stage.controllers import Controllers
-from friso.stage.lists import Several
+from friso.stage.lists import Coefficients, Several
 from friso.stage.section import Section, Table, TableArray, Variants
 from friso.version import VERSION
 
@@ -73,6 +73,9 @@ def _key(annotation: Any, metadata: Iterable[Any], path: str, described: Mapping
             return _one_of(item.pick, path, described)
         if isinstance(item, TableArray):
             return {"type": "array", "maxItems": item.most, "items": _one_of(item.variants.pick, path, described)}
+        if isinstance(item, Coefficients):
+            numbers: Node = {"anyOf": [{"type": "number"}, {"type": "string"}]} if item.roots else {"type": "number"}
+            return {"type": "array", "items": numbers, "description": item.expected, "examples": [[*item.examples]]}
         if isinstance(item, Quantity | Number | Several | Span | OneOrMany):
             return _numeric(item)
     types = [part for part in get_args(annotation) or (annotation,) if part is not NoneType]

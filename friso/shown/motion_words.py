@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from friso.hunting import Dwell, Tracking
     from friso.stage import Stage
 
-MOST_PLACES = 4
-"""Places at which settling is told in a sentence; the document has all."""
-
 
 def following_sentence(tracking: Tracking) -> str:
     """Say how far a stage is off a reference that keeps moving."""
@@ -43,10 +40,9 @@ def dwell_sentences(dwells: Sequence[Dwell]) -> list[str]:
     """Say how a stage settles at each of several places where its reference stands, the slowest first."""
     if not dwells:
         return []
-    texts = [f"{_place(dwell)} {_settling(dwell)}" for dwell in dwells[:MOST_PLACES]]
-    more = [f"sooner at {len(dwells) - MOST_PLACES} others"] if len(dwells) > MOST_PLACES else []
+    texts = [f"{_place(dwell)} {_settling(dwell)}" for dwell in dwells]
     band = with_unit(BAND, "m")
-    return [f"Where its reference stands it is within {band}, the slowest first, {listed([*texts, *more], 'and')}."]
+    return [f"Where its reference stands it is within {band}, the slowest first, {listed(texts, 'and')}."]
 
 
 def _place(dwell: Dwell) -> str:

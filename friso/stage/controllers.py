@@ -167,6 +167,11 @@ class ControllerSection(AgainstFriction):
         canvas.box(flat[KIND])
 
     @classmethod
+    def note(cls, flat: Mapping[str, Any]) -> str:
+        """Return what a verdict on a stage with this controller takes for granted, in a sentence."""
+        return ""
+
+    @classmethod
     def key(cls, name: str) -> str:
         """Return the stage-file key of a name in the table."""
         return f"{CONTROLLER}.{name}"
@@ -233,4 +238,6 @@ def controller_of(flat: Mapping[str, Any]) -> type[ControllerSection]:
 def as_tuned(flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keys of a controller that follow other keys of the stage,
     with their present values: it is tuned once, for the machine of the stage file."""
-    return {key: flat[key] for key in controller_of(flat).with_defaults(flat)}
+    controller = controller_of(flat)
+    of_file = {*map(controller.key, numeric_fields(controller))}
+    return {key: flat[key] for key in controller.with_defaults(flat) if key in of_file}

@@ -107,11 +107,11 @@ def _stage_of(text: str, origin: str, folder: Path | None = None) -> Stage:
 
 def _with_whole_paths(tables: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
     """Return tables in which a `file`, which is beside the stage file in a folder, stands by its whole path."""
-    found: dict[str, Any] = dict(tables)
+    whole: dict[str, Any] = dict(tables)
     for name, table in tables.items():
         if folder is not None and isinstance(table, dict) and isinstance(table.get("file"), str):
-            found[name] = {**table, "file": str((folder / table["file"]).absolute())}
-    return found
+            whole[name] = {**table, "file": str((folder / table["file"]).absolute())}
+    return whole
 
 
 def _refuse_specification(tables: Mapping[str, Any]) -> None:

@@ -8,6 +8,7 @@ one for each of their keys: controller.filters.2.frequency.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import count, takewhile
+from math import isfinite
 from typing import Any, Self
 
 from pydantic import GetCoreSchemaHandler, ValidationInfo
@@ -15,7 +16,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError
-from friso.quantities import Number, Quantity, quoted
+from friso.quantities import Number, Quantity, as_toml, quoted
 
 _WORDS = {1: "one", 2: "two"}
 
@@ -90,6 +91,44 @@ class Several:
 
     def _read_on_axis(self, raw: Any, info: ValidationInfo) -> Values:
         return self.on(info.context or LINEAR).read(raw)
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """A key that takes an array of numbers that belong together and are not varied one by one.
+
+    `roots` may be complex, written as texts.
+    """
+
+    examples: tuple[Any, ...]
+    roots: bool = False
+
+    @property
+    def expected(self) -> str:
+        """Return the values that the key accepts, in words."""
+        return f"an array of numbers{', complex ones as texts' if self.roots else ''}"
+
+    @property
+    def written_example(self) -> str:
+        """Return the example as it stands in a file."""
+        return f"[{', '.join(as_toml(example) for example in self.examples)}]"
+
+    def read(self, raw: Any) -> Values:
+        """Return the values of an array. Raises InputError."""
+        if not isinstance(raw, list | tuple):
+            raise InputError("", quoted(raw), self.expected, self.written_example)
+        for number, item in enumerate(raw, start=1):
+            try:
+                fine = not isinstance(item, bool) and isfinite(abs(complex(item)))
+                fine = fine and (self.roots or not isinstance(item, str))
+            except (TypeError, ValueError):
+                fine = False
+            if not fine:
+                raise InputError(str(number), quoted(item), self.expected, self.written_example)
+        return Values(item if isinstance(item, str) else float(item) for item in raw)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
 
 
 def element_keys(flat: Mapping[str, Any], key: str) -> list[str]:

@@ -71,7 +71,7 @@ def plug_ins(classes: Iterable[type]) -> tuple[PlugIn, ...]:
 
 
 FRISO = {
-    "friso.controllers": ("friso.equations.controllers",),
+    "friso.controllers": ("friso.equations.controllers", "friso.identification.state_space_controller"),
     "friso.friction": ("friso.equations.friction",),
     "friso.motions": ("friso.equations.motions", "friso.identification.recorded_motion"),
     "friso.derivations": ("friso.leaf_springs.joint", "friso.equations.conditions"),

@@ -33,6 +33,17 @@ seeds = Bound("a whole number from 0, below 1e15", lambda value: (value >= 0) & 
 AS_BUILT = ("drive", "rail", "cable", "floor")
 """The tables of the machine as built, which the analyses of the ideal one leave out."""
 
+CONVERSIONS = frozenset({"machine_unit", "force_per_output", "velocity_per_output", "travel_per_turn"})
+"""Keys of [drive] that say nothing of how it is carried out."""
+
+
+def is_as_built(stage: Any) -> bool:
+    """Tell whether a stage says how its drive is carried out, at which samples for one, or what surrounds it."""
+    if any(getattr(stage, table) for table in AS_BUILT[1:]) or getattr(stage.controller, "sample_time", None):
+        return True
+    return stage.drive is not None and bool({*stage.drive.as_written()} - CONVERSIONS)
+
+
 IntegralRule = Literal["bilinear", "backward_euler", "forward_euler"]
 """How a drive integrates: by trapezoids, or by a sum that ends with the present sample or with the one before."""
 

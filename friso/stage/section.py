@@ -216,10 +216,21 @@ class Variants:
 
 
 @dataclass(frozen=True)
+class OneTable:
+    """A single class of tables, where there might be variants."""
+
+    section: type[Section]
+
+    def pick(self, table: dict[str, Any]) -> type[Section]:
+        """Return the class for a table."""
+        return self.section
+
+
+@dataclass(frozen=True)
 class TableArray:
     """A key that takes an array of tables, `most` of them at most, of `variants`; `example` shows one."""
 
-    variants: Variants
+    variants: Variants | OneTable
     example: str
     most: int
 

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.engine.batch import run_chunks
+from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import Structure, decisive_keys, structure
 from friso.hunting import Motions, StageAttractors, find_attractors, judge_runs, sketch_attractors
 from friso.hunting.criteria import FAILED
-from friso.hunting.measures import measure_runs, measuring_options
+from friso.hunting.measures import Measures, measure_runs, measuring_options
 from friso.stage import Stage, violations
+from friso.studies.built_runs import built_runs, runs_as_built
 from friso.studies.links import linked
 from friso.studies.metric import (
     STATUS,
@@ -53,19 +54,26 @@ def run_cells(
 ) -> Columns:
     """Run one stage per entry of the columns: axis names to SI values, words or booleans, each of shape (cells,).
 
-    The result holds the usual metrics of a run, and those named (`friso.studies.metric`), each of shape (cells,). A
-    cell that no stage may have has the word "invalid" and the reason in its status; one that a run did not complete for
-    has the outcome "failed". Setting cancel[0] from another thread ends the work early: cells not run by then keep the
-    outcome "".
+    The drive runs as built where only metrics of runs are named and the file tells how it is carried out
+    (`friso.studies.built_runs`). The result holds the usual metrics of a run, and those named
+    (`friso.studies.metric`), each of shape (cells,). A cell that no stage may have has the word "invalid" and the
+    reason in its status; one that a run did not complete for has the outcome "failed". Setting cancel[0] from another
+    thread ends the work early: cells not run by then keep the outcome "".
     """
     table = _Table(len(next(iter(columns.values()))), in_order((*usual_metrics(), *names)))
     parts = list(by_words(stage, links, columns))
     for flat, cells in parts:
         table.invalidate(cells, flat)
+    built = runs_as_built(stage, names)
     for flat, cells, shape in by_equations(parts, table.valid):
-        for runs in run_chunks(kernel(shape), flat, len(cells), measuring_options(rtol, threads, cancel)):
-            part = runs.part(flat)
-            table.write_runs(cells[runs.numbers], RunEvidence(part, runs, measure_runs(part, runs)))
+        options = measuring_options(rtol, threads, cancel)
+        several = (
+            built_runs(stage, flat, len(cells), threads, cancel)
+            if built
+            else ideal_runs(shape, flat, len(cells), options)
+        )
+        for runs, measures in several:
+            table.write_runs(cells[runs.numbers], RunEvidence(runs.part(flat), runs, measures))
     for source, find in SURVEYS.items():
         if not table.of(source):
             continue
@@ -76,6 +84,14 @@ def run_cells(
             for name, metric in table.of(source).items():
                 table.columns[name][cells] = metric.compute(evidence)
     return table.columns
+
+
+def ideal_runs(
+    shape: Structure, flat: Mapping[str, Any], count: int, options: RunOptions
+) -> Iterator[tuple[Runs, Measures]]:
+    """Run cells of one structure with the controller in continuous time, and measure them."""
+    for runs in run_chunks(kernel(shape), flat, count, options):
+        yield runs, measure_runs(runs.part(flat), runs)
 
 
 Parts = Iterable[tuple[dict[str, Any], np.ndarray]]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.engine.arrays import Status
+from friso.engine.arrays import Batch, Status
 from friso.engine.batch import RunOptions, options_of, prepare, run_batch
 from friso.engine.kernel import Kernel, empty_results, kernel
 from friso.equations.as_built import COMMANDED, NEUTRAL, READING, AsBuilt, whole_samples
@@ -17,6 +17,7 @@ from friso.equations.reference import value
 from friso.equations.roles import Role, Steady
 from friso.errors import InputError
 from friso.stage import Stage
+from friso.stage.rig import Floor
 from friso.virtual_rig.settings import RigSettings
 from friso.virtual_rig.surroundings import tables
 from friso.virtual_rig.task import SAMPLE_TIME, MoveTask
@@ -34,7 +35,8 @@ class RecordedRuns:
     """Numbers of the runs and their records, every `interval` [s].
 
     `logged` are the signals that the drive knows, `true` what really moves, by the names of the roles of a log: SI,
-    shape (runs, n), NaN after a failure; `statuses` tell of failures, shape (runs,). Where the delay is no whole number
+    shape (runs, n), NaN after a failure; `statuses` tell of failures, shape (runs,), `statistics` of the solver;
+    `outputs` are all that the equations tell, if asked for. Where the delay is no whole number
     of samples, `true` and the relative position stand at the instant of the force, that fraction of a sample later.
     """
 
@@ -43,6 +45,8 @@ class RecordedRuns:
     logged: Mapping[str, np.ndarray]
     true: Mapping[str, np.ndarray]
     statuses: np.ndarray
+    statistics: np.ndarray
+    outputs: Mapping[str, np.ndarray] | None = None
 
     @property
     def time(self) -> np.ndarray:
@@ -53,9 +57,14 @@ class RecordedRuns:
 def as_built_keys(stage: Stage, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return the flat keys of a stage with a complete drive: what it does not tell is ideal.
     `changes` are SI numbers, or arrays with one for each run."""
-    flat = anywhere(stage.flat(changes))
+    return with_complete_drive(stage.flat(changes))
+
+
+def with_complete_drive(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Return flat keys with those of a complete drive: what it does not tell is ideal."""
+    flat = anywhere(flat)
     flat.setdefault("drive.sample_time", SAMPLE_TIME)
-    flat = {**NEUTRAL, **flat, "drive.integrator_reset": float(flat.get("drive.integrator_reset", False))}
+    flat = {**NEUTRAL, **flat, "drive.integrator_reset": flat.get("drive.integrator_reset", False) * 1.0}
     flat["drive.late"] = flat["drive.delay"] - whole_samples(flat) * flat["drive.sample_time"]
     flat["drive.late"] *= flat["drive.late"] > 1e-9 * flat["drive.sample_time"]
     return flat
@@ -76,8 +85,23 @@ def run(
     The runs come chunk by chunk; they are the same for any number of threads. Raises InputError for an interval that
     does not fit the samples, and for a [rail] along which this law does not vary.
     """
+    yield from run_flat(as_built_keys(stage, changes), stage.floor, task, seeds, interval, threads)
+
+
+def run_flat(
+    flat: Mapping[str, Any],
+    floor: Floor | None,
+    task: MoveTask,
+    seeds: Sequence[int],
+    interval: float,
+    threads: int | None = None,
+    outputs: bool = False,
+) -> Iterator[RecordedRuns]:
+    """Run stages given as flat keys with a complete drive, as `run` does, on a floor that may shake.
+
+    With `outputs`, everything that the equations tell is recorded, not what the drive and a sensor see alone.
+    """
     settings = RigSettings.current()
-    flat = as_built_keys(stage, changes)
     _check(flat, interval)
     first_run = {key: value[0] if np.ndim(value) else value for key, value in flat.items()}
     form = AsBuilt.of(first_run)
@@ -87,7 +111,8 @@ def run(
     for first in range(0, len(seeds), chunk):
         numbers = np.arange(first, min(first + chunk, len(seeds)))
         part = {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
-        yield _recorded(shape, part, stage, task, np.asarray(seeds)[numbers], numbers, (interval, count, threads))
+        part["drive.seed"] = np.asarray(seeds)[numbers].astype(float)
+        yield _recorded(shape, part, floor, task.of_runs(numbers), numbers, (interval, count, threads), outputs)
 
 
 def _check(flat: Mapping[str, Any], interval: float) -> None:
@@ -118,16 +143,16 @@ def _check(flat: Mapping[str, Any], interval: float) -> None:
 def _recorded(
     shape: Kernel,
     flat: dict[str, Any],
-    stage: Stage,
+    floor: Floor | None,
     task: MoveTask,
-    seeds: np.ndarray,
     numbers: np.ndarray,
     timing: tuple[float, int, int | None],
+    with_outputs: bool,
 ) -> RecordedRuns:
     """Run moves on the virtual rig, and return the signals that the drive records."""
     settings = RigSettings.current()
     interval, count, threads = timing
-    flat = {**flat, "drive.seed": seeds.astype(float)}
+    seeds = flat["drive.seed"].astype(np.int64)
     low, high = task.span
     motion = {
         "motion.kind": "step",
@@ -136,23 +161,53 @@ def _recorded(
     }
     options = RunOptions(
         rtol=settings.rig_rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, interval=interval,
-        budget=int(settings.steps_per_sample * task.duration / flat["drive.sample_time"]),
+        budget=int(settings.steps_per_sample * task.duration / np.min(flat["drive.sample_time"])),
     )  # fmt: skip
-    at_rest = Steady(-task.displacement, float(task.pieces[0, 1]) + task.displacement)
-    starts = shape.unwound_at(shape.values(flat | motion, len(seeds)), at_rest, len(seeds))
-    batch = prepare(shape, flat | motion, len(seeds), options, starts)
-    end = np.zeros(task.pieces.shape[1])
-    end[0] = task.duration
+    pieces = task.pieces.reshape(-1, *task.pieces.shape[-2:])
+    at_rest = Steady(-task.displacement, pieces[:, 0, 1] + task.displacement)
+    values = shape.values(flat | motion, len(seeds))
+    batch = prepare(shape, flat | motion, len(seeds), options, shape.unwound_at(values, at_rest, len(seeds)))
+    end = np.zeros((len(pieces), 1, pieces.shape[2]))
+    end[:, 0, 0] = task.duration
     batch = batch._replace(
-        segments=np.vstack([task.pieces, end])[None],
+        segments=np.concatenate([pieces, end], axis=1),
         windows=np.full(len(seeds), -1),
-        tables=tables(flat, stage.floor, task, [int(seed) for seed in seeds]),
+        tables=tables(flat, floor, task, [int(seed) for seed in seeds]),
     )
     results = empty_results(len(seeds), 1, count, len(shape.full_state))
     run_batch(shape, batch, options_of(options), results, threads)
-    return RecordedRuns(
-        numbers, interval, *_signals(shape, results.samples, flat, task, seeds, interval), results.statuses
-    )
+    logged, true = _signals(shape, results.samples, flat, task, seeds, interval)
+    recorded = RecordedRuns(numbers, interval, logged, true, results.statuses, results.statistics)
+    if not with_outputs:
+        return recorded
+    outputs = [_outputs(shape, results.samples[k], values, batch, interval, k) for k in range(len(seeds))]
+    return replace(recorded, outputs={name: np.array([one[name] for one in outputs]) for name in shape.outputs})
+
+
+def _outputs(
+    shape: Kernel, samples: np.ndarray, values: list[np.ndarray], batch: Batch, interval: float, number: int
+) -> dict[str, np.ndarray]:
+    """Return what the equations tell of a run, from its samples, by name, each of shape (samples,)."""
+    time, states = np.arange(len(samples)) * interval, samples.T
+    rows = batch.segments[min(number, len(batch.segments) - 1)]
+    active = rows[np.searchsorted(rows[:, 0], time * (1 + 1e-12), side="right") - 1]
+    over, at = batch.tables, [shape.cart_position, shape.cart_position, shape.position]
+    grid, places, times = (part[min(number, len(part) - 1)] for part in (over.grid, over.places, over.times))
+    looked_up = [_interpolated(table, (states[x] - grid[0]) * grid[1]) for table, x in zip(places, at, strict=True)]
+    looked_up += [_interpolated(table, time * over.per_second[0]) for table in times]
+    inputs = np.vstack([active[:, 1:].T, states[len(shape.states) :], *looked_up])
+    elapsed, parameters = time - active[:, 0], [value[number] for value in values]
+    modes = shape.modes(states, elapsed, inputs, parameters)
+    outputs = shape.module.outputs(states[: len(shape.states)], modes, elapsed, inputs, parameters)
+    return {
+        name: np.broadcast_to(np.asarray(output, dtype=float), time.shape)
+        for name, output in zip(shape.outputs, outputs, strict=True)
+    }
+
+
+def _interpolated(table: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return a table, evenly spaced, at places counted in its points; the ends go on."""
+    return np.interp(place, np.arange(len(table)), table)
 
 
 def _signals(
@@ -186,10 +241,11 @@ def _signals(
 
 
 def reference(task: MoveTask, time: np.ndarray) -> np.ndarray:
-    """Return the reference [m] at times [s]."""
+    """Return the reference [m] at times [s], shape (n,); of runs with moves of their own, (runs, n)."""
+    if task.pieces.ndim > 2:
+        return np.array([reference(replace(task, pieces=pieces), time) for pieces in task.pieces])
     rows = task.pieces[np.searchsorted(task.pieces[:, 0], time * (1 + 1e-12), side="right") - 1]
-    since = time - rows[:, 0]
-    return value(task.form, rows, since)
+    return value(task.form, rows, time - rows[:, 0])
 
 
 def failures(recorded: RecordedRuns) -> list[tuple[int, str]]:

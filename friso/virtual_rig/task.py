@@ -3,9 +3,10 @@ and a force injected beside the controller's."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,8 @@ SAMPLE_TIME = 50e-6
 
 @dataclass(frozen=True)
 class MoveTask:
-    """Pieces of the reference (see `friso.equations.reference`), shape (pieces, 1 + inputs), of a `form`.
+    """Pieces of the reference (see `friso.equations.reference`), shape (pieces, 1 + inputs), of a `form`; of runs with
+    moves of their own, shape (runs, pieces, 1 + inputs).
 
     Further fields are its duration [s], and the injected force [N] every `injected_each` [s], shape (n,), empty for
     none; the drive logs it unless it is `unknown` to it. The stage starts at rest where the reference does, but
@@ -32,30 +34,43 @@ class MoveTask:
     injected: np.ndarray = field(default_factory=lambda: np.zeros(0))
     injected_each: float = 1.0
     unknown: bool = False
-    displacement: float = 0.0
+    displacement: Any = 0.0
     form: ReferenceForm = QUADRATIC
 
     @property
     def span(self) -> tuple[float, float]:
         """Return the lowest and highest position of the reference [m]."""
-        lengths = np.append(self.pieces[1:, 0], self.duration) - self.pieces[:, 0]
-        velocity, acceleration = self.pieces[:, 2], self.pieces[:, 3]
+        starts, velocity, acceleration = self.pieces[..., 0], self.pieces[..., 2], self.pieces[..., 3]
+        lengths = np.diff(starts, axis=-1, append=self.duration)
         turns = np.divide(-velocity, acceleration, out=np.zeros_like(velocity), where=acceleration != 0)
         times = 0.0 * lengths, lengths, np.clip(turns, 0.0, lengths)
-        places = np.concatenate([value(self.form, self.pieces, time) for time in times])
-        return min(places.min(), places[0] + self.displacement), max(places.max(), places[0] + self.displacement)
+        places = np.stack([value(self.form, self.pieces, time) for time in times])
+        begins = self.pieces[..., 0, 1] + self.displacement
+        return float(min(places.min(), np.min(begins))), float(max(places.max(), np.max(begins)))
+
+    def of_runs(self, numbers: np.ndarray) -> MoveTask:
+        """Return the task of some of the runs."""
+        own = self.pieces[numbers] if self.pieces.ndim > 2 else self.pieces
+        displacement = self.displacement[numbers] if np.ndim(self.displacement) else self.displacement
+        return replace(self, pieces=own, displacement=displacement)
 
 
 def own_motion(stage: Stage) -> MoveTask:
     """Return the motion of the stage file, at whose start the stage stands at 0 (or displaced
     from there): the reference of a step has been there too, and leaves it after one sample of the drive."""
-    flat = stage.flat()
-    pieces, duration = motion.pieces(flat, 1)[0], flat["motion.duration"]
-    if pieces[0, 1]:
-        pieces = np.vstack([np.zeros(pieces.shape[1]), pieces])
-        pieces[1:, 0] += flat.get("drive.sample_time", SAMPLE_TIME)
-    displacement = float(motion.initial_displacement(flat))
-    return MoveTask(pieces, duration, displacement=displacement, form=motion.form_of(flat))
+    return motion_task(stage.flat(), 1)
+
+
+def motion_task(flat: Mapping[str, Any], runs: int) -> MoveTask:
+    """Return the motions of stages given as flat keys, for the longest of their durations (see `own_motion`)."""
+    several = motion.varies(flat)
+    pieces = motion.pieces(flat, runs if several else 1)
+    if pieces[:, 0, 1].any():
+        before = np.zeros((len(pieces), 1, pieces.shape[2]))
+        pieces[:, :, 0] += np.reshape(flat.get("drive.sample_time", SAMPLE_TIME), (-1, 1))
+        pieces = np.concatenate([before, pieces], axis=1)
+    displacement, duration = motion.initial_displacement(flat), float(np.max(flat["motion.duration"]))
+    return MoveTask(pieces if several else pieces[0], duration, displacement=displacement, form=motion.form_of(flat))
 
 
 def standing(place: float, duration: float) -> MoveTask:

@@ -36,6 +36,17 @@ def example(
     target = path or Path(source.name)
     write_file("FILE", target, source.read_text(encoding="utf-8"), overwrite)
     print(f"wrote {target}")
+    for beside in named_files(source):
+        write_file("FILE", target.parent / beside.name, beside.read_text(encoding="utf-8"), overwrite)
+        print(f"wrote {target.parent / beside.name}")
+
+
+def named_files(source: Path) -> list[Path]:
+    """The files beside an example that its tables name."""
+    import tomllib
+
+    tables = tomllib.loads(source.read_text("utf-8")).values() if source.suffix == ".toml" else ()
+    return [source.parent / table["file"] for table in tables if isinstance(table, dict) and "file" in table]
 
 
 def listed_examples() -> list[tuple[str, str]]:

@@ -7,6 +7,7 @@ from fractions import Fraction
 from math import lcm, pi
 from typing import Annotated, Any, ClassVar, Literal
 
+from friso.equations.motions.settings import MotionSettings
 from friso.quantities import Quantity, any_sign, positive
 from friso.stage.lists import Several, Values, element_keys
 from friso.stage.motion import DURATION, Motion, ReferenceForm, Tone, register_motion
@@ -15,12 +16,12 @@ from friso.stage.tables import ROUNDING
 
 AMPLITUDE, FREQUENCY, PHASE = (f"motion.{name}" for name in ("amplitude", "frequency", "phase"))
 
-MOST_TONES = 24
-"""Tones of a reference: each adds to the code of every step."""
-
 
 def _numbers(flat: Mapping[str, Any], key: str) -> list[Any]:
     return [flat[name] for name in element_keys(flat, key)]
+
+
+_MOST = MotionSettings().most_tones
 
 
 @register_motion
@@ -28,11 +29,9 @@ class Multisine(Motion):
     """The reference is a sum of sinusoids."""
 
     kind: Literal["multisine"]
-    amplitude: Annotated[Values, Several(Quantity("m", positive, "1 mm"), ("1 mm", "0.5 mm"), 2, MOST_TONES)]
-    frequency: Annotated[Values, Several(Quantity("Hz", positive, "1 Hz"), ("1 Hz", "3 Hz"), 2, MOST_TONES)]
-    phase: Annotated[Values | None, Several(Quantity("rad", any_sign, "0 deg"), ("0 deg", "90 deg"), 2, MOST_TONES)] = (
-        None
-    )
+    amplitude: Annotated[Values, Several(Quantity("m", positive, "1 mm"), ("1 mm", "0.5 mm"), 2, _MOST)]
+    frequency: Annotated[Values, Several(Quantity("Hz", positive, "1 Hz"), ("1 Hz", "3 Hz"), 2, _MOST)]
+    phase: Annotated[Values | None, Several(Quantity("rad", any_sign, "0 deg"), ("0 deg", "90 deg"), 2, _MOST)] = None
     """At time 0; default: 0."""
 
     rests = False

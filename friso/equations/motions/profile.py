@@ -13,6 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
+from friso.equations.motions.settings import MotionSettings
 from friso.quantities import Bound, Quantity, Value, non_negative, positive
 from friso.stage.lists import Several, Values, element_keys
 from friso.stage.motion import (
@@ -31,9 +32,6 @@ LIMITS = {"velocity": "m/s", "acceleration": "m/s^2", "jerk": "m/s^3", "snap": "
 """Limits of a move, each of which bounds one derivative more, and their units."""
 
 DISTANCE, DWELL = "motion.distance", "motion.dwell"
-
-MOST_MOVES = 100
-"""Moves of a profile: settling is told for each."""
 
 not_zero = Bound("not 0", lambda value: value != 0)
 
@@ -148,14 +146,18 @@ def _end(flat: Mapping[str, Any]) -> Any:
     return start + move.time
 
 
+_MOST = MotionSettings().most_moves
+
+
 @register_motion
-class Profile(Motion):
+class MoveProfile(Motion):
     """Moves planned as drives do, one after the other with a dwell after each: velocity, acceleration and, where given,
     jerk and snap stay within their limits; a distance too short for a limit lowers its peak."""
 
     kind: Literal["profile"]
     distance: Annotated[
-        Values, Several(Quantity("m", not_zero, "5 mm"), ("5 mm", "-5 mm", "20 um"), 1, MOST_MOVES, alone=True)
+        Values,
+        Several(Quantity("m", not_zero, "5 mm"), ("5 mm", "-5 mm", "20 um"), 1, _MOST, alone=True),
     ]
     """Of the moves one after the other, forward or (negative) back."""
     velocity: Annotated[Value, Quantity("m/s", positive, "0.5 m/s")]

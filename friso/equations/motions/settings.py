@@ -9,7 +9,13 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class MotionSettings(Settings):
-    """Reversals of references that are sums of sinusoids."""
+    """How many moves and sinusoids there may be, and how finely reversals of sums of sinusoids are sought."""
+
+    most_moves: int = setting(100, "")
+    """Moves of a profile: each has eight pieces or more, and settling is told for each."""
+
+    most_tones: int = setting(24, "")
+    """Sinusoids of a reference: each adds to the code of every step, which takes longer to compile."""
 
     samples_per_period: float = setting(32.0, "")
     """Samples in a period of the fastest sinusoid among which reversals are sought. With fewer, two reversals that are

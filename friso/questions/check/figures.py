@@ -109,7 +109,7 @@ def _settling_figure(cases: list[ShownCase]) -> Figure:
     # A stage that stays within the finest band shows as a line, not as a screenful of solver noise.
     view = common_range([line.y for line in lines], least=2 * min(BANDS))
     zoom = Panel(
-        f"From {start:g} s on: deviation from the reference",
+        f"From {start:.4g} s on: deviation from the reference",
         Axis("Time", "s", (start, end)),
         Axis("Deviation", "m", view),
         tuple(lines),
@@ -221,7 +221,7 @@ def _joint(cases: list[ShownCase]) -> Figure:
         after = Series(*_cut(item, deflection, start, end), item.label, item.colour)
         panels += [
             Panel("Whole run", _TIME, axis, (trace,), limits=limits),
-            Panel(f"From {start:g} s on", Axis("Time", "s", (start, end)), axis, (after,), limits=limits),
+            Panel(f"From {start:.4g} s on", Axis("Time", "s", (start, end)), axis, (after,), limits=limits),
         ]
     caption = "Deflection of the stage against the cart. Beyond the dashed lines the stroke limiter carries load."
     return Figure("joint", "The joint", caption, tuple(panels), columns=2, subject=subject(cases))
@@ -235,7 +235,7 @@ def _friction(with_trace: list[ShownCase]) -> Figure:
     cases = [item for item in with_trace if "friction_force" in trace_of(item)]
     hunting = any(item.case.peaks for item in cases)
     start, end = _window(with_trace) if hunting else (-np.inf, np.inf)
-    part = f"From {start:g} s on." if hunting else "The whole run."
+    part = f"From {start:.4g} s on." if hunting else "The whole run."
     caption = f"{part} The friction force opposes the velocity of the cart. A case at rest is a single point."
     along = "Cart position from the target" if hunting else "Cart position"
     panels = []

@@ -65,6 +65,7 @@ def check_html(
         sentences=[
             *filter(None, [conclusion(cases)]),
             *motion_sentences(stage),
+            *filter(None, [stage.controller.note(stage.flat())]),
             *([isolator_sentence(isolator)] if isolator else []),
             *(draws_sentences(draws) if draws else []),
             *(laws_sentences(laws) if laws else []),

@@ -89,7 +89,7 @@ class CheckAnswer(Answer):
 
         suggested = [isolator_sentence(self.isolator)] if self.isolator else []
         drawn = draws_sentences(self.draws) if self.draws else []
-        short = motion_sentences(self.stage)
+        short = [*motion_sentences(self.stage), *filter(None, [self.stage.controller.note(self.stage.flat())])]
         return [*answer(self.result), *short, *suggested, *drawn, *(laws_sentences(self.laws) if self.laws else [])]
 
     def tables(self) -> Sequence[AnswerTable]:

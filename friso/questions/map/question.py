@@ -51,7 +51,9 @@ from friso.questions.map.study import (
     write_beside,
 )
 from friso.stage import Stage
+from friso.stage.rig import AS_BUILT
 from friso.studies.axes import AxisValues
+from friso.studies.built_runs import of_runs_alone
 from friso.studies.execute import Crew, local_crew
 from friso.studies.samples import Samples
 from friso.studies.settings import StudySettings
@@ -303,7 +305,7 @@ def sweep(
             study, metric = stored_study(store, metric, None if yes else LARGE)
         else:
             metric = ("verdict" if confirm else "sketch") if metric in (None, "sketch") else metric
-            chosen = read_stage(stage, set)
+            chosen = read_stage(stage, set, leaves_out=() if of_runs_alone([metric]) else AS_BUILT)
             study = study_for(chosen, varied, metric, refine, None if yes else LARGE, crew)
             study = replace(study, rtol=_chosen_rtol(1e-6 if rtol is None else rtol, study, crew))
             study = study if store is None else as_stored(study, store, metric, overwrite)

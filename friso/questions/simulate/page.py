@@ -24,6 +24,6 @@ def simulate_files(response: xr.Dataset, stem: str) -> dict[str, Content]:
 
 def _write_samples(response: xr.Dataset, path: Path) -> None:
     """Write the samples of a response as CSV, with units in the header."""
-    samples = response.drop_dims("turning_point").to_dataframe()
+    samples = response.drop_dims("turning_point", errors="ignore").to_dataframe()
     units = {name: f"{name} [{response[name].attrs['units']}]" for name in samples}
     samples.rename(columns=units).to_csv(path, index_label="time [s]")

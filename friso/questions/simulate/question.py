@@ -26,6 +26,7 @@ from friso.interface.inputs import (
 )
 from friso.progress import Progress, silent
 from friso.stage import Stage
+from friso.stage.rig import AS_BUILT, is_as_built
 
 if TYPE_CHECKING:
     import os
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from friso.hunting import Dwell
     from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files
+    from friso.studies.study import Study
 
 
 class SimulateAnswer(Answer):
@@ -52,19 +54,32 @@ class SimulateAnswer(Answer):
         """Return the response over time: position, error, force, friction and more."""
         return self.result
 
+    @property
+    def as_built(self) -> bool:
+        """Tell whether the drive ran as built, sample by sample, in the machine's surroundings."""
+        return "as_built" in self.result.attrs
+
     @cached_property
     def measures(self) -> Measures:
         """Return measures of the run's end, such as outcome, swing and settling time."""
+        if self.as_built:
+            from friso.virtual_rig.response import measured_response
+
+            return measured_response(self.stage, self.result)
         return measured_run(self.stage, self.result.attrs["rtol"])
 
     @cached_property
     def dwells(self) -> Sequence[Dwell]:
         """Return how the stage settles at each place where its reference stands, if these are more than two."""
         from friso.equations.motion import stands
-        from friso.hunting import dwells
+        from friso.hunting import dwells, dwells_of_trace
 
-        several = len(stands(self.stage.flat())) > 2 and not self.failure
-        return dwells(self.stage, self.result.attrs["rtol"]) if several else ()
+        if len(stands(self.stage.flat())) <= 2 or self.failure:
+            return ()
+        if self.as_built:
+            deviation = (self.result["position"] - self.result["reference"]).to_numpy()
+            return dwells_of_trace(self.stage, self.result["time"].to_numpy(), deviation)
+        return dwells(self.stage, self.result.attrs["rtol"])
 
     @property
     def failure(self) -> str:
@@ -75,13 +90,14 @@ class SimulateAnswer(Answer):
     def sentences(self) -> Sequence[str]:
         """Return what the run does, how it settles at several places, and what its moves are too short for."""
         from friso.equations.motion import rests
-        from friso.questions.simulate.words import conclusion
+        from friso.questions.simulate.words import built_sentence, conclusion
         from friso.shown.motion_words import dwell_sentences, motion_sentences
 
         deviation = (self.result["position"] - self.result["reference"]).to_numpy()
         name, moves_on = self.name if self.of_cell else self.stage.name or self.name, not rests(self.stage.flat())
         does = conclusion(name, self.measures, deviation, moves_on)
-        return [does, *dwell_sentences(self.dwells), *motion_sentences(self.stage)]
+        says = [does, *dwell_sentences(self.dwells), *motion_sentences(self.stage)]
+        return [*says, *([built_sentence(self.stage)] if self.as_built else [])]
 
     def details(self) -> Sequence[str]:
         """Return how many steps the solver took."""
@@ -115,20 +131,27 @@ def simulate(
     *,
     set: Changes = None,
     cell: str | os.PathLike[str] | None = None,
+    continuous: bool = False,
     progress: Progress = silent,
 ) -> SimulateAnswer:
     """What does one run do: the time response of a stage to its motion, as NetCDF, CSV and a plot.
+
+    A stage with [drive], [rail], [cable] or [floor] runs as built: the drive samples, waits and saturates, and friction
+    varies along the rail.
 
     Parameters
     ----------
     stage : Stage, path or dict
         The stage, its file, or its tables; with --cell, the numbers of the cell: 3 4.
     rtol : float, optional
-        Relative tolerance of the solver; default: 1e-9, or that of the study.
+        Relative tolerance of the solver; default: 1e-9, of a drive as built 1e-4, or that of the study.
     sample_time : str or float, optional
-        Sampling interval, "1 ms" or a number [s]; default: the duration over 20 000.
+        Sampling interval, "1 ms" or a number [s], of a drive as built a whole number of its samples; default: about
+        the duration over 20 000.
     cell : path, optional
         Run a single cell of this study again.
+    continuous : bool
+        Run the controller in continuous time, without [drive], [rail], [cable] and [floor].
 
     Returns
     -------
@@ -157,23 +180,33 @@ def simulate(
             raise InputError(
                 "STAGE.toml", " ".join(map(str, source or [])), "one stage file", "friso simulate rig.toml"
             )
-        chosen, name, usual = read_stage(source, set), stem_of(source), RTOL
+        left_out = AS_BUILT if continuous else ()
+        chosen, name, usual = read_stage(source, set, leaves_out=left_out), stem_of(source), None
     else:
+        from friso.studies.built_runs import runs_as_built
+
         if not isinstance(stage, list | tuple | None):
             raise InputError(
                 "STAGE.toml", "a stage beside --cell", "the numbers of a cell", "friso.simulate([3, 4], cell=...)"
             )
         index = list(stage or ())
-        chosen, name, usual = _cell(Path(cell), [str(number) for number in index], set)
+        chosen, name, study = _cell(Path(cell), [str(number) for number in index], set)
+        continuous = continuous or not runs_as_built(chosen, study.metrics)  # as the study ran it
+        usual = study.rtol if continuous else None
     from friso.engine.simulate import simulate as simulated
 
     mention_unstable_loop(chosen)
-    response = simulated(chosen, tolerance or usual, interval)
+    if is_as_built(chosen) and not continuous:
+        from friso.virtual_rig.response import response as run_as_built
+
+        response = run_as_built(chosen, tolerance or usual, interval)
+    else:
+        response = simulated(chosen, tolerance or usual or RTOL, interval)
     return SimulateAnswer(response, stage=chosen, name=name, of_cell=cell is not None)
 
 
-def _cell(store: Path, numbers: list[str], changes: Changes) -> tuple[Stage, str, float]:
-    """Return the stage of a cell, a name for it, and the tolerance of its study.
+def _cell(store: Path, numbers: list[str], changes: Changes) -> tuple[Stage, str, Study]:
+    """Return the stage of a cell, a name for it, and its study.
 
     Raises InputError for numbers that name no cell of the study.
     """
@@ -187,4 +220,4 @@ def _cell(store: Path, numbers: list[str], changes: Changes) -> tuple[Stage, str
     if not inside:
         raise InputError(f"--cell {store}", " ".join(numbers), f"one number per axis: {sizes}", "3 4")
     name = f"{store.with_suffix('').name}_cell_{'_'.join(numbers)}"
-    return stage_of(study.cell_stage(index), changes), name, study.rtol
+    return stage_of(study.cell_stage(index), changes), name, study

@@ -7,21 +7,21 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.hunting.criteria import BAND, CREEPS, RESTS, SWINGS
 from friso.hunting.measures import BANDS, WINDOW, Measures
-from friso.shown.drawing.prefixes import plus_minus, with_unit
+from friso.shown.drawing.prefixes import listed, plus_minus, with_unit
 from friso.shown.motion_words import off_its_reference
+from friso.stage import Stage
+from friso.stage.rig import AS_BUILT
 
 GROWN = 1.1
 """How many times as far as before a run is off its reference in its last quarter that goes ever farther."""
 
 
-def conclusion(name: str, measures: Measures, deviation: np.ndarray, moves_on: bool) -> str:
+def conclusion(name: str, measures: Measures, deviation: np.ndarray, moves_on: bool = False) -> str:
     """Say what the run of a stage does, whose reference stands in the end, or else `moves_on`.
 
     `deviation` holds samples of its deviation [m], evenly over time, shape (n,).
     """
     before, late = np.split(np.abs(deviation), [int(WINDOW * len(deviation))])
-    if moves_on and measures.status[0] == Status.DONE:
-        return f"{name} {off_its_reference(float(late.max()), float(np.sqrt(np.mean(late**2))))}."
     grows = bool(late.max() > GROWN * before.max(initial=0.0))
     clauses = {
         SWINGS: lambda: (
@@ -34,7 +34,17 @@ def conclusion(name: str, measures: Measures, deviation: np.ndarray, moves_on: b
     outcome = str(measures.outcome[0])
     if outcome not in clauses:
         return f"{name}: the run was not completed ({Status(int(measures.status[0])).text})."
+    if moves_on:
+        swings = f"; its deviation {clauses[SWINGS]()}" if outcome == SWINGS else ""
+        return f"{name} {off_its_reference(float(late.max()), float(np.sqrt(np.mean(late**2))))}{swings}."
     return f"{name}: {clauses[outcome]()}."
+
+
+def built_sentence(stage: Stage) -> str:
+    """Say what of the machine as built the run has taken into account."""
+    tables = listed([f"[{name}]" for name in AS_BUILT if getattr(stage, name)], "and")
+    what = f", with {tables}" if tables else ""
+    return f"The drive ran as built, sample by sample{what}; --continuous leaves that out."
 
 
 def _restless(farthest: float, final: float, moved: float, grows: bool) -> str:

@@ -1,0 +1,253 @@
+"""Controllers that are given as a transfer function of the error, in one form or another: what they have in common.
+
+The transfer function is gain k0/s + gain R(s): an integral, which winds up, beside sections of the second order. One
+for samples is turned by the bilinear transform (Tustin), which a drive with these samples turns back exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import zip_longest
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.quantities import Number, Quantity, Value, positive
+from friso.stage.controllers import CONTROLLER, ControllerSection
+from friso.stage.section import Rule
+from friso.stage.tables import ROUNDING
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from friso.equations.blocks import Blocks, Measured, Signal
+
+SAMPLE_TIME, DRIVE_TIME, LOOP_TIME = f"{CONTROLLER}.sample_time", "drive.sample_time", "drive.position_sample_time"
+PARTS = "parts"
+"""Under which the coefficients of integral and sections stand among the flat keys of a stage."""
+
+AT_ZERO = 1e3 * ROUNDING
+"""Share of the largest pole (or of 1, in z) up to which a pole is one at 0 (at z = 1), moved by rounding."""
+
+
+class TransferRoots(NamedTuple):
+    """A transfer function gain prod(x - zeros)/prod(x - poles), in s [1/s] or in z."""
+
+    zeros: np.ndarray
+    poles: np.ndarray
+    gain: float
+
+
+class RationalTerms(NamedTuple):
+    """Terms that are present: the integral, the poles beside it, and whether coefficients are for samples."""
+
+    integral: bool
+    order: int
+    sampled: bool
+
+
+def _divides(flat: Mapping[str, Any]) -> Any:
+    """Tell whether the drive's samples divide those of the controller."""
+    if SAMPLE_TIME not in flat or DRIVE_TIME not in flat:
+        return True
+    ratio = flat[SAMPLE_TIME] / flat[DRIVE_TIME]
+    return (ratio > 1 - 1e-9) & (abs(ratio - np.round(ratio)) < 1e-9 * ratio)
+
+
+class RationalController(ControllerSection):
+    """Base of the controllers that are transfer functions: a kind says how its roots are given."""
+
+    gain: Annotated[float, Number(positive, "1.0")] = 1.0
+    """By what the force is multiplied."""
+    speed: Annotated[float, Number(positive, "1.0")] = 1.0
+    """By what all frequencies of zeros and poles are multiplied."""
+    sample_time: Annotated[Value | None, Quantity("s", positive, "1 ms")] = None
+    """Of a transfer function in z; left out, it is one in s."""
+
+    speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType({"gain": 2, "speed": 1})
+    loop_gain = ("gain",)
+    shares: ClassVar[Mapping[str, str]] = MappingProxyType({"i": "integral", "r": "rest"})
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            (SAMPLE_TIME, DRIVE_TIME),
+            _divides,
+            "a whole number of samples of the drive",
+            'sample_time = "1 ms" with [drive] sample_time = "125 us"',
+        ),
+        Rule(
+            (SAMPLE_TIME, "drive.integral_discretisation"),
+            lambda f: SAMPLE_TIME not in f or f.get("drive.integral_discretisation", "bilinear") == "bilinear",
+            "no rule of the drive for a controller whose coefficients are for samples already",
+            'sample_time = "1 ms" without integral_discretisation',
+        ),
+    )
+
+    @classmethod
+    def roots(cls, flat: Mapping[str, Any]) -> TransferRoots:
+        """Return zeros, poles and gain of the transfer function, in s or in z. Raises InputError."""
+        raise NotImplementedError
+
+    @classmethod
+    def with_defaults(cls, flat: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the coefficients of integral and sections, and the samples of a drive that tells none."""
+        roots, times = cls.roots(flat), flat.get(SAMPLE_TIME)
+        if times is None or not np.ndim(times):
+            return {**_coefficients(roots, times), **_timing(flat)}
+        by_time = [_coefficients(roots, time) for time in np.asarray(times)]
+        return {**{key: np.array([one[key] for one in by_time]) for key in by_time[0]}, **_timing(flat)}
+
+    @classmethod
+    def variant(cls, flat: Mapping[str, Any]) -> RationalTerms:
+        """Return which terms there are."""
+        orders = (number for number in range(1, len(flat)) if cls.key(f"{PARTS}.{number}.b1") not in flat)
+        sections = next(orders) - 1
+        odd = sections > 0 and cls.key(f"{PARTS}.{sections}.a2") not in flat
+        return RationalTerms(cls.integrates(flat), 2 * sections - odd, SAMPLE_TIME in flat)
+
+    @classmethod
+    def integrates(cls, flat: Mapping[str, Any]) -> bool:
+        """Tell whether the transfer function has a pole at s = 0 (z = 1)."""
+        return cls.key(f"{PARTS}.integral") in flat
+
+    @classmethod
+    def note(cls, flat: Mapping[str, Any]) -> str:
+        """Say that a verdict is on the continuous equivalent of a controller for samples."""
+        if SAMPLE_TIME not in flat:
+            return ""
+        equivalent = "The verdict is on the continuous equivalent (Tustin) of the controller"
+        return f"{equivalent}, whose coefficients are for samples of {flat[SAMPLE_TIME]:g} s."
+
+    @classmethod
+    def stiffness(cls, blocks: Blocks, variant: RationalTerms) -> sp.Expr:
+        """Return the static stiffness beside the integral [N/m]."""
+        return blocks.key("gain") * blocks.key(f"{PARTS}.stiffness")
+
+    @classmethod
+    def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
+        """A box with the order."""
+        order = cls.variant(flat).order + cls.integrates(flat)
+        canvas.box(f"C({'z' if SAMPLE_TIME in flat else 's'}), order {order}")
+
+    @classmethod
+    def declare(cls, measured: Measured, blocks: Blocks, variant: RationalTerms) -> Mapping[str, Signal]:
+        """Return the shares of the integral and of the sections [N]."""
+        gain, speed = blocks.key("gain"), blocks.key("speed")
+        rule = "bilinear" if variant.sampled else None
+        with blocks.loop("position"):
+            rest = measured.error
+            for number in range(1, (variant.order + 1) // 2 + 1):
+                first = variant.order % 2 and 2 * number > variant.order
+
+                def key(name: str, number: int = number) -> sp.Symbol:
+                    return blocks.key(f"{PARTS}.{number}.{name}")
+
+                upper = (1, key("b1") / speed, 0 if first else key("b2") / speed**2)
+                lower = (1, key("a1") / speed, 0 if first else key("a2") / speed**2)
+                rest = blocks.transfer(rest, upper, lower, f"section_{number}", rule)
+            shares = {"r": blocks.handed_on(rest * (gain * blocks.key(f"{PARTS}.stiffness")), "rest")}
+            if variant.integral:
+                integral = blocks.integral(measured.error, gain * speed * blocks.key(f"{PARTS}.integral"))
+                shares = {"i": integral, **shares}
+        return shares
+
+
+def _timing(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the samples of the drive, where the controller alone tells them, and those of a controller that is
+    carried out less often than the drive's."""
+    if SAMPLE_TIME not in flat:
+        return {}
+    if DRIVE_TIME not in flat:
+        return {DRIVE_TIME: flat[SAMPLE_TIME]}
+    slower = np.all(_divides(flat)) and np.any(flat[SAMPLE_TIME] > flat[DRIVE_TIME] * (1 + 1e-9))
+    return {LOOP_TIME: flat[SAMPLE_TIME]} if slower else {}
+
+
+def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, float]:
+    """Return the flat keys of integral, static stiffness and sections. Raises InputError."""
+    zeros, poles, scale = _times(roots, sample_time)
+    infinite = np.isinf(poles)
+    if np.count_nonzero(infinite) > 1:
+        raise _wrong("two poles or more at 0 (z = 1)", "one integral at most")
+    if np.any(poles.real <= 0):
+        worst = roots.poles[np.argmax(np.abs(roots.poles)) if sample_time else np.argmax(roots.poles.real)]
+        raise _wrong(f"a pole at {worst:.6g}", "a stable transfer function; an integral, a pole at 0 (z = 1), is fine")
+    poles = poles[~infinite]
+    if len(zeros) > len(poles) + bool(infinite.any()):
+        counts = f"{len(zeros)} zeros and {len(poles) + bool(infinite.any())} poles"
+        raise _wrong(counts, "a proper transfer function: no more zeros than poles, and none of these at z = -1")
+    keys: dict[str, float] = {}
+    stiffness = scale
+    if infinite.any():
+        upper, lower = _expanded(zeros), _expanded(poles)
+        gap = np.array([a - b for a, b in zip_longest(upper, lower, fillvalue=0.0)])[1:]
+        keys[f"{PARTS}.integral"], stiffness = scale, scale * (gap[0] if gap.size else 0.0)
+        zeros = -np.roots(np.trim_zeros(gap / gap[0], "b")) if gap.size and gap[0] else np.zeros(0)
+    keys[f"{PARTS}.stiffness"] = stiffness
+    if not stiffness > 0 or (infinite.any() and not scale > 0):
+        actual = f"a static stiffness of {stiffness:.6g}{' beside the integral' if infinite.any() else ''}"
+        raise _wrong(actual, "a controller that pulls back: static stiffness greater than 0")
+    sections = zip_longest(_sections(zeros), _sections(poles), fillvalue=(0.0, None))
+    for number, ((b1, b2), (a1, a2)) in enumerate(sections, start=1):
+        keys |= {f"{PARTS}.{number}.b1": b1, f"{PARTS}.{number}.a1": a1}
+        keys |= {} if a2 is None else {f"{PARTS}.{number}.b2": b2 or 0.0, f"{PARTS}.{number}.a2": a2}
+    return {ControllerSection.key(name): float(value) for name, value in keys.items()}
+
+
+def _times(roots: TransferRoots, sample_time: float | None) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return zeros and poles as times t of factors 1 + t s, infinite for a pole at s = 0, and the gain before them.
+
+    A root r in z becomes, with z = (1 + s T/2)/(1 - s T/2), the factor (1 - r) + (1 + r) s T/2.
+    """
+    zeros, poles = np.asarray(roots.zeros, complex), np.asarray(roots.poles, complex)
+    if sample_time is None:
+        pairs = [(-part, np.ones(len(part))) for part in (zeros, poles)]
+    else:
+        pairs = [(1 - part, (1 + part) * sample_time / 2) for part in (zeros, poles)]
+        lacking = np.ones(len(poles) - len(zeros))  # a zero at z = infinity is the factor 1 - s T/2
+        pairs[0] = np.append(pairs[0][0], lacking), np.append(pairs[0][1], -lacking * sample_time / 2)
+    (upper, upper_rate), (lower, lower_rate) = pairs
+    largest = 1.0 if sample_time is not None else np.abs(poles).max(initial=0.0)
+    lower = np.where(np.abs(lower) <= AT_ZERO * largest, 0.0, lower)
+    if np.any(upper == 0):
+        raise _wrong("a zero at 0 (z = 1)", "a controller that pulls back: static stiffness greater than 0")
+    free = lower == 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        times = upper_rate / upper, np.where(free, np.inf, lower_rate / lower)
+    scale = roots.gain * np.prod(upper) / np.prod(lower[~free]) / np.prod(lower_rate[free])
+    kept = [part[part != 0] for part in times]
+    return kept[0], kept[1], float(np.real(scale))
+
+
+def _expanded(times: np.ndarray) -> np.ndarray:
+    """Return the coefficients of 1, s, s^2, ... of prod(1 + t s)."""
+    polynomial = np.ones(1, complex)
+    for time in times:
+        polynomial = np.append(polynomial, 0) + time * np.append(0, polynomial)
+    return polynomial.real
+
+
+def _sections(times: np.ndarray) -> list[tuple[float, float | None]]:
+    """Return coefficients of s and s^2 of factors of the second order; of an odd number the last has none of s^2."""
+    pairs = sorted((t for t in times if t.imag > 1e-12 * abs(t)), key=abs, reverse=True)
+    real = sorted((t.real for t in times if abs(t.imag) <= 1e-12 * abs(t)), key=abs, reverse=True)
+    factors: list[tuple[float, float | None]] = [(2 * t.real, abs(t) ** 2) for t in pairs]
+    factors += [(a + b, a * b) for a, b in zip(real[::2], real[1::2], strict=False)]
+    return factors + ([(real[-1], None)] if len(real) % 2 else [])
+
+
+def _wrong(actual: str, expected: str) -> InputError:
+    return InputError(CONTROLLER, actual, expected)
+
+
+def polynomial_roots(numerator: Sequence[float], denominator: Sequence[float]) -> TransferRoots:
+    """Return the roots of a quotient of polynomials, their highest powers first. Raises InputError."""
+    upper, lower = (np.trim_zeros(np.asarray(part, float), "f") for part in (numerator, denominator))
+    if not upper.size or not lower.size:
+        raise _wrong("coefficients that are all 0", "a transfer function")
+    if len(upper) > len(lower):
+        raise _wrong(
+            f"a numerator of degree {len(upper) - 1} over a denominator of degree {len(lower) - 1}", "a proper one"
+        )
+    return TransferRoots(np.roots(upper), np.roots(lower), float(upper[0] / lower[0]))

@@ -1,0 +1,83 @@
+"""A controller given by its coefficients, by its zeros and poles, or by its sections."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+
+from friso.equations.controllers.rational import RationalController, TransferRoots, polynomial_roots
+from friso.stage import Rule, register_controller
+from friso.stage.filters import FILTER_ARRAY
+from friso.stage.lists import Coefficients, Rows, Values, element_keys, row_keys
+from friso.stage.section import OneTable, TableArray, UncertainSection
+
+WAYS = ("denominator", "poles", "sections")
+"""Keys that each belong to one way of giving a transfer function."""
+
+
+class TransferSection(UncertainSection):
+    """A section of the transfer function: a quotient of polynomials, their highest powers first."""
+
+    numerator: Annotated[Values, Coefficients((1.0, 120.0, 3600.0))]
+    denominator: Annotated[Values, Coefficients((1.0, 300.0, 0.0))]
+
+
+_SECTIONS = TableArray(
+    OneTable(TransferSection), "[[controller.sections]] numerator = [1, 20], denominator = [1, 400]", FILTER_ARRAY.most
+)
+
+
+def _ways(flat: Mapping[str, Any]) -> int:
+    """Return in how many ways the transfer function is given."""
+    return sum(any(key.startswith(f"controller.{way}.") for key in flat) for way in WAYS)
+
+
+@register_controller
+class TransferFunction(RationalController):
+    """Force over error as a transfer function in s, or with a sample_time in z, given in one of three ways; in SI."""
+
+    kind: Literal["transfer_function"]
+    numerator: Annotated[Values | None, Coefficients((2e3, 8e4, 4e5))] = None
+    denominator: Annotated[Values | None, Coefficients((1.0, 400.0, 0.0))] = None
+    """Coefficients, the highest power first."""
+    zeros: Annotated[Values | None, Coefficients((-6.0, "-30+10j"), roots=True)] = None
+    poles: Annotated[Values | None, Coefficients((0.0, -400.0), roots=True)] = None
+    """In 1/s, or in z; a complex one stands for itself and its conjugate. The gain before them is `gain`."""
+    sections: Annotated[Rows, _SECTIONS] = Rows()
+    """Factors of the transfer function."""
+
+    rules: ClassVar[tuple[Rule, ...]] = RationalController.rules
+
+    @classmethod
+    def roots(cls, flat: Mapping[str, Any]) -> TransferRoots:
+        """Return zeros, poles and gain, whichever way they are given. Raises InputError."""
+        if _ways(flat) != 1:
+            actual = "none of them" if not _ways(flat) else "several of them"
+            from friso.errors import InputError
+
+            expected = "one of numerator and denominator, zeros and poles, or [[controller.sections]]"
+            raise InputError("controller", actual, expected, "numerator = [2e3, 8e4, 4e5], denominator = [1, 400, 0]")
+        if row_keys(flat, cls.key("sections")):
+            parts = [_quotient(flat, place) for place in row_keys(flat, cls.key("sections"))]
+            zeros, poles, gains = zip(*parts, strict=True)
+            return TransferRoots(np.concatenate(zeros), np.concatenate(poles), float(np.prod(gains)))
+        if element_keys(flat, cls.key("poles")):
+            zeros, poles = (_roots(flat, cls.key(name)) for name in ("zeros", "poles"))
+            return TransferRoots(zeros, poles, 1.0)
+        return _quotient(flat, "controller")
+
+
+def _quotient(flat: Mapping[str, Any], place: str) -> TransferRoots:
+    """Return the roots of numerator and denominator at a place of a stage file."""
+    numerator, denominator = (
+        [flat[key] for key in element_keys(flat, f"{place}.{name}")] for name in ("numerator", "denominator")
+    )
+    return polynomial_roots(numerator or [1.0], denominator)
+
+
+def _roots(flat: Mapping[str, Any], key: str) -> np.ndarray:
+    """Return roots, with the conjugates of complex ones."""
+    roots = [complex(flat[name]) for name in element_keys(flat, key)]
+    return np.array([one for root in roots for one in ((root, root.conjugate()) if root.imag else (root,))])

@@ -1,0 +1,67 @@
+"""Runs of cells with the drive as built, in the machine's surroundings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from friso.engine.arrays import Results
+from friso.engine.batch import Runs, part_of
+from friso.engine.kernel import empty_results
+from friso.engine.simulate import SAMPLES
+from friso.hunting.measures import Measures
+from friso.stage import Stage
+from friso.stage.rig import is_as_built
+from friso.studies.metric import metrics
+from friso.virtual_rig.response import measured_recording
+from friso.virtual_rig.run import run_flat, with_complete_drive
+from friso.virtual_rig.task import motion_task
+
+TIMING = tuple(
+    f"drive.{name}"
+    for name in ("sample_time", "delay", "velocity_samples", "velocity_sample_time", "position_sample_time")
+)
+"""Keys on which the equations of a drive depend by whole samples."""
+
+
+def runs_as_built(stage: Stage, names: Sequence[str]) -> bool:
+    """Tell whether cells of a stage run with its drive as built: where only metrics of runs are asked for.
+
+    A verdict is on the ideal machine, and so are the runs that it looks at.
+    """
+    return is_as_built(stage) and of_runs_alone(names)
+
+
+def of_runs_alone(names: Sequence[str]) -> bool:
+    """Tell whether all of some metrics are computed from runs."""
+    every = metrics()
+    return all(every[name].source == "run" for name in names if name in every)
+
+
+def built_runs(
+    stage: Stage, flat: Mapping[str, Any], count: int, threads: int | None, cancel: np.ndarray | None
+) -> Iterator[tuple[Runs, Measures]]:
+    """Run cells of one structure, given as flat keys to SI numbers or arrays (count,), and measure them.
+
+    All have the same noise. The runs tell statistics and statuses; turning points are those of samples, in the
+    measures. Once `cancel` is set, no further chunk of them begins.
+    """
+    timing = [np.broadcast_to(flat[key], (count,)) for key in TIMING if key in flat]
+    kinds, which = np.unique(np.stack([np.zeros(count), *timing]), axis=1, return_inverse=True)
+    for kind in range(kinds.shape[1]):
+        numbers = np.flatnonzero(which.ravel() == kind)
+        part = part_of(flat, numbers)
+        part = with_complete_drive(part | {key: float(np.ravel(part[key])[0]) for key in TIMING if key in part})
+        task = motion_task(part, len(numbers))
+        interval = max(1, round(task.duration / SAMPLES / part["drive.sample_time"])) * part["drive.sample_time"]
+        for recorded in run_flat(part, stage.floor, task, [0] * len(numbers), interval, threads):
+            if cancel is not None and cancel[0]:
+                return
+            results: Results = empty_results(len(recorded.numbers), 0, 0, 0)
+            results = results._replace(statuses=recorded.statuses, statistics=recorded.statistics)
+            yield (
+                Runs(numbers[recorded.numbers], results),
+                measured_recording(part_of(part, recorded.numbers), recorded),
+            )

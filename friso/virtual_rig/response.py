@@ -1,0 +1,96 @@
+"""The time response of a stage with its drive as built, in its surroundings: as `friso simulate` shows it."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.axis import axis_of
+from friso.engine.arrays import STATISTICS, Status
+from friso.engine.simulate import SAMPLES, checked_interval, time_axis
+from friso.engine.tolerance import checked_rtol
+from friso.equations.as_built import AsBuilt
+from friso.errors import InputError
+from friso.hunting.measures import Measures, SampledSolver, measure_traces
+from friso.stage import Stage
+from friso.version import VERSION
+from friso.virtual_rig.run import RecordedRuns, as_built_keys, run_flat
+from friso.virtual_rig.settings import RigSettings
+from friso.virtual_rig.task import own_motion
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LOGGED = {"position": ("measured_position", "m", "position that the drive reads"), "force": ("command", "N", "command")}
+"""What the drive logs beside what really moves: name of a signal, unit and label."""
+
+
+def response(stage: Stage, rtol: float | None = None, sample_time: float | None = None, seed: int = 0) -> xr.Dataset:
+    """Run a stage's own motion on its drive as built, and return its time response.
+
+    Variables over `time` [s] are those of `friso.engine.simulate`, and what the drive reads and commands. Samples are
+    taken with the drive, by default some twenty thousand of them. The noise is that of a `seed`. Raises InputError for
+    a sample time that is no whole number of the drive's samples.
+    """
+    flat = as_built_keys(stage)
+    settings = RigSettings.current()
+    drive, duration = flat["drive.sample_time"], flat["motion.duration"]
+    usual = max(1, round(duration / SAMPLES / drive)) * drive
+    interval = usual if sample_time is None else checked_interval(sample_time, duration)
+    tight = nullcontext() if rtol is None else replace(settings, rig_rtol=checked_rtol(rtol)).in_use()
+    if (share := interval / drive) < 1 - 1e-9 or abs(share - round(share)) > 1e-6:
+        expected = f"a whole number of samples of the drive, {drive:g} s each"
+        raise InputError("sample_time", f"{interval:g} s", expected, f"{max(1, round(share)) * drive:g} s")
+    with tight:
+        (recorded,) = run_flat(flat, stage.floor, own_motion(stage), [seed], interval, outputs=True)
+    return _dataset(stage, flat, recorded, settings.rig_rtol if rtol is None else rtol)
+
+
+def measured_recording(flat: Any, recorded: RecordedRuns) -> Measures:
+    """Measure recorded runs of the stages `flat`; the force is what the drive commands."""
+    attempted, rejected = (
+        recorded.statistics[:, STATISTICS.index(name)].astype(np.int64) for name in ("attempted", "rejected")
+    )
+    deviation = recorded.true["position"] - recorded.logged["reference"]
+    solver = SampledSolver(recorded.statuses, attempted, rejected)
+    return measure_traces(flat, recorded.time, deviation, recorded.logged["force"], solver)
+
+
+def measured_response(stage: Stage, response: xr.Dataset) -> Measures:
+    """Measure the run of a `response`."""
+    time, status = response["time"].to_numpy(), {one.text: one for one in Status}[response.attrs["status"]]
+    deviation = (response["position"] - response["reference"]).to_numpy()[None]
+    counts = (np.array([value]) for value in (status, response.attrs["steps"], response.attrs["rejected"]))
+    return measure_traces(stage.flat(), time, deviation, response["command"].to_numpy()[None], SampledSolver(*counts))
+
+
+def _dataset(stage: Stage, flat: dict[str, Any], recorded: RecordedRuns, rtol: float) -> xr.Dataset:
+    """Return the signals of a recorded run as a dataset over time, with units, names and the status of the run."""
+    import xarray as xr
+
+    from friso.engine.kernel import kernel
+    from friso.virtual_rig.run import METHOD
+
+    kind, shape = axis_of(flat), kernel(AsBuilt.of(flat), method=METHOD)
+    assert recorded.outputs is not None
+    variables: dict[str, Any] = {
+        name: ("time", recorded.outputs[name][0], {"units": kind.unit(unit), "long_name": label})
+        for name, (unit, label) in shape.outputs.items()
+    }
+    for signal, (name, unit, label) in LOGGED.items():
+        variables[name] = ("time", recorded.logged[signal][0], {"units": kind.unit(unit), "long_name": label})
+    statistics = dict(zip(STATISTICS, recorded.statistics[0], strict=True))
+    attrs = {
+        "name": stage.name,
+        "stage": stage.to_toml(),
+        "friso": VERSION,
+        "rtol": rtol,
+        "status": Status(int(recorded.statuses[0])).text,
+        "steps": int(statistics["attempted"]),
+        "rejected": int(statistics["rejected"]),
+        "as_built": 1,
+    }
+    return stage.axis_kind.with_units(xr.Dataset(variables, coords=time_axis(recorded.time), attrs=attrs))

@@ -1,0 +1,187 @@
+"""Controllers by their coefficients: against NumPy and SciPy, and against the PID controller that they are."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import signal
+from scipy.io import savemat
+
+import friso
+from friso.engine.simulate import simulate
+from friso.equations.bandwidth import faster
+from friso.frequency.drive import DriveTiming
+from friso.frequency.loops import poles
+from friso.frequency.members import limit_cases
+from friso.frequency.parts import FORCE, REFERENCE, compensator
+from friso.hunting import hunting
+from friso.stage import Stage
+
+TABLES = friso.load(friso.example("motions/profile")).as_written()
+KP, KI, KD, TAU = 6e4, 6e5, 500.0, 2.5e-3
+NUMERATOR, DENOMINATOR = [KD + KP * TAU, KP + KI * TAU, KI], [TAU, 1.0, 0.0]
+PID = {"kind": "pid", "kp": "60 N/mm", "ki": "600 kN/(m*s)", "kd": "500 N*s/m", "tau": "2.5 ms"}
+OMEGA = np.geomspace(0.3, 3e4, 60)
+SAMPLE = 5e-4
+
+
+def controlled(keys: Mapping[str, Any], **tables: Any) -> Stage:
+    return Stage(**{**TABLES, "controller": {"kind": "transfer_function", **keys}, **tables})
+
+
+def response(flat: Mapping[str, Any], s: np.ndarray) -> np.ndarray:
+    """The controller in continuous time, from the error, as friso's own equations have it."""
+    system = compensator(flat, 1).take((REFERENCE,), (FORCE,))
+    a, b, c, d = (np.asarray(part)[0] for part in (system.a, system.b, system.c, system.d))
+    return np.array([(c @ np.linalg.solve(place * np.eye(len(a)) - a, b) + d)[0, 0] for place in s])
+
+
+def matlab(matrix: np.ndarray) -> str:
+    return "; ".join(" ".join(repr(float(number)) for number in row) for row in np.atleast_2d(matrix))
+
+
+def ways(numerator: list[float], denominator: list[float]) -> dict[str, dict[str, Any]]:
+    zeros, roots_below, gain = signal.tf2zpk(numerator, denominator)
+    listed = [[str(root) for root in roots.astype(complex) if root.imag >= 0] for roots in (zeros, roots_below)]
+    matrices = dict(zip("abcd", map(matlab, signal.tf2ss(numerator, denominator)), strict=True))
+    return {
+        "coefficients": {"numerator": numerator, "denominator": denominator},
+        "roots": {"zeros": listed[0], "poles": listed[1], "gain": float(gain)},
+        "matrices": {"kind": "state_space", **matrices},
+    }
+
+
+TRANSFERS = {
+    "pid": (NUMERATOR, DENOMINATOR),
+    "lead": ([4e3, 4e5], [1.0, 300.0]),
+    "third order": ([2e6, 4e7, 3e8], [1.0, 500.0, 9e4, 0.0]),
+    "resonant": ([3e4, 1e6, 8e8, 5e9, 2e10], [1.0, 420.0, 1.3e5, 3e7, 0.0]),
+}
+
+
+@pytest.mark.parametrize("way", ["coefficients", "roots", "matrices"])
+@pytest.mark.parametrize("transfer", TRANSFERS.values(), ids=TRANSFERS)
+def test_the_controller_is_its_transfer_function(transfer: tuple[list[float], list[float]], way: str) -> None:
+    by_hand = np.polyval(transfer[0], 1j * OMEGA) / np.polyval(transfer[1], 1j * OMEGA)
+    ours = response(controlled(ways(*transfer)[way]).flat(), 1j * OMEGA)
+    assert np.abs(ours / by_hand - 1).max() < 1e-9
+
+
+def test_sections_are_factors() -> None:
+    sections = [
+        {"numerator": [500.0, 6e4], "denominator": [1.0, 0.0]},
+        {"numerator": [1.0, 40.0, 4e4], "denominator": [1.0, 300.0, 4e4]},
+    ]
+    factors = [np.polyval(s["numerator"], 1j * OMEGA) / np.polyval(s["denominator"], 1j * OMEGA) for s in sections]
+    by_hand = factors[0] * factors[1]
+    assert np.abs(response(controlled({"sections": sections}).flat(), 1j * OMEGA) / by_hand - 1).max() < 1e-9
+
+
+def test_matrices_are_read_from_a_file_by_name(tmp_path: Path) -> None:
+    names = dict(zip("ABCD", signal.tf2ss(NUMERATOR, DENOMINATOR), strict=True))
+    savemat(tmp_path / "controller.mat", names)
+    keys = {"kind": "state_space", "file": str(tmp_path / "controller.mat"), "a": "A", "b": "B", "c": "C", "d": "D"}
+    by_hand = np.polyval(NUMERATOR, 1j * OMEGA) / np.polyval(DENOMINATOR, 1j * OMEGA)
+    assert np.abs(response(controlled(keys).flat(), 1j * OMEGA) / by_hand - 1).max() < 1e-9
+
+
+@pytest.mark.parametrize("factor", [0.5, 3.0])
+def test_a_faster_controller_has_gain_and_frequencies_scaled(factor: float) -> None:
+    flat = controlled({"numerator": NUMERATOR, "denominator": DENOMINATOR}).flat()
+    slow, quick = response(flat, 1j * OMEGA), response(faster(flat, factor), 1j * OMEGA * factor)
+    assert np.abs(quick / (factor**2 * slow) - 1).max() < 1e-12
+
+
+@pytest.mark.parametrize("limit", [{}, {"force_limit": "7 N"}], ids=["free", "limited"])
+def test_the_trace_is_that_of_the_pid_controller_that_it_is(limit: dict[str, str]) -> None:
+    """With a force limit the integral rests at it, by the same anti-windup."""
+    one = simulate(Stage(**{**TABLES, "controller": {**PID, **limit}}), 1e-10, 1e-4)
+    other = simulate(controlled({"numerator": NUMERATOR, "denominator": DENOMINATOR, **limit}), 1e-10, 1e-4)
+    deflection = 3.0 / KP
+    assert other["position"].to_numpy() == pytest.approx(one["position"].to_numpy(), abs=1e-6 * deflection)
+    largest = float(np.abs(other["force"]).max())
+    assert largest == pytest.approx(7) if limit else largest > 10
+
+
+def test_it_hunts_as_the_pid_controller_that_it_is() -> None:
+    tables = friso.load(friso.example("lugre_stick_slip")).as_written()
+    motion = {"kind": "release", "displacement": "1 mm", "duration": "20 s"}
+    gains = {"kind": "pid", "kp": "2 N/mm", "ki": "20 N/(mm*s)", "kd": "40 N*s/m", "tau": "1 ms"}
+    numerator, denominator = [40 + 2000 * 1e-3, 2000 + 20000 * 1e-3, 20000.0], [1e-3, 1.0, 0.0]
+    mine = {"kind": "transfer_function", "numerator": numerator, "denominator": denominator}
+    one, other = (hunting(Stage(**{**tables, "motion": motion, "controller": keys})) for keys in (gains, mine))
+    assert one.attracting
+    assert len(one.attracting) == len(other.attracting)
+    assert other.attracting[0].amplitude == pytest.approx(one.attracting[0].amplitude, rel=1e-5)
+
+
+@pytest.mark.parametrize("divided", [1, 4])
+@pytest.mark.parametrize("transfer", TRANSFERS.values(), ids=TRANSFERS)
+def test_coefficients_for_samples_run_as_they_are(transfer: tuple[list[float], list[float]], divided: int) -> None:
+    numerator, denominator, _ = signal.cont2discrete(transfer, SAMPLE, "bilinear")
+    keys = {"numerator": [*map(float, numerator.ravel())], "denominator": [*map(float, denominator)]}
+    drive = {"drive": {"sample_time": f"{SAMPLE / divided!r} s"}}
+    answer = friso.simulate(controlled({**keys, "sample_time": f"{SAMPLE!r} s"}, **drive), sample_time=SAMPLE / divided)
+    error = (answer["reference"] - answer["measured_position"]).to_numpy()[::divided]
+    by_hand = np.repeat(signal.lfilter(numerator.ravel(), denominator, error), divided)
+    command = answer["command"].to_numpy()
+    assert command == pytest.approx(by_hand[: len(command)], abs=1e-8 * np.abs(by_hand).max())
+
+
+def test_a_verdict_says_that_it_is_on_the_continuous_equivalent() -> None:
+    numerator, denominator, _ = signal.cont2discrete((NUMERATOR, DENOMINATOR), SAMPLE, "bilinear")
+    keys = {"numerator": [*map(float, numerator.ravel())], "denominator": [*map(float, denominator)]}
+    stage = controlled({**keys, "sample_time": "0.5 ms"})
+    by_hand = np.polyval(NUMERATOR, 1j * OMEGA) / np.polyval(DENOMINATOR, 1j * OMEGA)
+    flat = stage.flat()
+    assert np.abs(response(flat, 1j * OMEGA) / by_hand - 1).max() < 1e-9
+    assert "continuous equivalent (Tustin)" in stage.controller.note(flat)
+    assert "samples of 0.0005 s" in stage.controller.note(flat)
+
+
+def test_a_loop_of_samples_is_that_of_the_plant_at_them() -> None:
+    """Without friction: the zero-order hold of a free mass, times the controller's transfer function in z."""
+    numerator, denominator, _ = signal.cont2discrete((NUMERATOR, DENOMINATOR), SAMPLE, "bilinear")
+    keys = {"numerator": [*map(float, numerator.ravel())], "denominator": [*map(float, denominator)]}
+    stage = controlled({**keys, "sample_time": "0.5 ms"}, friction={"model": "none"})
+    members = next(iter(limit_cases(stage.flat()).values()))
+    loop = poles(stage.flat(), members, DriveTiming.of(stage.flat()))
+    omega = np.geomspace(1, 3000, 40)
+    z = np.exp(1j * omega * SAMPLE)
+    plant = SAMPLE**2 / 2 / 1.7 * (z + 1) / (z - 1) ** 2
+    by_hand = plant * np.polyval(numerator.ravel(), z) / np.polyval(denominator, z)
+    assert np.abs(loop.loop(omega)[0] / by_hand - 1).max() < 1e-6
+
+
+BAD: dict[str, tuple[dict[str, Any], str]] = {
+    "improper": ({"numerator": [1.0, 2.0, 3.0], "denominator": [1.0, 4.0]}, "proper"),
+    "unstable": ({"numerator": [100.0, 200.0], "denominator": [1.0, -3.0, 0.0]}, "stable"),
+    "unstable in z": ({"numerator": [5.0, 4.0], "denominator": [1.0, -1.1], "sample_time": "1 ms"}, "stable"),
+    "two integrals": ({"numerator": [100.0, 200.0], "denominator": [1.0, 0.0, 0.0]}, "one integral"),
+    "at z = -1": ({"numerator": [5.0, 4.0], "denominator": [1.0, 1.0], "sample_time": "1 ms"}, "z = -1"),
+    "pushes away": ({"numerator": [-100.0], "denominator": [1.0, 3.0]}, "pulls back"),
+    "no stiffness": ({"numerator": [100.0, 0.0], "denominator": [1.0, 3.0]}, "pulls back"),
+    "nothing": ({}, "one of numerator"),
+    "two ways": ({"numerator": [1.0], "denominator": [1.0, 2.0], "poles": [-3.0]}, "one of numerator"),
+    "no numbers": ({"numerator": ["a"], "denominator": [1.0, 2.0]}, "an array of numbers"),
+    "not square": ({"kind": "state_space", "a": "0 1", "b": "1", "c": "1"}, "one error, one force"),
+    "no matrix": ({"kind": "state_space", "a": "x", "b": "1", "c": "1"}, "rows divided by semicolons"),
+    "no file": ({"kind": "state_space", "file": "no.mat", "a": "A", "b": "B", "c": "C"}, "a MAT file"),
+}
+
+
+@pytest.mark.parametrize(("keys", "words"), BAD.values(), ids=BAD)
+def test_a_transfer_function_that_cannot_be_is_refused(keys: dict[str, Any], words: str) -> None:
+    with pytest.raises(friso.InputError) as caught:
+        controlled(keys)
+    assert caught.value.key.startswith("controller")
+    assert words in caught.value.expected
+
+
+def test_samples_that_do_not_divide_are_refused() -> None:
+    keys = {"numerator": [6e4, -5.9e4], "denominator": [1.0, -0.5], "sample_time": "1 ms"}
+    with pytest.raises(friso.InputError) as caught:
+        controlled(keys, drive={"sample_time": "300 us"})
+    assert "whole number of samples of the drive" in caught.value.expected
