@@ -25,6 +25,7 @@ from friso.stage import ControllerSection
 from friso.stage.section import numeric_fields
 from friso.stage.standstill import AgainstFriction
 from friso.studies.compare.disturbance_rejection import rejection
+from friso.studies.compare.needed_bandwidth import NeededBandwidth
 from friso.studies.compare.options import MODEL_ERROR, Option
 from friso.studies.compare.statistics import EstimatedValue
 from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, OptionResult
@@ -91,7 +92,9 @@ def _bandwidth(option: Option, comparison: Comparison) -> str:
     if present is not None:
         raised, before = with_unit(present * option.factor, "Hz"), with_unit(present, "Hz")
         faster = f"a {comparison.stage.controller.bandwidth_name} of {raised} instead of {before}"
-    return f"{faster}, the highest at which the machine of the file has a modulus margin of {WANTED:g}"
+    limit = comparison.bandwidth_limit
+    below = "" if limit is None else f" and a bandwidth of at most {with_unit(limit, 'Hz')}"
+    return f"{faster}, the highest at which the machine of the file has a modulus margin of {WANTED:g}{below}"
 
 
 def table_rows(comparison: Comparison) -> list[PairedRow]:
@@ -183,7 +186,32 @@ def sentences(comparison: Comparison) -> list[str]:
 
 def answer(comparison: Comparison) -> list[str]:
     """Say whether to buy a joint, then which options bring the machines to rest, at what cost."""
-    return [*_unstable(comparison), *_recommendation(comparison), conclusion(comparison)]
+    return [*_unstable(comparison), *_recommendation(comparison), conclusion(comparison), *_turning(comparison)]
+
+
+def _turning(comparison: Comparison) -> list[str]:
+    """Say at which limit of the bandwidth the conclusion turns: below it, the controller alone does not do."""
+    needed, base = comparison.needed, comparison.results[0]
+    if needed is None or base.rests:
+        return []
+    enough, last = f"{percent(ENOUGH)} of the machines", len(needed.shares) - 1
+    at, hertz = needed.turning(ENOUGH), [with_unit(float(value), "Hz") for value in needed.bandwidths]
+    if at is None:
+        share = _share_at(needed, last)
+        return [f"The controller alone does not bring {enough} to rest at any bandwidth up to {hertz[last]} ({share})."]
+    if at == 0:
+        return []
+    others = [result for result in _resting(comparison) if result.option.factor == 1.0]
+    return [
+        f"A faster controller alone needs a bandwidth of {hertz[at]} or more, where the loop last crosses 0 dB, to "
+        f"bring {enough} to rest after their moves (at {hertz[at - 1]}: {_share_at(needed, at - 1)}). A drive limited "
+        f"to less needs {_names(others) if others else 'something else'}."
+    ]
+
+
+def _share_at(needed: NeededBandwidth, number: int) -> str:
+    """Write the share of machines that come to rest at one of the bandwidths."""
+    return percent(float(needed.shares[number]), 3)
 
 
 def _unstable(comparison: Comparison) -> list[str]:

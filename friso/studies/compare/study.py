@@ -25,6 +25,7 @@ from friso.studies.compare.measures import (
     measure_chunk,
     staying_in_position,
 )
+from friso.studies.compare.needed_bandwidth import NeededBandwidth, needed_bandwidth
 from friso.studies.compare.options import OPTIONS, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import EstimatedValue, difference, median
 from friso.virtual_rig.run import RecordedRuns, run
@@ -137,7 +138,10 @@ class Paired:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The results of the options on the machines drawn with a seed, tolerance [m] included; and notes."""
+    """The results of the options on the machines drawn with a seed, tolerance [m] included; and notes.
+
+    `needed` says which bandwidth the controller needs alone. No faster controller exceeds `bandwidth_limit` [Hz].
+    """
 
     machines: Machines
     options: CompareOptions
@@ -145,6 +149,8 @@ class Comparison:
     within: float
     seed: int
     notes: tuple[str, ...]
+    needed: NeededBandwidth | None = None
+    bandwidth_limit: float | None = None
 
     @property
     def stage(self) -> Stage:
@@ -183,9 +189,11 @@ def compare(
     progress: Progress = silent,
     also: tuple[str, ...] = (),
     begins: Callable[[], None] = lambda: None,
+    bandwidth_limit: float | None = None,
 ) -> Comparison:
     """Settle `count` machines drawn around a stage in up to seven ways, `within` [m] being in position, and by what is
-    named `also`: settings against friction (`friso.equations.settings`), or "adrc". `begins` is called before the first
+    named `also`: settings against friction (`friso.equations.settings`), or "adrc". No faster controller exceeds the
+    `bandwidth_limit` [Hz]. `begins` is called before the first
     work that takes time, once nothing of the input is wrong.
 
     Raises InputError for a number, a seed or a tolerance that is not allowed, and for a motion that ends too late.
@@ -197,7 +205,8 @@ def compare(
     places = _places(machines.stage)
     begins()
     progress(0, 1, "how fast the controller may be")
-    tried = options(machines, within, also)
+    tried = options(machines, within, also, bandwidth_limit)
+    needed = needed_bandwidth(machines, tried.options[0].stage, within)
     work = _Work(machines, own_motion(machines.stage), places, within, progress, len(tried.options))
     results: list[OptionResult] = []
     for option in tried.options:
@@ -207,7 +216,7 @@ def compare(
     titles = {kind.letter: kind.title for kind in OPTIONS.values()}
     left_out = [f"{letter} {titles[letter]} is left out: {why}" for letter, why in tried.left_out.items()]
     notes = (*machines.notes, *_missing(machines.stage), *left_out, *_troubles(results, count))
-    return Comparison(machines, tried, tuple(results), within, seed, notes)
+    return Comparison(machines, tried, tuple(results), within, seed, notes, needed, bandwidth_limit)
 
 
 def _places(stage: Stage) -> list[Stand]:
