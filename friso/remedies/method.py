@@ -11,7 +11,7 @@ import numpy as np
 
 from friso.axis import LINEAR
 from friso.design_method.leaves_for_joint import leaves_for_joint
-from friso.engine.allowance import allowance
+from friso.engine.allowance import Allowance, Exhausted, allowance
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import last_corner
@@ -186,24 +186,15 @@ def tune(
             session.tries_one_factor(listed.pop(0), len(listed) > 0)
             answered(session.outcomes[0])
             session.adds_windows()
-        progress(0, 0, "the stage as it is")
+        report("the stage as it is", 0)
         case = verified(ideal)
         present = present.surveyed(ideal, unseen, goal)
         if not unmet_goals(case, present, goal):
             listed = []  # nothing has to change
-        own = [remedy for remedy in listed if remedy.stage is ideal and remedy.verifiable]
-        later = [remedy for remedy in listed if remedy not in own and remedy.verifiable]
-        for remedy in own:
-            session.tries(remedy)
-        session.tries_less()
-        for remedy in later:
-            session.tries(remedy)
-        for remedy in pairs(session.outcomes, goal) if chosen is None else ():
-            session.tries(remedy)
-        session.tries_less()
-        for remedy in listed:
-            if not remedy.verifiable and not session.works:
-                session.tries(remedy)
+        for joint in (False, True):
+            with allowance(settings.tuning_work) as session.allowed:
+                several = [remedy for remedy in listed if remedy.buys_joint == joint]
+                session.tries_all(several, pairs if chosen is None and not joint else lambda outcomes, goal: [])
         session.adds_windows()
         if session.outcomes and not session.works:
             session.tries_large_moves()
@@ -263,7 +254,7 @@ class _Session:
     """The remedies of a stage, tried one after the other, with the `outcomes` so far.
 
     `searching` is the search under way, `searches` has all by the names of their remedies, and `least_factor` tells
-    that the bandwidth that works is the least.
+    that the bandwidth that works is the least. All remedies together may take the work `allowed`.
     """
 
     stage: Stage
@@ -279,6 +270,7 @@ class _Session:
     searching: Search | None = None
     tried_less: bool = False
     least_factor: bool = False
+    allowed: Allowance | None = None
     searches: dict[str, Search] = field(default_factory=dict)
     unmade: dict[str, Unmade] = field(default_factory=dict)
 
@@ -304,6 +296,29 @@ class _Session:
 
         self._ended(search, points())
 
+    def tries_all(
+        self, listed: Sequence[Remedy], further: Callable[[Sequence[RemedyOutcome], Goal], list[Remedy]]
+    ) -> None:
+        """Try remedies, what changes least first; then the least change, and `further` remedies by what became of them.
+
+        Settings against friction with more keys than what works already changes are left out. Remedies that cannot be
+        verified come last, and only if nothing works.
+        """
+        verifiable = [remedy for remedy in listed if remedy.verifiable]
+        for own in (True, False):
+            for remedy in verifiable:
+                keys = min((self._size(one).keys for one in self.outcomes if one.certainty == "works"), default=np.inf)
+                small = not remedy.of_setting or len(remedy.variables) <= keys
+                if small and (remedy.stage is self.stage) == own:
+                    self.tries(remedy)
+            self.tries_less()
+        for remedy in further(self.outcomes, self.goal):
+            self.tries(remedy)
+        self.tries_less()
+        for remedy in listed:
+            if not remedy.verifiable and not self.works:
+                self.tries(remedy)
+
     def adds_windows(self) -> None:
         """Find how far each number of what is told first may vary: of the least change, and of what settles soonest."""
         working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes]
@@ -315,7 +330,10 @@ class _Session:
                 self.outcomes[place] = replace(outcome, windows=around)
 
     def tries(self, remedy: Remedy) -> None:
-        """Try a remedy for the settings that settle soonest."""
+        """Try a remedy for the settings that settle soonest, unless all work that is allowed was done."""
+        if self.allowed is not None and self.allowed.left <= 0:
+            self.outcomes.append(RemedyOutcome(remedy, None, None, None, (), cut=True, untried=True))
+            return
         search = self._begun(remedy, self.budget.machines)
         search.optimise()
         self._ended(search, search.surveyed())
@@ -346,7 +364,7 @@ class _Session:
         """
         working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and outcome.stage]
         own = [outcome for outcome in working if outcome.remedy.stage is self.stage]
-        if not working or self.tried_less:
+        if not working or self.tried_less or (self.allowed is not None and self.allowed.left <= 0):
             return
         first = len(self.outcomes)
         least, *others = sorted(own or working, key=self._size)
@@ -432,8 +450,12 @@ class _Session:
         tries, worked = 0, 0.0
         looks = settings.most_looks if search.remedy.verifiable else 1
         for shares in islice(search.looked_at(points), looks):
-            with allowance() as spent:
-                outcome = self._verified(search, shares)
+            try:
+                with allowance() as spent:
+                    outcome = self._verified(search, shares)
+            except Exhausted:
+                search.cut = True
+                break
             tries, worked = tries + (outcome.case is not None), worked + spent.used
             if outcome.certainty == "works":
                 unsure = outcome

@@ -161,8 +161,9 @@ class RemedyOutcome:
     reasons why it is not sure to work; it works if there are none. `windows` tell how far each number may vary.
 
     `points` are all settings tried; `attracted` counts those given up because something attracted machines. `shares`
-    locate the stage in the remedy's ranges. `cut` tells that the search took too much work. `moves_from` [m] is the
-    smallest move of those for which the stage was verified, if it serves large moves alone.
+    locate the stage in the remedy's ranges. `cut` tells that the search took too much work, and `untried` that others
+    had taken all of it. `moves_from` [m] is the smallest move of those for which the stage was verified, if it serves
+    large moves alone.
     """
 
     remedy: Remedy
@@ -176,6 +177,7 @@ class RemedyOutcome:
     interrupted: bool = False
     shares: np.ndarray = field(default_factory=lambda: np.zeros(0))
     cut: bool = False
+    untried: bool = False
     moves_from: float | None = None
 
     @property
