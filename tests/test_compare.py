@@ -616,3 +616,26 @@ def test_the_conclusion_turns_at_a_bandwidth(comparison: Comparison) -> None:
     assert comparison.needed is not None
     assert np.diff(comparison.needed.bandwidths).min() > 0
     assert comparison.needed.shares[-1] > comparison.needed.shares[0]
+
+
+def test_ctrl_c_keeps_the_options_that_were_run(built: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a conclusion of these alone, which says so; before the first there is nothing to keep."""
+    ran = []
+
+    def runs(work: study._Work, option: Option, before: int) -> measures.MachineMeasures:
+        ran.append(option.letter)
+        if len(ran) == most:
+            raise KeyboardInterrupt
+        never, nothing = np.full(COUNT, np.inf), np.zeros(COUNT)
+        return measures.MachineMeasures(np.full(COUNT, "swings"), nothing, never, nothing + 1, nothing + 1)
+
+    monkeypatch.setattr(study._Work, "runs", runs)
+    most = 3
+    cut = compare(built, COUNT, 1)
+    assert [result.letter for result in cut.results] == ["a", "b"]
+    assert [option.letter for option in cut.not_run] == ["c", "d", "e", "f", "g"]
+    assert any(line.startswith("Interrupted") and "c, d, e, f and g were not" in line for line in sentences(cut))
+    assert compare_document(cut)["interrupted"]
+    ran, most = [], 1
+    with pytest.raises(KeyboardInterrupt):
+        compare(built, COUNT, 1)

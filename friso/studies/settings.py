@@ -196,3 +196,7 @@ class StudySettings(Settings):
 
     limit_factors: int = setting(400, "")
     """Factors on the bandwidth that are looked at below a limit of it: the fastest lies within a percent of it."""
+
+    followed_share: float = setting(0.5, "")
+    """Share of machines in position from which on longer runs tell whether they stay there. With fewer, an option does
+    not do, and its longer runs would take as long as all others together."""

@@ -26,6 +26,7 @@ def compare_document(comparison: Comparison) -> dict[str, Any]:
             "conclusion": conclusion,
             "details": details,
             "stage": comparison.stage.name,
+            "interrupted": bool(comparison.not_run),
             "seed": comparison.seed,
             "machines": machines.count,
             "criteria": {
@@ -66,7 +67,7 @@ def _option(comparison: Comparison, result: OptionResult) -> dict[str, Any]:
         "swings": asdict(result.swinging),
         "distinct_peaks": asdict(result.counted),
         "in_position": asdict(result.settled),
-        "stays": asdict(result.stays),
+        "stays": asdict(result.stays) if result.later.done.size else None,
         "settling_time_s": asdict(result.settling),
         "in_position_rms_m": asdict(result.in_position),
         "force_rms_n": asdict(result.force),

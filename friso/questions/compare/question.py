@@ -26,6 +26,11 @@ class CompareAnswer(Answer):
     """Several options on the same machines; `result` is a `Comparison`."""
 
     @property
+    def interrupted(self) -> bool:
+        """Tell whether some options were not run."""
+        return bool(self.result.not_run)
+
+    @property
     def failure(self) -> str:
         """Say how many runs stopped early; empty if none did."""
         stopped = sum(result.failed for result in self.result.results)

@@ -106,10 +106,8 @@ def table_rows(comparison: Comparison) -> list[PairedRow]:
         (
             label(result),
             [
-                *(
-                    share_with_interval(share)
-                    for share in (result.swinging, result.counted, result.settled, result.stays)
-                ),
+                *(share_with_interval(share) for share in (result.swinging, result.counted, result.settled)),
+                share_with_interval(result.stays) if result.later.done.size else NOTHING,
                 _time(result.settling),
                 _at_rest(result.in_position),
                 _force(result.force),
@@ -186,7 +184,16 @@ def sentences(comparison: Comparison) -> list[str]:
 
 def answer(comparison: Comparison) -> list[str]:
     """Say whether to buy a joint, then which options bring the machines to rest, at what cost."""
-    return [*_unstable(comparison), *_recommendation(comparison), conclusion(comparison), *_turning(comparison)]
+    says = [*_recommendation(comparison), conclusion(comparison), *_turning(comparison)]
+    return [*_unstable(comparison), *_interrupted(comparison), *says]
+
+
+def _interrupted(comparison: Comparison) -> list[str]:
+    """Say which options an interruption left, so that nothing is concluded of them."""
+    if not comparison.not_run:
+        return []
+    letters = listed([option.letter for option in comparison.not_run], "and")
+    return [f"Interrupted: this is the answer so far. It is that of the options which were run; {letters} were not."]
 
 
 def _turning(comparison: Comparison) -> list[str]:
@@ -316,11 +323,17 @@ def _failing(comparison: Comparison) -> list[str]:
     """Say what the machines do at the end with the options that fail."""
     return [
         f"{label(result)}: not enough. {share_with_interval(result.swinging)} of the machines swing at the end and "
-        f"{share_with_interval(result.settled)} are in position; {share_with_interval(result.stays)} stay in position "
-        f"throughout the last half of a run {LONGER} times as long."
+        f"{share_with_interval(result.settled)} are in position{_in_the_longer_run(result)}."
         for result in comparison.results
         if not result.rests
     ]
+
+
+def _in_the_longer_run(result: OptionResult) -> str:
+    """Say how many machines stay in position in the longer run; nothing if there was none."""
+    if not result.later.done.size:
+        return ""
+    return f"; {share_with_interval(result.stays)} stay there throughout the last half of a run {LONGER} times as long"
 
 
 def _standstill(comparison: Comparison) -> list[str]:
