@@ -253,8 +253,9 @@ def machines_of_search(
 class _Session:
     """The remedies of a stage, tried one after the other, with the `outcomes` so far.
 
-    `searching` is the search under way, `searches` has all by the names of their remedies, and `least_factor` tells
-    that the bandwidth that works is the least. All remedies together may take the work `allowed`.
+    `searching` is the search under way, `searches` has all by the names of their remedies. `least_factor` tells that
+    the least bandwidth that works is sought, and `is_least` that it was found. All remedies together may take the work
+    `allowed`.
     """
 
     stage: Stage
@@ -270,6 +271,7 @@ class _Session:
     searching: Search | None = None
     tried_less: bool = False
     least_factor: bool = False
+    is_least: bool = False
     allowed: Allowance | None = None
     searches: dict[str, Search] = field(default_factory=dict)
     unmade: dict[str, Unmade] = field(default_factory=dict)
@@ -295,6 +297,8 @@ class _Session:
             yield from search.surveyed()
 
         self._ended(search, points())
+        self.is_least = self.least_factor and self.outcomes[-1].certainty == "works"
+        self.least_factor = False
 
     def tries_all(
         self, listed: Sequence[Remedy], further: Callable[[Sequence[RemedyOutcome], Goal], list[Remedy]]
@@ -371,7 +375,7 @@ class _Session:
         most = others[-1] if own and others else least
         self.tried_less = self._tries_less_than(most)
         works = [outcome for outcome in self.outcomes if outcome.certainty == "works"]
-        is_least = self.least_factor and least.remedy.name == BANDWIDTH and self._size(least).keys == 1
+        is_least = self.is_least and least.remedy.name == BANDWIDTH and self._size(least).keys == 1
         if least is not most and not is_least and min(works, key=self._size, default=None) is least:
             self.tried_less |= self._tries_less_than(least)
         for place in range(first, len(self.outcomes)):
@@ -478,7 +482,7 @@ class _Session:
         The machines make all moves, or those from `moves_from` [m] on.
 
         The interval of the share of machines that meet the goal must lie at the share wanted or above. While it leaves
-        that open, further machines are measured.
+        that open, further machines are measured, but for the first answer: its next factor costs less.
         """
         settings = RemedySettings.current()
         remedy, goal = search.remedy, search.goal
@@ -489,6 +493,8 @@ class _Session:
         self.report(f"{remedy.name}: verified on machines not tuned for")
         measured = performance_of(tuned, unseen, goal, self.drive)
         doubted, case = missed_parts(measured, goal), None
+        if not doubted and self.least_factor and moves_from is None and not measured.decides(goal):
+            doubted = ("together",)
         if not doubted:
             self.report(f"{remedy.name}: verified by its hunting cycles")
             case = verified(tuned)

@@ -125,8 +125,8 @@ class Performance:
     def surveyed(self, stage: Stage, machines: Fleet, goal: Goal) -> Performance:
         """Return the performance with a survey of what attracts the machines that meet the rest of the goal.
 
-        Machines are surveyed a few at a time. As soon as something attracts so many that too few can meet the goal, those
-        not surveyed yet are left out: the share is that of fewer machines then.
+        Machines are surveyed a few at a time. As soon as something attracts so many that too few can meet the goal,
+        those not surveyed yet are left out: the share is that of fewer machines then.
         """
         meets, remedy, measured = self._meets_all(goal), Remedy.settled_on("", stage), self
         for part in np.array_split(np.arange(self.margin.size), RemedySettings.current().survey_parts):
