@@ -317,6 +317,24 @@ def _checked_unit(text: str) -> str:
     return text
 
 
+def si_value(text: str) -> float:
+    """Return the SI value of a number with a unit of any kind, "2.4 N/mm", made of usual ones alone.
+
+    Raises InputError.
+    """
+    try:
+        number, unit = _split(text)
+        if unknown := [part for part in re.findall(r"[^\W\d_]+", unit) if part not in common_units()]:
+            raise _Refused(f"{quoted(unknown[0])} is no usual unit; a product has a *")
+        factor, root, names = _root(unit)
+        if set(root) <= {"radian", "second"} and root.get("second") == -1:  # Hz, rad/s, rpm, 1/s
+            factor = _hertz(factor, {"second": -1}, names)
+    except _Refused as refused:
+        raise InputError("", quoted(text, str(refused)), "a number and its unit", "2.4 N/mm") from None
+    kilograms = 1e-3 ** root.get("gram", 0)  # pint's root unit of mass is the gram
+    return float(f"{float(number) * factor * kilograms:.15g}")
+
+
 TORQUES = ("newton_meter = newton * meter = Nm", "newton_centimeter = newton * centimeter = Ncm")
 """Units of torque as they are written on motors."""
 

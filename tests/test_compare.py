@@ -20,6 +20,7 @@ from friso.equations.settings import SETTINGS, settings_named
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency import crossover
+from friso.frequency.bandwidth import loop_bandwidth
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases, member
 from friso.frequency.settings import FrequencySettings
@@ -28,7 +29,7 @@ from friso.interface.output_folder import MARKER
 from friso.questions.compare.document import compare_document
 from friso.questions.compare.figures import compare_figures
 from friso.questions.compare.page import page
-from friso.questions.compare.words import conclusion, paired_rows, sentences, table_rows
+from friso.questions.compare.words import _turning, conclusion, paired_rows, sentences, table_rows
 from friso.shares import share
 from friso.shown.drawing.matplotlib_renderer import image
 from friso.stage import Stage, load
@@ -37,6 +38,7 @@ from friso.stage.lists import element_keys
 from friso.studies.compare import measures, study
 from friso.studies.compare.machines import ELEMENTS, SPREADS, TOGETHER_BY, Machines, draw_machines
 from friso.studies.compare.measures import linear_loops
+from friso.studies.compare.needed_bandwidth import NeededBandwidth
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR, OPTIONS, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import difference, median, quantile_interval
 from friso.studies.compare.study import Comparison, OptionResult, compare
@@ -364,12 +366,17 @@ def test_the_isolator_and_bandwidth_stop_what_swings(comparison: Comparison) -> 
     assert results["b"].margin.value < results["a"].margin.value
 
 
-def test_an_integrator_that_starts_anew_does_not_stay(comparison: Comparison) -> None:
-    """Without its integral the stage breaks away again, so slowly that only the longer run shows it."""
+def test_an_integrator_that_starts_anew_does_not_stay(built: Stage, comparison: Comparison) -> None:
+    """Without its integral the stage breaks away again, so slowly that only the longer run shows it: which is not run
+    where too few machines are in position before."""
     reset = comparison.results[4]
     assert reset.swinging.probability < comparison.results[0].swinging.probability
     assert not reset.rests
-    assert reset.stays.high < 0.9
+    assert reset.settled.probability < 0.5
+    assert not reset.later.done.size
+    work = study._Work(comparison.machines, study.own_motion(built), study._places(built), 1e-6, study.silent, 1)
+    later = work.longer(reset.option)
+    assert share(later.stays, later.done).high < 0.9
 
 
 def test_options_share_their_machines(built: Stage, comparison: Comparison) -> None:
@@ -586,3 +593,54 @@ def test_settings_that_are_asked_for_are_tried() -> None:
     assert [OPTIONS[name].letter for name in SETTINGS] == list("hijklm")
     with pytest.raises(InputError, match="--also leak"):
         settings_named(("leek",))
+
+
+def test_a_limit_of_the_bandwidth_holds_for_faster_controllers(machines: Machines) -> None:
+    """As where the loop crosses 0 dB, with and without the joint; below the present one there is no faster one."""
+    tried = {option.kind.name: option for option in options(machines, 1e-6, bandwidth_limit=30.0).options}
+    free = {option.kind.name: option for option in options(machines, 1e-6).options}
+    for name in ("faster", "isolator-faster"):
+        assert loop_bandwidth(tried[name].stage) == pytest.approx(30.0, rel=0.02)
+        assert loop_bandwidth(tried[name].stage) <= 30.0 * 1.001
+        assert loop_bandwidth(free[name].stage) > 30.0
+    assert "below the present bandwidth" in options(machines, 1e-6, bandwidth_limit=5.0).left_out["b"]
+
+
+def test_the_conclusion_turns_at_a_bandwidth(comparison: Comparison) -> None:
+    """Where more machines rest at each higher bandwidth, it is the first at which enough do, and from which on."""
+    needed = NeededBandwidth(np.array([10.0, 12.0, 14.0, 16.0]), np.array([0.5, 1.0, 0.9, 1.0]))
+    assert (needed.turning(0.99), needed.turning(0.4), needed.turning(1.1)) == (3, 0, None)
+    never = replace(comparison.results[0].measures, settling=np.full(COUNT, np.inf))
+    base = replace(comparison.results[0], measures=never)
+    hunting = replace(comparison, results=(base, *comparison.results[1:]))
+    (line,) = _turning(replace(hunting, needed=needed))
+    assert "16.0 Hz or more" in line
+    assert "at 14.0 Hz: 90 %" in line
+    (none,) = _turning(replace(hunting, needed=replace(needed, shares=needed.shares * 0.5)))
+    assert "does not bring 99 % of the machines to rest at any bandwidth up to 16.0 Hz (50 %)" in none
+    assert comparison.needed is not None
+    assert np.diff(comparison.needed.bandwidths).min() > 0
+    assert comparison.needed.shares[-1] > comparison.needed.shares[0]
+
+
+def test_ctrl_c_keeps_the_options_that_were_run(built: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a conclusion of these alone, which says so; before the first there is nothing to keep."""
+    ran = []
+
+    def runs(work: study._Work, option: Option, before: int) -> measures.MachineMeasures:
+        ran.append(option.letter)
+        if len(ran) == most:
+            raise KeyboardInterrupt
+        never, nothing = np.full(COUNT, np.inf), np.zeros(COUNT)
+        return measures.MachineMeasures(np.full(COUNT, "swings"), nothing, never, nothing + 1, nothing + 1)
+
+    monkeypatch.setattr(study._Work, "runs", runs)
+    most = 3
+    cut = compare(built, COUNT, 1)
+    assert [result.letter for result in cut.results] == ["a", "b"]
+    assert [option.letter for option in cut.not_run] == ["c", "d", "e", "f", "g"]
+    assert any(line.startswith("Interrupted") and "c, d, e, f and g were not" in line for line in sentences(cut))
+    assert compare_document(cut)["interrupted"]
+    ran, most = [], 1
+    with pytest.raises(KeyboardInterrupt):
+        compare(built, COUNT, 1)

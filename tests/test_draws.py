@@ -18,6 +18,7 @@ from friso.shown.documents import plain_json
 from friso.stage import Stage, save
 from friso.stage.correlations import Correlations, Sample, draw
 from friso.studies.draws import Draws, Fates, different, fates
+from friso.studies.settings import StudySettings
 
 pytestmark = pytest.mark.xdist_group("rig")
 
@@ -133,7 +134,7 @@ def draws(fates: Fates) -> Draws:
     count = len(fates.verdicts)
     drawn = Sample({"friction.coulomb": np.linspace(0.5, 1.5, count)}, count, 2, {"a rule": 3})
     stage = friso.load(Path(__file__).parents[1] / "examples" / "lugre_stick_slip.toml")
-    return Draws(stage, drawn, 7, {"given": fates})
+    return Draws(stage, drawn, 7, {"given": fates}, drawn.count)
 
 
 def test_draws_with_an_unstable_loop_are_told_first() -> None:
@@ -226,3 +227,27 @@ def test_check_draws_refused(
     shown = capsys.readouterr()
     assert shown.out == ""
     refused.says(shown.err)
+
+
+def test_ctrl_c_keeps_the_stages_judged_so_far(rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Named so, with the verdicts that there are; before the first group of stages there is nothing to keep."""
+    stage, sample = rig, Sample({"masses.stage": np.linspace(0.4, 0.6, 10)}, 10, 0, {})
+    judged = []
+
+    def judge(flat: object, count: int, rtol: float) -> np.ndarray:
+        judged.append(count)
+        if len(judged) == most:
+            raise KeyboardInterrupt
+        return np.full(count, "settles", dtype=object)
+
+    monkeypatch.setattr("friso.studies.draws.judge_many", judge)
+    variants = len(different(stage))
+    with StudySettings(stages_together=4).in_use():
+        most = 2 * variants + 1
+        drawn = Draws.of(stage, sample, 1, 1e-6)
+        assert (drawn.sample.count, drawn.asked) == (8, 10)
+        assert len(drawn.sample.keys["masses.stage"]) == len(drawn.fates["given"].verdicts) == 8
+        assert draws_sentences(drawn)[0] == "Interrupted: 8 of 10 stages were drawn so far."
+        judged, most = [], 1
+        with pytest.raises(KeyboardInterrupt):
+            Draws.of(stage, sample, 1, 1e-6)

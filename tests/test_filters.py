@@ -16,6 +16,7 @@ import friso
 from friso.equations.blocks import Loop
 from friso.equations.sampled import sampled_controller
 from friso.equations.structure import controller_form
+from friso.errors import InputError
 from friso.frequency.members import limit_cases
 from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator
 from friso.stage import Stage, numeric_keys
@@ -238,3 +239,13 @@ def test_a_sweep_into_an_unstable_filter_is_a_violation(several: Stage) -> None:
     ((broken, why),) = friso.stage.violations(flat)
     assert list(broken) == [False, True]
     assert "stable" in why
+
+
+def test_numbers_of_links_take_units() -> None:
+    links = {"masses.stage": "0.3 * mass + 20 g", "joint.stroke": "max(2 um, 1e-6)", "joint.stiffness": "2 N/mm * mass"}
+    assert linked(links, {"mass": 1.0}) == pytest.approx(
+        {"masses.stage": 0.32, "joint.stroke": 2e-6, "joint.stiffness": 2000.0}
+    )
+    for text, why in (("2 mass", "no usual unit"), ("3 rad/s", "could mean Hz or rad/s"), ("2 m m", "2 m m")):
+        with pytest.raises(InputError, match=why):
+            linked({"masses.stage": text}, {"mass": 1.0})

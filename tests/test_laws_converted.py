@@ -26,6 +26,7 @@ from friso.stage import Stage
 from friso.stage.lists import element_keys
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import convert, convertible, measure_friction
+from friso.studies.laws.loops import hysteresis_loop
 from friso.studies.laws.virgin import with_virgin_curve
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
@@ -119,8 +120,26 @@ def test_what_a_law_cannot_keep_is_said() -> None:
     lost = {law: [item.kind for item in convert(LUGRE, law).lost] for law in ("dahl", "stribeck")}
     assert {"static", "curve", "virgin"} <= {*lost["dahl"]}
     assert {"stiffness", "virgin"} <= {*lost["stribeck"]}
-    (fewer,) = convert(LUGRE, "gms", 2).lost
-    assert fewer.kind == "virgin"
+    fewer = {item.kind for item in convert(LUGRE, "gms", 2).lost}
+    assert "virgin" in fewer
+    assert fewer <= {"virgin", "loop area", "loop stiffness"}
+
+
+def test_a_loop_of_dahl_is_that_of_its_solution() -> None:
+    """Along each way the force lacks less and less of sliding friction, F = F_c - (F_c + F_e) exp(-s x / F_c), and
+    comes to F_e at the end. A loop that LuGre and GMS share on the way there is not one that they share on the way
+    back: "fits the same measurements" was said of 27 in place of 74 uJ."""
+    flat, amplitude = under(DAHL).replace({"friction.viscous": "0 N*s/m"}).flat(), 15e-6
+    sliding, stiffness = flat["friction.coulomb"], flat["friction.bristle_stiffness"]
+    decay = np.exp(-2 * stiffness * amplitude / sliding)
+    end = sliding * (1 - decay) / (1 + decay)
+    way = 2 * sliding * amplitude - (sliding + end) * sliding / stiffness * (1 - decay)
+    loop = hysteresis_loop(flat, amplitude, 1e-6)
+    assert loop.area == pytest.approx(2 * way, rel=0.01)
+    assert loop.stiffness == pytest.approx(end / amplitude, rel=0.01)
+    lost = [item for item in convert(LUGRE, "gms").lost if item.amplitude]
+    assert {item.kind for item in lost} >= {"loop area"}
+    assert all(item.off > item.allowed for item in lost)
 
 
 def test_passive_laws_are_not_warned_of() -> None:
@@ -261,7 +280,8 @@ def test_every_law_but_none_can_be_converted_to() -> None:
 
 def test_the_command(tmp_path: Path, undrawn: None) -> None:
     done = friso_inside(tmp_path, "convert", RIG, "--friction", "gms", "--elements", "4", "--out", "out", "--json")
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 0
+    assert all("compiling" in line for line in done.stderr.splitlines())
     document = json.loads(done.stdout)
     assert document["law"] == "gms"
     assert not document["passive"]

@@ -546,6 +546,24 @@ def test_looking_further_ends_where_it_takes_too_much_work(
         assert not search.cut
 
 
+def test_machines_are_left_out_once_too_many_are_attracted(rigid: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Surveys of settings that fail took as long as those of settings that work: the share is that of fewer then."""
+    surveyed: list[int] = []
+
+    def attracted(remedy: Remedy, shares: np.ndarray, some: Fleet, goal: Goal) -> Attraction:
+        surveyed.append(some.count)
+        every = np.ones((1, some.count), bool)
+        return Attraction(every, every, every)
+
+    monkeypatch.setattr(verified_module, "attraction", attracted)
+    fleet = draw_fleet(rigid, Correlations(), 40, 1)
+    fast = rigid.replace({"controller.crossover": "20 Hz"})
+    measured = performance_of(fast, fleet, Goal(), fast)
+    assert (surveyed, measured.count) == ([10], 10)
+    assert measured.share(Goal()).probability == 0
+    assert measured.moves.settling.shape == measured.attraction.clear.shape == (1, 10)
+
+
 def test_the_answer_names_what_to_change(tuning: Advice) -> None:
     stage = tuning.working[0].stage
     assert stage is not None
@@ -611,8 +629,8 @@ def test_what_attracts_is_surveyed_only_where_the_rest_of_the_goal_is_met(
     near = rigid.replace({"controller.crossover": "11.5 Hz"})
     measured = performance_of(near, machines, Goal(), near)
     parts = measured.meets(Goal())
-    assert surveyed == [np.count_nonzero(parts["settling"])]
-    assert 0 < surveyed[0] < machines.count
+    assert sum(surveyed) == np.count_nonzero(parts["settling"])
+    assert 0 < sum(surveyed) < machines.count
     assert np.array_equal(measured.share(Goal()).probability, np.mean(parts["settling"] & parts["hunting"]))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
@@ -30,7 +31,9 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     Where standard error is no terminal, a line is printed every `LINES` seconds.
 
     The bar is a `friso.progress.Progress`. Without a total it shows `label` and only moves. If fewer steps are done
-    than before, or the total changes, new work has begun, and its time counts from there.
+    than before, or the total changes, new work has begun, and its time counts from there. The time to go never rises
+    while one piece of work is done: steps that take longer than those before hold it. A line without news is not
+    printed.
     """
 
     def __init__(self, label: str = "") -> None:
@@ -38,6 +41,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         self.label = label
         self.begun = WORK_CLOCK.now()
         self.done = self.total = self.before = 0
+        self.shortest = math.inf  # time to go told so far [s]
         self.display: Display | None = None
         self.task: TaskID | None = None
         self.ended, self._turn = Event(), Lock()
@@ -71,7 +75,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         """Report that `done` of `total` steps are finished; a `total` of 0 means unknown."""
         with self._turn:
             if done < self.done or total != self.total:
-                self.begun, self.before = WORK_CLOCK.now(), done
+                self.begun, self.before, self.shortest = WORK_CLOCK.now(), done, math.inf
             self.done, self.total, self.label = done, total, label
         if self.display is not None and self.task is not None:
             self.display.update(self.task, completed=done, total=total or None, description=one_line(label))
@@ -87,14 +91,20 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         done = self.done - self.before
         if not self.total or done < min(SHARE * (self.total - self.before), STEPS) or not done:
             return ""
-        seconds = (WORK_CLOCK.now() - self.begun) * (self.total - self.done) / done
+        estimate = (WORK_CLOCK.now() - self.begun) * (self.total - self.done) / done
+        seconds = self.shortest = min(self.shortest, estimate)
         return f"{seconds / 60:.0f} min to go" if seconds >= 100 else f"{seconds:.0f} s to go"
 
     def _tell(self, stream: TextIO) -> None:
         """Print a line of progress now and then, until the block ends or the stream is closed."""
+        before = ("", 0)
         with suppress(OSError, ValueError):
             while not self.ended.wait(LINES):
-                print(f"friso: {self.line()}", file=stream, flush=True)
+                with self._turn:
+                    news = self.label, 100 * self.done // max(1, self.total)
+                if news != before:
+                    print(f"friso: {self.line()}", file=stream, flush=True)
+                before = news
 
 
 def _display(to_go: Callable[[], str]) -> Display:

@@ -76,6 +76,7 @@ def outline(stage: Stage) -> str:
             'thickness = "0.1 mm .. 0.5 mm"   # standard gauges in this range, or a list of available sheets',
             'materials = ["stainless 1.4310"]',
             f'stroke = "{stroke}"   # the largest feasible one is chosen',
+            'offset = "1 mm"   # of actuator and sensor from the middle of the width',
             "",
             "[safety]   # factors; those left out are the defaults",
             "hunting = 1.2   # crossover over the edge of hunting",

@@ -52,8 +52,19 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
     numbers = ("young", "poisson", "density", "yield", "fatigue")
     section = stage.flexure.as_written() if stage.flexure else {}
     removed |= {f"flexure.{key}": None for key in (*numbers, "load") if key in section}
-    base = stage.replace(removed | masses | sizes | leaves)
+    base = stage.replace(removed | masses | sizes | leaves | offset_points(stage, spec))
     return base.with_numbers(moved_along(stage.flat(), base.flat()["flexure.length"])) if section else base
+
+
+def offset_points(stage: Stage, spec: Spec) -> dict[str, str]:
+    """Return the key by which actuator and sensor are off the middle of the leaves' width; none if the stage has any.
+
+    Without an offset, a mode in which the stage turns about the leaves would be seen by neither, as on no machine.
+    """
+    points = {f"flexure.{point}_{axis}" for point in ("actuation", "sensor") for axis in "xyz"}
+    if points & stage.flat().keys() or not spec.leaves.offset:
+        return {}
+    return {"flexure.actuation_y": exactly(spec.leaves.offset, "m")}
 
 
 def by_rules(stage: Stage) -> Stage:

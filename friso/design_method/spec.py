@@ -203,6 +203,9 @@ class SpecLeaves(Section):
     thickness: Annotated[tuple[Any, ...], Gauges(_GAUGE, _GAUGES)]
     materials: Annotated[tuple[Any, ...], OneOrMany(None, 'materials = ["stainless 1.4310"]')]
     stroke: Annotated[Interval, Span(_LENGTH, "0.3 mm .. 1 mm")]
+    offset: Annotated[Value, Quantity("m", non_negative, "1 mm")] = Value(1e-3, "1 mm")
+    """How far actuator and sensor are off the middle of the width, by which they see the stage turn about the leaves;
+    where the stage file says where they are, that holds."""
 
     def space(self, name: str) -> tuple[float, float]:
         """Return the least and the largest length, width or spacing [m]; a fixed one is both."""

@@ -41,7 +41,7 @@ SHARED: Mapping[str, SharedOption] = {
     "link": SharedOption(
         "dict, optional",
         'Keys tied to others: ``{"masses.cart": "0.7 * mass"}``.',
-        'A key tied to others: masses.cart="0.7 * mass".',
+        'A key tied to others: masses.cart="0.7 * mass + 20 g".',
     ),
     "log": SharedOption("bool", "Make all ranges logarithmic; for a single one, append :log."),
     "logs": SharedOption("path or list of paths", "Log files; friso logs --help lists their formats."),

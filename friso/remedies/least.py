@@ -88,6 +88,7 @@ def of_one_key(search: Search, most: float = np.inf, enough: float | None = None
     """Return changes of a single variable that work, the least first, and all smaller than `most`.
 
     They break no constraint, `enough` of the fresh machines (a share) meet the goal, and nothing attracts the machines.
+    If that share is given, values between those on a grid are not tried, for a first answer with something to spare.
     """
     settings = RemedySettings.current()
     wanted = partial(change_costs, search.remedy)
@@ -99,7 +100,7 @@ def of_one_key(search: Search, most: float = np.inf, enough: float | None = None
         return points[np.argsort(wanted(points), kind="stable")]
 
     alone = changed(np.concatenate([home + step * ways for step in range(1, settings.values_alone + 1)]))
-    closest = settings.finer_values + 1
+    closest = settings.finer_values + 1 if enough is None else 1
     for few in search.tries(alone):
         for one in _robust(search, few, enough):
             way = ways[(ways @ (one - home)).argmax()]

@@ -11,7 +11,7 @@ import numpy as np
 
 from friso.axis import LINEAR
 from friso.design_method.leaves_for_joint import leaves_for_joint
-from friso.engine.allowance import allowance
+from friso.engine.allowance import Allowance, Exhausted, allowance
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import last_corner
@@ -187,24 +187,15 @@ def tune(
             session.tries_one_factor(listed.pop(0), len(listed) > 0)
             answered(session.outcomes[0])
             session.adds_windows()
-        progress(0, 0, "the stage as it is")
+        report("the stage as it is", 0)
         case = verified(ideal)
         present = present.surveyed(ideal, unseen, goal)
         if not unmet_goals(case, present, goal):
             listed = []  # nothing has to change
-        own = [remedy for remedy in listed if remedy.stage is ideal and remedy.verifiable]
-        later = [remedy for remedy in listed if remedy not in own and remedy.verifiable]
-        for remedy in own:
-            session.tries(remedy)
-        session.tries_less()
-        for remedy in later:
-            session.tries(remedy)
-        for remedy in pairs(session.outcomes, goal) if chosen is None else ():
-            session.tries(remedy)
-        session.tries_less()
-        for remedy in listed:
-            if not remedy.verifiable and not session.works:
-                session.tries(remedy)
+        for joint in (False, True):
+            with allowance(settings.tuning_work) as session.allowed:
+                several = [remedy for remedy in listed if remedy.buys_joint == joint]
+                session.tries_all(several, pairs if chosen is None and not joint else lambda outcomes, goal: [])
         session.adds_windows()
         if session.outcomes and not session.works:
             session.tries_large_moves()
@@ -263,8 +254,9 @@ def machines_of_search(
 class _Session:
     """The remedies of a stage, tried one after the other, with the `outcomes` so far.
 
-    `searching` is the search under way, `searches` has all by the names of their remedies, and `least_factor` tells
-    that the bandwidth that works is the least.
+    `searching` is the search under way, `searches` has all by the names of their remedies. `least_factor` tells that
+    the least bandwidth that works is sought, and `is_least` that it was found. All remedies together may take the work
+    `allowed`.
     """
 
     stage: Stage
@@ -280,6 +272,8 @@ class _Session:
     searching: Search | None = None
     tried_less: bool = False
     least_factor: bool = False
+    is_least: bool = False
+    allowed: Allowance | None = None
     searches: dict[str, Search] = field(default_factory=dict)
     unmade: dict[str, Unmade] = field(default_factory=dict)
 
@@ -304,6 +298,31 @@ class _Session:
             yield from search.surveyed()
 
         self._ended(search, points())
+        self.is_least = self.least_factor and self.outcomes[-1].certainty == "works"
+        self.least_factor = False
+
+    def tries_all(
+        self, listed: Sequence[Remedy], further: Callable[[Sequence[RemedyOutcome], Goal], list[Remedy]]
+    ) -> None:
+        """Try remedies, what changes least first; then the least change, and `further` remedies by what became of them.
+
+        Settings against friction with more keys than what works already changes are left out. Remedies that cannot be
+        verified come last, and only if nothing works.
+        """
+        verifiable = [remedy for remedy in listed if remedy.verifiable]
+        for own in (True, False):
+            for remedy in verifiable:
+                keys = min((self._size(one).keys for one in self.outcomes if one.certainty == "works"), default=np.inf)
+                small = not remedy.of_setting or len(remedy.variables) <= keys
+                if small and (remedy.stage is self.stage) == own:
+                    self.tries(remedy)
+            self.tries_less()
+        for remedy in further(self.outcomes, self.goal):
+            self.tries(remedy)
+        self.tries_less()
+        for remedy in listed:
+            if not remedy.verifiable and not self.works:
+                self.tries(remedy)
 
     def adds_windows(self) -> None:
         """Find how far each number of what is told first may vary: of the least change, and of what settles soonest."""
@@ -316,7 +335,10 @@ class _Session:
                 self.outcomes[place] = replace(outcome, windows=around)
 
     def tries(self, remedy: Remedy) -> None:
-        """Try a remedy for the settings that settle soonest."""
+        """Try a remedy for the settings that settle soonest, unless all work that is allowed was done."""
+        if self.allowed is not None and self.allowed.left <= 0:
+            self.outcomes.append(RemedyOutcome(remedy, None, None, None, (), cut=True, untried=True))
+            return
         search = self._begun(remedy, self.budget.machines)
         search.optimise()
         self._ended(search, search.surveyed())
@@ -347,14 +369,14 @@ class _Session:
         """
         working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and outcome.stage]
         own = [outcome for outcome in working if outcome.remedy.stage is self.stage]
-        if not working or self.tried_less:
+        if not working or self.tried_less or (self.allowed is not None and self.allowed.left <= 0):
             return
         first = len(self.outcomes)
         least, *others = sorted(own or working, key=self._size)
         most = others[-1] if own and others else least
         self.tried_less = self._tries_less_than(most)
         works = [outcome for outcome in self.outcomes if outcome.certainty == "works"]
-        is_least = self.least_factor and least.remedy.name == BANDWIDTH and self._size(least).keys == 1
+        is_least = self.is_least and least.remedy.name == BANDWIDTH and self._size(least).keys == 1
         if least is not most and not is_least and min(works, key=self._size, default=None) is least:
             self.tried_less |= self._tries_less_than(least)
         for place in range(first, len(self.outcomes)):
@@ -433,8 +455,12 @@ class _Session:
         tries, worked = 0, 0.0
         looks = settings.most_looks if search.remedy.verifiable else 1
         for shares in islice(search.looked_at(points), looks):
-            with allowance() as spent:
-                outcome = self._verified(search, shares)
+            try:
+                with allowance() as spent:
+                    outcome = self._verified(search, shares)
+            except Exhausted:
+                search.cut = True
+                break
             tries, worked = tries + (outcome.case is not None), worked + spent.used
             if outcome.certainty == "works":
                 unsure = outcome
@@ -457,7 +483,7 @@ class _Session:
         The machines make all moves, or those from `moves_from` [m] on.
 
         The interval of the share of machines that meet the goal must lie at the share wanted or above. While it leaves
-        that open, further machines are measured.
+        that open, further machines are measured, but for the first answer: its next factor costs less.
         """
         settings = RemedySettings.current()
         remedy, goal = search.remedy, search.goal
@@ -468,6 +494,8 @@ class _Session:
         self.report(f"{remedy.name}: verified on machines not tuned for")
         measured = performance_of(tuned, unseen, goal, self.drive)
         doubted, case = missed_parts(measured, goal), None
+        if not doubted and self.least_factor and moves_from is None and not measured.decides(goal):
+            doubted = ("together",)
         if not doubted:
             self.report(f"{remedy.name}: verified by its hunting cycles")
             case = verified(tuned)

@@ -351,7 +351,8 @@ class Search:
         """Tell at which points (points, variables) nothing attracts the machines, shape (points,)."""
         self.report(f"{self.remedy.name}: what attracts the machines")
         machines = self.machines.take(np.arange(min(self.budget.surveyed, self.machines.count)))
-        clear = attraction(self.remedy, shares, machines, self.goal).clear.mean(axis=1) >= self.goal.share
+        least = self.goal.share
+        clear = attraction(self.remedy, shares, machines, self.goal, least).clear.mean(axis=1) >= least
         self.attracted += int(np.count_nonzero(~clear))
         return np.asarray(clear)
 

@@ -99,6 +99,10 @@ class RemedySettings(Settings):
     worst_time: float = setting(1e3, "s")
     """Longer than any move: a point that breaks a constraint is worse than any that does not."""
 
+    survey_parts: int = setting(4, "")
+    """Parts in which fresh machines are surveyed: the first tells of most settings that fail, at a quarter of the cost;
+    more leave lanes idle."""
+
     survey_batch: int = setting(3, "")
     """Points whose machines are surveyed at once: fewer leave cores idle, more are surveyed in vain."""
 
@@ -107,6 +111,10 @@ class RemedySettings(Settings):
 
     generation_points: int = setting(40, "")
     """Larger generations of the optimiser cost more moves and converge no better."""
+
+    tuning_work: float = setting(1.5e9, "")
+    """About 18 s on one core for all remedies of the controller but the first, and as much for those that buy a joint;
+    remedies left then are not tried, which the answer says. With more, machines whose motions are long take minutes."""
 
     search_work: float = setting(4e8, "")
     """About 5 s on one core; moves that chatter take most of it. Less ends a search of four keys early."""
@@ -212,6 +220,6 @@ class RemedySettings(Settings):
     surveyed_halvings: int = setting(2, "")
     """The same for the ends at which something attracts machines: each halving costs surveys of all of them."""
 
-    worthwhile_share: float = setting(0.9, "")
+    worthwhile_share: float = setting(0.85, "")
     """A change counts as smaller than another if its logarithm is below this share of the other's: to verify one that
     is hardly smaller costs seconds and brings nothing."""

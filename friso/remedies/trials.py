@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.batch import RunOptions, part_of, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.bandwidth import faster
 from friso.equations.settings import gain_states
@@ -133,18 +133,28 @@ class Attraction:
 
 
 @np.errstate(all="ignore")
-def attraction(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal) -> Attraction:
+def attraction(
+    remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, enough: float | None = None
+) -> Attraction:
     """Survey what attracts the machines at points.
 
-    The bandwidth is that of the point, and lower ones down to the goal's distance. Simulations start from many states;
-    closed orbits have to confirm the final answer.
+    The bandwidth is that of the point, and lower ones down to the goal's distance: the lowest first, where most is
+    attracted. A machine of which something is not clear there is not surveyed again, nor are the machines of a point
+    at which fewer than `enough` of them (a share) are clear. Simulations start from many states; closed orbits have to
+    confirm the final answer.
     """
     flat = machines.laid_over(remedy.stage, remedy.changes(shares), len(shares))
     shape = len(shares), machines.count
     attracts, decided, certain = np.zeros(shape, bool), np.ones(shape, bool), np.ones(shape, bool)
-    for factor in (1.0, goal.distance**-0.5, 1 / goal.distance):
-        attracted = find_attractors(faster(flat, factor), len(shares) * machines.count, close_orbits=False)
-        attracts |= attracted.attracts.reshape(shape)
-        decided &= attracted.decided.reshape(shape)
-        certain &= attracted.certain.reshape(shape)
+    for factor in (1 / goal.distance, goal.distance**-0.5, 1.0):
+        left = ~attracts & decided
+        if enough is not None:
+            left &= left.mean(axis=1, keepdims=True) >= enough
+        numbers = np.flatnonzero(left)
+        if not numbers.size:
+            break
+        attracted = find_attractors(faster(part_of(flat, numbers), factor), numbers.size, close_orbits=False)
+        attracts.flat[numbers] |= attracted.attracts
+        decided.flat[numbers] &= attracted.decided
+        certain.flat[numbers] &= attracted.certain
     return Attraction(attracts, decided, certain)

@@ -123,12 +123,26 @@ class Performance:
         return True if meeting.low >= goal.share else False if meeting.high < goal.share else None
 
     def surveyed(self, stage: Stage, machines: Fleet, goal: Goal) -> Performance:
-        """Return the performance with a survey of what attracts the machines that meet the rest of the goal."""
-        some = np.flatnonzero(self._meets_all(goal))
-        if not some.size:
-            return self
-        surveyed = attraction(Remedy.settled_on("", stage), ONE, machines.take(some), goal)
-        return replace(self, attraction=self.attraction.of_some(surveyed, some))
+        """Return the performance with a survey of what attracts the machines that meet the rest of the goal.
+
+        Machines are surveyed a few at a time. As soon as something attracts so many that too few can meet the goal,
+        those not surveyed yet are left out: the share is that of fewer machines then.
+        """
+        meets, remedy, measured = self._meets_all(goal), Remedy.settled_on("", stage), self
+        for part in np.array_split(np.arange(self.margin.size), RemedySettings.current().survey_parts):
+            if (some := part[meets[part]]).size:
+                surveyed = attraction(remedy, ONE, machines.take(some), goal)
+                measured = replace(measured, attraction=measured.attraction.of_some(surveyed, some))
+                if np.count_nonzero(meets & ~measured._meets_all(goal)) > (1 - goal.share) * self.margin.size:
+                    return measured._first(int(part[-1]) + 1)
+        return measured
+
+    def _first(self, count: int) -> Performance:
+        """Return what was measured on the first machines alone."""
+        moves = Moves(*(column[:, :count] for column in vars(self.moves).values()))
+        attracted = Attraction(*(column[:, :count] for column in vars(self.attraction).values()))
+        margin, sizes = self.margin[:, :count], self.sizes[:count]
+        return replace(self, moves=moves, margin=margin, attraction=attracted, sizes=sizes)
 
     def with_further(self, stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
         """Return the performance with further machines measured."""
@@ -161,8 +175,9 @@ class RemedyOutcome:
     reasons why it is not sure to work; it works if there are none. `windows` tell how far each number may vary.
 
     `points` are all settings tried; `attracted` counts those given up because something attracted machines. `shares`
-    locate the stage in the remedy's ranges. `cut` tells that the search took too much work. `moves_from` [m] is the
-    smallest move of those for which the stage was verified, if it serves large moves alone.
+    locate the stage in the remedy's ranges. `cut` tells that the search took too much work, and `untried` that others
+    had taken all of it. `moves_from` [m] is the smallest move of those for which the stage was verified, if it serves
+    large moves alone.
     """
 
     remedy: Remedy
@@ -176,6 +191,7 @@ class RemedyOutcome:
     interrupted: bool = False
     shares: np.ndarray = field(default_factory=lambda: np.zeros(0))
     cut: bool = False
+    untried: bool = False
     moves_from: float | None = None
 
     @property

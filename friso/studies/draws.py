@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,12 +58,26 @@ class Fates:
 
 
 def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent) -> dict[str, Fates]:
-    """Return the fates of the drawn stages as given and, with a joint, locked and free."""
+    """Return the fates of the drawn stages as given and, with a joint, locked and free.
+
+    After Ctrl-C, they are those of the first of the stages, as many as were judged in all variants by then.
+    """
+    settings = StudySettings.current()
     variants = different(stage)
     structures = [shared_structure(laid_over(variant, sample.keys)) for variant in variants.values()]
     kernels(set[KernelRequest]().union(*map(kernels_to_judge, structures)))
     tally = Tally(progress, sample.count * len(variants))
-    by_variant = {name: _fates(variant, sample, rtol, tally) for name, variant in variants.items()}
+    parts: dict[str, list[Fates]] = {name: [] for name in variants}
+    try:
+        for first in range(0, sample.count, settings.stages_together):
+            chunk = slice(first, min(first + settings.stages_together, sample.count))
+            judged = {name: _fates(variant, sample, chunk, rtol, tally) for name, variant in variants.items()}
+            for name, part in judged.items():
+                parts[name].append(part)
+    except KeyboardInterrupt:
+        if not all(parts.values()):
+            raise
+    by_variant = {name: _joined(some) for name, some in parts.items()}
     return {
         name: by_variant[next(other for other, same in variants.items() if same == variant)]
         for name, variant in stage.variants().items()
@@ -82,12 +96,24 @@ def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float)
 
 @dataclass(frozen=True)
 class Draws:
-    """Stages drawn from an uncertain one with a seed, and their fates case by case."""
+    """Stages drawn from an uncertain one with a seed, and their fates case by case.
+
+    They are fewer than were `asked` for after an interruption.
+    """
 
     stage: Stage
     sample: Sample
     seed: int
     fates: Mapping[str, Fates]
+    asked: int
+
+    @classmethod
+    def of(cls, stage: Stage, sample: Sample, seed: int, rtol: float, progress: Progress = silent) -> Draws:
+        """Judge the stages of a sample (see `fates`)."""
+        judged = fates(stage, sample, rtol, progress)
+        count = len(next(iter(judged.values())).verdicts)
+        keys = {key: values[:count] for key, values in sample.keys.items()}
+        return cls(stage, replace(sample, keys=keys, count=count), seed, judged, sample.count)
 
     def unit(self, key: str) -> str:
         """Return the SI unit of a key."""
@@ -103,14 +129,15 @@ def different(stage: Stage) -> dict[str, Stage]:
     return variants
 
 
-def _fates(stage: Stage, sample: Sample, rtol: float, tally: Tally) -> Fates:
-    settings = StudySettings.current()
-    words, lost = np.full(sample.count, "failed", dtype=object), np.zeros(sample.count, bool)
-    for first in range(0, sample.count, settings.stages_together):
-        chunk = slice(first, min(first + settings.stages_together, sample.count))
-        keys = {key: values[chunk] for key, values in sample.keys.items()}
-        flat, count = laid_over(stage, keys), chunk.stop - first
-        words[chunk] = judge_many(flat, count, rtol)
-        lost[chunk] = loops_unstable(flat, count)
-        tally.add(chunk.stop - first, "machines drawn")
-    return Fates(words, lost)
+def _fates(stage: Stage, sample: Sample, chunk: slice, rtol: float, tally: Tally) -> Fates:
+    """Judge some of the drawn stages."""
+    flat = laid_over(stage, {key: values[chunk] for key, values in sample.keys.items()})
+    count = chunk.stop - chunk.start
+    judged = Fates(judge_many(flat, count, rtol), loops_unstable(flat, count))
+    tally.add(count, "machines drawn")
+    return judged
+
+
+def _joined(parts: Sequence[Fates]) -> Fates:
+    """Return the fates of several groups of stages as those of one."""
+    return Fates(np.concatenate([part.verdicts for part in parts]), np.concatenate([part.unstable for part in parts]))

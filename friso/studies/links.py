@@ -1,4 +1,7 @@
-"""Links: stage keys that follow the axes of a study by an expression in SI numbers, such as "0.7 * mass"."""
+"""Links: stage keys that follow the axes of a study by an expression, such as "0.7 * mass" or "gap + 2 um".
+
+Numbers without a unit are in SI.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from friso.errors import InputError
-from friso.quantities import quoted
+from friso.quantities import quoted, si_value
 from friso.stage import Stage
 
 EXAMPLE = 'masses.stage = "0.3 * mass" or friction.static = "max(friction.static, friction.coulomb)"'
@@ -28,6 +31,9 @@ _OPERATORS: dict[type, Any] = {
 _FUNCTIONS: dict[str, Any] = {"min": np.minimum, "max": np.maximum, "sqrt": np.sqrt, "abs": np.abs}
 _KEY, _ELEMENT = re.compile(r"\b[A-Za-z_]\w*(?:\.\w+)+"), re.compile(r"\.([0-9]+)\b")
 """A key, and the number of an element of an array in it, controller.filters.2.frequency; Python would write [2]."""
+
+_QUANTITY = re.compile(r"(?<![\w.])[0-9.]+(?:[eE][+-]?[0-9]+)?\s+[^\W\d_][\w/*^²³]*(?:/\([\w*^]+\))?")
+"""A number with a unit, which has no blanks in it: "2 um", "0.5 N*s/m", "3 N/(m*s)"."""
 
 _ARGUMENTS = {"min": 2, "max": 2, "sqrt": 1, "abs": 1}
 
@@ -71,10 +77,15 @@ def linked(links: Mapping[str, str], values: Mapping[str, Any]) -> dict[str, Any
 
 def _parsed(key: str, text: str) -> ast.expr:
     try:
-        tree = ast.parse(_KEY.sub(lambda key: _ELEMENT.sub(r"[\1]", key[0]), text.strip()), mode="eval").body
+        plain = _QUANTITY.sub(lambda quantity: repr(si_value(quantity[0])), text.strip())
+        tree = ast.parse(_KEY.sub(lambda key: _ELEMENT.sub(r"[\1]", key[0]), plain), mode="eval").body
         _check(tree)
+    except InputError as error:
+        raise error.under(key) from None
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise InputError(key, quoted(text), "numbers, names, + - * / **, min, max, sqrt, abs", EXAMPLE) from error
+        raise InputError(
+            key, quoted(text), "numbers, with units or in SI, names, + - * / **, min, max, sqrt, abs", EXAMPLE
+        ) from error
     return tree
 
 

@@ -166,3 +166,37 @@ class StudySettings(Settings):
 
     candidate_rtols: tuple[float, ...] = setting((1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8), "")
     """Tolerances for the automatic choice, the loosest first."""
+
+    points_of_a_loop: int = setting(1000, "")
+    """Samples of a period of a hysteresis loop; fewer cut its corners."""
+
+    loop_periods: int = setting(3, "")
+    """Periods of a hysteresis loop, the last of which counts; fewer still move away from the first way there."""
+
+    loop_speed: float = setting(1e-3, "")
+    """In Stribeck velocities: faster loops lose energy in the damping of bristles, which the table has by itself."""
+
+    loop_tolerance: float = setting(1e-6, "")
+    """Relative tolerance of the solver along a loop; the last digit of the table is then that of the law."""
+
+    loop_amplitudes: tuple[float, float] = setting((0.1, 0.5), "")
+    """In deflections of the first stiffness by static friction: one where bristles hardly slip, one where they do."""
+
+    loop_error: float = setting(0.05, "")
+    """Loops whose areas or stiffnesses differ by less are hardly told apart in a log."""
+
+    needed_bandwidths: int = setting(48, "")
+    """Bandwidths at which a controller alone is tried: 5 % apart over a factor of ten."""
+
+    needed_machines: int = setting(200, "")
+    """Machines on which it is tried; of fewer a share of 99 % does not show."""
+
+    needed_rtol: float = setting(1e-5, "")
+    """Relative tolerance of their moves, whose times are then off by a thousandth; that moves none into position."""
+
+    limit_factors: int = setting(400, "")
+    """Factors on the bandwidth that are looked at below a limit of it: the fastest lies within a percent of it."""
+
+    followed_share: float = setting(0.5, "")
+    """Share of machines in position from which on longer runs tell whether they stay there. With fewer, an option does
+    not do, and its longer runs would take as long as all others together."""

@@ -43,7 +43,11 @@ def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
 def draws_sentences(draws: Draws) -> list[str]:
     """Say what the draws do, in one sentence per case, and which draws were left out."""
     sample = draws.sample
-    sentences = [f"{label}: {_sentence(draws.fates[name], draws)}" for name, label in case_labels(draws.stage).items()]
+    cut = [f"Interrupted: {sample.count} of {draws.asked} stages were drawn so far."] * (sample.count < draws.asked)
+    sentences = [
+        *cut,
+        *(f"{label}: {_sentence(draws.fates[name], draws)}" for name, label in case_labels(draws.stage).items()),
+    ]
     if sample.left_out:
         reasons = [f"{count}: {why}" for why, count in sample.broken.items()]
         beyond = [f"{sample.beyond}: a key beyond its bounds"] if sample.beyond else []

@@ -25,6 +25,7 @@ from friso.interface.inputs import (
     tolerance_of,
     whole_number,
 )
+from friso.platform.interrupts import answers_interrupts
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, draw
@@ -44,12 +45,19 @@ class CheckAnswer(Answer):
     """The verdict on a stage.
 
     `result` holds a `Case` for "given" and, with a joint, for "locked" and "free". `draws` holds the fates of stages
-    drawn from uncertain keys, or None. `laws` holds the verdicts across friction laws, or None.
+    drawn from uncertain keys, or None; `cut` tells that Ctrl-C left some undrawn. `laws` holds the verdicts across
+    friction laws, or None.
     """
 
     stage: Stage
     draws: Draws | None
     laws: VerdictsByLaw | None
+    cut: bool
+
+    @property
+    def interrupted(self) -> bool:
+        """Tell whether Ctrl-C ended the draws."""
+        return self.cut
 
     @cached_property
     def isolator(self) -> Suggestion | None:
@@ -89,6 +97,8 @@ class CheckAnswer(Answer):
 
         suggested = [isolator_sentence(self.isolator)] if self.isolator else []
         drawn = draws_sentences(self.draws) if self.draws else []
+        if self.cut and not self.draws:
+            drawn = ["Interrupted: no stages were drawn yet."]
         short = [*motion_sentences(self.stage), *filter(None, [self.stage.controller.note(self.stage.flat())])]
         return [*answer(self.result), *short, *suggested, *drawn, *(laws_sentences(self.laws) if self.laws else [])]
 
@@ -219,19 +229,25 @@ def check(
     mention_unstable_loop(chosen)
     cases = judged(chosen, tolerance, progress=progress, tell=partial(mention_verdict, chosen))
     drawn = across = None
+    cut = False
     if uncertain is not None:
         from friso.studies.draws import affordable
 
         sample = draw(chosen, uncertain, affordable(chosen, uncertain, seed, loose), seed)
     if sample is not None:
-        from friso.studies.draws import fates
+        from friso.studies.draws import Draws
 
-        drawn = Draws(chosen, sample, seed, fates(chosen, sample, loose, progress))
-    if laws:
+        answers_interrupts()  # from here on, there is an answer
+        try:
+            drawn = Draws.of(chosen, sample, seed, loose, progress)
+            cut = drawn.asked > drawn.sample.count
+        except KeyboardInterrupt:
+            cut = True
+    if laws and not cut:
         from friso.studies.laws.verdicts import verdicts_by_law
 
         across = verdicts_by_law(chosen, loose, progress=progress)
-    return CheckAnswer(cases, stage=chosen, draws=drawn, laws=across)
+    return CheckAnswer(cases, stage=chosen, draws=drawn, laws=across, cut=cut)
 
 
 def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:

@@ -8,4 +8,5 @@ QUESTION = Question(
     STOPS,
     "compare examples/thesis_drive.toml --machines 200 --out compare",
     details=True,
+    answers_interrupted=True,
 )

@@ -11,7 +11,7 @@ from friso.hunting.criteria import DISTINCT_CRITERION as PEAKS
 from friso.hunting.criteria import OUTCOME_CRITERION as OUTCOME
 from friso.questions.compare.words import sentences
 from friso.shown.documents import plain_json
-from friso.studies.compare.study import Comparison, OptionResult
+from friso.studies.compare.study import ENOUGH, Comparison, OptionResult
 
 
 def compare_document(comparison: Comparison) -> dict[str, Any]:
@@ -26,6 +26,7 @@ def compare_document(comparison: Comparison) -> dict[str, Any]:
             "conclusion": conclusion,
             "details": details,
             "stage": comparison.stage.name,
+            "interrupted": bool(comparison.not_run),
             "seed": comparison.seed,
             "machines": machines.count,
             "criteria": {
@@ -33,6 +34,8 @@ def compare_document(comparison: Comparison) -> dict[str, Any]:
                 "distinct_peaks": axis_shown().text(PEAKS),
             },
             "within_m": comparison.within,
+            "bandwidth_limit_hz": comparison.bandwidth_limit,
+            "needed_bandwidth_hz": _needed(comparison),
             "deadband_m": comparison.options.deadband,
             "sample_time_s": comparison.stage.flat()["drive.sample_time"],
             "from_file": [*machines.from_file],
@@ -46,6 +49,13 @@ def compare_document(comparison: Comparison) -> dict[str, Any]:
     )
 
 
+def _needed(comparison: Comparison) -> float | None:
+    """Return the bandwidth [Hz] that the controller needs alone; None if it does not suffice or is not known."""
+    needed = comparison.needed
+    at = None if needed is None else needed.turning(ENOUGH)
+    return None if needed is None or at is None else float(needed.bandwidths[at])
+
+
 def _option(comparison: Comparison, result: OptionResult) -> dict[str, Any]:
     """Return the results of one option, alone and against option a."""
     pair = comparison.paired(result)
@@ -57,7 +67,7 @@ def _option(comparison: Comparison, result: OptionResult) -> dict[str, Any]:
         "swings": asdict(result.swinging),
         "distinct_peaks": asdict(result.counted),
         "in_position": asdict(result.settled),
-        "stays": asdict(result.stays),
+        "stays": asdict(result.stays) if result.later.done.size else None,
         "settling_time_s": asdict(result.settling),
         "in_position_rms_m": asdict(result.in_position),
         "force_rms_n": asdict(result.force),

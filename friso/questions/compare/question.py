@@ -8,6 +8,7 @@ from functools import partial
 from friso.interface.answer import Answer, AnswerTable, question
 from friso.interface.inputs import (
     Changes,
+    FrequencyLike,
     LengthLike,
     Seed,
     SettingName,
@@ -23,6 +24,11 @@ from friso.quantities import Quantity, positive
 
 class CompareAnswer(Answer):
     """Several options on the same machines; `result` is a `Comparison`."""
+
+    @property
+    def interrupted(self) -> bool:
+        """Tell whether some options were not run."""
+        return bool(self.result.not_run)
 
     @property
     def failure(self) -> str:
@@ -61,6 +67,7 @@ def compare(
     machines: int = 2000,
     seed: Seed = 1,
     within: LengthLike | None = None,
+    bandwidth_limit: FrequencyLike | None = None,
     also: Iterable[SettingName] = (),
     set: Changes = None,
     progress: Progress = silent,
@@ -71,6 +78,8 @@ def compare(
     ----------
     machines : int
         Number of machines drawn around the stage, 20 or more.
+    bandwidth_limit : str or float, optional
+        Highest bandwidth that the machine or its drive allows, "15 Hz" or a number [Hz].
     also : list of str, optional
         Also settings of drives against friction, "limit", "leak", "hysteresis", "standstill", "push", "dither"; active
         disturbance rejection, "adrc"; or "all".
@@ -93,8 +102,12 @@ def compare(
     chosen = read_stage(stage, set, leaves_out=(), uncertain_too=True)
     length = Quantity("m", positive, "1 um").on(chosen.axis_kind)
     tolerance = quantity_of(length.example if within is None else within, "within", length)
+    hertz = Quantity("Hz", positive, "15 Hz")
+    limit = None if bandwidth_limit is None else quantity_of(bandwidth_limit, "bandwidth_limit", hertz)
     from friso.studies.compare.study import compare as compared
 
     correlations = correlations_of(stage, chosen)
     begins = partial(mention_unstable_loop, chosen)
-    return CompareAnswer(compared(chosen, machines, seed, tolerance, correlations, progress, tuple(also), begins))
+    return CompareAnswer(
+        compared(chosen, machines, seed, tolerance, correlations, progress, tuple(also), begins, limit)
+    )

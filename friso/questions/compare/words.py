@@ -25,6 +25,7 @@ from friso.stage import ControllerSection
 from friso.stage.section import numeric_fields
 from friso.stage.standstill import AgainstFriction
 from friso.studies.compare.disturbance_rejection import rejection
+from friso.studies.compare.needed_bandwidth import NeededBandwidth
 from friso.studies.compare.options import MODEL_ERROR, Option
 from friso.studies.compare.statistics import EstimatedValue
 from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, OptionResult
@@ -91,7 +92,9 @@ def _bandwidth(option: Option, comparison: Comparison) -> str:
     if present is not None:
         raised, before = with_unit(present * option.factor, "Hz"), with_unit(present, "Hz")
         faster = f"a {comparison.stage.controller.bandwidth_name} of {raised} instead of {before}"
-    return f"{faster}, the highest at which the machine of the file has a modulus margin of {WANTED:g}"
+    limit = comparison.bandwidth_limit
+    below = "" if limit is None else f" and a bandwidth of at most {with_unit(limit, 'Hz')}"
+    return f"{faster}, the highest at which the machine of the file has a modulus margin of {WANTED:g}{below}"
 
 
 def table_rows(comparison: Comparison) -> list[PairedRow]:
@@ -103,10 +106,8 @@ def table_rows(comparison: Comparison) -> list[PairedRow]:
         (
             label(result),
             [
-                *(
-                    share_with_interval(share)
-                    for share in (result.swinging, result.counted, result.settled, result.stays)
-                ),
+                *(share_with_interval(share) for share in (result.swinging, result.counted, result.settled)),
+                share_with_interval(result.stays) if result.later.done.size else NOTHING,
                 _time(result.settling),
                 _at_rest(result.in_position),
                 _force(result.force),
@@ -183,7 +184,41 @@ def sentences(comparison: Comparison) -> list[str]:
 
 def answer(comparison: Comparison) -> list[str]:
     """Say whether to buy a joint, then which options bring the machines to rest, at what cost."""
-    return [*_unstable(comparison), *_recommendation(comparison), conclusion(comparison)]
+    says = [*_recommendation(comparison), conclusion(comparison), *_turning(comparison)]
+    return [*_unstable(comparison), *_interrupted(comparison), *says]
+
+
+def _interrupted(comparison: Comparison) -> list[str]:
+    """Say which options an interruption left, so that nothing is concluded of them."""
+    if not comparison.not_run:
+        return []
+    letters = listed([option.letter for option in comparison.not_run], "and")
+    return [f"Interrupted: this is the answer so far. It is that of the options which were run; {letters} were not."]
+
+
+def _turning(comparison: Comparison) -> list[str]:
+    """Say at which limit of the bandwidth the conclusion turns: below it, the controller alone does not do."""
+    needed, base = comparison.needed, comparison.results[0]
+    if needed is None or base.rests:
+        return []
+    enough, last = f"{percent(ENOUGH)} of the machines", len(needed.shares) - 1
+    at, hertz = needed.turning(ENOUGH), [with_unit(float(value), "Hz") for value in needed.bandwidths]
+    if at is None:
+        share = _share_at(needed, last)
+        return [f"The controller alone does not bring {enough} to rest at any bandwidth up to {hertz[last]} ({share})."]
+    if at == 0:
+        return []
+    others = [result for result in _resting(comparison) if result.option.factor == 1.0]
+    return [
+        f"A faster controller alone needs a bandwidth of {hertz[at]} or more, where the loop last crosses 0 dB, to "
+        f"bring {enough} to rest after their moves (at {hertz[at - 1]}: {_share_at(needed, at - 1)}). A drive limited "
+        f"to less needs {_names(others) if others else 'something else'}."
+    ]
+
+
+def _share_at(needed: NeededBandwidth, number: int) -> str:
+    """Write the share of machines that come to rest at one of the bandwidths."""
+    return percent(float(needed.shares[number]), 3)
 
 
 def _unstable(comparison: Comparison) -> list[str]:
@@ -288,11 +323,17 @@ def _failing(comparison: Comparison) -> list[str]:
     """Say what the machines do at the end with the options that fail."""
     return [
         f"{label(result)}: not enough. {share_with_interval(result.swinging)} of the machines swing at the end and "
-        f"{share_with_interval(result.settled)} are in position; {share_with_interval(result.stays)} stay in position "
-        f"throughout the last half of a run {LONGER} times as long."
+        f"{share_with_interval(result.settled)} are in position{_in_the_longer_run(result)}."
         for result in comparison.results
         if not result.rests
     ]
+
+
+def _in_the_longer_run(result: OptionResult) -> str:
+    """Say how many machines stay in position in the longer run; nothing if there was none."""
+    if not result.later.done.size:
+        return ""
+    return f"; {share_with_interval(result.stays)} stay there throughout the last half of a run {LONGER} times as long"
 
 
 def _standstill(comparison: Comparison) -> list[str]:

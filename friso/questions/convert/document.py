@@ -10,7 +10,7 @@ from friso.shown.documents import plain_json
 if TYPE_CHECKING:
     from friso.studies.laws.conversion import LawConversion
 
-SUFFIXES = {"N": "n", "N/m": "n_per_m", "N*s/m": "n_s_per_m"}
+SUFFIXES = {"N": "n", "N/m": "n_per_m", "N*s/m": "n_s_per_m", "J": "j"}
 """Suffixes of the units."""
 
 
@@ -26,6 +26,7 @@ def convert_document(conversion: LawConversion) -> dict[str, Any]:
             "compared": [
                 {
                     "what": SHOWN[item.kind],
+                    "amplitude_m": item.amplitude,
                     f"before_{SUFFIXES[item.unit]}": item.before,
                     f"after_{SUFFIXES[item.unit]}": item.after,
                     "off": item.off,

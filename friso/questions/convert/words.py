@@ -25,6 +25,8 @@ SHOWN: Mapping[MeasuredKind, str] = {
     "conditions": "the conditions of the stage",
     "damping": "damping at rest",
     "viscous": "viscous damping",
+    "loop area": "energy lost in a loop",
+    "loop stiffness": "stiffness of a loop",
 }
 """Names of the properties of friction that measurements show."""
 
@@ -40,6 +42,8 @@ def sentences(conversion: LawConversion) -> list[str]:
         says = [f"{name} under {law}: {listed([_change(item) for item in lost], 'and')}."]
     else:
         says = [f"{name} under {law} fits the same measurements."]
+    if not any(item.amplitude for item in conversion.compared):
+        says.append("Hysteresis loops were not compared: nothing shows them of what was measured.")
     if conversion.points:
         says.append(_stiffness(conversion.points.stiffness, conversion.before.stiffness))
     says += [_open(key, ends, conversion) for key, ends in conversion.open.items()]
@@ -72,10 +76,16 @@ def activity_sentences(condition: str) -> list[str]:
     return [f"The law may give energy back, which no friction does. It is passive where {condition}."] * bool(condition)
 
 
+def quantity_name(item: MeasuredChange) -> str:
+    """Name a measured quantity, a loop with its amplitude."""
+    amplitude = "" if item.amplitude is None else f" of ±{with_unit(item.amplitude, 'm')}"
+    return f"{SHOWN[item.kind]}{amplitude}"
+
+
 def _change(item: MeasuredChange) -> str:
     """Say by how much a measured effect changes in the conversion."""
     before, after = (with_unit(value, item.unit) for value in (item.before, item.after))
-    return f"{SHOWN[item.kind]} is not kept ({before} becomes {after})"
+    return f"{quantity_name(item)} is not kept ({before} becomes {after})"
 
 
 def _open(key: str, ends: tuple[float, float], conversion: LawConversion) -> str:
@@ -90,7 +100,7 @@ def conversion_rows(conversion: LawConversion) -> list[tuple[str, list[str]]]:
     """Return the rows of the table: before, after, difference, and whether it is kept."""
     return [
         (
-            SHOWN[item.kind],
+            quantity_name(item),
             [
                 with_unit(item.before, item.unit),
                 with_unit(item.after, item.unit),

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from friso.design_method.outline import outline
-from friso.design_method.prepare import assumed, by_rules, check_designable
+from friso.design_method.prepare import assumed, by_rules, check_designable, offset_points
 from friso.design_method.spec import Spec, load_spec, read_spec
 from friso.interface.answer import Answer, question
 from friso.interface.inputs import AS_BUILT, LOGGER, Changes, StageLike, mention_unstable_loop, read_stage
@@ -116,6 +116,11 @@ def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
         LOGGER.warning(
             f"the design is that of a PID by van Dijk's rules (alpha = 0.1, beta = 2) in the place of the stage file's "
             f"controller, with its bandwidth when the joint is locked, {hertz}; friso export gains lists its gains"
+        )
+    if offset := offset_points(stage, spec):
+        LOGGER.warning(
+            f"actuator and sensor are taken {with_unit(float(spec.leaves.offset), 'm')} off the middle of the leaves' "
+            f"width, so that they see it turn: state [leaves] offset, or {', '.join(offset)}, to have another"
         )
     if keys := assumed(stage, spec):
         units = numeric_keys(stage.flat() | keys)

@@ -476,6 +476,8 @@ def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
     """Say why no setting of a remedy meets the goal."""
     if _met_by_another(outcome, tuning):
         return "Its own search found no setting, but that of another option did, which changes the bandwidth alone."
+    if outcome.untried:
+        return "It was not tried: the others took all the computing that is allowed."
     if outcome.points is None:
         return "Its motions take too much computing."
     points, goal = outcome.points, tuning.goal
@@ -655,7 +657,10 @@ def assumptions(tuning: Advice) -> list[str]:
     if any(outcome.remedy.of_setting for outcome in tuning.outcomes) and any(
         not outcome.remedy.buys_joint for outcome in tuning.working
     ):
-        lines.append("Settings against friction were not tried together with the bandwidth, as less than both works.")
+        lines.append(
+            "Settings against friction were not tried together with the bandwidth, nor those of more keys than what "
+            "works, as less works."
+        )
     lines.append(
         "Margins include sampling, delay and current loop of the file; hunting and moves are those of a controller in "
         f"continuous time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), "

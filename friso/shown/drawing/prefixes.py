@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # Prefixes by exponent of ten, and the smallest and largest exponent of the units that take them: lengths beyond metres,
 # times beyond seconds and slow frequencies are read best as they are.
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-_PREFIXED = {"m": (-9, 0), "rad": (-9, 0), "s": (-9, 0), "N": (-9, 9), "Hz": (0, 9)}
+_PREFIXED = {"m": (-9, 0), "rad": (-9, 0), "s": (-9, 0), "N": (-9, 9), "J": (-9, 9), "Hz": (0, 9)}
 _SIGNS = str.maketrans({"*": "·"})
 _POWERS = {"^2": "²", "^3": "³", "**2": "²", "**3": "³"}
 

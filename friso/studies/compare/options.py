@@ -14,6 +14,7 @@ from friso.equations.bandwidth import bandwidth, sped_up
 from friso.equations.conditions import anywhere, level_under_conditions
 from friso.equations.settings import SETTINGS, Setting
 from friso.errors import InputError
+from friso.frequency.bandwidth import bandwidths_at
 from friso.frequency.crossover import WANTED, limits
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases
@@ -21,6 +22,7 @@ from friso.stage import Stage
 from friso.stage.controllers import controller_of
 from friso.studies.compare.disturbance_rejection import ADRC, rejecting
 from friso.studies.compare.machines import Machines
+from friso.studies.settings import StudySettings
 
 DEADBAND = 0.5
 """Deadband of the integrator, in tolerances for being in position: our choice. It rests while the stage is in position,
@@ -39,10 +41,14 @@ class UnavailableError(Exception):
 
 @dataclass(frozen=True)
 class Situation:
-    """The machines that are to be settled, and the tolerance `within` [m] for being in position."""
+    """The machines that are to be settled, and the tolerance `within` [m] for being in position.
+
+    The bandwidth of a faster controller must not exceed `bandwidth_limit` [Hz]; None means that only margins limit it.
+    """
 
     machines: Machines
     within: float
+    bandwidth_limit: float | None = None
 
     @property
     def locked(self) -> Stage:
@@ -161,10 +167,14 @@ def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def options(machines: Machines, within: float, also: Collection[str] = ()) -> CompareOptions:
-    """Return the options of machines that are to be in position `within` a tolerance [m]; those named `also`, or "all",
-    join the usual ones."""
-    situation = Situation(machines, within)
+def options(
+    machines: Machines, within: float, also: Collection[str] = (), bandwidth_limit: float | None = None
+) -> CompareOptions:
+    """Return the options of machines that are to be in position `within` a tolerance [m].
+
+    Those named `also`, or "all", join the usual ones. No faster controller exceeds the `bandwidth_limit` [Hz].
+    """
+    situation = Situation(machines, within, bandwidth_limit)
     tried: list[Option] = []
     left_out: dict[str, str] = {}
     for kind in OPTIONS.values():
@@ -177,11 +187,11 @@ def options(machines: Machines, within: float, also: Collection[str] = ()) -> Co
     return CompareOptions(tuple(tried), left_out, situation.deadband)
 
 
-def _faster(stage: Stage) -> Variant:
+def _faster(stage: Stage, situation: Situation) -> Variant:
     """Return a stage with the highest bandwidth at which the machine of the file keeps its margin.
 
-    An engineer tunes one machine, and all others get its settings. Raises UnavailableError where it is that fast
-    already.
+    It lies below the limit of the bandwidth. An engineer tunes one machine, and all others get its settings. Raises
+    UnavailableError where it is that fast already.
     """
     flat = stage.flat()
     highest = limits(linear_flat(stage, flat)).highest_comfortable
@@ -189,6 +199,12 @@ def _faster(stage: Stage) -> Variant:
     present = 1.0 if tuned is None else tuned
     if tuned is not None and highest is not None:
         highest = min(highest, 1 / (PER_PERIOD * flat["drive.sample_time"]))
+    if highest is not None and highest > present and situation.bandwidth_limit is not None:
+        factors = np.geomspace(1.0, highest / present, StudySettings.current().limit_factors)
+        below = np.flatnonzero(bandwidths_at(stage, factors) <= situation.bandwidth_limit)
+        if not below.size:
+            raise UnavailableError(f"the limit of {situation.bandwidth_limit:g} Hz is below the present bandwidth")
+        highest = present * factors[below[-1]]
     if highest is None or highest <= present:
         raise UnavailableError(f"no higher bandwidth keeps a modulus margin of {WANTED:g}")
     factor = float(highest / present)
@@ -244,7 +260,7 @@ _OPTIONS = (
         "b",
         "faster",
         "{faster}",
-        lambda situation: _faster(situation.locked),
+        lambda situation: _faster(situation.locked, situation),
         ("blue", "solid"),
         prose="the faster controller",
         own_loop=True,
@@ -292,7 +308,7 @@ _OPTIONS = (
         "g",
         "isolator, faster",
         "{faster}",
-        lambda situation: _faster(situation.free),
+        lambda situation: _faster(situation.free, situation),
         ("green", "solid"),
         prose="isolator and faster controller",
         joint=True,

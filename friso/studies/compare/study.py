@@ -25,8 +25,10 @@ from friso.studies.compare.measures import (
     measure_chunk,
     staying_in_position,
 )
+from friso.studies.compare.needed_bandwidth import NeededBandwidth, needed_bandwidth
 from friso.studies.compare.options import OPTIONS, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import EstimatedValue, difference, median
+from friso.studies.settings import StudySettings
 from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import MoveTask, own_motion
 
@@ -35,6 +37,9 @@ INTERVAL = 1e-3
 
 FOLLOWED, LONGER = 40, 6
 """Machines that are run again for so many times as long: an integrator that was reset may swing that slowly."""
+
+NOT_FOLLOWED = Later(np.zeros(0, bool), np.zeros(0, bool))
+"""Longer runs of an option that need not be run."""
 
 ENOUGH = 0.99
 """Share of the machines that an option has to bring into position to be called one that brings them to rest."""
@@ -46,7 +51,7 @@ LATEST = 0.5
 @dataclass(frozen=True)
 class OptionResult:
     """An option with the measures of each machine's run, those of longer runs of the first machines (`later`), and the
-    linear loop of each."""
+    linear loop of each. There are no longer runs if too few machines are in position at the end of the shorter ones."""
 
     option: Option
     measures: MachineMeasures
@@ -77,6 +82,8 @@ class OptionResult:
     def stays(self) -> Share:
         """Return the probability of staying in position throughout the last half of a run that is
         `LONGER`."""
+        if not self.later.done.size:
+            return Share(np.nan, np.nan, np.nan)
         return share(self.later.stays, self.later.done)
 
     @property
@@ -113,9 +120,8 @@ class OptionResult:
     def rests(self) -> bool:
         """Tell whether `ENOUGH` of the machines are in position by the end,
         and of those that are followed stay there."""
-        return self.in_position_count >= ENOUGH * len(self.measures.settling) and bool(
-            self.later.stays.mean() >= ENOUGH
-        )
+        in_position = self.in_position_count >= ENOUGH * len(self.measures.settling)
+        return bool(in_position and self.later.stays.size and self.later.stays.mean() >= ENOUGH)
 
 
 @dataclass(frozen=True)
@@ -137,7 +143,11 @@ class Paired:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The results of the options on the machines drawn with a seed, tolerance [m] included; and notes."""
+    """The results of the options on the machines drawn with a seed, tolerance [m] included; and notes.
+
+    `needed` says which bandwidth the controller needs alone. No faster controller exceeds `bandwidth_limit` [Hz]. The
+    options `not_run` are those that an interruption left.
+    """
 
     machines: Machines
     options: CompareOptions
@@ -145,6 +155,9 @@ class Comparison:
     within: float
     seed: int
     notes: tuple[str, ...]
+    needed: NeededBandwidth | None = None
+    bandwidth_limit: float | None = None
+    not_run: tuple[Option, ...] = ()
 
     @property
     def stage(self) -> Stage:
@@ -183,9 +196,11 @@ def compare(
     progress: Progress = silent,
     also: tuple[str, ...] = (),
     begins: Callable[[], None] = lambda: None,
+    bandwidth_limit: float | None = None,
 ) -> Comparison:
     """Settle `count` machines drawn around a stage in up to seven ways, `within` [m] being in position, and by what is
-    named `also`: settings against friction (`friso.equations.settings`), or "adrc". `begins` is called before the first
+    named `also`: settings against friction (`friso.equations.settings`), or "adrc". No faster controller exceeds the
+    `bandwidth_limit` [Hz]. `begins` is called before the first
     work that takes time, once nothing of the input is wrong.
 
     Raises InputError for a number, a seed or a tolerance that is not allowed, and for a motion that ends too late.
@@ -197,17 +212,25 @@ def compare(
     places = _places(machines.stage)
     begins()
     progress(0, 1, "how fast the controller may be")
-    tried = options(machines, within, also)
+    tried = options(machines, within, also, bandwidth_limit)
+    needed = needed_bandwidth(machines, tried.options[0].stage, within)
     work = _Work(machines, own_motion(machines.stage), places, within, progress, len(tried.options))
     results: list[OptionResult] = []
-    for option in tried.options:
-        measures, later = work.runs(option, len(results)), work.longer(option)
-        loops = results[0].loops if results and not option.kind.own_loop else _loops(machines, option)
-        results.append(OptionResult(option, measures, later, loops))
+    try:
+        for option in tried.options:
+            measures = work.runs(option, len(results))
+            may_rest = measures.rests.mean() >= StudySettings.current().followed_share
+            later = work.longer(option) if may_rest else NOT_FOLLOWED
+            loops = results[0].loops if results and not option.kind.own_loop else _loops(machines, option)
+            results.append(OptionResult(option, measures, later, loops))
+    except KeyboardInterrupt:
+        if not results:
+            raise
     titles = {kind.letter: kind.title for kind in OPTIONS.values()}
     left_out = [f"{letter} {titles[letter]} is left out: {why}" for letter, why in tried.left_out.items()]
     notes = (*machines.notes, *_missing(machines.stage), *left_out, *_troubles(results, count))
-    return Comparison(machines, tried, tuple(results), within, seed, notes)
+    left = tried.options[len(results) :]
+    return Comparison(machines, tried, tuple(results), within, seed, notes, needed, bandwidth_limit, left)
 
 
 def _places(stage: Stage) -> list[Stand]:

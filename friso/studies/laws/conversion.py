@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from friso.quantities import exactly
 from friso.stage import Stage
 from friso.stage.section import list_fields, nearest_name, numeric_fields
 from friso.stage.tables import FrictionSection, friction_law, friction_laws, passive_where
+from friso.studies.laws.loops import hysteresis_loop
 from friso.studies.laws.virgin import VirginPoints, read_virgin_curve, with_virgin_curve
 from friso.studies.settings import StudySettings
 
@@ -30,9 +31,12 @@ SPEEDS = np.geomspace(1e-2, 1e3, 201)
 """Speeds, in Stribeck velocities, at which steady friction is compared."""
 
 
-MeasuredKind = Literal["curve", "static", "stiffness", "virgin", "damping", "viscous", "conditions"]
+MeasuredKind = Literal[
+    "curve", "static", "stiffness", "virgin", "damping", "viscous", "conditions", "loop area", "loop stiffness"
+]
 """Measured quantities: steady friction over speed, break-away, stiffness before sliding, the virgin curve, damping at
-rest, viscous damping; and the conditions under which they were taken."""
+rest, viscous damping; the conditions under which they were taken; and the energy lost in a hysteresis loop before
+sliding, and its stiffness from end to end."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,7 @@ class MeasuredChange:
     """One measured quantity, `before` and `after` the conversion [unit], and its error.
 
     The error is a share of static friction for curves, and of the number itself for numbers. The quantity is kept if
-    the error is below `allowed`.
+    the error is below `allowed`. The `amplitude` [m] is that of a loop.
     """
 
     kind: MeasuredKind
@@ -49,6 +53,7 @@ class MeasuredChange:
     after: float
     off: float
     allowed: float = KEPT
+    amplitude: float | None = None
 
     @property
     def kept(self) -> bool:
@@ -165,8 +170,21 @@ def compared(
         _virgin_change(before, after, points),
         _number("damping", "N*s/m", before.damping, after.damping),
         _number("viscous", "N*s/m", before.levels.viscous, after.levels.viscous),
+        *(_loops(source, made, before) if points is None and before.stiffness and after.stiffness else ()),
     )
     return LawConversion(made, source, before, after, items, left_open, passive_where(flat), points)
+
+
+def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[MeasuredChange]:
+    """Yield area and stiffness of slow loops at shares of the deflection of break-away, under both laws."""
+    settings = StudySettings.current()
+    deflection, speed = before.levels.static / before.stiffness, settings.loop_speed * before.levels.stribeck_velocity
+    for share in settings.loop_amplitudes:
+        old, new = (hysteresis_loop(stage.flat(), share * deflection, speed) for stage in (source, made))
+        pairs = (("loop area", "J", old.area, new.area), ("loop stiffness", "N/m", old.stiffness, new.stiffness))
+        for kind, unit, first, second in pairs:
+            change = _number(cast(MeasuredKind, kind), unit, first, second)
+            yield replace(change, allowed=settings.loop_error, amplitude=old.amplitude)
 
 
 def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
