@@ -24,9 +24,6 @@ Source = Log | MeasuredResponse
 
 Result = TypeVar("Result")
 
-OF_ANY_FORM = ("kind", "force_limit", "anti_windup")
-"""Keys of a controller that stay where a log was taken with one of another form."""
-
 
 @dataclass(frozen=True)
 class AnalysisSettings:
@@ -100,12 +97,7 @@ def as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
     try:
         return stage.replace(changes).flat()
     except InputError as error:
-        reason = error
-    own = {f"{CONTROLLER}.{name}" for name in stage.as_written()[CONTROLLER] if name not in OF_ANY_FORM}
-    try:
-        return stage.replace({**dict.fromkeys(own - changes.keys()), **changes}).flat()
-    except InputError:
-        raise reason.found_in(f"{log.name}, [setup]") from None
+        raise error.found_in(f"{log.name}, [setup]") from None
 
 
 def left_out(stage: Stage, log: Log) -> list[str]:

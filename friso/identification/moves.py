@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from friso.errors import InputError
-from friso.identification.doubt import FitCase, KeyCase, judged_fit, judged_keys, raised
+from friso.identification.doubt import FitCase, FittedCase, KeyCase, judged_fit, judged_keys, leading_effect, raised
 from friso.identification.errors import Residual, SimulationErrors, errors_of, residual_of, unexplained
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import InverseModel, directions, inverse_model, motion, unit_of
@@ -103,16 +103,16 @@ def identify_moves(
     noise = noise_of(log["force"][part])
     answer = fit_identifiable(follows, loop, covered, inverse.bandwidth, noise, between(progress, 0, FITTED))
     fit = answer.fit
-    quality = quality_of(log, inverse, fit, noise, share)
+    leading = leading_effect(FittedCase(log, inverse, share, flat=flat, fit=fit, velocity=moved.velocity))
+    quality = quality_of(log, inverse, fit, noise, share, leading is not None)
     if not fit.problem.closed:
         fit = as_far_off_as_repeated(fit, log, part, inverse.bandwidth, noise, between(progress, FITTED, REPEATED))
         fit = fit if fit.explains(noise) else late_by_a_sample(fit)
-    doubted = judged_fit(
-        FitCase(
-            log, inverse, share, flat=flat, fit=fit, quality=quality, velocity=moved.velocity,
-            progress=between(progress, REPEATED, 1),
-        )
+    case = FitCase(
+        log, inverse, share, flat=flat, fit=fit, quality=quality, velocity=moved.velocity,
+        leading=leading, progress=between(progress, REPEATED, 1),
     )  # fmt: skip
+    doubted = judged_fit(case)
     inverse, quality, answer = doubted.inverse, doubted.quality, replace(answer, fit=doubted.fit)
     case = _with_estimates(doubted, answer, covered, moved.acceleration)
     fit, estimates, correlation = case.fit, case.estimates, case.correlation

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from friso.engine.allowance import allowance
 from friso.engine.kernel import KernelRequest, kernels
+from friso.equations.bandwidth import at_bandwidth, bandwidth
 from friso.equations.structure import shared_structure
-from friso.hunting import judge_many, kernels_to_judge, loops_unstable
+from friso.hunting import Margin, find_attractors, judge_many, kernels_to_judge, loops_unstable
 from friso.hunting.criteria import ATTRACTED, VERDICTS
 from friso.progress import Progress, Tally, silent
 from friso.shares import Share, share
@@ -22,10 +23,16 @@ from friso.studies.settings import StudySettings
 @dataclass(frozen=True)
 class Fates:
     """The verdicts on drawn stages, words of `friso.hunting.criteria.VERDICTS`, and the loops of which are `unstable`,
-    sticking or sliding, both of shape (count,)."""
+    sticking or sliding, both of shape (count,).
+
+    `amplitudes` [m], half of peak to peak, and `periods` [s] are those of the hunting of the first draws, shape
+    (count,) or shorter; NaN where nothing attracts, or nothing certain is known.
+    """
 
     verdicts: np.ndarray
     unstable: np.ndarray
+    amplitudes: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    periods: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def counts(self) -> dict[str, int]:
@@ -70,6 +77,40 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
     }
 
 
+@dataclass(frozen=True)
+class DrawnEdges:
+    """Where the hunting of drawn stages ends in bandwidth [Hz]: between `low` and `high` for each, shape (count,).
+
+    Both are NaN for a stage that does not begin to hunt, or cease to, within the bandwidths that were tried.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+
+
+def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | None:
+    """Find the edge of hunting in bandwidth of the first stages of a sample, near that of the stage itself.
+
+    `margin` is the latter. Returns None where there is none, or where no key states a bandwidth.
+    """
+    settings = StudySettings.current()
+    own = bandwidth(stage.flat())
+    if margin is None or margin.crossover is None or own is None:
+        return None
+    count = min(sample.count, settings.draws_of_an_edge)
+    factors = np.geomspace(1 / settings.reach_of_an_edge, settings.reach_of_an_edge, settings.steps_of_an_edge)
+    flat = laid_over(stage, {key: np.repeat(values[:count], len(factors)) for key, values in sample.keys.items()})
+    tried = np.tile(margin.crossover * factors, count)
+    attracted = find_attractors(at_bandwidth(flat, tried), len(tried))
+    attracts, certain = (rows.reshape(count, -1) for rows in (attracted.attracts, attracted.certain))
+    low, high = np.full((2, count), np.nan)
+    for row, (hunts, sure) in enumerate(zip(attracts, certain, strict=True)):
+        last = np.flatnonzero(hunts)
+        if sure.all() and last.size and last[-1] + 1 < len(factors):
+            low[row], high[row] = margin.crossover * factors[last[-1] : last[-1] + 2]
+    return DrawnEdges(low, high)
+
+
 def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float) -> int:
     """Return how many stages may be drawn for a fixed work,
     a power of two (Sobol' points are even then)."""
@@ -88,6 +129,7 @@ class Draws:
     sample: Sample
     seed: int
     fates: Mapping[str, Fates]
+    edges: DrawnEdges | None = None
 
     def unit(self, key: str) -> str:
         """Return the SI unit of a key."""
@@ -106,6 +148,8 @@ def different(stage: Stage) -> dict[str, Stage]:
 def _fates(stage: Stage, sample: Sample, rtol: float, tally: Tally) -> Fates:
     settings = StudySettings.current()
     words, lost = np.full(sample.count, "failed", dtype=object), np.zeros(sample.count, bool)
+    first_ones = min(sample.count, settings.draws_of_a_swing)
+    amplitudes, periods = np.full((2, first_ones), np.nan)
     for first in range(0, sample.count, settings.stages_together):
         chunk = slice(first, min(first + settings.stages_together, sample.count))
         keys = {key: values[chunk] for key, values in sample.keys.items()}
@@ -113,4 +157,10 @@ def _fates(stage: Stage, sample: Sample, rtol: float, tally: Tally) -> Fates:
         words[chunk] = judge_many(flat, count, rtol)
         lost[chunk] = loops_unstable(flat, count)
         tally.add(chunk.stop - first, "machines drawn")
-    return Fates(words, lost)
+    swinging = np.flatnonzero(np.isin(words[:first_ones], ATTRACTED))
+    if swinging.size:
+        flat = laid_over(stage, {key: values[swinging] for key, values in sample.keys.items()})
+        attracted = find_attractors(flat, swinging.size)
+        amplitudes[swinging] = np.where(attracted.certain, attracted.amplitude, np.nan)
+        periods[swinging] = np.where(attracted.certain, attracted.period, np.nan)
+    return Fates(words, lost, amplitudes, periods)

@@ -88,7 +88,7 @@ class CheckAnswer(Answer):
 
         suggested = [isolator_sentence(self.isolator)] if self.isolator else []
         drawn = draws_sentences(self.draws) if self.draws else []
-        return [*answer(self.result), *suggested, *drawn, *(laws_sentences(self.laws) if self.laws else [])]
+        return [*drawn, *answer(self.result), *suggested, *(laws_sentences(self.laws) if self.laws else [])]
 
     def tables(self) -> Sequence[AnswerTable]:
         """Return the numbers of each case, of the stages drawn, and across friction laws."""
@@ -199,18 +199,34 @@ def check(
     >>> print(answer.data["peak_to_peak"].attrs["units"])
     m
     """
-    settings = StudySettings.current()
     chosen, tolerance = read_stage(stage, set, uncertain_too=True), tolerance_of(rtol)
+    return checked_stage(chosen, correlations_of(stage, chosen), tolerance, draws, seed, laws, progress)
+
+
+def checked_stage(
+    chosen: Stage,
+    correlations: Correlations,
+    tolerance: float = RTOL,
+    draws: int | None = None,
+    seed: int = 0,
+    laws: bool = False,
+    progress: Progress = silent,
+) -> CheckAnswer:
+    """Answer the question of a stage whose uncertain keys have these correlations.
+
+    Raises InputError for a number of draws that is not usable.
+    """
+    settings = StudySettings.current()
     loose = max(tolerance, LONG_RUN_RTOL)
     sample = uncertain = None
     if draws is not None:
         whole_number(draws, "draws", 1, settings.most_draws, "1000")
         try:
-            sample = draw(chosen, correlations_of(stage, chosen), draws, seed)
+            sample = draw(chosen, correlations, draws, seed)
         except InputError as error:
             raise error if error.origin else error.found_in("draws") from None
     elif chosen.uncertain():
-        uncertain = _drawable(chosen, correlations_of(stage, chosen), seed)
+        uncertain = _drawable(chosen, correlations, seed)
     from friso.hunting import check as judged
 
     kernels(needed_kernels(chosen))
@@ -222,9 +238,10 @@ def check(
 
         sample = draw(chosen, uncertain, affordable(chosen, uncertain, seed, loose), seed)
     if sample is not None:
-        from friso.studies.draws import fates
+        from friso.studies.draws import edges, fates
 
-        drawn = Draws(chosen, sample, seed, fates(chosen, sample, loose, progress))
+        fates_by_case = fates(chosen, sample, loose, progress)
+        drawn = Draws(chosen, sample, seed, fates_by_case, edges(chosen, sample, cases["given"].judgement.margin))
     if laws:
         from friso.studies.laws.verdicts import verdicts_by_law
 
