@@ -228,19 +228,20 @@ FAMILIES: Mapping[str, tuple[Callable[[dict[str, float], np.random.Generator], d
     "sound": (_sound, ()),
     "load friction": (_load_friction, ("load-friction",)),
     "play": (_play, ("play",)),
-    "friction by place": (_by_place, ("force-by-place", "friction-by-place")),
-    "cogging": (_cogging, ("force-by-place",)),
+    "friction by place": (_by_place, ("friction-by-place",)),
+    "cogging": (_cogging, ("cogging",)),
     "second mode": (_second_mode, ("coupling", "oscillation")),
     "delay": (_delay, ("delay", "timing")),
     "drifting delay": (_drifting_delay, ("drifting-delay", "delay", "timing")),
     "saturated force": (_saturated, ()),
-    "clipped log": (_clipped, ("clipped-force",)),
+    "clipped log": (_clipped, ("the channel clips",)),
     "coarse force": (_coarse, ("force-digits",)),
     "gain switch": (_gain_switch, ()),
-    "wrong sign": (_wrong_sign, ("wrong-sign",)),
+    "wrong sign": (_wrong_sign, ("the other sign",)),
 }
-"""Each family by name: what it adds to a sound machine, and the doubts that are right about it. A saturated force that
-is logged as it acts, and a controller that switches its gains while the stage follows the log, are in the model."""
+"""Each family by name: what it adds to a sound machine, and the doubts that are right about it, or words of theirs. A
+saturated force that is logged as it acts, and a controller that switches its gains while the stage follows the log, are
+in the model."""
 
 KEYS = {
     "masses.cart": "mass",
@@ -272,7 +273,8 @@ class Outcome:
     def right(self, names: Iterable[str]) -> bool:
         """Whether the first cause that was named is one of these."""
         causes = [name for name, _ in self.doubts if name not in ("model", "little-friction")]
-        return ("sign" in self.refused and "wrong-sign" in names) or (bool(causes) and causes[0] in names)
+        said = self.doubts[0][1] if self.doubts else self.refused  # what explains the inverse model stands in its words
+        return (bool(causes) and causes[0] in names) or any(name in said for name in names)
 
 
 def outcome(family: str, seed: int) -> Outcome:
@@ -287,7 +289,7 @@ def outcome(family: str, seed: int) -> Outcome:
             [log := simulated(machine, rng)], Prior(KIND.around(log) if KIND.around else None), NOTHING_CHOSEN
         )
     except InputError as error:
-        result.refused = f"{error.actual}; {error.expected} sign" if "mass of -" in error.actual else str(error.actual)
+        result.refused = f"{error.actual}; {error.expected}"
         return result
     result.seconds = time.process_time() - begin
     result.doubts = [[one.doubt, one.words] for one in identified.quality.findings if one.words]

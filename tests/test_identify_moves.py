@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from friso.identification import moves as moves_analysis
 from friso.identification.doubt import DOUBTS, FitCase, RecordCase, leading_effect
 from friso.identification.doubts import coupling, delay, force_digits, friction_by_direction, load_friction, play
 from friso.identification.errors import errors_of
+from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, identify_moves, simulated_log
@@ -422,6 +423,18 @@ def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, wordi
     assert doubt.fit is not None
     off = abs(np.log(fitted.value(MASS) / mass))
     assert off < COVERAGE * np.sqrt(doubt.fit.covariance[0, 0])
+
+
+def test_first_estimates_are_told_before_the_whole_model_is_fitted() -> None:
+    log, said = on_a_coupling(1e4, False), {}
+
+    def tell(name: str, estimates: Sequence[Estimate]) -> None:
+        said[name] = {estimate.name: estimate for estimate in estimates}
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        identify_moves(log, made_up(log, inverse_model(log)).flat(), False, tell=tell)
+    assert said[log.name]["mass"].low < sum(TWO_MASSES) < said[log.name]["mass"].high
 
 
 def test_a_force_in_coarse_digits_is_told(wording: Wording) -> None:

@@ -24,19 +24,24 @@ Source = Log | MeasuredResponse
 
 Result = TypeVar("Result")
 
+FirstEstimates = Callable[[str, Sequence[Estimate]], object]
+"""A function that is given the name of a log and the first estimates of it."""
+
 
 @dataclass(frozen=True)
 class AnalysisSettings:
     """What the user chose for an analysis; None where friso is to find it.
 
     `bandwidth` [Hz] is that of moves for the inverse model, `band` [Hz] and `period` [s] are those of frequency
-    responses. `progress` is told how far an analysis is.
+    responses. `progress` is told how far an analysis is, and `tell` the first estimates of a log, by its name, which a
+    longer analysis then improves.
     """
 
     bandwidth: float | None = None
     band: tuple[float, float] | None = None
     period: float | None = None
     progress: Progress = silent
+    tell: FirstEstimates = lambda name, estimates: None
 
 
 NOTHING_CHOSEN = AnalysisSettings()

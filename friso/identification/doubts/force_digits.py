@@ -12,12 +12,13 @@ from friso.quantities import percent
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Compare the step of which all steps of the force are whole numbers with Coulomb friction."""
+    """Compare the step of which all steps of the force are whole numbers with Coulomb friction, where most are none."""
     settings = DoubtSettings.current()
     steps = np.abs(np.diff(case.log["force"][case.log.longest]))
     digit = float(steps[steps > settings.rounding_of_a_digit * steps.max(initial=0.0)].min(initial=np.inf))
     coulomb = abs(case.inverse.value("coulomb"))
-    if not np.isfinite(digit) or digit < settings.friction_share_of_a_digit * coulomb:
+    dithered = np.median(steps) > 0  # noise of a digit and more makes up for it
+    if dithered or not np.isfinite(digit) or digit < settings.friction_share_of_a_digit * coulomb:
         return
     digits = steps / digit
     if np.abs(digits - np.rint(digits)).max() > settings.error_of_a_whole_digit:

@@ -27,7 +27,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     what = "mass" if share == shares[0] else "friction"
     words = (
         f"Play of about {width * 1e6:.2g} um, to a factor of three, between motor and load: the force lacks that of "
-        f"{percent(share)} of the {what} while the load crosses it; it passes for soft bristles, which are not reported, "
+        f"{percent(share)} of the {what} while the load crosses it; it passes for soft bristles, which are refused, "
         "and the intervals of the rest allow for it; a dial gauge on the load while the motor turns to and fro shows it"
     )
     wider = reaching_over(case.fit, settings.reach_of_an_effect * np.abs(effect.explained.moved))

@@ -18,6 +18,7 @@ from friso.identification.sources import LogFile, per_unit_of_force, read_all, r
 from friso.identification.stage_file import TOLD_BY_LOGS, completed
 from friso.interface.answer import Answer, AnswerTable, question
 from friso.interface.inputs import (
+    LOGGER,
     Changes,
     ChannelUnits,
     FrequencyBand,
@@ -41,6 +42,7 @@ from friso.stage import Stage
 from friso.stage.stage import axis_written, changed
 
 if TYPE_CHECKING:
+    from friso.identification.estimate import Estimate
     from friso.questions.check.question import CheckAnswer
     from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files
@@ -281,7 +283,20 @@ def _settings(bandwidth: FrequencyLike | None, band: FrequencyBand | None, perio
         limits = None if band is None else Span(_HERTZ, "3 Hz .. 20 Hz").read(band)
     except InputError as error:
         raise error.found_in("--band") from None
-    return AnalysisSettings(values[0], None if limits is None else (limits.low, limits.high), values[1])
+    band_limits = None if limits is None else (limits.low, limits.high)
+    return AnalysisSettings(values[0], band_limits, values[1], tell=mention_first_estimates)
+
+
+def mention_first_estimates(name: str, estimates: Sequence[Estimate]) -> None:
+    """Log the first estimates of a log of moves, while the whole model is still fitted.
+
+    The message is information of the logger "friso".
+    """
+    from friso.questions.identify.numbers import with_interval
+
+    shown = [f"{one.name} {with_interval(one)}" for one in estimates if one.determined and one.name != "offset"]
+    if shown:
+        LOGGER.info(f"{name}: at first {', '.join(shown)}, by the inverse model", extra={"meanwhile": True})
 
 
 def _logs_to_predict(inputs: Sequence[LogFile]) -> list[Log]:
