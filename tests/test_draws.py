@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,14 @@ from scipy.stats import beta
 
 import friso
 from friso.cli import main
+from friso.hunting import find_margin
 from friso.hunting.criteria import ATTRACTED, VERDICTS
 from friso.questions.check.document import draws_document
 from friso.questions.check.draws import draws_figure, draws_rows, draws_sentences
 from friso.shown.documents import plain_json
 from friso.stage import Stage, save
 from friso.stage.correlations import Correlations, Sample, draw
-from friso.studies.draws import Draws, Fates, different, fates
+from friso.studies.draws import DrawnEdges, Draws, Fates, different, edges, fates
 from friso.studies.settings import StudySettings
 
 pytestmark = pytest.mark.xdist_group("rig")
@@ -144,6 +146,36 @@ def test_draws_with_an_unstable_loop_are_told_first() -> None:
     assert text.index("unstable") < text.index("hunts")
     assert draws_document(shown, "given")["loop_unstable"] == 2
     assert "unstable" not in draws_sentences(draws(made(6, 3)))[0]
+
+
+def test_ranges_of_what_hunts_are_told_first_with_what_narrows_them() -> None:
+    """Amplitude, period and edge from the least to the most; the key that the amplitude follows decides."""
+    count = 30
+    keys = {"friction.coulomb": np.linspace(0.5, 1.5, count), "friction.viscous": np.tile([1.0, 2.0], count // 2)}
+    swings = {"amplitudes": np.linspace(2.5e-4, 3e-4, count), "periods": np.linspace(1.4, 1.9, count)}
+    words, stable = np.array(["hunts"] * count, dtype=object), np.zeros(count, bool)
+    shown = draws(Fates(words, stable, **swings))
+    edges = DrawnEdges(np.array([17.0, np.nan]), np.array([18.5, np.nan]))
+    shown = replace(shown, sample=Sample(keys, count, 0, {}), edges=edges)
+    first, second = draws_sentences(shown)
+    for text in ("± 250 to 300 µm", "1.40 to 1.90 s", "17.0 to 18.5 Hz", "1 of 2"):
+        assert text in first
+    assert "measure friction.coulomb" in second
+    document = draws_document(shown, "given")
+    assert (document["amplitude_m"], document["edge_hz"]) == ([2.5e-4, 3e-4], [17.0, 18.5])
+
+
+def test_the_edge_of_every_draw_is_that_of_its_own_stage(rig: Stage) -> None:
+    """Each lies where the margin of that stage alone does, to the step between the bandwidths that were tried."""
+    stage = locked(rig, "8 Hz")
+    margin = friso.check(stage).result["given"].judgement.margin
+    own = stage.flat()["friction.static"]
+    drawn_edges = edges(stage, Sample({"friction.static": np.array([own, 1.1 * own])}, 2, 0, {}), margin)
+    assert drawn_edges is not None
+    other = find_margin(stage.replace({"friction.static": f"{1.1 * own} N"}), True)
+    for row, alone in enumerate((margin, other)):
+        assert drawn_edges.low[row] <= 1.001 * alone.crossover
+        assert alone.crossover <= 1.001 * drawn_edges.high[row]
 
 
 def test_loops_of_draws_are_judged(rig: Stage) -> None:

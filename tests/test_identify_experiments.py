@@ -490,6 +490,16 @@ def test_an_integrator_that_winds_up_makes_no_ramps_from_none(rig: friso.Stage, 
     assert recognised(log, Path("log.csv"))[0] == "moves"
 
 
+def test_break_away_that_rises_with_the_rate_is_no_value(wording: Wording) -> None:
+    """A motion that is noticed 50 ms late: bristles break away lower at higher rates, never higher."""
+    rng, rates = np.random.default_rng(5), np.repeat([1.0, 3.0, 10.0, 30.0], 4)
+    forces = 3.0 + 0.05 * rates + rng.normal(0, 0.05, len(rates))
+    estimate = static_friction("friction.static", forces, rates)
+    assert not estimate.determined
+    assert estimate.low <= 3.0 <= estimate.high < 3.2
+    wording(estimate.reason)
+
+
 def test_rates_that_are_too_high_are_told(wording: Wording) -> None:
     for rates in ([10.0, 10.0, 10.0, 20.0, 20.0, 20.0], [35.0] * 4):
         result = static_from_ramps(ramps(LUGRE, rates, 1.0, np.random.default_rng(2)), 1.0)

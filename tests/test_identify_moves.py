@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,10 @@ from scipy.signal import lsim
 
 import friso
 from friso.identification import moves as moves_analysis
-from friso.identification.doubt import FitCase
-from friso.identification.doubts import coupling, delay, friction_by_direction, load_friction
+from friso.identification.doubt import DOUBTS, FitCase, RecordCase, leading_effect
+from friso.identification.doubts import coupling, delay, force_digits, friction_by_direction, load_friction, play
 from friso.identification.errors import errors_of
+from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, identify_moves, simulated_log
@@ -331,11 +332,12 @@ WELL = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
 """The quality of a fit that lacks nothing."""
 
 
-def fit_case(log: Log, fitted: OutputErrorFit, bandwidth: float) -> FitCase:
+def fit_case(log: Log, fitted: OutputErrorFit, bandwidth: float, led: bool = True) -> FitCase:
     """A fit to a log whose motion is of a bandwidth [Hz]."""
     velocity = np.gradient(log["position"], log.sample_time)[log.longest]
     inverse = inverse_model(log, bandwidth)
-    return FitCase(log, inverse, flat=fitted.problem.flat, fit=fitted, quality=WELL, velocity=velocity)
+    case = FitCase(log, inverse, flat=fitted.problem.flat, fit=fitted, quality=WELL, velocity=velocity)
+    return replace(case, leading=leading_effect(case)) if led else case
 
 
 @pytest.mark.parametrize("behind", [False, True], ids=["position of the motor", "position of the load"])
@@ -351,7 +353,7 @@ def test_an_interval_of_the_mass_holds_the_truth_where_a_coupling_moves_the_fit(
     assert abs(off) > COVERAGE * np.sqrt(fitted.covariance[0, 0])
     case = fit_case(log, fitted, bandwidth)
     (unspoilt,) = coupling.find(case)
-    (spoiled,) = coupling.find(replace(case, quality=replace(WELL, spoilt=True)))
+    (spoiled,) = coupling.find(replace(case, quality=replace(WELL, spoilt=True), leading=None))
     assert unspoilt.fit is not None
     assert COVERAGE * np.sqrt(unspoilt.fit.covariance[0, 0]) > 1.5 * abs(off)
     assert unspoilt.size == pytest.approx(off, rel=0.3)
@@ -381,8 +383,68 @@ def test_friction_that_grows_with_the_force_of_the_motor_is_named(share: float, 
     assert doubt.fit is not None
     off = np.log(fitted.value(MASS) / sum(TWO_MASSES))
     assert abs(off) < COVERAGE * np.sqrt(doubt.fit.covariance[0, 0])
+    assert not [*load_friction.find(replace(fit_case(log, fitted, bandwidth), leading=None))]
+
+
+def with_force(log: Log, force: np.ndarray) -> Log:
+    """A log with a force more than its own."""
+    return replace(log, signals={**log.signals, "force": log["force"] + force})
+
+
+@pytest.mark.parametrize("effect", ["cogging", "friction-by-place", "drifting-delay", "play"])
+def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, wording: Wording) -> None:
+    """Of all effects that the model leaves out the right one leads; none does on a sound log."""
+    plain = on_a_coupling(1e4, False)
+    fitted, bandwidth = rigid(plain)
+    assert fit_case(plain, fitted, bandwidth).leading is None
+    position, time = plain["position"], plain.time
+    way = np.tanh(np.gradient(position, plain.sample_time) / 1e-3)
+    acceleration = np.gradient(np.gradient(position, plain.sample_time), plain.sample_time)
+    coulomb, mass, pitch, width = FRICTION[0], sum(TWO_MASSES), 0.02, 5e-5
+    late = 0.004 * time / time[-1]
+    _, loose = play.loose_load(position, np.gradient(position, plain.sample_time), plain.sample_time, width, 0.0)
+    log = {
+        "cogging": with_force(plain, 0.15 * coulomb * np.sin(2 * np.pi * position / pitch)),
+        "friction-by-place": with_force(plain, 0.3 * coulomb * way * np.cos(2 * np.pi * position / 0.1)),
+        "drifting-delay": with_force(plain, np.interp(time + late, time, plain["force"]) - plain["force"]),
+        "play": with_force(plain, 0.4 * mass * (loose - acceleration)),
+    }[effect]
+    fitted, bandwidth = rigid(log)
     case = fit_case(log, fitted, bandwidth)
-    assert not [*load_friction.find(replace(case, quality=replace(WELL, spoilt=True)))]
+    assert case.leading is not None
+    assert case.leading.doubt == effect
+    (doubt,) = DOUBTS[effect].find(case)
+    wording(doubt.words)
+    truth = {
+        "cogging": 0.3 * coulomb, "friction-by-place": 0.6 * coulomb, "drifting-delay": 0.004, "play": width
+    }[effect]  # fmt: skip
+    assert abs(doubt.size) == pytest.approx(truth, rel=0.3)
+    assert {*doubt.refuses} == {*BRISTLES}
+    assert doubt.fit is not None
+    off = abs(np.log(fitted.value(MASS) / mass))
+    assert off < COVERAGE * np.sqrt(doubt.fit.covariance[0, 0])
+
+
+def test_first_estimates_are_told_before_the_whole_model_is_fitted() -> None:
+    log, said = on_a_coupling(1e4, False), {}
+
+    def tell(name: str, estimates: Sequence[Estimate]) -> None:
+        said[name] = {estimate.name: estimate for estimate in estimates}
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        identify_moves(log, made_up(log, inverse_model(log)).flat(), False, tell=tell)
+    assert said[log.name]["mass"].low < sum(TWO_MASSES) < said[log.name]["mass"].high
+
+
+def test_a_force_in_coarse_digits_is_told(wording: Wording) -> None:
+    plain = on_a_coupling(1e4, False)
+    digit = 0.4 * FRICTION[0]
+    log = replace(plain, signals={**plain.signals, "force": np.round(plain["force"] / digit) * digit})
+    (doubt,) = force_digits.find(RecordCase(log, inverse_model(log)))
+    wording(doubt.words)
+    assert doubt.size == pytest.approx(digit)
+    assert not [*force_digits.find(RecordCase(plain, inverse_model(plain)))]
 
 
 @pytest.mark.parametrize("late", [1, 3, -2])
@@ -399,7 +461,7 @@ def test_an_interval_of_friction_holds_the_truth_where_a_delay_moves_the_fit(lat
     off = [np.log(fitted.value(name) / true) for name, true in zip(names[1:3], FRICTION, strict=True)]
     assert (COVERAGE * np.sqrt(np.diag(finding.fit.covariance))[1:3] > np.abs(off)).all()
     wording(finding.words)
-    (spoiled,) = delay.find(replace(case, quality=replace(WELL, spoilt=True)))
+    (spoiled,) = delay.find(replace(case, quality=replace(WELL, spoilt=True), leading=None))
     assert not spoiled.words
 
 
@@ -448,7 +510,7 @@ def test_static_friction_of_one_direction_is_named_and_intervals_reach_to_what_e
     more = 0.3 * machine.flat["friction.coulomb"] * np.exp(-((speed / machine.flat["friction.stribeck_velocity"]) ** 2))
     log = replace(log, signals={**log.signals, "force": log["force"] + more * (speed > 0)})
     both = followed(log, machine.flat)
-    case = replace(fit_case(log, both, 20.0), velocity=speed[: len(both.problem.counted)])
+    case = replace(fit_case(log, both, 20.0, led=False), velocity=speed[: len(both.problem.counted)])
     (apart,) = friction_by_direction.find(replace(case, quality=replace(WELL, noise=0.0)))
     wider = apart.fit
     assert wider is not None

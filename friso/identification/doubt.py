@@ -8,7 +8,7 @@ applies consequences here, in one place, so that one more effect is one more fil
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -18,6 +18,7 @@ from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import InverseModel
 from friso.identification.kinds import in_order
 from friso.identification.logs.log import Log
+from friso.identification.output_error.effects import ExplainedResidual, explained_by_forces
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.settings import DoubtSettings
 from friso.progress import Progress, silent
@@ -65,16 +66,38 @@ class ValueCase(RecordCase):
     poor: bool = False
 
 
+@dataclass(frozen=True)
+class TriedForces:
+    """Forces [N] of an effect that the model leaves out, each of shape (n,) and of size 1.
+
+    `units` are the small sizes at which they are tried, and `label` tells several hypotheses of one effect apart, as
+    the width of a play [m]. `searched` is among how many hypotheses this one was chosen: chance explains more then.
+    """
+
+    forces: Sequence[np.ndarray]
+    units: Sequence[float]
+    label: float = np.nan
+    searched: int = 1
+
+
 @dataclass(frozen=True, kw_only=True)
-class FitCase(RecordCase):
-    """A log of moves with the fit of the whole model, and how good that is. `flat` is the stage as it was given, and
-    `velocity` [m/s], shape (n,), the smooth one of the part of the log that is fitted."""
+class FittedCase(RecordCase):
+    """A log of moves with the fit of the whole model. `flat` is the stage as it was given, and `velocity` [m/s], shape
+    (n,), the smooth one of the part of the log that is fitted."""
 
     flat: Mapping[str, Any]
     fit: OutputErrorFit
-    quality: Quality
     velocity: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitCase(FittedCase):
+    """A log of moves with its fit, and how good that is. `leading` is the effect that explains most of what the fit
+    leaves, of all doubts that try forces."""
+
+    quality: Quality
     refused: Mapping[str, str] = field(default_factory=dict)
+    leading: LeadingEffect | None = None
     progress: Progress = silent
 
     @property
@@ -83,6 +106,10 @@ class FitCase(RecordCase):
         explaining = any(finding.explains for finding in self.quality.findings)
         return explaining or self.quality.spoilt or bool(self.quality.without)
 
+    def may_name(self, doubt: str) -> bool:
+        """Tell whether a doubt may name its cause: it leads, or no other cause is named and no other doubt leads."""
+        return not self.has_cause if self.leading is None else self.leading.doubt == doubt
+
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
         """The case after a finding: its consequences for the fit, and the finding among those of the quality."""
         quality = replace(
@@ -90,6 +117,15 @@ class FitCase(RecordCase):
         )
         fit, inverse = finding.fit or self.fit, finding.inverse or self.inverse
         return replace(self, fit=fit, inverse=inverse, quality=quality, refused={**finding.refuses, **self.refused})
+
+
+@dataclass(frozen=True)
+class LeadingEffect:
+    """The effect whose forces explain most of what a fit leaves, by the name of its doubt."""
+
+    doubt: str
+    tried: TriedForces
+    explained: ExplainedResidual
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,6 +183,8 @@ class Doubt:
 
     `find` yields findings for what it is given at its `moment`; it `looks_at` something, has a `consequence` in words,
     and is `decided_by` a measurement: these stand in the reference. `after` names doubts that are asked before.
+    `forces` are those of an effect that may be in what a fit leaves: of all such doubts the one that explains most of
+    it leads, and the others do not name a cause.
     """
 
     moment: Moment
@@ -155,6 +193,7 @@ class Doubt:
     consequence: str
     decided_by: str
     after: tuple[str, ...] = ()
+    forces: Callable[[FittedCase], Iterable[TriedForces]] | None = None
 
 
 DOUBTS: Registry[Doubt] = Registry("friso.identification.doubts", "DOUBT")
@@ -189,6 +228,25 @@ def causes(case: RecordCase) -> list[RaisedDoubt]:
     rivals = [one for one in better if one.without and one.without.error <= most]
     plain = [finding for finding in every if finding.without is None]
     return [*raised("fault", case), *rivals, *plain, *(() if rivals else raised("otherwise", case))]
+
+
+def way_of(case: FittedCase) -> np.ndarray:
+    """Return the direction of the motion from -1 to 1, shape (n,), which turns gradually where it creeps."""
+    top = DoubtSettings.current().speed_share_of_creeping * np.abs(case.velocity).max()
+    return np.clip(case.velocity / top, -1.0, 1.0)
+
+
+def leading_effect(case: FittedCase) -> LeadingEffect | None:
+    """Try the forces of all doubts on what a fit leaves; None where none explains enough of it to be named."""
+    best: LeadingEffect | None = None
+    for name in _at("fit"):
+        tries = DOUBTS[name].forces
+        for tried in tries(case) if tries is not None else ():
+            explained = explained_by_forces(case.fit, tried.forces, tried.units, tried.searched)
+            if explained is not None and (best is None or explained.left < best.explained.left):
+                best = LeadingEffect(name, tried, explained)
+    enough = DoubtSettings.current().power_left_by_an_effect
+    return best if best is not None and best.explained.left <= enough else None
 
 
 def judged_fit(case: FitCase) -> FitCase:

@@ -24,8 +24,8 @@ Source = Log | MeasuredResponse
 
 Result = TypeVar("Result")
 
-OF_ANY_FORM = ("kind", "force_limit", "anti_windup")
-"""Keys of a controller that stay where a log was taken with one of another form."""
+FirstEstimates = Callable[[str, Sequence[Estimate]], object]
+"""A function that is given the name of a log and the first estimates of it."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +33,15 @@ class AnalysisSettings:
     """What the user chose for an analysis; None where friso is to find it.
 
     `bandwidth` [Hz] is that of moves for the inverse model, `band` [Hz] and `period` [s] are those of frequency
-    responses. `progress` is told how far an analysis is.
+    responses. `progress` is told how far an analysis is, and `tell` the first estimates of a log, by its name, which a
+    longer analysis then improves.
     """
 
     bandwidth: float | None = None
     band: tuple[float, float] | None = None
     period: float | None = None
     progress: Progress = silent
+    tell: FirstEstimates = lambda name, estimates: None
 
 
 NOTHING_CHOSEN = AnalysisSettings()
@@ -100,12 +102,7 @@ def as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
     try:
         return stage.replace(changes).flat()
     except InputError as error:
-        reason = error
-    own = {f"{CONTROLLER}.{name}" for name in stage.as_written()[CONTROLLER] if name not in OF_ANY_FORM}
-    try:
-        return stage.replace({**dict.fromkeys(own - changes.keys()), **changes}).flat()
-    except InputError:
-        raise reason.found_in(f"{log.name}, [setup]") from None
+        raise error.found_in(f"{log.name}, [setup]") from None
 
 
 def left_out(stage: Stage, log: Log) -> list[str]:

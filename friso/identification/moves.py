@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from friso.errors import InputError
-from friso.identification.doubt import FitCase, KeyCase, judged_fit, judged_keys, raised
+from friso.identification.doubt import FitCase, FittedCase, KeyCase, judged_fit, judged_keys, leading_effect, raised
 from friso.identification.errors import Residual, SimulationErrors, errors_of, residual_of, unexplained
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import InverseModel, directions, inverse_model, motion, unit_of
+from friso.identification.kind import FirstEstimates
 from friso.identification.logs.log import Log
 from friso.identification.model_error import allowed_for
 from friso.identification.output_error.coverage import Coverage, coverage
@@ -80,21 +81,27 @@ class IdentifiedMoves:
 
 
 def identify_moves(
-    log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth: float | None = None, progress: Progress = silent
+    log: Log,
+    flat: Mapping[str, Any],
+    own_loop: bool,
+    bandwidth: float | None = None,
+    progress: Progress = silent,
+    tell: FirstEstimates = lambda name, estimates: None,
 ) -> IdentifiedMoves:
     """Identify mass, friction and what else the moves of a log show of a stage given as flat
     keys.
 
     With `own_loop` the stage's controller is the machine's, and the closed loop is simulated on the log's reference;
     else the model follows the log's position. `bandwidth` [Hz] is the motion's, read off the force by default. Where
-    the force is not in newtons, which no loop of a machine allows, estimates are per unit of it. Raises InputError for
-    a log without position or force.
+    the force is not in newtons, which no loop of a machine allows, estimates are per unit of it. The inverse model's
+    estimates are told as soon as they are known. Raises InputError for a log without position or force.
     """
     settings = IdentificationSettings.current()
     check_roles(log, ("position", "force", *(("reference",) if own_loop else ())), () if own_loop else ("force",))
     part = log.longest
     share = _cart_share(log, flat)
     inverse, by_direction = (inverse_model(log, bandwidth, split, share) for split in (False, True))
+    tell(log.name, inverse.estimates)
     follows, loop = _problems(log, part, flat, inverse, own_loop)
     moved = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * inverse.bandwidth)
     starts = {parameter.name: parameter.start for parameter in follows.parameters}
@@ -103,16 +110,16 @@ def identify_moves(
     noise = noise_of(log["force"][part])
     answer = fit_identifiable(follows, loop, covered, inverse.bandwidth, noise, between(progress, 0, FITTED))
     fit = answer.fit
-    quality = quality_of(log, inverse, fit, noise, share)
+    leading = leading_effect(FittedCase(log, inverse, share, flat=flat, fit=fit, velocity=moved.velocity))
+    quality = quality_of(log, inverse, fit, noise, share, leading is not None)
     if not fit.problem.closed:
         fit = as_far_off_as_repeated(fit, log, part, inverse.bandwidth, noise, between(progress, FITTED, REPEATED))
         fit = fit if fit.explains(noise) else late_by_a_sample(fit)
-    doubted = judged_fit(
-        FitCase(
-            log, inverse, share, flat=flat, fit=fit, quality=quality, velocity=moved.velocity,
-            progress=between(progress, REPEATED, 1),
-        )
+    case = FitCase(
+        log, inverse, share, flat=flat, fit=fit, quality=quality, velocity=moved.velocity,
+        leading=leading, progress=between(progress, REPEATED, 1),
     )  # fmt: skip
+    doubted = judged_fit(case)
     inverse, quality, answer = doubted.inverse, doubted.quality, replace(answer, fit=doubted.fit)
     case = _with_estimates(doubted, answer, covered, moved.acceleration)
     fit, estimates, correlation = case.fit, case.estimates, case.correlation

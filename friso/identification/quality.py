@@ -70,8 +70,13 @@ class Quality:
         return float(np.sqrt(max(0.0, 1 - 1 / self.ratio**2))) if self.ratio > 1 else 0.0
 
 
-def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: float, cart_share: float) -> Quality:
+def quality_of(
+    log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: float, cart_share: float, led: bool = False
+) -> Quality:
     """Judge a fit of moves, and name in sentences what is wrong with it.
+
+    Where it is `led` by an effect that explains what the fit leaves, the inverse model's causes are not named: the
+    effect is.
 
     The whole model may describe a record that is `beyond` the inverse one, which does not know of sticking. A cause is
     no doubt then if the whole model is clearly better than the inverse model without it.
@@ -91,7 +96,9 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
         reasons = [cause for cause in reasons if cause.without is None or share * cause.without.error < left]
     worse = max(settings.error_ratio_of_a_contradiction * inverse.error, settings.error_of_a_fine_model)
     rejected = not (beyond or poor) and plain.whole_error > worse and plain.lacks_something
-    words = _verdict(plain, reasons, case.unit, poor, rejected, flat["friction.model"] == "none")
+    words = _verdict(
+        plain, [] if led and not poor else reasons, case.unit, poor, rejected, flat["friction.model"] == "none"
+    )
     findings += [RaisedDoubt(words, plain.ratio, doubt="model")] if words else []
     findings += raised("value", ValueCase(log, inverse, cart_share, plain.lacks_something, poor))
     without = tuple(cause.without for cause in reasons if cause.without)

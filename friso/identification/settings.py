@@ -111,8 +111,57 @@ class DoubtSettings(Settings):
     """Share of the residual's power that such friction leaves at most: of drawn logs with a tenth of it 0.02 to 0.26,
     of sound ones 0.92 and more."""
 
-    reach_of_a_load: float = setting(2.0, "")
-    """Intervals reach so many times as far as such friction moves the fit: that is one linear step."""
+    friction_share_of_a_digit: float = setting(0.1, "")
+    """Share of Coulomb friction from which on digits of the force are coarse: below, the noise of most logs is more."""
+
+    rounding_of_a_digit: float = setting(1e-6, "")
+    """Share of the largest step of the force below which a step is rounding."""
+
+    error_of_a_whole_digit: float = setting(0.05, "")
+    """Error of a whole number of digits, that of texts of few figures: a force of noise has 0.5."""
+
+    power_left_by_an_effect: float = setting(0.85, "")
+    """Share of the residual's power that an effect leaves at most to be named: of 45 drawn logs with effects of a tenth
+    of the friction and more the right one left 0.01 to 0.84, and of sound ones none explained anything."""
+
+    reach_of_an_effect: float = setting(2.0, "")
+    """Intervals reach so many times as far as an effect moves the fit: that is one linear step."""
+
+    places_of_a_force_along: int = setting(12, "")
+    """Places along the way that have a force, or friction, of their own: each takes a simulated run."""
+
+    travels_of_a_pitch: tuple[float, ...] = setting((2.0, 60.0), "")
+    """Pitches of cogging that are tried, as parts of the travel: a coarser one is a force by place."""
+
+    pitches_for_each_travel: int = setting(4, "")
+    """Pitches that are tried for each further period along the travel: between two of them the phase slips by a
+    quarter turn."""
+
+    plays_tried: tuple[float, ...] = setting((8e-6, 1e-3), "m")
+    """Widths of play that are tried: a narrower one passes within a few samples, a wider one is seen without a test."""
+
+    ratio_of_plays: float = setting(1.4, "")
+    """Ratio of one width that is tried to the next: at 1.5 times its width a play explains half of it."""
+
+    bandwidths_of_a_play: float = setting(4.0, "")
+    """Bandwidth of the motion over the usual one of smoothing: at one a gap that is crossed in 5 ms is blurred, at 16
+    the noise of the position counts."""
+
+    power_share_of_a_drift: float = setting(0.5, "")
+    """Share that a delay which changes leaves at most of what one leaves that stays: of drawn logs 0.02 to 0.25."""
+
+    mass_share_of_a_tried_play: float = setting(0.05, "")
+    """Share of the mass that is loose for its effect on the record: play acts in proportion to it."""
+
+    mass_share_of_a_loose_load: float = setting(0.5, "")
+    """Share of the mass that a loose load with friction is taken to have, by which it slows down: what is found of it
+    is fitted."""
+
+    most_of_a_play: float = setting(1.5, "")
+    """Share of mass or friction up to which a play is believed: more than all is another effect."""
+
+    mass_share_of_a_play: float = setting(0.03, "")
+    """Share of the mass that is loose from which on a play is told."""
 
     bandwidths_of_a_delayed_force: float = setting(10.0, "")
     """Cut-off of the force in bandwidths of the motion, above which its derivative is noise."""

@@ -21,6 +21,9 @@ KIND, FORCE_LIMIT, ANTI_WINDUP, ANTI_WINDUP_TIME, FILTERS_KEY = (
 )
 """Stage-file keys that every controller has."""
 
+OF_ANY_FORM = ("kind", "force_limit", "anti_windup", "anti_windup_time", "filters")
+"""Keys of a controller that stay where it is put into another form."""
+
 AntiWindup = Literal["none", "clamp", "back_calculation"]
 """What integrators do while the force is at its limit: wind up on; rest while they would drive it further; or unwind in
 proportion to what is cut off."""

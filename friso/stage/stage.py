@@ -21,6 +21,7 @@ from friso.stage.controllers import (
     CONTROLLERS,
     FORCE_LIMIT,
     KIND,
+    OF_ANY_FORM,
     ControllerSection,
     controller_of,
 )
@@ -328,8 +329,11 @@ class Stage(Section):
 
 
 def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
-    """Return the stage of tables in which dotted keys are set, or removed by None;
-    they themselves stay as they are. Raises StageError."""
+    """Return the stage of tables in which dotted keys are set, or removed by None; they themselves stay as they are.
+
+    A controller that is set in another form, by its gains where the tables have a crossover, replaces that of the
+    tables. Raises StageError.
+    """
     own, tables = {*tables}, deepcopy(dict(tables))
     for key, value in changes.items():
         _put(tables, key, getattr(value, "text", value))
@@ -337,6 +341,15 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
         return Stage(**tables)
     except StageError as error:
         name = error.key.partition(".")[0]
+        kept = {*OF_ANY_FORM, *(key.partition(".")[2] for key in changes)}
+        others = [key for key in tables.get(CONTROLLER) or () if key not in kept]
+        if error.key == CONTROLLER and others and any(key.startswith(f"{CONTROLLER}.") for key in changes):
+            for key in others:
+                del tables[CONTROLLER][key]
+            try:
+                return Stage(**tables)
+            except StageError as other:
+                raise error if other.key == CONTROLLER else other from None
         begun = [key for key in changes if key.startswith(f"{name}.")]
         if name in own or not begun or not error.actual.startswith("nothing"):
             raise

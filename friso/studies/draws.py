@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from friso.engine.allowance import allowance
 from friso.engine.kernel import KernelRequest, kernels
+from friso.equations.bandwidth import at_bandwidth, bandwidth
 from friso.equations.structure import shared_structure
-from friso.hunting import judge_many, kernels_to_judge, loops_unstable
+from friso.hunting import Margin, find_attractors, judge_many, kernels_to_judge, loops_unstable
 from friso.hunting.criteria import ATTRACTED, VERDICTS
 from friso.progress import Progress, Tally, silent
 from friso.shares import Share, share
@@ -22,10 +23,16 @@ from friso.studies.settings import StudySettings
 @dataclass(frozen=True)
 class Fates:
     """The verdicts on drawn stages, words of `friso.hunting.criteria.VERDICTS`, and the loops of which are `unstable`,
-    sticking or sliding, both of shape (count,)."""
+    sticking or sliding, both of shape (count,).
+
+    `amplitudes` [m], half of peak to peak, and `periods` [s] are those of the hunting of the first draws, shape
+    (count,) or shorter; NaN where nothing attracts, or nothing certain is known.
+    """
 
     verdicts: np.ndarray
     unstable: np.ndarray
+    amplitudes: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    periods: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def counts(self) -> dict[str, int]:
@@ -60,7 +67,8 @@ class Fates:
 def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent) -> dict[str, Fates]:
     """Return the fates of the drawn stages as given and, with a joint, locked and free.
 
-    After Ctrl-C, they are those of the first of the stages, as many as were judged in all variants by then.
+    After Ctrl-C, they are those of the first of the stages, as many as were judged in all variants by then, without
+    the sizes of their hunting.
     """
     settings = StudySettings.current()
     variants = different(stage)
@@ -74,14 +82,49 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
             judged = {name: _fates(variant, sample, chunk, rtol, tally) for name, variant in variants.items()}
             for name, part in judged.items():
                 parts[name].append(part)
+        by_variant = {name: _with_swings(variants[name], sample, _joined(some)) for name, some in parts.items()}
     except KeyboardInterrupt:
         if not all(parts.values()):
             raise
-    by_variant = {name: _joined(some) for name, some in parts.items()}
+        by_variant = {name: _joined(some) for name, some in parts.items()}
     return {
         name: by_variant[next(other for other, same in variants.items() if same == variant)]
         for name, variant in stage.variants().items()
     }
+
+
+@dataclass(frozen=True)
+class DrawnEdges:
+    """Where the hunting of drawn stages ends in bandwidth [Hz]: between `low` and `high` for each, shape (count,).
+
+    Both are NaN for a stage that does not begin to hunt, or cease to, within the bandwidths that were tried.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+
+
+def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | None:
+    """Find the edge of hunting in bandwidth of the first stages of a sample, near that of the stage itself.
+
+    `margin` is the latter. Returns None where there is none, or where no key states a bandwidth.
+    """
+    settings = StudySettings.current()
+    own = bandwidth(stage.flat())
+    if margin is None or margin.crossover is None or own is None:
+        return None
+    count = min(sample.count, settings.draws_of_an_edge)
+    factors = np.geomspace(1 / settings.reach_of_an_edge, settings.reach_of_an_edge, settings.steps_of_an_edge)
+    flat = laid_over(stage, {key: np.repeat(values[:count], len(factors)) for key, values in sample.keys.items()})
+    tried = np.tile(margin.crossover * factors, count)
+    attracted = find_attractors(at_bandwidth(flat, tried), len(tried))
+    attracts, certain = (rows.reshape(count, -1) for rows in (attracted.attracts, attracted.certain))
+    low, high = np.full((2, count), np.nan)
+    for row, (hunts, sure) in enumerate(zip(attracts, certain, strict=True)):
+        last = np.flatnonzero(hunts)
+        if sure.all() and last.size and last[-1] + 1 < len(factors):
+            low[row], high[row] = margin.crossover * factors[last[-1] : last[-1] + 2]
+    return DrawnEdges(low, high)
 
 
 def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float) -> int:
@@ -98,7 +141,7 @@ def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float)
 class Draws:
     """Stages drawn from an uncertain one with a seed, and their fates case by case.
 
-    They are fewer than were `asked` for after an interruption.
+    They are fewer than were `asked` for after an interruption, and have no `edges` then.
     """
 
     stage: Stage
@@ -106,14 +149,24 @@ class Draws:
     seed: int
     fates: Mapping[str, Fates]
     asked: int
+    edges: DrawnEdges | None = None
 
     @classmethod
-    def of(cls, stage: Stage, sample: Sample, seed: int, rtol: float, progress: Progress = silent) -> Draws:
-        """Judge the stages of a sample (see `fates`)."""
+    def of(
+        cls,
+        stage: Stage,
+        sample: Sample,
+        seed: int,
+        rtol: float,
+        margin: Margin | None = None,
+        progress: Progress = silent,
+    ) -> Draws:
+        """Judge the stages of a sample (see `fates`), and find the edges of the first near the stage's own `margin`."""
         judged = fates(stage, sample, rtol, progress)
         count = len(next(iter(judged.values())).verdicts)
         keys = {key: values[:count] for key, values in sample.keys.items()}
-        return cls(stage, replace(sample, keys=keys, count=count), seed, judged, sample.count)
+        ends = edges(stage, sample, margin) if count == sample.count else None
+        return cls(stage, replace(sample, keys=keys, count=count), seed, judged, sample.count, ends)
 
     def unit(self, key: str) -> str:
         """Return the SI unit of a key."""
@@ -141,3 +194,16 @@ def _fates(stage: Stage, sample: Sample, chunk: slice, rtol: float, tally: Tally
 def _joined(parts: Sequence[Fates]) -> Fates:
     """Return the fates of several groups of stages as those of one."""
     return Fates(np.concatenate([part.verdicts for part in parts]), np.concatenate([part.unstable for part in parts]))
+
+
+def _with_swings(stage: Stage, sample: Sample, judged: Fates) -> Fates:
+    """Add amplitudes and periods of the hunting of the first drawn stages."""
+    first_ones = min(sample.count, StudySettings.current().draws_of_a_swing)
+    amplitudes, periods = np.full((2, first_ones), np.nan)
+    swinging = np.flatnonzero(np.isin(judged.verdicts[:first_ones], ATTRACTED))
+    if swinging.size:
+        flat = laid_over(stage, {key: values[swinging] for key, values in sample.keys.items()})
+        attracted = find_attractors(flat, swinging.size)
+        amplitudes[swinging] = np.where(attracted.certain, attracted.amplitude, np.nan)
+        periods[swinging] = np.where(attracted.certain, attracted.period, np.nan)
+    return replace(judged, amplitudes=amplitudes, periods=periods)

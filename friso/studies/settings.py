@@ -44,6 +44,18 @@ class StudySettings(Settings):
     usual_work: float = setting(3e8, "")
     """About 4 s on one core, for a check for which no number of draws was asked."""
 
+    draws_of_a_swing: int = setting(64, "")
+    """Draws of which amplitude and period are told: a range of fewer leaves a tenth of the machines out."""
+
+    draws_of_an_edge: int = setting(16, "")
+    """Draws whose edge of hunting is searched: each takes as many searches as there are steps."""
+
+    steps_of_an_edge: int = setting(17, "")
+    """Bandwidths tried for each: fewer tell the edge more coarsely."""
+
+    reach_of_an_edge: float = setting(1.6, "")
+    """Factor about the edge of the stage itself over which they lie: wider, the steps are coarser."""
+
     most_draws: int = setting(100_000, "")
     """At the edge of hunting a draw takes 50 ms: more take hours."""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
+from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
 from friso.identification.inverse_model import InverseModel
 from friso.identification.output_error.effects import (
     ExplainedResidual,
@@ -132,6 +132,12 @@ def inverse_reaching(inverse: InverseModel, changes: RecordDrift) -> InverseMode
     return replace(inverse, estimates=tuple(answers))
 
 
+def forces(case: FittedCase) -> Iterator[TriedForces]:
+    """Yield friction and a constant force that change along the record."""
+    if "friction.coulomb" in [parameter.name for parameter in case.fit.problem.parameters]:
+        yield TriedForces(*changing_forces(case.fit, case.velocity)[:2])
+
+
 DOUBT = Doubt(
     "fit",
     find,
@@ -139,4 +145,5 @@ DOUBT = Doubt(
     "intervals reach over the change",
     "the same moves again, after the machine has warmed up",
     after=("delay",),
+    forces=forces,
 )

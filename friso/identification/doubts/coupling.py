@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
+from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
 from friso.identification.inverse_model import motion
 from friso.identification.output_error.effects import explained_by_forces, reaching_over
 from friso.identification.output_error.parameters import BRISTLES, MASS, is_free
@@ -38,11 +38,11 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     if share * load <= 0 or abs(share) < settings.mass_share_of_a_coupling:
         yield RaisedDoubt(fit=further)
         return
-    words = "" if case.has_cause else _sentence(share)  # an averaged motion, and others, make such a force too
+    words = _sentence(share) if case.may_name("coupling") else ""  # an averaged motion makes such a force too
     yield RaisedDoubt(words, share, fit=further, refuses=dict.fromkeys(BRISTLES, IMITATED))
 
 
-def coupling_force(case: FitCase) -> np.ndarray | None:
+def coupling_force(case: FittedCase) -> np.ndarray | None:
     """Return the force of a coupling [N], shape (n,), with the standard deviation of the inertia.
 
     None where no mass is fitted, or the stage does not move.
@@ -70,11 +70,19 @@ def _sentence(share: float) -> str:
     )
 
 
+def forces(case: FittedCase) -> Iterator[TriedForces]:
+    """Yield the force of a coupling, where a mass is fitted."""
+    force = coupling_force(case)
+    if force is not None:
+        yield TriedForces([force], [DoubtSettings.current().mass_share_of_a_tried_coupling])
+
+
 DOUBT = Doubt(
     "fit",
     find,
     "a force that goes with the second derivative of the acceleration",
     "intervals widen; bristles are refused",
     "a frequency response",
-    after=("load-friction",),
+    after=("load-friction", "play", "cogging", "friction-by-place", "drifting-delay"),
+    forces=forces,
 )

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
+from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
 from friso.identification.output_error.effects import explained_by_forces, reaching_over
 from friso.identification.readings.common import low_pass
 from friso.identification.settings import DoubtSettings
@@ -27,7 +27,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         return
     moved, late = explained.moved, -float(explained.sizes[0])
     words = ""
-    if abs(late) >= settings.samples_of_a_delay * step and not case.has_cause:
+    if abs(late) >= settings.samples_of_a_delay * step and case.may_name("delay"):
         words = (
             f"The motion seems to come {abs(late) * 1e3:.2g} ms {'after' if late > 0 else 'before'} the force: a delay "
             "of the drive or between the channels, which passes for damping and viscous friction; the intervals allow "
@@ -36,7 +36,14 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     yield RaisedDoubt(words, late, "s", fit=reaching_over(fit, settings.reach_of_a_delay * np.abs(moved)))
 
 
-def delay_force(case: FitCase) -> np.ndarray:
+def forces(case: FittedCase) -> Iterator[TriedForces]:
+    """Yield the derivative of the log's force, where the stage was held to the log."""
+    force = delay_force(case)
+    if not case.fit.problem.closed and force.any():
+        yield TriedForces([force], [DoubtSettings.current().samples_of_a_tried_delay * case.log.sample_time])
+
+
+def delay_force(case: FittedCase) -> np.ndarray:
     """Return the derivative of the log's force [N/s], shape (n,), which a delay multiplies, without its noise."""
     cutoff = DoubtSettings.current().bandwidths_of_a_delayed_force * case.inverse.bandwidth
     force = low_pass(case.log["force"][case.log.longest], case.log.sample_time, cutoff)
@@ -50,4 +57,5 @@ DOUBT = Doubt(
     "intervals widen",
     "a frequency response, whose phase shows the delay",
     after=("coupling",),
+    forces=forces,
 )

@@ -6,12 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from friso.identification.doubt import Doubt, FitCase, RaisedDoubt
-from friso.identification.doubts.changing_friction import changing_forces
-from friso.identification.doubts.coupling import coupling_force
-from friso.identification.doubts.delay import delay_force
-from friso.identification.output_error.effects import explained_by_forces, reaching_over
-from friso.identification.output_error.parameters import is_free
+from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces, way_of
+from friso.identification.output_error.effects import reaching_over
 from friso.identification.settings import DoubtSettings
 from friso.quantities import percent
 
@@ -24,31 +20,26 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     and 5.44 to 5.60 N, without a doubt. It is named where it explains much of what the fit leaves, and more than a
     coupling, a delay, or friction that changes with time would.
     """
-    fit, settings, step = case.fit, DoubtSettings.current(), case.log.sample_time
-    names = [parameter.name for parameter in fit.problem.parameters]
-    quality = case.quality
-    if quality.failed or quality.rejected or case.has_cause or is_free(case.flat) or "friction.coulomb" not in names:
+    settings, effect = DoubtSettings.current(), case.leading
+    if effect is None or effect.doubt != "load-friction":
         return
-    top = settings.speed_share_of_creeping * np.abs(case.velocity).max()
-    against = -np.abs(case.log["force"][case.log.longest]) * np.clip(case.velocity / top, -1.0, 1.0)
-    explained = explained_by_forces(fit, [against], [settings.share_of_a_tried_load])
-    if explained is None or explained.left > settings.power_left_by_a_load:
-        return
-    share, coupled = float(explained.sizes[0]), coupling_force(case)
-    rivals = [([delay_force(case)], [settings.samples_of_a_tried_delay * step])]
-    rivals += [([coupled], [settings.mass_share_of_a_tried_coupling])] if coupled is not None else []
-    rivals.append(changing_forces(fit, case.velocity)[:2])
-    others = [explained_by_forces(fit, *rival) for rival in rivals]
-    least, most = settings.shares_of_a_load
-    if not least <= share <= most or any(other.left < explained.left for other in others if other):
+    share, (least, most) = float(effect.explained.sizes[0]), settings.shares_of_a_load
+    if effect.explained.left > settings.power_left_by_a_load or not least <= share <= most:
         return
     words = (
         f"Friction grows with the force of the motor, by {percent(share)} of it, as that of worm gears, belts and "
         "preloaded screws does: no friction of the stage file does so, and the intervals allow for it; constant speeds "
         "with and without a load would show it"
     )
-    wider = reaching_over(fit, settings.reach_of_a_load * np.abs(explained.moved))
+    wider = reaching_over(case.fit, settings.reach_of_an_effect * np.abs(effect.explained.moved))
     yield RaisedDoubt(words, share, fit=wider, explains=True)
+
+
+def forces(case: FittedCase) -> Iterator[TriedForces]:
+    """Yield a force against the motion in proportion to the motor's force."""
+    settings = DoubtSettings.current()
+    force = case.log["force"][case.log.longest]
+    yield TriedForces([-np.abs(force) * way_of(case)], [settings.share_of_a_tried_load])
 
 
 DOUBT = Doubt(
@@ -58,4 +49,5 @@ DOUBT = Doubt(
     "intervals widen; a coupling and a delay are not named beside it",
     "constant speeds with and without a load",
     after=("friction-by-direction",),
+    forces=forces,
 )

@@ -60,7 +60,8 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     log = whole.excerpt(ExperimentSettings.current().samples_of_moves)
     flat = prior.flat(log) if _in_newtons(log) else made_up(log, inverse_model(log, settings.bandwidth)).flat()
     start = {**flat, **{key: estimate.value for key, estimate in prior.estimates.items() if key in flat}}
-    return identify_moves(log, start, prior.from_user and "reference" in log, settings.bandwidth, settings.progress)
+    own_loop = prior.from_user and "reference" in log
+    return identify_moves(log, start, own_loop, settings.bandwidth, settings.progress, settings.tell)
 
 
 def _in_newtons(log: Log) -> bool:

@@ -28,20 +28,20 @@ class ExplainedResidual:
 
 
 def explained_by_forces(
-    fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]
+    fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float], searched: int = 1
 ) -> ExplainedResidual | None:
     """Fit further forces to what a fit leaves, with its own numbers free to follow.
 
     Each force [N], shape (n,), is one of size 1; it is tried at the size `unit`, small enough for its effect to be in
-    proportion. Returns None where the forces clearly explain nothing.
+    proportion. Returns None where the forces explain no more than chance, the best of so many `searched` ones.
     """
-    rest, slopes = fit.linearised()
+    rest, slopes = fit.linearised
     effects = [effect_of(unit * force, fit, rest) / unit for force, unit in zip(forces, units, strict=True)]
-    return explained_by(slopes, rest, effects, fit.problem.counted)
+    return explained_by(slopes, rest, effects, fit.problem.counted, searched)
 
 
 def explained_by(
-    slopes: np.ndarray, rest: np.ndarray, effects: Sequence[np.ndarray], counted: np.ndarray
+    slopes: np.ndarray, rest: np.ndarray, effects: Sequence[np.ndarray], counted: np.ndarray, searched: int = 1
 ) -> ExplainedResidual | None:
     """Fit a residual, shape (n,), by fitted numbers and further effects.
 
@@ -59,7 +59,7 @@ def explained_by(
     solution[usable] = np.linalg.lstsq(scaled, -rest, rcond=settings.smallest_singular_value)[0] / size[usable]
     left = rest + every[:, usable] @ solution[usable]
     independent = max(float(counted.sum()), 1.0) / correlation_length(left)
-    chance = chi2.ppf(settings.probability_of_an_effect, len(effects))
+    chance = chi2.isf((1 - settings.probability_of_an_effect) / searched, len(effects))
     if rest @ rest <= left @ left * (1 + chance / independent):
         return None
     moved, sizes = np.split(solution, [slopes.shape[1]])

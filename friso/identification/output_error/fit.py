@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -77,12 +78,14 @@ class OutputErrorFit:
         """
         usable = np.isfinite(self.deviation) & (self.deviation > 0)
         wider = np.divide(wanted, self.deviation, out=np.ones(len(self.free)), where=usable)
-        return replace(self, covariance=self.covariance * np.outer(wider, wider))
+        fit = replace(self, covariance=self.covariance * np.outer(wider, wider))
+        if "linearised" in vars(self):  # derivatives do not depend on how well the numbers are known
+            vars(fit)["linearised"] = self.linearised
+        return fit
 
+    @cached_property
     def linearised(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residual, shape (n,), and its derivatives to the fitted numbers, shape (n,
-        free).
-        """
+        """The residual, shape (n,), and its derivatives to the fitted numbers, shape (n, free)."""
         mask = np.isin(np.arange(len(self.inner)), self.free)
         return self.problem.linearised(self.inner, mask)
 

@@ -97,6 +97,31 @@ def _slow_enough() -> float:
     return float(max(rate for rate in rates if share_below(rate) <= 2 * settings.share_extrapolated))
 
 
+def _rising(name: str, forces: np.ndarray, rates: np.ndarray) -> Estimate | None:
+    """Refuse a value where break-away clearly rises with the force rate; None where it does not.
+
+    No bristles do so. A motion that is noticed late, by the same time at all rates, makes forces rise in proportion to
+    the rate: their line at rate 0 and the forces at the lowest rates bound static friction.
+    """
+    if len(forces) < 4:
+        return None
+    design = np.stack([np.ones_like(rates), rates], axis=1)
+    solution, rest, _, _ = np.linalg.lstsq(design, forces, rcond=None)
+    freedom = len(forces) - 2
+    errors = t_value(freedom) * np.sqrt(np.diag(np.linalg.inv(design.T @ design)) * float(np.sum(rest)) / freedom)
+    lowest, highest = rates <= 1.5 * rates.min(), rates >= rates.max() / 1.5
+    low, high = (float(forces[chosen].mean()) for chosen in (lowest, highest))
+    if not (solution[1] > errors[1] and high > low):
+        return None
+    reason = (
+        f"break-away rises with the force rate, from {low:.3g} N at {rates.min():.3g} N/s to {high:.3g} N at "
+        f"{rates.max():.3g} N/s, which contradicts LuGre's bristles: usually the motion is noticed late, by a "
+        f"threshold or a filter, here by about {1e3 * float(solution[1]):.2g} ms; static friction is no more than at "
+        "the lowest rate"
+    )
+    return Estimate.unknown(name, "N", "break-away forces", reason, max(float(solution[0] - errors[0]), 0.0), low)
+
+
 def _extrapolated(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float) -> Estimate:
     """Extrapolate break-away forces to rate 0 by a straight line over rate^(2/3) at the lower
     rates.
@@ -104,6 +129,9 @@ def _extrapolated(name: str, forces: np.ndarray, rates: np.ndarray, relative_err
     Half of the way extrapolated widens the interval.
     """
     settings = ReadingSettings.current()
+    rises = _rising(name, forces, rates)
+    if rises is not None:
+        return rises
     near = rates <= max(settings.range_of_rates * rates.min(), np.sort(rates)[2])
     if np.ptp(rates[near]) == 0:
         return _bounded(name, forces[near], rates[near], relative_error)

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from friso.questions.check.laws import laws_document
 from friso.questions.check.words import answer
 from friso.shown.documents import dwells_document, plain_json, tracking_document, unit_suffix
@@ -211,7 +213,16 @@ def draws_document(draws: Draws, case: str) -> dict[str, Any]:
         "verdicts": fates.counts,
         "loop_unstable": int(fates.unstable.sum()),
         "separation": fates.separations(draws.sample.keys),
+        "amplitude_m": _ends(fates.amplitudes),
+        "period_s": _ends(fates.periods),
+        "edge_hz": _ends(np.r_[draws.edges.low, draws.edges.high]) if draws.edges and case == "given" else None,
     }
+
+
+def _ends(values: np.ndarray) -> list[float] | None:
+    """Return the least and the largest of some values; None where none is known."""
+    finite = values[np.isfinite(values)]
+    return [float(finite.min()), float(finite.max())] if finite.size else None
 
 
 def _share_document(share: Share) -> dict[str, float]:

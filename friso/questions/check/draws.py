@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from friso.hunting.criteria import ATTRACTED, VERDICTS
+from friso.identification.ways import ways_to_show
 from friso.shown.cases import case_labels
 from friso.shown.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel
-from friso.shown.drawing.prefixes import NOTHING, share_with_interval
+from friso.shown.drawing.prefixes import NOTHING, range_with_unit, share_with_interval
 from friso.studies.draws import Draws, Fates
+from friso.studies.settings import StudySettings
 
 COLOURS = {"hunts": VERMILLION, "bistable": ORANGE, "transient": SKY, "settles": BLUE, "failed": GREY}
 
@@ -44,10 +46,8 @@ def draws_sentences(draws: Draws) -> list[str]:
     """Say what the draws do, in one sentence per case, and which draws were left out."""
     sample = draws.sample
     cut = [f"Interrupted: {sample.count} of {draws.asked} stages were drawn so far."] * (sample.count < draws.asked)
-    sentences = [
-        *cut,
-        *(f"{label}: {_sentence(draws.fates[name], draws)}" for name, label in case_labels(draws.stage).items()),
-    ]
+    sentences = [*cut, *(f"{label}: {_sentence(name, draws)}" for name, label in case_labels(draws.stage).items())]
+    sentences += [text for text in [_narrowed(draws)] if text]
     if sample.left_out:
         reasons = [f"{count}: {why}" for why, count in sample.broken.items()]
         beyond = [f"{sample.beyond}: a key beyond its bounds"] if sample.beyond else []
@@ -55,8 +55,48 @@ def draws_sentences(draws: Draws) -> list[str]:
     return sentences
 
 
-def _sentence(fates: Fates, draws: Draws) -> str:
-    """Say with which probability a case hunts, and which key matters most."""
+def _swings(fates: Fates) -> str:
+    """Say how far and how slowly the draws hunt, from the least to the most; "" where none does."""
+    amplitudes, periods = (values[np.isfinite(values)] for values in (fates.amplitudes, fates.periods))
+    if not amplitudes.size:
+        return ""
+    far, slow = (
+        range_with_unit(float(values.min()), float(values.max()), unit)
+        for values, unit in ((amplitudes, "m"), (periods, "s"))
+    )
+    return f": by ± {far}, every {slow}"
+
+
+def _edge(draws: Draws) -> str:
+    """Say between which bandwidths the edge of hunting of the draws lies; "" where that is not known."""
+    drawn_edges = draws.edges
+    if drawn_edges is None or not np.isfinite(drawn_edges.low).any():
+        return ""
+    span = range_with_unit(float(np.nanmin(drawn_edges.low)), float(np.nanmax(drawn_edges.high)), "Hz")
+    beyond = int(np.isnan(drawn_edges.low).sum())
+    out = f" ({beyond} of {len(drawn_edges.low)} have it farther away or nowhere)" if beyond else ""
+    return f"; the edge of hunting at {span}{out}"
+
+
+def _narrowed(draws: Draws) -> str:
+    """Say what to measure to narrow the ranges: the key that amplitudes follow most; "" where that is not known."""
+    fates = draws.fates["given"]
+    shown = np.flatnonzero(np.isfinite(fates.amplitudes))
+    if len(shown) < StudySettings.current().trial_draws or not np.ptp(fates.amplitudes[shown]) > 0:
+        return ""
+    ranks = fates.amplitudes[shown].argsort().argsort()
+    follows = {
+        key: abs(float(np.corrcoef(values[shown].argsort().argsort(), ranks)[0, 1]))
+        for key, values in draws.sample.keys.items()
+    }
+    key = max(follows, key=lambda name: follows[name])
+    ways = ways_to_show(key)
+    return f"To narrow these ranges, measure {key}, which the amplitude follows most{f': {ways}' if ways else ''}."
+
+
+def _sentence(name: str, draws: Draws) -> str:
+    """Say with which probability a case hunts, how far, and which key matters most."""
+    fates = draws.fates[name]
     failed, keys = fates.counts["failed"], fates.separations(draws.sample.keys)
     lost = int(np.count_nonzero(fates.unstable))
     sentences = (
@@ -64,7 +104,8 @@ def _sentence(fates: Fates, draws: Draws) -> str:
     )
     sentences += [
         f"of {draws.sample.count} draws, hunts with a probability of {share_with_interval(fates.share(('hunts',)))}, "
-        f"has a cycle that attracts with {share_with_interval(fates.share(ATTRACTED))}."
+        f"has a cycle that attracts with {share_with_interval(fates.share(ATTRACTED))}{_swings(fates)}"
+        f"{_edge(draws) if name == 'given' else ''}."
     ]
     if failed:
         noun, pronoun = ("draw", "it") if failed == 1 else ("draws", "them")

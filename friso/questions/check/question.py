@@ -100,7 +100,7 @@ class CheckAnswer(Answer):
         if self.cut and not self.draws:
             drawn = ["Interrupted: no stages were drawn yet."]
         short = [*motion_sentences(self.stage), *filter(None, [self.stage.controller.note(self.stage.flat())])]
-        return [*answer(self.result), *short, *suggested, *drawn, *(laws_sentences(self.laws) if self.laws else [])]
+        return [*drawn, *answer(self.result), *short, *suggested, *(laws_sentences(self.laws) if self.laws else [])]
 
     def tables(self) -> Sequence[AnswerTable]:
         """Return the numbers of each case, of the stages drawn, and across friction laws."""
@@ -211,18 +211,34 @@ def check(
     >>> print(answer.data["peak_to_peak"].attrs["units"])
     m
     """
-    settings = StudySettings.current()
     chosen, tolerance = read_stage(stage, set, uncertain_too=True), tolerance_of(rtol)
+    return checked_stage(chosen, correlations_of(stage, chosen), tolerance, draws, seed, laws, progress)
+
+
+def checked_stage(
+    chosen: Stage,
+    correlations: Correlations,
+    tolerance: float = RTOL,
+    draws: int | None = None,
+    seed: int = 0,
+    laws: bool = False,
+    progress: Progress = silent,
+) -> CheckAnswer:
+    """Answer the question of a stage whose uncertain keys have these correlations.
+
+    Raises InputError for a number of draws that is not usable.
+    """
+    settings = StudySettings.current()
     loose = max(tolerance, LONG_RUN_RTOL)
     sample = uncertain = None
     if draws is not None:
         whole_number(draws, "draws", 1, settings.most_draws, "1000")
         try:
-            sample = draw(chosen, correlations_of(stage, chosen), draws, seed)
+            sample = draw(chosen, correlations, draws, seed)
         except InputError as error:
             raise error if error.origin else error.found_in("draws") from None
     elif chosen.uncertain():
-        uncertain = _drawable(chosen, correlations_of(stage, chosen), seed)
+        uncertain = _drawable(chosen, correlations, seed)
     from friso.hunting import check as judged
 
     kernels(needed_kernels(chosen))
@@ -239,7 +255,7 @@ def check(
 
         answers_interrupts()  # from here on, there is an answer
         try:
-            drawn = Draws.of(chosen, sample, seed, loose, progress)
+            drawn = Draws.of(chosen, sample, seed, loose, cases["given"].judgement.margin, progress)
             cut = drawn.asked > drawn.sample.count
         except KeyboardInterrupt:
             cut = True

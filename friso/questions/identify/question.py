@@ -18,6 +18,7 @@ from friso.identification.sources import LogFile, per_unit_of_force, read_all, r
 from friso.identification.stage_file import TOLD_BY_LOGS, completed
 from friso.interface.answer import Answer, AnswerTable, question
 from friso.interface.inputs import (
+    LOGGER,
     Changes,
     ChannelUnits,
     FrequencyBand,
@@ -41,6 +42,8 @@ from friso.stage import Stage
 from friso.stage.stage import axis_written, changed
 
 if TYPE_CHECKING:
+    from friso.identification.estimate import Estimate
+    from friso.questions.check.question import CheckAnswer
     from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files
 
@@ -54,11 +57,13 @@ class IdentifyAnswer(Answer):
     """The machine that logs show.
 
     `result` is an `Identification` with the estimates. It holds a `stage` if the logs describe a whole machine.
-    `inputs` are the files read, and `predictions` the predictions of other logs.
+    `inputs` are the files read, and `predictions` the predictions of other logs. `checked` is the answer of friso check
+    on the stage, where that was asked.
     """
 
     inputs: Sequence[LogFile]
     predictions: Sequence[Prediction]
+    checked: CheckAnswer | None
 
     @property
     def failure(self) -> str:
@@ -69,14 +74,16 @@ class IdentifyAnswer(Answer):
         """Return what was identified, how well other logs are predicted, and notes."""
         from friso.questions.identify.words import sentences
 
-        return sentences(self.result, self.predictions)
+        verdicts = [] if self.checked is None else self.checked.sentences()
+        return [*sentences(self.result, self.predictions), *verdicts]
 
     def tables(self) -> Sequence[AnswerTable]:
         """Return the table of estimates with their intervals."""
         from friso.questions.identify.words import COLUMNS, estimate_rows
 
         rows = [(first, rest) for first, *rest in (row.texts for row in estimate_rows(self.result))]
-        return [AnswerTable("", COLUMNS[1:], rows)] if rows else []
+        checked = [] if self.checked is None else self.checked.tables()
+        return [*([AnswerTable("", COLUMNS[1:], rows)] if rows else []), *checked]
 
     def details(self) -> Sequence[str]:
         """Return the experiments behind the estimates, and what was read."""
@@ -86,7 +93,7 @@ class IdentifyAnswer(Answer):
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """Return the command that checks the identified stage."""
-        if self.result.stage is None or not files:
+        if self.result.stage is None or not files or self.checked is not None:
             return []
         draws = " --draws 1000" if self.result.stage.uncertain() else ""
         return [f"friso check {shell_word(str(files[0]))}{draws}"]
@@ -101,7 +108,8 @@ class IdentifyAnswer(Answer):
         """Return estimates, experiments and logs as a document."""
         from friso.questions.identify.document import identify_document
 
-        return identify_document(self.result, self.inputs, self.predictions)
+        document = identify_document(self.result, self.inputs, self.predictions)
+        return document if self.checked is None else {**document, "check": self.checked.document()}
 
     def files(self) -> Files:
         """Return the stage file, the correlations, the page and the figures."""
@@ -127,6 +135,7 @@ def identify(
     band: FrequencyBand | None = None,
     period: TimeLike | None = None,
     laws: bool = False,
+    check: bool = False,
     folder: Path = Path(),
     keep: MappingKeeper | None = None,
     progress: Progress = silent,
@@ -152,6 +161,8 @@ def identify(
         Period of a periodic excitation, "5 s" or a number [s].
     laws : bool
         Fit every friction law too, and say which of them the record supports; needs a stage.
+    check : bool
+        Also say whether the identified stage hunts, as friso check does of the stage file that is written.
     folder : Path
         Where what was said of channels is looked for, if not beside the logs.
     keep : callable, optional
@@ -214,7 +225,12 @@ def identify(
     predictions = [predicted(result, log, settings, assumed) for log in others]
     if keep is not None and not result.failed:
         keep({file.path: file.mapping for file in inputs})
-    return IdentifyAnswer(result, inputs=inputs, predictions=predictions, axis_kind=axis_kind)
+    checked = None
+    if check and result.stage is not None:
+        from friso.questions.check.question import checked_stage
+
+        checked = checked_stage(result.stage, result.correlations, progress=progress)
+    return IdentifyAnswer(result, inputs=inputs, predictions=predictions, axis_kind=axis_kind, checked=checked)
 
 
 def _in_one_line(error: InputError) -> str:
@@ -267,7 +283,20 @@ def _settings(bandwidth: FrequencyLike | None, band: FrequencyBand | None, perio
         limits = None if band is None else Span(_HERTZ, "3 Hz .. 20 Hz").read(band)
     except InputError as error:
         raise error.found_in("--band") from None
-    return AnalysisSettings(values[0], None if limits is None else (limits.low, limits.high), values[1])
+    band_limits = None if limits is None else (limits.low, limits.high)
+    return AnalysisSettings(values[0], band_limits, values[1], tell=mention_first_estimates)
+
+
+def mention_first_estimates(name: str, estimates: Sequence[Estimate]) -> None:
+    """Log the first estimates of a log of moves, while the whole model is still fitted.
+
+    The message is information of the logger "friso".
+    """
+    from friso.questions.identify.numbers import with_interval
+
+    shown = [f"{one.name} {with_interval(one)}" for one in estimates if one.determined and one.name != "offset"]
+    if shown:
+        LOGGER.info(f"{name}: at first {', '.join(shown)}, by the inverse model", extra={"meanwhile": True})
 
 
 def _logs_to_predict(inputs: Sequence[LogFile]) -> list[Log]:

@@ -15,6 +15,7 @@ from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.method import nothing_learnt
 from friso.identification.stage_file import CHOSEN
+from friso.identification.ways import ways_to_show
 from friso.questions.identify.kind_view import Facts, PredictionView, view_of
 from friso.questions.identify.laws import TITLE, how, law_facts, law_sentence
 from friso.questions.identify.numbers import interval_text, name_of, value_text, with_interval, within
@@ -122,26 +123,6 @@ def _why_no_stage(identification: Identification) -> str:
 ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
 """Keys that are usually 0: an interval that holds that shows no such effect."""
 
-_OF_BRISTLES = (("presliding",), "small motion before sliding (--as presliding; rehearsed by friso rig presliding)")
-_OF_SLOW_SLIDING = (("slow-sliding",), "slow sliding (--as slow-sliding; rehearsed by friso rig constant-speed)")
-
-SHOWN_BY: dict[str, tuple[tuple[tuple[str, ...], str], ...]] = {
-    "masses": ((("frequency",), "a frequency response (--as frequency; rehearsed by friso rig frf)"),),
-    "friction.coulomb": ((("moves", "constant-speed"), "moves in both directions at several speeds"),),
-    "friction.viscous": (
-        (("constant-speed",), "constant speeds (--as constant-speed; rehearsed by friso rig constant-speed)"),
-    ),
-    "friction.static": (
-        (("break-away",), "force ramps from rest (--as break-away)"),
-        (("stick-slip",), "slow motion that sticks and slips (--as stick-slip; rehearsed by friso rig stiction)"),
-    ),
-    "friction.stribeck_velocity": (_OF_SLOW_SLIDING,),
-    "friction.bristle_stiffness": (_OF_BRISTLES,),
-    "friction.bristle_damping": (_OF_BRISTLES,),
-    "joint.stiffness": ((("steps",), "steps with the cart fixed (--as steps; rehearsed by friso rig stiffness)"),),
-}
-"""The experiments that show a key, or one of a table: the kinds of which a log would be one, and what to do."""
-
 
 def _absent(estimate: Estimate) -> bool:
     """Tell whether an estimate says that something is not there: its interval holds 0."""
@@ -155,8 +136,7 @@ def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
     """
     names: dict[str, list[str]] = {}
     for estimate in estimates:
-        ways = SHOWN_BY.get(estimate.name) or SHOWN_BY.get(estimate.name.split(".")[0]) or ()
-        left = " or ".join(text for kinds, text in ways if not {*kinds} & done)
+        left = ways_to_show(estimate.name, done)
         if left and not estimate.determined:
             names.setdefault(left, []).append(within(estimate.name))
     return "; ".join(f"{', '.join(group)}: {way}" for way, group in names.items())

@@ -1,0 +1,79 @@
+"""A force that differs along the way: cogging of a motor, a cable, a slope; it passes for friction and for mass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
+from friso.identification.doubts.coupling import IMITATED
+from friso.identification.output_error.effects import reaching_over
+from friso.identification.output_error.parameters import BRISTLES
+from friso.identification.settings import DoubtSettings
+
+
+def find(case: FitCase) -> Iterator[RaisedDoubt]:
+    """Name the force that differs along the way, and its pitch, where it explains most of what the fit leaves."""
+    settings, effect = DoubtSettings.current(), case.leading
+    if effect is None or effect.doubt != "cogging" or case.quality.failed or case.quality.rejected:
+        return
+    parts = zip(effect.explained.sizes, effect.tried.forces, strict=True)
+    size = float(np.ptp(sum(share * force for share, force in parts)))
+    pitch = effect.tried.label
+    every = f", every {pitch * 1e3:.3g} mm, as cogging does" if np.isfinite(pitch) else ""
+    words = (
+        f"A force along the way differs from place to place by {size:.2g} {case.unit}{every}: no stage file has one, "
+        "and the intervals allow for it; slow passes to and fro over the same way would show it"
+    )
+    wider = reaching_over(case.fit, settings.reach_of_an_effect * np.abs(effect.explained.moved))
+    yield RaisedDoubt(words, size, case.unit, fit=wider, refuses=dict.fromkeys(BRISTLES, IMITATED), explains=True)
+
+
+def forces(case: FittedCase) -> Iterator[TriedForces]:
+    """Yield a force at each of some places along the way, and one that repeats with the pitch that fits best."""
+    settings, problem = DoubtSettings.current(), case.fit.problem
+    position, counted = case.log["position"][case.log.longest], problem.counted > 0
+    travel = float(np.ptp(position))
+    unit = settings.friction_share_of_a_tried_force * float(np.std(case.log["force"][case.log.longest]))
+    along = places_along(position)
+    yield TriedForces(along, [unit] * len(along))
+    rest = case.fit.residual[counted]
+    low, high = settings.travels_of_a_pitch
+    pitches = travel / np.linspace(low, high, 1 + round(settings.pitches_for_each_travel * (high - low)))
+    explained = [_explained_by(position[counted], pitch, rest) for pitch in pitches]
+    pitch = float(pitches[int(np.argmax(explained))])
+    yield TriedForces(_waves(position, pitch), [unit] * 2, pitch, len(pitches))
+
+
+def places_along(position: np.ndarray) -> list[np.ndarray]:
+    """Return columns that tell places along the way [m] apart, each of shape (n,), less their means and without that
+    of the first place.
+    """
+    nodes = np.linspace(position.min(), position.max(), DoubtSettings.current().places_of_a_force_along)
+    near = np.maximum(1 - np.abs(position - nodes[:, None]) / (nodes[1] - nodes[0]), 0.0)
+    return [column - column.mean() for column in near[1:]]
+
+
+def _waves(position: np.ndarray, pitch: float) -> list[np.ndarray]:
+    """Return sine and cosine of a position [m] with a pitch [m], each of shape (n,)."""
+    angle = 2 * np.pi * position / pitch
+    return [np.sin(angle), np.cos(angle)]
+
+
+def _explained_by(position: np.ndarray, pitch: float, rest: np.ndarray) -> float:
+    """Return the power [N^2] of a rest, shape (n,), that a force of a pitch [m] explains, less its constant part."""
+    columns = np.stack([*_waves(position, pitch), np.ones(len(rest))], axis=1)
+    solution = np.linalg.lstsq(columns, rest, rcond=None)[0]
+    return float(np.var(columns @ solution))
+
+
+DOUBT = Doubt(
+    "fit",
+    find,
+    "a force at places along the way, and one that repeats along it",
+    "intervals widen; bristles are refused",
+    "slow passes to and fro over the same way",
+    after=("friction-by-direction",),
+    forces=forces,
+)

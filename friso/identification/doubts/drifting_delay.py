@@ -1,0 +1,52 @@
+"""A delay between force and motion that grows or shrinks along the record: two clocks, a buffer that fills."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
+from friso.identification.doubts.coupling import IMITATED
+from friso.identification.doubts.delay import delay_force
+from friso.identification.output_error.effects import explained_by_forces, reaching_over
+from friso.identification.output_error.parameters import BRISTLES
+from friso.identification.settings import DoubtSettings
+
+
+def find(case: FitCase) -> Iterator[RaisedDoubt]:
+    """Name the delays at the beginning and the end, where a delay that changes explains more than one that stays."""
+    settings, effect = DoubtSettings.current(), case.leading
+    if effect is None or effect.doubt != "drifting-delay" or case.quality.failed or case.quality.rejected:
+        return
+    late, more = (-float(size) for size in effect.explained.sizes)
+    words = (
+        f"The delay between force and motion changes along the record, from {late * 1e3:.2g} to "
+        f"{(late + more) * 1e3:.2g} ms, as of two clocks: the intervals allow for it; log force and motion by one clock"
+    )
+    wider = reaching_over(case.fit, settings.reach_of_an_effect * np.abs(effect.explained.moved))
+    yield RaisedDoubt(words, more, "s", fit=wider, refuses=dict.fromkeys(BRISTLES, IMITATED), explains=True)
+
+
+def forces(case: FittedCase) -> Iterator[TriedForces]:
+    """Yield the derivative of the force, and that times a line over the record, where this clearly explains more."""
+    force = delay_force(case)
+    if case.fit.problem.closed or not force.any():
+        return
+    settings = DoubtSettings.current()
+    units = [settings.samples_of_a_tried_delay * case.log.sample_time] * 2
+    both = [force, force * np.linspace(0.0, 1.0, len(force))]
+    alone, together = (explained_by_forces(case.fit, both[:count], units[:count]) for count in (1, 2))
+    if together is not None and together.left < settings.power_share_of_a_drift * (alone.left if alone else 1.0):
+        yield TriedForces(both, units)
+
+
+DOUBT = Doubt(
+    "fit",
+    find,
+    "a force that goes with the derivative of the logged force, more and more along the record",
+    "intervals widen; bristles are refused",
+    "force and motion logged by one clock",
+    after=("friction-by-direction",),
+    forces=forces,
+)

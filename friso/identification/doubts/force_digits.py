@@ -1,0 +1,33 @@
+"""A force in digits that are coarse beside the friction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, RaisedDoubt, RecordCase
+from friso.identification.settings import DoubtSettings
+from friso.quantities import percent
+
+
+def find(case: RecordCase) -> Iterator[RaisedDoubt]:
+    """Compare the step of which all steps of the force are whole numbers with Coulomb friction, where most are none."""
+    settings = DoubtSettings.current()
+    steps = np.abs(np.diff(case.log["force"][case.log.longest]))
+    digit = float(steps[steps > settings.rounding_of_a_digit * steps.max(initial=0.0)].min(initial=np.inf))
+    coulomb = abs(case.inverse.value("coulomb"))
+    dithered = np.median(steps) > 0  # noise of a digit and more makes up for it
+    if dithered or not np.isfinite(digit) or digit < settings.friction_share_of_a_digit * coulomb:
+        return
+    digits = steps / digit
+    if np.abs(digits - np.rint(digits)).max() > settings.error_of_a_whole_digit:
+        return
+    words = (
+        f"The force is logged in steps of {digit:.2g} {case.unit}, {percent(digit / coulomb)} of Coulomb friction: "
+        "what friction does at low speed is hidden in them; log it with more digits"
+    )
+    yield RaisedDoubt(words, digit, case.unit)
+
+
+DOUBT = Doubt("record", find, "the steps of the force beside Coulomb friction", "reported", "a log with more digits")

@@ -1,0 +1,56 @@
+"""Friction that differs along the way: a worn stretch, a preload that varies, a dry place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces, way_of
+from friso.identification.doubts.cogging import places_along
+from friso.identification.doubts.coupling import IMITATED
+from friso.identification.output_error.effects import reaching_over
+from friso.identification.output_error.parameters import BRISTLES
+from friso.identification.settings import DoubtSettings
+
+
+def find(case: FitCase) -> Iterator[RaisedDoubt]:
+    """Name by how much friction differs along the way, where that explains most of what the fit leaves."""
+    settings, effect = DoubtSettings.current(), case.leading
+    if effect is None or effect.doubt != "friction-by-place" or case.quality.failed or case.quality.rejected:
+        return
+    columns = places_along(case.log["position"][case.log.longest])
+    friction = sum(share * column for share, column in zip(effect.explained.sizes, columns, strict=True))
+    size, reach = float(np.ptp(friction)), float(np.abs(friction).max())
+    words = (
+        f"Friction differs along the way by {size:.2g} {case.unit}: the intervals reach from its least to its largest; "
+        "slow passes to and fro over the same way would show it"
+    )
+    further = settings.reach_of_an_effect * np.abs(effect.explained.moved)
+    for i, number in enumerate(case.fit.free):
+        if case.fit.problem.parameters[number].name == "friction.coulomb":
+            further[i] += reach / case.fit.value("friction.coulomb")
+    wider = reaching_over(case.fit, further)
+    yield RaisedDoubt(words, size, case.unit, fit=wider, refuses=dict.fromkeys(BRISTLES, IMITATED), explains=True)
+
+
+def forces(case: FittedCase) -> Iterator[TriedForces]:
+    """Yield friction of its own at each of some places along the way."""
+    settings = DoubtSettings.current()
+    if "friction.coulomb" not in [parameter.name for parameter in case.fit.problem.parameters]:
+        return
+    along = [-column * way_of(case) for column in places_along(case.log["position"][case.log.longest])]
+    unit = settings.friction_share_of_a_tried_force * case.fit.value("friction.coulomb")
+    yield TriedForces(along, [unit] * len(along))
+
+
+DOUBT = Doubt(
+    "fit",
+    find,
+    "friction of its own at places along the way",
+    "intervals reach from the least to the largest friction; bristles are refused",
+    "slow passes to and fro over the same way",
+    after=("friction-by-direction",),
+    forces=forces,
+)
+"""Places are the same as of a force along the way: what turns with the direction is friction."""
