@@ -170,8 +170,8 @@ def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, 
     infinite = np.isinf(poles)
     if np.count_nonzero(infinite) > 1:
         raise _wrong("two poles or more at 0 (z = 1)", "one integral at most")
-    if np.any(poles.real <= 0):
-        worst = roots.poles[np.argmax(np.abs(roots.poles)) if sample_time else np.argmax(roots.poles.real)]
+    if np.any(np.real(poles) <= 0):
+        worst = roots.poles[np.argmax(np.abs(roots.poles)) if sample_time else np.argmax(np.real(roots.poles))]
         raise _wrong(f"a pole at {worst:.6g}", "a stable transfer function; an integral, a pole at 0 (z = 1), is fine")
     poles = poles[~infinite]
     if len(zeros) > len(poles) + bool(infinite.any()):
@@ -225,7 +225,7 @@ def _expanded(times: np.ndarray) -> np.ndarray:
     polynomial = np.ones(1, complex)
     for time in times:
         polynomial = np.append(polynomial, 0) + time * np.append(0, polynomial)
-    return polynomial.real
+    return np.real(polynomial)
 
 
 def _sections(times: np.ndarray) -> list[tuple[float, float | None]]:
