@@ -483,7 +483,7 @@ class _Session:
         The machines make all moves, or those from `moves_from` [m] on.
 
         The interval of the share of machines that meet the goal must lie at the share wanted or above. While it leaves
-        that open, further machines are measured, but for the first answer: its next factor costs less.
+        that open, further machines are measured.
         """
         settings = RemedySettings.current()
         remedy, goal = search.remedy, search.goal
@@ -494,8 +494,6 @@ class _Session:
         self.report(f"{remedy.name}: verified on machines not tuned for")
         measured = performance_of(tuned, unseen, goal, self.drive)
         doubted, case = missed_parts(measured, goal), None
-        if not doubted and self.least_factor and moves_from is None and not measured.decides(goal):
-            doubted = ("together",)
         if not doubted:
             self.report(f"{remedy.name}: verified by its hunting cycles")
             case = verified(tuned)
