@@ -117,7 +117,7 @@ def identify_moves(
         fit = fit if fit.explains(noise) else late_by_a_sample(fit)
     case = FitCase(
         log, inverse, share, flat=flat, fit=fit, quality=quality, velocity=moved.velocity,
-        leading=leading, progress=between(progress, REPEATED, 1),
+        leading=None if quality.seen else leading, progress=between(progress, REPEATED, 1),
     )  # fmt: skip
     doubted = judged_fit(case)
     inverse, quality, answer = doubted.inverse, doubted.quality, replace(answer, fit=doubted.fit)

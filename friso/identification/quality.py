@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.identification.doubt import RaisedDoubt, RecordCase, ValueCase, causes, raised
+from friso.identification.doubt import DOUBTS, RaisedDoubt, RecordCase, ValueCase, causes, raised
 from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
@@ -34,7 +34,9 @@ class Quality:
     force: by the inverse model, and by steady friction and mass of the whole model on the samples of the inverse model.
     `findings` are the doubts raised. The whole model may be `rejected`, or nothing holds at all (`failed`). The inverse
     models `without` a cause are of a log rid of what may be wrong with it. A record is `spoilt` where what is wrong
-    with it passes for friction at low speed, and `unsettled` where much is left for which no cause was found.
+    with it passes for friction at low speed, and `unsettled` where much is left for which no cause was found. A cause
+    is `seen` where the samples themselves show it, as a force that clips: no effect is named then that would
+    explain it.
     """
 
     noise: float
@@ -48,6 +50,7 @@ class Quality:
     without: tuple[InverseModel, ...] = ()
     spoilt: bool = False
     unsettled: bool = False
+    seen: bool = False
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -96,9 +99,9 @@ def quality_of(
         reasons = [cause for cause in reasons if cause.without is None or share * cause.without.error < left]
     worse = max(settings.error_ratio_of_a_contradiction * inverse.error, settings.error_of_a_fine_model)
     rejected = not (beyond or poor) and plain.whole_error > worse and plain.lacks_something
-    words = _verdict(
-        plain, [] if led and not poor else reasons, case.unit, poor, rejected, flat["friction.model"] == "none"
-    )
+    seen = any(cause.without is None and DOUBTS[cause.doubt].moment == "cause" for cause in reasons)
+    named = [] if led and not (poor or seen) else reasons
+    words = _verdict(plain, named, case.unit, poor, rejected, flat["friction.model"] == "none")
     findings += [RaisedDoubt(words, plain.ratio, doubt="model")] if words else []
     findings += raised("value", ValueCase(log, inverse, cart_share, plain.lacks_something, poor))
     without = tuple(cause.without for cause in reasons if cause.without)
@@ -112,6 +115,7 @@ def quality_of(
         without=without,
         spoilt=unsettled or any(cause.spoils for cause in reasons),
         unsettled=unsettled,
+        seen=seen,
     )
 
 
