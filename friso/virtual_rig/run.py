@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,7 @@ class RecordedRuns:
     logged: Mapping[str, np.ndarray]
     true: Mapping[str, np.ndarray]
     statuses: np.ndarray
-    statistics: np.ndarray
+    statistics: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     outputs: Mapping[str, np.ndarray] | None = None
 
     @property
