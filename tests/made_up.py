@@ -123,7 +123,8 @@ def fake_stage(
         name=name,
         source="made up",
         joint=joint,
-        controller=SimpleNamespace(note=lambda flat: "", 
+        controller=SimpleNamespace(
+            note=lambda flat: "",
             force_limit=force_limit,
             **{"kp": 3.0, "ki": 4.0, "kd": 6.0, "tau": 0.0},
             bandwidth_name=VanDijk.bandwidth_name,
