@@ -19,6 +19,7 @@ from friso.quantities import (
     Quantity,
     Value,
     at_least_1,
+    exactly,
     inside_0_1,
     non_negative,
     positive,
@@ -282,6 +283,12 @@ class Spec(Section):
             return float(self.machine.crossover_limit)
         frequencies: Sequence[float] = self.machine.parasitic_frequencies or ()
         return min(frequencies) / self.safety.parasitic
+
+    def with_limit(self, crossover: float) -> Spec:
+        """Return the specification with another highest crossover [Hz], whatever its machine allows."""
+        limit = Value(crossover, exactly(crossover, "Hz"))
+        machine = self.machine.model_copy(update={"crossover_limit": limit, "parasitic_frequencies": None})
+        return self.model_copy(update={"machine": machine})
 
 
 EXAMPLE = '[machine] and, on the next line, crossover_limit = "48 Hz"'

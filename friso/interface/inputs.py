@@ -126,7 +126,7 @@ def read_stage(
         tables = ", ".join(f"[{name}]" for name in left)
         bode = "; friso bode takes sampling, delay and current loop into account" if "drive" in left else ""
         verb = "are" if len(left) > 1 else "is"
-        LOGGER.warning(f"{tables} {verb} left out: friso rig simulates the machine as built{bode}")
+        LOGGER.warning(f"{tables} {verb} left out: friso simulate and friso rig run the machine as built{bode}")
     return stage
 
 

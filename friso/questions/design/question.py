@@ -13,9 +13,19 @@ from friso.design_method.outline import outline
 from friso.design_method.prepare import assumed, by_rules, check_designable, offset_points
 from friso.design_method.spec import Spec, load_spec, read_spec
 from friso.interface.answer import Answer, question
-from friso.interface.inputs import AS_BUILT, LOGGER, Changes, StageLike, mention_unstable_loop, read_stage
+from friso.interface.inputs import (
+    AS_BUILT,
+    LOGGER,
+    Changes,
+    FrequencyLike,
+    StageLike,
+    mention_unstable_loop,
+    quantity_of,
+    read_stage,
+)
 from friso.platform.extras import need
 from friso.progress import Progress, silent
+from friso.quantities import Quantity, positive
 from friso.stage import Stage, numeric_keys
 
 
@@ -46,6 +56,7 @@ def design(
     spec: Spec | str | os.PathLike[str] | None = None,
     *,
     set: Changes = None,
+    crossover: FrequencyLike | None = None,
     laws: bool = False,
     progress: Progress = silent,
 ) -> DesignAnswer:
@@ -55,6 +66,8 @@ def design(
     ----------
     spec : path, optional
         The specification: crossover limit, friction, moves, load, space, sheets; default: one made from the stage.
+    crossover : str or float, optional
+        Crossover that can be reached, "20 Hz", in place of the limit in the specification.
     laws : bool
         Take the worst edge of hunting over all friction laws that keep what is measured.
 
@@ -79,6 +92,8 @@ def design(
     chosen = read_stage(stage, set, leaves_out=AS_BUILT[1:])
     check_designable(chosen)
     specification = specification_of(chosen, spec)
+    if crossover is not None:
+        specification = specification.with_limit(quantity_of(crossover, "crossover", Quantity("Hz", positive, "20 Hz")))
     _tell_what_is_assumed(chosen, specification, spec is None)
     mention_unstable_loop(chosen)
     if chosen.drive:
