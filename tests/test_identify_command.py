@@ -235,7 +235,7 @@ BAD_OPTIONS = [
     (["--map", "position=Nowhere"], "Nowhere"),
     (["--map", "speed=ActPos"], "one of time, reference"),
     (["--map", "position"], "two texts separated by ="),
-    (["--as", "dance"], "one of break-away, constant-speed, frequency, moves"),
+    (["--as", "dance"], "one of break-away, constant-speed, frequency, hunting, moves"),
     (["--unit", "ActPos=parrots"], "parrots"),
     (["--scale", "force=heavy"], "heavy"),
     (["--bandwidth", "20 kg"], "--bandwidth"),

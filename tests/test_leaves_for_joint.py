@@ -184,4 +184,5 @@ def test_the_least_change_has_leaves_of_its_own(tuning: Advice, monkeypatch: pyt
     )
     search = SimpleNamespace(remedy=isolator.remedy, tried=[], attracted=0, cut=False, looked_at=iter)
     session._ended(search, iter([np.zeros(0)]))
+    session.makes_leaves()
     assert tried == [isolator.remedy.name]

@@ -196,6 +196,7 @@ def tune(
             with allowance(settings.tuning_work) as session.allowed:
                 several = [remedy for remedy in listed if remedy.buys_joint == joint]
                 session.tries_all(several, pairs if chosen is None and not joint else lambda outcomes, goal: [])
+        session.makes_leaves()
         session.adds_windows()
         if session.outcomes and not session.works:
             session.tries_large_moves()
@@ -473,9 +474,13 @@ class _Session:
         tried = search.points if search.tried else None
         none = RemedyOutcome(search.remedy, None, None, None, (), (), tried, search.attracted, cut=search.cut)
         self.outcomes[-1] = unsure or none
-        last = self.outcomes[-1]
-        if last.remedy.buys_joint and not last.remedy.makes and last.certainty == "works":
-            self._made_of_leaves(last)
+
+    def makes_leaves(self) -> None:
+        """Size leaf springs for every joint that works, and verify them; their search is over, so its work does not
+        limit this."""
+        for one in tuple(self.outcomes):
+            if one.remedy.buys_joint and not one.remedy.makes and one.certainty == "works":
+                self._made_of_leaves(one)
 
     def _verified(self, search: Search, shares: np.ndarray, moves_from: float | None = None) -> RemedyOutcome:
         """Measure a point on fresh machines, and verify it by its cycles if they meet the goal.
