@@ -1,5 +1,6 @@
 """The stage: all tables together, and the flat SI mapping that the equations read."""
 
+import logging
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from copy import deepcopy
@@ -53,6 +54,8 @@ from friso.stage.tables import (
     friction_law,
 )
 from friso.stage.transmission import MOTOR_FRICTION, MOTOR_MASS, Encoder, Transmission, motor_mass, of_motor
+
+LOGGER = logging.getLogger("friso")
 
 _FRICTION = Table(FRICTION.pick, '[friction] model = "lugre" ...')
 _TRANSMISSION = Table(lambda _: Transmission, '[transmission] inertia = "1.2e-4 kg*m^2", lead = "10 mm" ...')
@@ -342,14 +345,17 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
     except StageError as error:
         name = error.key.partition(".")[0]
         kept = {*OF_ANY_FORM, *(key.partition(".")[2] for key in changes)}
-        others = [key for key in tables.get(CONTROLLER) or () if key not in kept]
+        table = tables.get(CONTROLLER)
+        others = [key for key in table if key not in kept] if isinstance(table, dict) else []
         if error.key == CONTROLLER and others and any(key.startswith(f"{CONTROLLER}.") for key in changes):
             for key in others:
                 del tables[CONTROLLER][key]
             try:
-                return Stage(**tables)
+                replaced = Stage(**tables)
             except StageError as other:
                 raise error if other.key == CONTROLLER else other from None
+            LOGGER.warning(f"[controller] is of another form now: {', '.join(others)} are gone")
+            return replaced
         begun = [key for key in changes if key.startswith(f"{name}.")]
         if name in own or not begun or not error.actual.startswith("nothing"):
             raise
