@@ -39,7 +39,7 @@ MASKED = (
     (re.compile(r"\b(took|takes) \d+(?:\.\d+)? ?(?:ms|s|min|h)\b"), r"\1 TIME"),
     (re.compile(r"\b\d+(?:\.\d+)?(?:e[-+]?\d+)? (?=(?:minutes|hours) on )"), "TIME "),
     (re.compile(r"(?<=VERSION) with (?:controller|friction law) [^)]*\)(?: and friction law [^)]*\))*"), ""),
-    (re.compile(r'(?<="pid"), "[\w-]+"'), ""),
+    (re.compile(r'(?<="transfer_function"), "[\w-]+"'), ""),
     (re.compile(r"(?<=\d ± )\d+(?:\.\d+)?(?:e-?\d+)?"), "ERROR"),
 )
 

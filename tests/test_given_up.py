@@ -190,7 +190,7 @@ def test_no_edge_is_more_certain_than_the_verdict_or_than_large_motions_are_boun
         ((NONE, NONE, None), True),
         ((HUNTING, replace(NONE, unknown=2), None), False),
         ((replace(HUNTING, unknown=2), NONE, None), True),
-        ((NONE, NONE, MoveShare(100, 0, (1.0, 2.0), (0.1, 0.2))), False),
+        ((NONE, NONE, MoveShare(100, 0, {"motion.acceleration": (1.0, 2.0)})), False),
     ],
 )
 def test_no_kick_or_move_starts_hunting_only_if_all_were_run(starts: Any, certain: bool) -> None:
