@@ -87,7 +87,6 @@ def own_bandwidth(monkeypatch: pytest.MonkeyPatch) -> None:
     """Checks search no other bandwidths than a stage's own, which takes most of their time: what they say of the stage
     itself does not depend on it."""
     monkeypatch.setattr("friso.hunting.verdict.search_bandwidths", lambda *how: NOT_SOUGHT)
-    monkeypatch.setattr("friso.hunting.verdict.followed_on", lambda stage, sought: sought)
 
 
 @pytest.fixture(scope="session", autouse=True)

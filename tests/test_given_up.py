@@ -221,7 +221,6 @@ def test_a_longer_run_that_is_given_up_tells_nothing_of_settling(budget: int, wo
     made_up = {
         "hunting": lambda *_, **__: attraction,
         "search_bandwidths": lambda *_: NOT_SOUGHT,
-        "followed_on": lambda stage, sought: sought,
         "measuring_options": lambda *_: replace(measuring_options(1e-6), budget=budget),
     }
     with patched({verdict: made_up}), allowance() as spent:

@@ -16,7 +16,6 @@ from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.outward import AttractionEnd, BandwidthWindow, Beyond, EdgeSearch
-from friso.hunting.restabilised import windows_again
 from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import sketched, what_attracts
 from friso.stage import Stage
@@ -62,8 +61,6 @@ class SearchedBandwidths:
     - `contradicts`: an orbit was followed to a stage that seemed to have no attractor.
     - `to_the_top`: something attracts up to the highest bandwidth, so that there is no edge.
     - `undecided`: no edge was found, but something may attract at some bandwidth.
-    - `last_returns`: factors at which an unstable cycle may exist while none does at the next one, each with the end of
-      the range on that side.
     """
 
     margin: Margin | None
@@ -72,7 +69,6 @@ class SearchedBandwidths:
     contradicts: bool = False
     to_the_top: bool = False
     undecided: bool = False
-    last_returns: tuple[tuple[float, float], ...] = ()
 
 
 NOT_SOUGHT = SearchedBandwidths(None, ())
@@ -111,27 +107,15 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     edge = edge or grid.last_edge(index, attracting)
     lower = grid.lower_end(index) if attracting else None
     windows = grid.windows(index if edge is None else edge[0])  # these may be followed to the stage itself
-    contradicts, returns = bool(grid.attracts[index]) and not attracting, grid.last_returns()
+    contradicts = bool(grid.attracts[index]) and not attracting
     if edge is None:
         to_the_top = bool((grid.attracts & grid.decided)[index:].all())
         undecided = not grid.decided[grid.lowest :].all()
-        return SearchedBandwidths(None, windows, lower, contradicts, to_the_top, undecided, returns)
+        return SearchedBandwidths(None, windows, lower, contradicts, to_the_top, undecided)
     _, end, certain = edge
     inside = None if crossover is None else crossover * end.inside
     outermost = Margin(end.inside, inside, certain and not contradicts, end.outside)
-    return SearchedBandwidths(outermost, windows, lower, contradicts, last_returns=returns)
-
-
-def followed_on(stage: Stage, sought: SearchedBandwidths) -> SearchedBandwidths:
-    """Add windows in which an unstable cycle becomes stable again,
-    next to the fold in which it ends.
-
-    The search stops where an allowance is used up.
-    """
-    windows = sought.windows
-    for at, farthest in sought.last_returns:
-        windows += windows_again(stage.flat(), at, farthest, windows)
-    return replace(sought, windows=windows)
+    return SearchedBandwidths(outermost, windows, lower, contradicts)
 
 
 class _Grid:
@@ -142,7 +126,6 @@ class _Grid:
         """Survey the stages at factors from number `first` on. Raises Exhausted."""
         self.flat, self.factors, self.lowest = flat, factors, first
         self.attracts, self.decided, self.passed = (np.zeros(len(factors), bool) for _ in range(3))
-        self.returns, self.resolved = np.zeros(len(factors), bool), np.zeros(len(factors), bool)
         self.motions: list[list[Swinging]] = [[] for _ in factors]
         self.ends: dict[tuple[int, int], AttractionEnd] = {}
         self.inspected: set[int] = set()
@@ -166,7 +149,6 @@ class _Grid:
         settings = EdgeSettings.current()
         sketch = sketched(self._stages(numbers))
         self.attracts[numbers], self.decided[numbers] = sketch.attracts, sketch.decided
-        self.returns[numbers], self.resolved[numbers] = sketch.returns, sketch.decided
         left = numbers[~sketch.decided]
         left = left[np.argsort(np.abs(np.log(self.factors[left])), kind="stable")]
         at_once, work = (
@@ -308,19 +290,6 @@ class _Grid:
             quiet = np.flatnonzero(self.factors < end.inside)[-2:]
             return end if quiet.size and self.decided[quiet].all() and not self.attracts[quiet].any() else None
         return None
-
-    def last_returns(self) -> tuple[tuple[float, float], ...]:
-        """Return factors without an attractor whose unstable cycles end before the next factor.
-
-        Each comes with the end of the range on that side.
-        """
-        ends = []
-        for ahead, farthest in ((1, HIGHEST), (-1, LOWEST)):
-            beyond = np.roll(~self.returns & self.resolved, -ahead)
-            last = self.returns & self.resolved & beyond & ~self.attracts
-            last[-1 if ahead > 0 else 0] = False
-            ends += [(float(factor), farthest) for factor in self.factors[last]]
-        return tuple(ends)
 
     def windows(self, besides: int) -> tuple[BandwidthWindow, ...]:
         """Return the windows of factors with an attractor,

@@ -59,12 +59,6 @@ class BandwidthWindow:
     low: AttractionEnd | None
     high: AttractionEnd | None
 
-    @property
-    def narrow(self) -> bool:
-        """Tell whether the window is too narrow for a machine to stay in it."""
-        settings = EdgeSettings.current()
-        return bool(self.low and self.high and self.high.inside < self.low.inside * (1 + settings.narrow_window_share))
-
     def holds(self, factor: float) -> bool:
         """Tell whether something attracts at a factor."""
         low, high = self.low.inside if self.low else 0.0, self.high.inside if self.high else np.inf

@@ -121,9 +121,6 @@ class EdgeSettings(Settings):
     """First factor beyond an edge at which nothing may attract: the edge is known to a hundredth, rounded to four
     digits."""
 
-    narrow_window_share: float = setting(1e-3, "of the bandwidth")
-    """No machine holds its bandwidth as exactly: narrower ones are only in --details."""
-
     most_orbits_followed: int = setting(8, "")
     """Beyond the end of one orbit another may attract; more than eight in a row were not met."""
 
@@ -135,18 +132,6 @@ class EdgeSettings(Settings):
 
     reach_log: float = setting(0.06, "log of bandwidth")
     """First distance at which attractors are looked for ahead, doubled each time; a longer one wastes surveys."""
-
-    window_pace: float = setting(8.0, "")
-    """Branches of unstable cycles are only followed to where they become stable again."""
-
-    shortest_window_step: float = setting(1e-5, "log of bandwidth")
-    """A branch that needs shorter steps is lost, and no window is reported."""
-
-    steepest_window_multiplier: float = setting(1000.0, "")
-    """Next to a fold, cycles are this unstable before they become stable again."""
-
-    least_window_error: float = setting(1e-5, "of the bandwidth")
-    """Ends of windows are no more exact than multipliers."""
 
     simulated_work: float = setting(1e8, "")
     """Work for simulations at bandwidths without a map: the rest of a check needs work too."""
@@ -209,9 +194,6 @@ class CheckSettings(Settings):
 
     kick_work_share: float = setting(0.3, "")
     """Work for kicks and moves; the search for the edge gets everything that is left."""
-
-    beyond_edge_work: float = setting(1.5e8, "")
-    """Work, beside that of a check, for following cycles beyond the edge."""
 
     small_swing_factor: float = setting(12.0, "")
     """A motion that swings by less than the attractor is followed for this many times longer: it may still grow."""

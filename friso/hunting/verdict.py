@@ -36,7 +36,7 @@ from friso.hunting.cycle.hunting import (
 )
 from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.loop import leaves_for_good, may_run_away
-from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths, followed_on, search_bandwidths
+from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths, search_bandwidths
 from friso.hunting.measures import Measures, measuring_options
 from friso.hunting.motions import Motions, followed_motions, keeps_moving, resting, run_motions
 from friso.hunting.outward import AttractionEnd, BandwidthWindow
@@ -381,8 +381,6 @@ def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBan
     attracting = attraction.target is not None
     with allowance(work) as search:
         sought = search_bandwidths(stage, attracting, attraction.surveyed)
-    with allowance(CheckSettings.current().beyond_edge_work):
-        sought = followed_on(stage, sought)
     left = CheckPart.LOWER_BANDWIDTHS if sought.to_the_top else CheckPart.BANDWIDTHS
     return sought, (left,) if search.exhausted or sought.undecided else ()
 

@@ -129,13 +129,11 @@ def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | 
 class Sketch:
     """Result of coarse return maps of stages, arrays of shape (count,).
 
-    Something seems to attract a stage, `attracts`; this is `decided`; the stage `returns` as far from some distance, so
-    that it has a cycle, stable or not.
+    Something seems to attract a stage, `attracts`, and this is `decided`.
     """
 
     attracts: np.ndarray
     decided: np.ndarray
-    returns: np.ndarray
 
 
 @np.errstate(all="ignore")
@@ -147,8 +145,8 @@ def sketched(stages: Ensemble) -> Sketch:
     """
     mapped, decided = _sketch(stages)
     if mapped is None:
-        return Sketch(decided, decided, decided)
-    return Sketch(mapped.attracts, decided, np.array([landing_map.returns for landing_map in mapped.maps]))
+        return Sketch(decided, decided)
+    return Sketch(mapped.attracts, decided)
 
 
 def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:

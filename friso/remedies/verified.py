@@ -275,7 +275,7 @@ def unsettled_parts(case: Case, measured: Performance, goal: Goal) -> tuple[str,
         1 + settings.rounded_share
     ):
         listed.append("bandwidth")
-    if any(_near(window.low, window.high, goal.distance) for window in judgement.windows if not window.narrow):
+    if any(_near(window.low, window.high, goal.distance) for window in judgement.windows):
         listed.append("window")
     if case.unstable or measured.own_margin < goal.margin * (1 - settings.rounded_share):
         listed.append("own margin")

@@ -230,19 +230,6 @@ class LandingMap:
         return float(np.abs(np.prod(slopes[np.searchsorted(begins, self._places(attractor.distances), "right") - 1])))
 
     @property
-    def returns(self) -> bool:
-        """Tell whether the map has a fixed point of distance: landings as far off,
-        and less far from beyond.
-
-        For symmetric stages this is a cycle, stable or not; for others it only may be one.
-        """
-        for side in self.sides:
-            gain = self.gain[self.points(side)]
-            if len(gain) < 2 or not np.any((gain[:-1] > 1) & (gain[1:] <= 1) & (gain[1:] > 0)):
-                return False
-        return True
-
-    @property
     def scatter(self) -> tuple[float, float]:
         """Return the largest relative difference of a landing from the prediction by its neighbours,
         and its distance.

@@ -368,9 +368,9 @@ def _elsewhere(case: Case) -> str | None:
     return None if controller.bandwidth_name == "crossover" else controller.bandwidth_key
 
 
-def _windows(case: Case, narrow: bool = False) -> list[str]:
-    """Say where else in bandwidth something attracts, in narrow windows or in others."""
-    places = [_window(case, window) for window in case.judgement.windows if window.narrow == narrow]
+def _windows(case: Case) -> list[str]:
+    """Say where else in bandwidth something attracts."""
+    places = [_window(case, window) for window in case.judgement.windows]
     return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
 
 
@@ -389,17 +389,13 @@ def _window(case: Case, window: BandwidthWindow) -> str:
 
 
 def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
-    """Say what the survey of bandwidths may have missed between its steps.
-
-    Windows too narrow for any machine to stay in are listed as well.
-    """
+    """Say what the survey of bandwidths may have missed between its steps."""
     if all(case.judgement.margin is None for case in cases.values()):
         return []
     low, high = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
     steps = SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond
     fine, coarse = (percent(10 ** (1 / count) - 1) for count in steps)
     return [
-        *(f"{item.label}: {sentence}" for item in shown_cases(cases) for sentence in _windows(item.case, narrow=True)),
         f"Bandwidths from {low:g} to {high:g} times this one were surveyed, {fine} or {coarse} apart. Other ranges in "
         "which the stage hunts, narrower than these steps, may lie between (friso boundary follows cycles from more "
         "bandwidths).",
