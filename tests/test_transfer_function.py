@@ -56,6 +56,8 @@ def ways(numerator: list[float], denominator: list[float]) -> dict[str, dict[str
 TRANSFERS = {
     "pid": (NUMERATOR, DENOMINATOR),
     "lead": ([4e3, 4e5], [1.0, 300.0]),
+    "lag beside a filter": ([2e6, 4e7, 3e8], [1.0, 500.7, 9e4 + 350, 63e3]),
+    "nearly an integral": (NUMERATOR, [TAU, 1.0, 1e-5]),
     "third order": ([2e6, 4e7, 3e8], [1.0, 500.0, 9e4, 0.0]),
     "resonant": ([3e4, 1e6, 8e8, 5e9, 2e10], [1.0, 420.0, 1.3e5, 3e7, 0.0]),
 }
@@ -130,6 +132,43 @@ def test_coefficients_for_samples_run_as_they_are(transfer: tuple[list[float], l
     assert command == pytest.approx(by_hand[: len(command)], abs=1e-8 * np.abs(by_hand).max())
 
 
+@pytest.mark.parametrize("divided", [1, 4])
+def test_the_integral_unwinds_by_its_own_samples(divided: int) -> None:
+    """By hand: a PI controller at every 2 ms, back calculation within 20 ms, and a drive that samples more often."""
+    step, unwinding, limit, inside = 2e-3, 20e-3, 3.0, 0.0
+    numerator, denominator = [6e4 + 6e5 * step / 2, 6e5 * step / 2 - 6e4], [1.0, -1.0]
+    keys = {"numerator": numerator, "denominator": denominator, "sample_time": "2 ms", "force_limit": "3 N"}
+    keys |= {"anti_windup": "back_calculation", "anti_windup_time": "20 ms"}
+    stage = controlled(keys, drive={"sample_time": f"{step / divided!r} s"})
+    answer = friso.simulate(stage, sample_time=step / divided)
+    error = (answer["reference"] - answer["measured_position"]).to_numpy()[::divided]
+    force, before = [], 0.0
+    for now in error:
+        inside += 6e5 * step / 2 * (now + before)
+        force.append(6e4 * now + inside)
+        inside += step / unwinding * (np.clip(force[-1], -limit, limit) - force[-1])
+        before = now
+    assert np.abs(force).max() > 2 * limit
+    by_hand = np.repeat(np.clip(force, -limit, limit), divided)
+    command = answer["command"].to_numpy()
+    assert command == pytest.approx(by_hand[: len(command)], abs=1e-8)
+
+
+def test_a_pole_and_a_zero_at_zero_cancel() -> None:
+    by_hand = np.polyval([2e5, 2.4e7], 1j * OMEGA) / np.polyval([1.0, 400.0], 1j * OMEGA)
+    flat = controlled({"numerator": [2e5, 2.4e7, 0.0], "denominator": [1.0, 400.0, 0.0]}).flat()
+    assert np.abs(response(flat, 1j * OMEGA) / by_hand - 1).max() < 1e-9
+
+
+@pytest.mark.parametrize("pole", [0.0, 1e-3, 0.1])
+def test_a_slow_pole_winds_up_as_an_integral_does(pole: float) -> None:
+    """A pole that leaks within 10 s or more changes little on a cycle of 0.6 s."""
+    numerator, denominator = [95.0, 6250.0, 1e5], [2.5e-3, 1.0, pole]
+    (cycle,) = hunting(controlled({"numerator": numerator, "denominator": denominator})).attracting
+    assert cycle.amplitude == pytest.approx(157e-6, rel=0.02)
+    assert cycle.period == pytest.approx(0.634, rel=0.02)
+
+
 def test_a_verdict_says_that_it_is_on_the_continuous_equivalent() -> None:
     numerator, denominator, _ = signal.cont2discrete((NUMERATOR, DENOMINATOR), SAMPLE, "bilinear")
     keys = {"numerator": [*map(float, numerator.ravel())], "denominator": [*map(float, denominator)]}
@@ -159,6 +198,15 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "improper": ({"numerator": [1.0, 2.0, 3.0], "denominator": [1.0, 4.0]}, "proper"),
     "unstable": ({"numerator": [100.0, 200.0], "denominator": [1.0, -3.0, 0.0]}, "stable"),
     "unstable in z": ({"numerator": [5.0, 4.0], "denominator": [1.0, -1.1], "sample_time": "1 ms"}, "stable"),
+    "lowest power first": (
+        {"numerator": [1e5, 6250.0, 95.0], "denominator": [0.0, 1.0, 0.0025]},
+        "highest powers first",
+    ),
+    "a pole that rounding moved": (
+        {"numerator": [5e4, -4.9e4], "denominator": [1.0, -1.8182, 0.81819999], "sample_time": "1 ms"},
+        "all their digits",
+    ),
+    "no gain": ({"zeros": [-6.0], "poles": [0.0, -400.0]}, "gain before"),
     "two integrals": ({"numerator": [100.0, 200.0], "denominator": [1.0, 0.0, 0.0]}, "one integral"),
     "at z = -1": ({"numerator": [5.0, 4.0], "denominator": [1.0, 1.0], "sample_time": "1 ms"}, "z = -1"),
     "pushes away": ({"numerator": [-100.0], "denominator": [1.0, 3.0]}, "pulls back"),

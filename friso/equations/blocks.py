@@ -187,10 +187,11 @@ class Blocks(ABC):
         name: str = "integral",
         rule: IntegralRule = "bilinear",
         limit: sp.Expr | None = None,
+        leak: sp.Expr | None = None,
     ) -> Signal:
-        """gain/s; the gain is positive, and the controller's force rises with the output. Where that force is at its
-        limit, the integrator does what the anti-windup prescribes; where its own output is at a `limit`, it rests. A
-        drive integrates by the `rule`, if its own is not another one."""
+        """gain/s, or gain/(s + leak); the gain is positive, and the controller's force rises with the output. Where
+        that force is at its limit, the integrator does what the anti-windup prescribes; where its own output is at a
+        `limit`, it rests. A drive integrates by the `rule`, if its own is not another one."""
 
     @abstractmethod
     def biquad(

@@ -113,8 +113,8 @@ class ForceLimit:
 
 @dataclass(frozen=True)
 class _Integral:
-    """An integrator's state, what it integrates (also in a steady motion), its magnitude, its output, and the limit of
-    that."""
+    """An integrator's state, what it integrates (also in a steady motion), its magnitude, its output, the limit of
+    that, and the rate at which it leaks."""
 
     symbol: sp.Symbol
     integrand: sp.Expr
@@ -122,6 +122,7 @@ class _Integral:
     scale: sp.Expr
     output: sp.Expr
     limit: sp.Expr | None
+    leak: sp.Expr | None
 
 
 class Continuous(Blocks):
@@ -161,11 +162,13 @@ class Continuous(Blocks):
         name: str = "integral",
         rule: IntegralRule = "bilinear",
         limit: sp.Expr | None = None,
+        leak: sp.Expr | None = None,
     ) -> Signal:
         """By a state, which rests as the base class describes; `gain` in N per unit of the state."""
         symbol = state(name)
         output = gain * symbol
-        self._integrals.append(_Integral(symbol, signal.value, signal.settled, signal.scale / self.rate, output, limit))
+        scale = signal.scale / self.rate
+        self._integrals.append(_Integral(symbol, signal.value, signal.settled, scale, output, limit, leak))
         return Signal(output, gain * signal.scale / self.rate, output, sp.S.Zero, rate=gain * signal.value)
 
     def biquad(
@@ -277,6 +280,8 @@ class Continuous(Blocks):
             derivative = integral.integrand * self.gains * share * going
             if self.settings.leak:
                 derivative -= 2 * sp.pi * self.key("integral_leak") * integral.symbol
+            if integral.leak is not None:
+                derivative -= integral.leak * integral.symbol
             if bound and bound.anti_windup == BACK_CALCULATION:  # Astrom and Hagglund, Advanced PID Control, 3.5
                 gain = len(self._integrals) * sp.diff(demand.total.value, integral.symbol)
                 derivative += bound.cut / (gain * unwinding_time())

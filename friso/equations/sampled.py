@@ -69,13 +69,21 @@ def sampled_controller(
 
 @dataclass(frozen=True)
 class _Integral:
-    """An integrator's number, its next one, what a sample adds to it, its gain, and the limit of its output."""
+    """An integrator's number, its next one, what a sample adds to it, its gain, the limit of its output, its leak, the
+    period of its loop, and when that is due (None: at every sample)."""
 
     symbol: sp.Symbol
     next: sp.Symbol
     share: sp.Expr
     gain: sp.Expr
     limit: sp.Expr | None
+    leak: sp.Expr | None
+    period: sp.Expr
+    due: Any
+
+    def when_due(self, value: Any, otherwise: Any = 0) -> Any:
+        """Return a value where the loop of the integrator is due."""
+        return value if self.due is None else Piecewise((value, self.due), (otherwise, True))
 
 
 @dataclass(frozen=True)
@@ -187,6 +195,7 @@ class Sampled(Blocks):
         name: str = "integral",
         rule: IntegralRule = "bilinear",
         limit: sp.Expr | None = None,
+        leak: sp.Expr | None = None,
     ) -> Signal:
         """Return a number that a sample adds to; `gain` in N per unit of it.
         Raises ValueError for an unknown rule."""
@@ -200,9 +209,8 @@ class Sampled(Blocks):
             if before is None:
                 before = self._previous(f"{name}_signal_before", signal.value, signal.settled)
             share = self.period * before if rule == "forward_euler" else self.period / 2 * (signal.value + before)
-        if self.due is not None:
-            share = Piecewise((share, self.due), (0, True))
-        self._integrals.append(_Integral(symbol, following, share, gain, limit))
+        integral = _Integral(symbol, following, share, gain, limit, leak, self.period, self.due)
+        self._integrals.append(replace(integral, share=integral.when_due(share)))
         return Signal(gain * following, gain * signal.scale * self.period, gain * symbol, sp.S.Zero)
 
     def biquad(
@@ -316,10 +324,11 @@ class Sampled(Blocks):
                 within: Any = clipped(unlimited, force_limit())
                 cut = within - unlimited
                 gain = len(self._integrals) * sp.diff(demand.total.value, integral.next)
-                following += SAMPLE_TIME * cut / (gain * unwinding_time())
+                following += integral.when_due(integral.period * cut / (gain * unwinding_time()))
             kept = Piecewise((share, rest.restarts), (integral.symbol, rests), (following, True))
-            leak = 2 * sp.pi * self.key("integral_leak") * SAMPLE_TIME if self.settings.leak else 0  # backward Euler
-            updates[integral.next] = kept / (1 + leak)
+            leak = (2 * sp.pi * self.key("integral_leak") if self.settings.leak else 0) + (integral.leak or 0)
+            left = 1 + integral.when_due(leak * integral.period) if leak else 1  # backward Euler
+            updates[integral.next] = kept / left
         steady: dict[Any, Any] = {**wound_up(demand.force.settled, [integral.symbol for integral in self._integrals])}
         updated: list[tuple[Any, Any]] = [(held.update, held.settled) for held in self.held]
         held = [

@@ -121,8 +121,11 @@ class Stage(Section):
             '[parasitic] mass = "0.25 kg" with [masses] stage = "0.5 kg"',
         ),
         Rule(
-            ("controller.anti_windup_time", "drive.sample_time"),
-            lambda f: f.get("controller.anti_windup_time", np.inf) >= f.get("drive.sample_time", 0.0),
+            ("controller.anti_windup_time", "drive.sample_time", "drive.position_sample_time"),
+            lambda f: (
+                f.get("controller.anti_windup_time", np.inf)
+                >= np.maximum(f.get("drive.sample_time", 0.0), f.get("drive.position_sample_time", 0.0))
+            ),
             "an anti-windup time of at least one sample: in a shorter one the integrator overshoots at every sample",
             '[controller] anti_windup_time = "50 ms" with [drive] sample_time = "50 us"',
         ),

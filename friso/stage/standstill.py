@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple, Self
 
+import numpy as np
 from pydantic import model_validator
 
 from friso.errors import StageError
@@ -104,4 +105,5 @@ def dead_band(flat: Mapping[str, Any]) -> Any:
 def integral_leak(flat: Mapping[str, Any]) -> Any:
     """Return the frequency of the leak of integrals [Hz], of stages given as flat keys;
     0 without one."""
-    return flat.get("controller.integral_leak", 0.0)
+    own = flat.get("controller.parts.leak", 0.0) * flat.get("controller.speed", 1.0) / (2 * np.pi)
+    return flat.get("controller.integral_leak", 0.0) + own

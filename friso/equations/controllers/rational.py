@@ -1,7 +1,8 @@
 """Controllers that are given as a transfer function of the error, in one form or another: what they have in common.
 
-The transfer function is gain k0/s + gain R(s): an integral, which winds up, beside sections of the second order. One
-for samples is turned by the bilinear transform (Tustin), which a drive with these samples turns back exactly.
+The transfer function is gain k0/(s + p) + gain R(s): an integral, which winds up and may leak at a rate p, beside
+sections of the second order. One for samples is turned by the bilinear transform (Tustin), which a drive with these
+samples turns back exactly.
 """
 
 from __future__ import annotations
@@ -41,11 +42,13 @@ class TransferRoots(NamedTuple):
 
 
 class RationalTerms(NamedTuple):
-    """Terms that are present: the integral, the poles beside it, and whether coefficients are for samples."""
+    """Terms that are present: the integral, the poles beside it, whether coefficients are for samples, and whether the
+    integral leaks."""
 
     integral: bool
     order: int
     sampled: bool
+    leaks: bool = False
 
 
 def _divides(flat: Mapping[str, Any]) -> Any:
@@ -104,11 +107,12 @@ class RationalController(ControllerSection):
         orders = (number for number in range(1, len(flat)) if cls.key(f"{PARTS}.{number}.b1") not in flat)
         sections = next(orders) - 1
         odd = sections > 0 and cls.key(f"{PARTS}.{sections}.a2") not in flat
-        return RationalTerms(cls.integrates(flat), 2 * sections - odd, SAMPLE_TIME in flat)
+        leaks = cls.key(f"{PARTS}.leak") in flat
+        return RationalTerms(cls.integrates(flat), 2 * sections - odd, SAMPLE_TIME in flat, leaks)
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
-        """Tell whether the transfer function has a pole at s = 0 (z = 1)."""
+        """Tell whether the transfer function has a pole at s = 0 (z = 1), or a lag that winds up as one does."""
         return cls.key(f"{PARTS}.integral") in flat
 
     @classmethod
@@ -148,7 +152,9 @@ class RationalController(ControllerSection):
                 rest = blocks.transfer(rest, upper, lower, f"section_{number}", rule)
             shares = {"r": blocks.handed_on(rest * (gain * blocks.key(f"{PARTS}.stiffness")), "rest")}
             if variant.integral:
-                integral = blocks.integral(measured.error, gain * speed * blocks.key(f"{PARTS}.integral"))
+                leak = speed * blocks.key(f"{PARTS}.leak") if variant.leaks else None
+                rate = gain * speed * blocks.key(f"{PARTS}.integral")
+                integral = blocks.integral(measured.error, rate, leak=leak)
                 shares = {"i": integral, **shares}
         return shares
 
@@ -171,8 +177,7 @@ def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, 
     if np.count_nonzero(infinite) > 1:
         raise _wrong("two poles or more at 0 (z = 1)", "one integral at most")
     if np.any(np.real(poles) <= 0):
-        worst = roots.poles[np.argmax(np.abs(roots.poles)) if sample_time else np.argmax(np.real(roots.poles))]
-        raise _wrong(f"a pole at {worst:.6g}", "a stable transfer function; an integral, a pole at 0 (z = 1), is fine")
+        raise _unstable(roots.poles, sample_time)
     poles = poles[~infinite]
     if len(zeros) > len(poles) + bool(infinite.any()):
         counts = f"{len(zeros)} zeros and {len(poles) + bool(infinite.any())} poles"
@@ -180,10 +185,16 @@ def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, 
     keys: dict[str, float] = {}
     stiffness = scale
     if infinite.any():
-        upper, lower = _expanded(zeros), _expanded(poles)
-        gap = np.array([a - b for a, b in zip_longest(upper, lower, fillvalue=0.0)])[1:]
-        keys[f"{PARTS}.integral"], stiffness = scale, scale * (gap[0] if gap.size else 0.0)
-        zeros = -np.roots(np.trim_zeros(gap / gap[0], "b")) if gap.size and gap[0] else np.zeros(0)
+        share, stiffness, zeros = _beside(0.0, zeros, poles)
+        keys[f"{PARTS}.integral"], stiffness = scale * share, scale * stiffness
+    elif poles.size and (slowest := poles[np.argmax(np.abs(poles))]).imag == 0:
+        rest, leak = poles[poles != slowest], 1 / slowest.real
+        share, static, others = _beside(leak, zeros, rest)
+        if share > 0 and static * leak > AT_ZERO and len(rest) + 1 == len(poles):
+            # as a drive's integrators leak, by backward Euler, the pole in z is the very one of the file
+            half = leak * (sample_time or 0.0) / 2
+            keys |= {f"{PARTS}.integral": scale * leak * share / (1 - half), f"{PARTS}.leak": leak / (1 - half)}
+            stiffness, zeros, poles = scale * leak * static, others, rest
     keys[f"{PARTS}.stiffness"] = stiffness
     if not stiffness > 0 or (infinite.any() and not scale > 0):
         actual = f"a static stiffness of {stiffness:.6g}{' beside the integral' if infinite.any() else ''}"
@@ -193,6 +204,17 @@ def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, 
         keys |= {f"{PARTS}.{number}.b1": b1, f"{PARTS}.{number}.a1": a1}
         keys |= {} if a2 is None else {f"{PARTS}.{number}.b2": b2 or 0.0, f"{PARTS}.{number}.a2": a2}
     return {ControllerSection.key(name): float(value) for name, value in keys.items()}
+
+
+def _beside(leak: float, zeros: np.ndarray, poles: np.ndarray) -> tuple[float, float, np.ndarray]:
+    """Return k0, R(0) and the times of the zeros of R, where prod(1 + t s) of zeros over (s + leak) prod(1 + t s) of
+    poles is k0/(s + leak) + R(s)."""
+    upper, lower = _expanded(zeros), _expanded(poles)
+    at_the_pole = [np.polyval(part[::-1], -leak) for part in (upper, lower)]
+    share = float(at_the_pole[0] / at_the_pole[1])
+    gap = np.array([a - share * b for a, b in zip_longest(upper, lower, fillvalue=0.0)])
+    gap = np.polydiv(gap[::-1], [1.0, leak])[0][::-1] if gap.size > 1 else np.zeros(1)
+    return share, float(gap[0]), -np.roots(np.trim_zeros(gap / gap[0], "b")) if gap[0] else np.zeros(0)
 
 
 def _times(roots: TransferRoots, sample_time: float | None) -> tuple[np.ndarray, np.ndarray, float]:
@@ -210,6 +232,13 @@ def _times(roots: TransferRoots, sample_time: float | None) -> tuple[np.ndarray,
     (upper, upper_rate), (lower, lower_rate) = pairs
     largest = 1.0 if sample_time is not None else np.abs(poles).max(initial=0.0)
     lower = np.where(np.abs(lower) <= AT_ZERO * largest, 0.0, lower)
+    upper = np.where(np.abs(upper) <= AT_ZERO * largest, 0.0, upper)
+    if np.any(upper == 0) and np.any(lower == 0):  # both cancel
+        (upper, upper_rate), (lower, lower_rate) = (
+            (np.delete(part, first), np.delete(rate, first))
+            for part, rate in ((upper, upper_rate), (lower, lower_rate))
+            for first in [int(np.argmax(part == 0))]
+        )
     if np.any(upper == 0):
         raise _wrong("a zero at 0 (z = 1)", "a controller that pulls back: static stiffness greater than 0")
     free = lower == 0
@@ -241,6 +270,17 @@ def _wrong(actual: str, expected: str) -> InputError:
     return InputError(CONTROLLER, actual, expected)
 
 
+def _unstable(poles: np.ndarray, sample_time: float | None) -> InputError:
+    """Make the error of a pole that is not stable, in s or in z."""
+    if sample_time is None:
+        worst = poles[np.argmax(np.real(poles))]
+        expected = "poles left of 0, and one at 0 for an integral; a transfer function in z needs its sample_time"
+        return _wrong(f"a pole at s = {worst:.10g}", f"a stable transfer function: {expected}")
+    worst = poles[np.argmax(np.abs(poles))]
+    expected = "poles within the unit circle, and one at 1 for an integral, with all their digits; a transfer function"
+    return _wrong(f"a pole at z = {worst:.10g}", f"a stable transfer function: {expected} in s has no sample_time")
+
+
 def polynomial_roots(numerator: Sequence[float], denominator: Sequence[float]) -> TransferRoots:
     """Return the roots of a quotient of polynomials, their highest powers first. Raises InputError."""
     upper, lower = (np.trim_zeros(np.asarray(part, float), "f") for part in (numerator, denominator))
@@ -248,6 +288,7 @@ def polynomial_roots(numerator: Sequence[float], denominator: Sequence[float]) -
         raise _wrong("coefficients that are all 0", "a transfer function")
     if len(upper) > len(lower):
         raise _wrong(
-            f"a numerator of degree {len(upper) - 1} over a denominator of degree {len(lower) - 1}", "a proper one"
+            f"a numerator of degree {len(upper) - 1} over a denominator of degree {len(lower) - 1}",
+            "a proper transfer function, the highest powers first",
         )
     return TransferRoots(np.roots(upper), np.roots(lower), float(upper[0] / lower[0]))

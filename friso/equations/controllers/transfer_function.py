@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
+from pydantic import model_validator
 
 from friso.equations.controllers.rational import RationalController, TransferRoots, polynomial_roots
+from friso.errors import InputError, StageError
 from friso.stage import Rule, register_controller
 from friso.stage.filters import FILTER_ARRAY
 from friso.stage.lists import Coefficients, Rows, Values, element_keys, row_keys
@@ -50,13 +52,17 @@ class TransferFunction(RationalController):
 
     rules: ClassVar[tuple[Rule, ...]] = RationalController.rules
 
+    @model_validator(mode="after")
+    def _roots_have_a_gain(self) -> Self:
+        if self.poles is not None and self.denominator is None and "gain" not in self.model_fields_set:
+            raise StageError("gain", "nothing", "the gain before the product of zeros over poles, in SI", "gain = 2e3")
+        return self
+
     @classmethod
     def roots(cls, flat: Mapping[str, Any]) -> TransferRoots:
         """Return zeros, poles and gain, whichever way they are given. Raises InputError."""
         if _ways(flat) != 1:
             actual = "none of them" if not _ways(flat) else "several of them"
-            from friso.errors import InputError
-
             expected = "one of numerator and denominator, zeros and poles, or [[controller.sections]]"
             raise InputError("controller", actual, expected, "numerator = [2e3, 8e4, 4e5], denominator = [1, 400, 0]")
         if row_keys(flat, cls.key("sections")):

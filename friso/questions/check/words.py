@@ -25,6 +25,7 @@ from friso.shown.drawing.prefixes import (
 from friso.shown.loop_words import unstable_where
 from friso.shown.motion_words import dwell_sentences, following_sentence
 from friso.stage.controllers import FORCE_LIMIT
+from friso.stage.standstill import integral_leak
 
 if TYPE_CHECKING:
     from friso.hunting import AttractionEnd, BandwidthWindow, Case, Kick, Margin
@@ -194,7 +195,7 @@ def _transient(case: Case) -> str:
         return " ".join([says, *_held(case)])
     attracts = "no cycle attracts" if judgement.hunting.certain else "no cycle was found that attracts"
     says = [f"transient: {attracts}, but this motion has not settled at its end ({end}).", *_held(case)]
-    leaks = getattr(case.stage.controller, "integral_leak", None) and case.force_limit is None
+    leaks = integral_leak(case.stage.flat()) and case.force_limit is None
     if leaks and case.peak_to_peak < _TEN_MICRON and judgement.hunting.certain and not judgement.runs_away:
         stays = f"; it is still there after {with_unit(judgement.followed, 's')}" if judgement.followed else ""
         off = f"{length_at_rest(abs(case.offset))} off its reference"
