@@ -17,6 +17,7 @@ from friso.frequency.loops import poles
 from friso.frequency.members import limit_cases
 from friso.frequency.parts import FORCE, REFERENCE, compensator
 from friso.hunting import hunting
+from friso.shown.motion_words import motion_sentences
 from friso.stage import Stage
 
 TABLES = friso.load(friso.example("motions/profile")).as_written()
@@ -233,3 +234,35 @@ def test_samples_that_do_not_divide_are_refused() -> None:
     with pytest.raises(friso.InputError) as caught:
         controlled(keys, drive={"sample_time": "300 us"})
     assert "whole number of samples of the drive" in caught.value.expected
+
+
+@pytest.mark.parametrize("step", [0.5e-3, 8e-3])
+def test_what_only_samples_make_unstable_is_told_first(step: float, own_bandwidth: None) -> None:
+    """By hand, without friction: the poles of the free mass behind a zero-order hold, and of the controller in z."""
+    transfer = ([6e4 * 1e-3 + 500, 6e4 + 6e5 * 1e-3, 6e5], [1e-3, 1.0, 0.0])
+    numerator, denominator, _ = signal.cont2discrete(transfer, step, "bilinear")
+    hold = step**2 / 2 / 1.7
+    closed = np.polyadd(np.convolve(denominator, [1.0, -2.0, 1.0]), hold * np.convolve(numerator.ravel(), [1.0, 1.0]))
+    diverges = bool(np.abs(np.roots(closed)).max() > 1)
+    assert diverges == (step > 1e-3)
+    keys = {"numerator": [*map(float, numerator.ravel())], "denominator": [*map(float, denominator)]}
+    answer = friso.check(controlled({**keys, "sample_time": f"{step} s"}))
+    case = answer.result["given"]
+    assert bool(case.unstable_as_built) == diverges
+    assert case.judgement.hunting.certain != diverges
+    assert answer.sentences()[0].startswith("As given: with the samples and delays") == diverges
+
+
+def test_a_multisine_with_phases_says_how_far_it_jumps_at_first() -> None:
+    motion = {"kind": "multisine", "amplitude": ["0.3 mm", "0.2 mm"], "frequency": ["1 Hz", "3 Hz"]}
+    keys = {"numerator": NUMERATOR, "denominator": DENOMINATOR}
+    phased = controlled(keys, motion={**motion, "phase": ["0 deg", "90 deg"], "duration": "6 s"})
+    assert any("jump of 200 µm" in sentence for sentence in motion_sentences(phased))
+    assert motion_sentences(controlled(keys, motion={**motion, "duration": "6 s"})) == []
+
+
+def test_a_stage_that_hunts_after_a_move_back_swings() -> None:
+    """Its last move counts for nothing: half of the deviation in the last half of the run is that of the move."""
+    stage = controlled({"numerator": [95.0, 6250.0, 1e5], "denominator": [2.5e-3, 1.0, 0.0]})
+    answer = friso.simulate(stage.replace({"motion.dwell": "5 s"}))
+    assert "swings ±157 µm every 63" in answer.sentences()[0]

@@ -113,6 +113,17 @@ def settled_members(flat: Mapping[str, Any]) -> Members:
     return concatenate_families([*limit_cases(flat).values(), members[members.stuck]])
 
 
+def unstable_as_built(flat: Mapping[str, Any]) -> tuple[bool, bool]:
+    """Tell whether the samples and delays of a drive make the loop unstable, which is stable without them,
+    while the stage sticks and while it slides."""
+    members = settled_members(flat)
+    smooth = {key: value for key, value in flat.items() if not key.startswith("drive.")}
+    if len(smooth) == len(flat):
+        return False, False
+    lost = scan_stability(smooth, members).stable & ~scan_stability(flat, members).stable
+    return bool(lost[members.stuck].any()), bool(lost[~members.stuck].any())
+
+
 def _stated(flat: Mapping[str, Any]) -> float:
     """Return the crossover of a stage [Hz]; 1 where its controller states none."""
     named = bandwidth(flat)

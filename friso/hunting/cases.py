@@ -71,6 +71,7 @@ class Case:
       may move the stage. A motion with less force leaves a stage without a free joint `unmoved`.
     - `force_limit` [N]: the controller's limit, if it keeps the stage off its reference (None: it does not).
     - `unstable`: states in which the loop is unstable regardless of friction (see `friso.hunting.loop`).
+    - `unstable_as_built`: states in which only the drive's samples and delays make it so.
     - `feeding`: with a backlash, the cause without which hunting ends (None also if this was given up).
     - `static_friction`: margin in static friction (None: not asked for, or see `friso.hunting.stage_margins`).
     - `advice_keeps_friction`: whether the advised bandwidth, a factor beyond the edge of hunting, still does not hunt
@@ -95,6 +96,7 @@ class Case:
     breakaway: float = 0.0
     force_limit: float | None = None
     unstable: tuple[LoopState, ...] = ()
+    unstable_as_built: tuple[LoopState, ...] = ()
     feeding: Feeding | None = None
     static_friction: ParameterMargin | None = None
     advice_keeps_friction: bool | None = None

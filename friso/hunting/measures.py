@@ -14,7 +14,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.engine.kernel import kernel
-from friso.equations.motion import Stand, stands
+from friso.equations.motion import Stand, last_corner, rests, stands
 from friso.equations.structure import structure
 from friso.hunting.criteria.run_outcome import BAND, End, end_of_traces, last_outside, outcomes
 from friso.hunting.criteria.settling import settling_in_the_end, settling_of_runs, settling_of_traces
@@ -92,12 +92,20 @@ def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarra
     )
 
 
-def turns_of(runs: Runs) -> Turns:
-    """Scan the turning points of a chunk of runs, up to the largest number that a run has."""
+def corner_of(flat: Mapping[str, Any]) -> np.ndarray | float:
+    """Return the time [s] from which the references of stages stand; 0 for references that move to the end."""
+    return np.asarray(last_corner(flat)) if rests(flat) else 0.0
+
+
+def turns_of(runs: Runs, corner: np.ndarray | float = 0.0) -> Turns:
+    """Scan the turning points of a chunk of runs, up to the largest number that a run has.
+
+    Their references stand from the `corner` [s] on.
+    """
     results = runs.results
     room = max(1, int(results.turn_counts.max(initial=0)))
     times, values = results.turn_times[:, :room], results.turn_values[:, :room]
-    return scan_turning_points(times, values, results.turn_counts, swing_of(runs), runs.statistic("ended"))
+    return scan_turning_points(times, values, results.turn_counts, swing_of(runs), runs.statistic("ended"), corner)
 
 
 def swing_of(runs: Runs) -> np.ndarray:
@@ -123,7 +131,7 @@ def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
     """Measure a chunk of runs of the stages `flat`,
     arrays of which have one entry per run of the chunk."""
     results = runs.results
-    ended, turns = runs.statistic("ended"), turns_of(runs)
+    ended, turns = runs.statistic("ended"), turns_of(runs, corner_of(flat))
     passing = np.nan_to_num(turns.period) / 2  # a cycle that crosses the reference as the run ends has not settled
     in_the_end, settling = [], []
     for band in ("inner", "outer"):
@@ -162,7 +170,7 @@ def measure_traces(
     Deviations [m] and forces [N] have the shape (runs, n), the times [s] (n,).
     """
     done, places = solver.status == Status.DONE, [*stands(flat)]
-    end = end_of_traces(time, deviation, BAND, done)
+    end = end_of_traces(time, deviation, BAND, done, corner_of(flat))
     samples, swings = np.full(len(deviation), len(time)), np.nan_to_num(end.swing)
     values = np.ascontiguousarray(deviation)
     turns = scan_turning_points(np.tile(time, (len(deviation), 1)), values, samples, swings, end.ended)

@@ -137,7 +137,7 @@ def last_turn(times, count, kinds):
     return last
 
 
-def run(times, values, counts, swing, ended, kinds, peaks, distinct, period, turned, earlier):
+def run(times, values, counts, swing, ended, since, kinds, peaks, distinct, period, turned, earlier):
     """Fill `peaks` and `distinct`, shape (runs, room), and `period`, `turned` and `earlier`,
     shape (runs,).
 
@@ -146,7 +146,7 @@ def run(times, values, counts, swing, ended, kinds, peaks, distinct, period, tur
     for j in range(counts.size):
         count = counts[j]
         period[j], turned[j] = np.nan, -np.inf
-        earlier[j] = max(swing[j], span(times[j], values[j], count, HALF * ended[j]))
+        earlier[j] = max(swing[j], span(times[j], values[j], count, since[j]))
         tall = False
         for k in range(count):
             if times[j, k] >= COUNTED_AFTER and values[j, k] > COUNTED_ABOVE:

@@ -14,10 +14,11 @@ from friso.engine.kinds import ArrayKind
 from friso.engine.machine_code import Loops, load_object
 from friso.hunting import turning
 from friso.hunting.settings import CheckSettings
+from friso.hunting.turning import HALF
 
 _FLAT, _SQUARE = ArrayKind("float64", 1), ArrayKind("float64", 2)
 _COUNTS, _MARKS = ArrayKind("int64", 1), ArrayKind("bool", 2)
-KINDS = (_SQUARE, _SQUARE, _COUNTS, _FLAT, _FLAT, _COUNTS, _MARKS, _MARKS, _FLAT, _FLAT, _FLAT)
+KINDS = (_SQUARE, _SQUARE, _COUNTS, _FLAT, _FLAT, _FLAT, _COUNTS, _MARKS, _MARKS, _FLAT, _FLAT, _FLAT)
 """Kinds of the arguments of `friso.hunting.turning.run`."""
 
 
@@ -39,23 +40,39 @@ class Turns:
 
 
 def scan_turning_points(
-    times: np.ndarray, values: np.ndarray, counts: np.ndarray, swing: np.ndarray, ended: np.ndarray
+    times: np.ndarray,
+    values: np.ndarray,
+    counts: np.ndarray,
+    swing: np.ndarray,
+    ended: np.ndarray,
+    corner: np.ndarray | float = 0.0,
 ) -> Turns:
     """Scan the turning points of runs for peaks, period and last turn.
 
     `times` [s] and `values` [m] of position minus reference have the shape (runs, room), valid up to `counts`, shape
     (runs,). `swing` [m], shape (runs,), is the peak-to-peak deviation of the last quarter. Legs of at least half of it
-    make the period, so that ringing on top does not count. `ended` [s], shape (runs,), is the end of each run.
+    make the period, so that ringing on top does not count. `ended` [s], shape (runs,), is the end of each run, and
+    `corner` [s] the last time at which its reference moved.
     """
     settings = CheckSettings.current()
     runs = len(counts)
-    arrays = tuple(map(np.ascontiguousarray, (times, values, counts, swing, ended)))
+    since = last_part(HALF, ended, corner)
+    arrays = tuple(map(np.ascontiguousarray, (times, values, counts, swing, ended, since)))
     kinds = np.zeros(times.shape[1], np.int64)
     peaks, distinct = (np.zeros(times.shape, np.bool_) for _ in range(2))
     period, turned, earlier = (np.empty(runs) for _ in range(3))
     scan_runs: Callable[..., None] = turning.run if counts.sum() < settings.compiled_from_points else _compiled()
     scan_runs(*arrays, kinds, peaks, distinct, period, turned, earlier)
     return Turns(peaks, distinct, period, turned, earlier)
+
+
+def last_part(share: float, ended: np.ndarray, corner: np.ndarray | float) -> np.ndarray:
+    """Return the time [s], shape (runs,), from which the last part of runs is looked at, which `ended` [s] then.
+
+    It is the last quarter (`share` WINDOW) or half (HALF) of the run. Where the reference still moved, up to a `corner`
+    [s], in the last half of the run, it is the last half or three quarters of the time after that.
+    """
+    return np.maximum(share * ended, corner + (share - HALF / 2) * (ended - corner))
 
 
 @cache

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from friso.axis import axis_shown
+from friso.equations.motion import initial_displacement, reference, rests
 from friso.hunting.criteria import BAND
 from friso.hunting.measures import BANDS
 from friso.shown.drawing.prefixes import listed, with_unit
@@ -60,8 +63,11 @@ def _settling(dwell: Dwell) -> str:
 
 
 def motion_sentences(stage: Stage) -> list[str]:
-    """Say which peaks the moves of a stage are too short to reach; nothing if they reach all."""
+    """Say which peaks the moves of a stage are too short to reach, and that a moving reference begins with a jump;
+    nothing otherwise."""
     flat, kind = stage.flat(), axis_shown()
+    jump = float(reference(flat, np.zeros(1))[0]) - float(initial_displacement(flat))
+    jumps = [f"The reference begins with a jump of {with_unit(jump, 'm')}."] if jump and not rests(flat) else []
     by_move: dict[float, list[str]] = {}
     for peak in motion_of(flat).lowered(flat):
         unit = kind.unit(peak.unit)
@@ -70,4 +76,4 @@ def motion_sentences(stage: Stage) -> list[str]:
         if text not in by_move[abs(peak.distance)]:
             by_move[abs(peak.distance)].append(text)
     moves = [f"one of {with_unit(distance, 'm')} reaches {listed(texts, 'and')}" for distance, texts in by_move.items()]
-    return [f"Moves are too short for their limits: {'; '.join(moves)}."] if moves else []
+    return [*jumps, *([f"Moves are too short for their limits: {'; '.join(moves)}."] if moves else [])]

@@ -2,7 +2,7 @@
 
 - *swings*: over the last quarter the deviation goes to and fro by more than twice the band; it does so again and again
   (it has a period); and it lasts: it is at least half of what it was over the last half of the run, and since it last
-  turned no more than a period has passed.
+  turned no more than a period has passed. Of a reference that moves in the last half, the time after it counts alone.
 - *rests*: it does not swing, and stays within the band about the reference to the end.
 - *creeps*: neither: it is outside the band at its end without swinging. It drifts, sticks there, or dies out.
 - *failed*: the run was not completed.
@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from friso.hunting.turning import HALF, WINDOW
-from friso.hunting.turns import scan_turning_points
+from friso.hunting.turns import last_part, scan_turning_points
 
 SWINGS: Final = "swings"
 CREEPS: Final = "creeps"
@@ -84,18 +84,28 @@ def outcomes(end: End, band: np.ndarray | float = BAND, hold: np.ndarray | float
 
 
 @np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
-def end_of_traces(time: np.ndarray, deviation: np.ndarray, band: float, completed: np.ndarray | None = None) -> End:
+def end_of_traces(
+    time: np.ndarray,
+    deviation: np.ndarray,
+    band: float,
+    completed: np.ndarray | None = None,
+    corner: np.ndarray | float = 0.0,
+) -> End:
     """Describe how sampled runs end: deviations [m], shape (runs, n), over times [s],
     shape (n,).
 
-    All runs count as `completed` unless given. A run outside the band at its last sample was outside when it ended.
+    All runs count as `completed` unless given; their references stand from the `corner` [s] on. A run outside the band
+    at its last sample was outside when it ended.
     """
     runs = len(deviation)
-    swing, earlier = (np.ptp(deviation[:, time >= share * time[-1]], axis=1) for share in (WINDOW, HALF))
     ended = np.full(runs, time[-1])
+    swing, earlier = (
+        np.ptp(np.where(time >= last_part(share, ended, corner)[:, None], deviation, deviation[:, -1:]), axis=1)
+        for share in (WINDOW, HALF)
+    )
     # All of the trace: the first sample of a part of it would pass for a turn, on a flank too.
     samples, values = np.full(runs, len(time)), np.ascontiguousarray(deviation)
-    turns = scan_turning_points(np.tile(time, (runs, 1)), values, samples, np.nan_to_num(swing), ended)
+    turns = scan_turning_points(np.tile(time, (runs, 1)), values, samples, np.nan_to_num(swing), ended, corner)
     done = np.ones(runs, bool) if completed is None else completed
     return End(done, swing, earlier, turns.period, turns.turned, last_outside(time, deviation, band), ended)
 

@@ -33,12 +33,16 @@ from friso.studies.draws import Draws
 from friso.studies.settings import StudySettings
 
 if TYPE_CHECKING:
-    from friso.hunting import ParameterMargin
+    from friso.hunting import LoopState, ParameterMargin
     from friso.hunting.criteria import Verdict
     from friso.remedies.suggestion import Suggestion
     from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files
     from friso.studies.laws.verdicts import VerdictsByLaw
+
+
+UNSTABLE_AS_BUILT = "it leaves out the samples and delays of the drive, with which the loop is unstable"
+"""Reason why a verdict is not certain whose loop only the drive makes unstable."""
 
 
 class CheckAnswer(Answer):
@@ -244,6 +248,7 @@ def checked_stage(
     kernels(needed_kernels(chosen))
     mention_unstable_loop(chosen)
     cases = judged(chosen, tolerance, progress=progress, tell=partial(mention_verdict, chosen))
+    cases = {name: _as_built(case) for name, case in cases.items()}
     drawn = across = None
     cut = False
     if uncertain is not None:
@@ -264,6 +269,19 @@ def checked_stage(
 
         across = verdicts_by_law(chosen, loose, progress=progress)
     return CheckAnswer(cases, stage=chosen, draws=drawn, laws=across, cut=cut)
+
+
+def _as_built(case: Case) -> Case:
+    """Return a case whose verdict is not certain where only the drive makes the loop unstable."""
+    from friso.frequency.crossover import unstable_as_built
+
+    states: tuple[LoopState, LoopState] = ("sticks", "slides")
+    lost = unstable_as_built(case.stage.flat())
+    where = tuple(state for state, unstable in zip(states, lost, strict=True) if unstable)
+    if not where:
+        return case
+    hunting = replace(case.judgement.hunting, certain=False, reason=UNSTABLE_AS_BUILT)
+    return replace(case, unstable_as_built=where, judgement=replace(case.judgement, hunting=hunting))
 
 
 def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:

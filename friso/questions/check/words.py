@@ -85,8 +85,10 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
 
 
 def _loop(case: Case) -> list[str]:
-    """Say first of all where the loop is unstable, whatever the friction."""
-    return [f"the loop is {unstable_where(case.unstable)}. The stage"] if case.unstable else []
+    """Say first of all where the loop is unstable, whatever the friction, and where the drive makes it so."""
+    built = case.unstable_as_built
+    drive = f"with the samples and delays of its drive, the loop is {unstable_where(built)}. Without them, the stage"
+    return [f"the loop is {unstable_where(case.unstable)}. The stage"] if case.unstable else [drive] if built else []
 
 
 def answer(cases: Mapping[str, Case]) -> list[str]:

@@ -35,8 +35,7 @@ def conclusion(name: str, measures: Measures, deviation: np.ndarray, moves_on: b
     if outcome not in clauses:
         return f"{name}: the run was not completed ({Status(int(measures.status[0])).text})."
     if moves_on:
-        swings = f"; its deviation {clauses[SWINGS]()}" if outcome == SWINGS else ""
-        return f"{name} {off_its_reference(float(late.max()), float(np.sqrt(np.mean(late**2))))}{swings}."
+        return f"{name} {off_its_reference(float(late.max()), float(np.sqrt(np.mean(late**2))))}."
     return f"{name}: {clauses[outcome]()}."
 
 

@@ -76,7 +76,7 @@ def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) ->
     time, reference = recorded.time, recorded.logged["reference"]
     deviation = recorded.true["position"] - reference
     done = recorded.statuses == Status.DONE
-    outcome = outcomes(end_of_traces(time, deviation, within, done), within)
+    outcome = outcomes(end_of_traces(time, deviation, within, done, np.asarray(stands[-1].corner)), within)
     late = deviation[:, time >= WINDOW * time[-1]]
     settling = np.where(outcome == RESTS, settling_of_traces(stands, time, deviation, within), np.inf)
     return MachineMeasures(
