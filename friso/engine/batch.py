@@ -132,14 +132,14 @@ def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
 
 def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.ndarray, np.ndarray]:
     """Pieces of the reference with the window's start and the end of the run among them, and the window's place; of
-    those that begin behind that end, nothing is left. Runs that have the same motion share one row. The window holds at
-    most the last half of the time for which the reference stands in the end."""
+    those that begin behind that end, nothing is left. Runs that have the same motion share one row. Where
+    the reference stands in the end or moves evenly, the window lies behind its last corner."""
     runs = runs if motion.varies(flat) else 1
     pieces = motion.pieces(flat, runs)
     end = np.broadcast_to(np.asarray(flat["motion.duration"], dtype=float), (runs,))
     pieces[:, :, 0] = np.minimum(pieces[:, :, 0], end[:, None])
-    standing = motion.at_rest(motion.form_of(flat), pieces[:, -1]) & (pieces[:, -1, 0] < end)
-    start = np.maximum(window * end, np.where(standing, (pieces[:, -1, 0] + end) / 2, 0.0))
+    corner = np.where(motion.at_rest(motion.form_of(flat), pieces[:, -1], 2), pieces[:, -1, 0], 0.0)
+    start = motion.last_part(window, end, corner)
     rows = np.arange(runs)
     windows = (pieces[:, :, 0] <= start[:, None]).sum(axis=1)
     before = pieces[rows, windows - 1]

@@ -106,6 +106,12 @@ def rests(flat: Mapping[str, Any]) -> bool:
     return motion_of(flat).rests or bool(np.all(at_rest(form, rows[:, -1])))
 
 
+def ends_evenly(flat: Mapping[str, Any]) -> bool:
+    """Tell whether the reference of some stages stands in the end, or moves on at an even velocity."""
+    rows = pieces(flat, int(np.max([np.size(value) for value in flat.values()])))
+    return bool(np.all(at_rest(form_of(flat), rows[:, -1], 2)))
+
+
 def returns(flat: Mapping[str, Any]) -> bool:
     """Tell whether the references of some stages come to stand where they began."""
     return motion_of(flat).rests and not np.any(motion_of(flat).pieces(flat)[-1][1])
@@ -114,6 +120,16 @@ def returns(flat: Mapping[str, Any]) -> bool:
 def last_corner(flat: Mapping[str, Any]) -> Any:
     """Time of the last corner of the reference [s]: from then on it stays as it is."""
     return motion_of(flat).pieces(flat)[-1][0]
+
+
+def last_part(share: float, ended: np.ndarray, corner: np.ndarray | float) -> np.ndarray:
+    """Return the time [s], shape (runs,), from which the last part of runs is looked at.
+
+    They `ended` [s], shape (runs,), and that part begins after a `share` of them, say 0.75. Where the last `corner`
+    [s] of the reference lies late, it begins at least a quarter less than that share of the time after it.
+    """
+    late = np.where(corner < ended, corner, 0.0)
+    return np.maximum(share * ended, late + (share - 0.25) * (ended - late))
 
 
 def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:

@@ -95,9 +95,9 @@ def moved_on(form: ReferenceForm, rows: np.ndarray, elapsed: Any) -> np.ndarray:
     return later
 
 
-def at_rest(form: ReferenceForm, rows: np.ndarray) -> np.ndarray:
-    """Tell which pieces stand still, shape of the rows."""
-    rests = np.all(rows[..., 2 : form.degree + 2] == 0, axis=-1)
+def at_rest(form: ReferenceForm, rows: np.ndarray, derivative: int = 1) -> np.ndarray:
+    """Tell which pieces stand still, or have no second `derivative` and so an even velocity, shape of the rows."""
+    rests = np.all(rows[..., 1 + derivative : form.degree + 2] == 0, axis=-1)
     for amplitude, *_ in _tones(form, rows):
         rests &= amplitude == 0
     return rests

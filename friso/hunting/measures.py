@@ -14,7 +14,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.engine.kernel import kernel
-from friso.equations.motion import Stand, last_corner, rests, stands
+from friso.equations.motion import Stand, ends_evenly, last_corner, stands
 from friso.equations.structure import structure
 from friso.hunting.criteria.run_outcome import BAND, End, end_of_traces, last_outside, outcomes
 from friso.hunting.criteria.settling import settling_in_the_end, settling_of_runs, settling_of_traces
@@ -93,8 +93,8 @@ def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarra
 
 
 def corner_of(flat: Mapping[str, Any]) -> np.ndarray | float:
-    """Return the time [s] from which the references of stages stand; 0 for references that move to the end."""
-    return np.asarray(last_corner(flat)) if rests(flat) else 0.0
+    """Return the time [s] from which the references of stages stand or move evenly; 0 for all others."""
+    return np.asarray(last_corner(flat)) if ends_evenly(flat) else 0.0
 
 
 def turns_of(runs: Runs, corner: np.ndarray | float = 0.0) -> Turns:

@@ -12,6 +12,7 @@ from friso.engine.building import built_entries
 from friso.engine.cache import CodeRequest, code_digest
 from friso.engine.kinds import ArrayKind
 from friso.engine.machine_code import Loops, load_object
+from friso.equations import motion
 from friso.hunting import turning
 from friso.hunting.settings import CheckSettings
 from friso.hunting.turning import HALF
@@ -56,7 +57,7 @@ def scan_turning_points(
     """
     settings = CheckSettings.current()
     runs = len(counts)
-    since = last_part(HALF, ended, corner)
+    since = motion.last_part(HALF, ended, corner)
     arrays = tuple(map(np.ascontiguousarray, (times, values, counts, swing, ended, since)))
     kinds = np.zeros(times.shape[1], np.int64)
     peaks, distinct = (np.zeros(times.shape, np.bool_) for _ in range(2))
@@ -64,15 +65,6 @@ def scan_turning_points(
     scan_runs: Callable[..., None] = turning.run if counts.sum() < settings.compiled_from_points else _compiled()
     scan_runs(*arrays, kinds, peaks, distinct, period, turned, earlier)
     return Turns(peaks, distinct, period, turned, earlier)
-
-
-def last_part(share: float, ended: np.ndarray, corner: np.ndarray | float) -> np.ndarray:
-    """Return the time [s], shape (runs,), from which the last part of runs is looked at, which `ended` [s] then.
-
-    It is the last quarter (`share` WINDOW) or half (HALF) of the run. Where the reference still moved, up to a `corner`
-    [s], in the last half of the run, it is the last half or three quarters of the time after that.
-    """
-    return np.maximum(share * ended, corner + (share - HALF / 2) * (ended - corner))
 
 
 @cache

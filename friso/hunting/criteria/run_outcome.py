@@ -18,8 +18,9 @@ from typing import Final
 
 import numpy as np
 
+from friso.equations.motion import last_part
 from friso.hunting.turning import HALF, WINDOW
-from friso.hunting.turns import last_part, scan_turning_points
+from friso.hunting.turns import scan_turning_points
 
 SWINGS: Final = "swings"
 CREEPS: Final = "creeps"

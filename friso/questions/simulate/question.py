@@ -89,13 +89,13 @@ class SimulateAnswer(Answer):
 
     def sentences(self) -> Sequence[str]:
         """Return what the run does, how it settles at several places, and what its moves are too short for."""
-        from friso.equations.motion import rests
+        from friso.equations.motion import ends_evenly, rests
         from friso.questions.simulate.words import built_sentence, conclusion
         from friso.shown.motion_words import dwell_sentences, motion_sentences
 
         deviation = (self.result["position"] - self.result["reference"]).to_numpy()
-        name, moves_on = self.name if self.of_cell else self.stage.name or self.name, not rests(self.stage.flat())
-        does = conclusion(name, self.measures, deviation, moves_on)
+        name, flat = self.name if self.of_cell else self.stage.name or self.name, self.stage.flat()
+        does = conclusion(name, self.measures, deviation, moves_on=not rests(flat), evenly=ends_evenly(flat))
         says = [does, *dwell_sentences(self.dwells), *motion_sentences(self.stage)]
         return [*says, *([built_sentence(self.stage)] if self.as_built else [])]
 

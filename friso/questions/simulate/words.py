@@ -16,8 +16,11 @@ GROWN = 1.1
 """How many times as far as before a run is off its reference in its last quarter that goes ever farther."""
 
 
-def conclusion(name: str, measures: Measures, deviation: np.ndarray, moves_on: bool = False) -> str:
-    """Say what the run of a stage does, whose reference stands in the end, or else `moves_on`.
+def conclusion(
+    name: str, measures: Measures, deviation: np.ndarray, moves_on: bool = False, evenly: bool = True
+) -> str:
+    """Say what the run of a stage does, whose reference stands in the end, or else `moves_on`, at an even velocity
+    or not.
 
     `deviation` holds samples of its deviation [m], evenly over time, shape (n,).
     """
@@ -35,7 +38,8 @@ def conclusion(name: str, measures: Measures, deviation: np.ndarray, moves_on: b
     if outcome not in clauses:
         return f"{name}: the run was not completed ({Status(int(measures.status[0])).text})."
     if moves_on:
-        return f"{name} {off_its_reference(float(late.max()), float(np.sqrt(np.mean(late**2))))}."
+        swings = f"; its deviation {clauses[SWINGS]()}" if outcome == SWINGS and evenly else ""
+        return f"{name} {off_its_reference(float(late.max()), float(np.sqrt(np.mean(late**2))))}{swings}."
     return f"{name}: {clauses[outcome]()}."
 
 
