@@ -318,9 +318,9 @@ def _checked_unit(text: str) -> str:
 
 
 def si_value(text: str) -> float:
-    """Return the SI value of a number with a unit of any kind, "2.4 N/mm", made of usual ones alone.
+    """Return the SI value of a number with any unit, such as "2.4 N/mm".
 
-    Raises InputError.
+    The unit is made of common ones, with * between factors. Raises InputError.
     """
     try:
         number, unit = _split(text)

@@ -75,7 +75,10 @@ class Registry(Generic[Item]):
                 leave_out(error)
 
     def one_line(self, name: str) -> str:
-        """What is declared under a name, in one line without a full stop. Raises KeyError for an unknown name."""
+        """Return the description of a registered name, the first line of its docstring.
+
+        Its full stop is removed. Raises KeyError for an unknown name.
+        """
         if name in self.added:
             return self.added[name][1]
         module = self._own.get(name) or self.installed[name]

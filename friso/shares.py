@@ -12,8 +12,11 @@ DOUBT = 0.05
 
 @dataclass(frozen=True)
 class Share:
-    """The probability of something, by a share of runs (NaN: none is known), and its 95 % interval (Clopper, Pearson),
-    which holds whatever became of the runs that failed."""
+    """The probability of an outcome, estimated from runs, with its 95 % interval.
+
+    The interval (Clopper, Pearson) holds whatever the runs that failed would have done. The probability is NaN if no
+    run tells.
+    """
 
     probability: float
     low: float

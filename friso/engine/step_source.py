@@ -121,7 +121,7 @@ class StepWriter:
         self._rows = ROW._asdict() | self.layout.first_rows
 
     def _jumping(self, jumps: Mapping[sp.Symbol, sp.Expr]) -> tuple[Block, list[int]]:
-        """Return by how much states jump at a kink, and the numbers of these."""
+        """Return a block that computes how far states jump at a kink, and the states' indices."""
         named = {f"jump{self._index[x]}_": jump for x, jump in jumps.items()}
         return Block(named, self.constants), [self._index[x] for x in jumps]
 

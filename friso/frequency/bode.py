@@ -170,8 +170,10 @@ def _plant(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> Compl
 
 
 def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Members]]:
-    """Return the cases with a touched limiter by the formula of Table 1:
-    as stages whose limiter is not touched."""
+    """Return the cases with a touched limiter, modelled as in Table 1 of the thesis.
+
+    There the limiter is in series with the joint, so that the stage is one with another joint and no touched limiter.
+    """
     touched = {name: member for name, member in limit_cases(flat).items() if member.touched[0]}
     return {f"{name}-series": (limiter_in_series(flat), member.with_limiter(False)) for name, member in touched.items()}
 

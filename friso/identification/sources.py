@@ -24,10 +24,10 @@ MOVED = ("position", "force")
 
 @dataclass(frozen=True)
 class LogFile:
-    """A file with what it holds, its kind of experiment and why it counts as one.
+    """A log file: its content, its kind of experiment, and the reason for that kind.
 
-    `mapping` says how it was read, `mapping_file` where that is kept (None: not yet, or nothing had to be said about
-    it), `earlier` what of it was kept from an earlier time, and `replaced` what was kept and is now said otherwise.
+    `mapping` says how it was read, and `mapping_file` is the file where that is kept (None: it is not kept). `earlier`
+    is the part of the mapping that was taken from that file, `replaced` the part of the file that the user overrode.
     """
 
     path: Path

@@ -80,7 +80,10 @@ def answer_questions(answer: Callable[[Any], Any], orphaned: bool = True) -> Non
 
 
 def _end_with(parent: int) -> None:
-    """End this process once it is no child of that one any more, which Windows does not tell."""
+    """End this process as soon as its parent has ended; look twice a second.
+
+    Windows does not report a new parent, so that it has no effect there.
+    """
     while os.getppid() == parent:
         time.sleep(0.5)
     os._exit(1)

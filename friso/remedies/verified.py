@@ -292,9 +292,10 @@ def missed_parts(measured: Performance, goal: Goal) -> tuple[str, ...]:
 
 
 def _near(low: object, high: object, distance: float) -> bool:
-    """Tell whether a window of bandwidths comes within the distance.
+    """Tell whether a window of hunting lies within a factor `distance` of the present bandwidth.
 
-    Its ends are factors; None means as far as the search goes.
+    `low` and `high` are the ends of the window, as factors on the bandwidth; None means that it goes on as far as the
+    search does.
     """
     first = getattr(low, "outside", 0.0) if low is not None else 0.0
     last = getattr(high, "outside", np.inf) if high is not None else np.inf

@@ -219,7 +219,10 @@ class FilterForm(NamedTuple):
 
 
 def filter_forms(flat: Mapping[str, Any], key: str) -> tuple[FilterForm, ...]:
-    """Return the filters of a stage given as flat keys, the array having a `key`."""
+    """Return the form of each filter in an array of filters, given the stage's flat keys.
+
+    `key` names the array: "controller.filters".
+    """
     forms = []
     for place in row_keys(flat, key):
         row = keys_below(flat, place)

@@ -106,7 +106,7 @@ class ElastoPlastic(StribeckSection):
 
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
-        """Break-away deflections with which the virgin curve is hardly another."""
+        """Return the range of break-away deflections that the measured virgin curve allows."""
         return {"friction.breakaway_deflection": as_good(*_break_away_candidates(measured))}
 
     @staticmethod

@@ -64,8 +64,11 @@ class MeasuredFriction:
 
 
 def virgin_displacements(static: float, stiffness: float, corners: Sequence[float] | np.ndarray = ()) -> np.ndarray:
-    """Displacements [m] at which virgin curves are compared, shape (n,), the `corners` of one among them: to the last
-    of these, if that is far away."""
+    """Return displacements [m] at which to compare virgin curves, shape (n,).
+
+    They reach beyond break-away, or to the last of `corners` if that lies farther, and include all `corners`, the
+    displacements at which a curve made of straight pieces bends.
+    """
     usual, corners = static / stiffness * REACH, np.unique(np.append(0.0, corners))
     places = usual * np.linspace(0.0, 1.0, POINTS) ** 2
     if corners[-1] > usual:

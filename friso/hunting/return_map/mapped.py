@@ -185,8 +185,10 @@ def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: in
 
 
 def gaps(landing_map: LandingMap) -> np.ndarray:
-    """Return signed distances in the middle of gaps between points that are too wide,
-    the worst first."""
+    """Return the distances at which the map needs a further point, the widest gap first.
+
+    They lie in the middle of gaps that are too wide, and have the sign of their side.
+    """
     settings = ReturnMapSettings.current()
     places, excess = [], []
     for side in landing_map.sides:

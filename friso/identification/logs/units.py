@@ -88,8 +88,9 @@ def spelled(text: str) -> str:
 
 
 def _below(part: str, before: str) -> str:
-    """Return a part of a unit, in brackets where it is a product below a stroke: the Nm of
-    rad/Nm.
+    """Return the text of a unit that follows a division sign, in brackets if it is a product.
+
+    Otherwise "rad/N*m" would read as rad/N times m.
     """
     return f"({part})" if before == "/" and "*" in part else part
 

@@ -23,8 +23,9 @@ from friso.intervals import COVERAGE
 
 @dataclass(frozen=True)
 class Harmonic:
-    """An oscillation over the place: wavelength [m], amplitude [N], and the frequency [Hz] in
-    time at that speed.
+    """A periodic variation of friction along the way.
+
+    It has a wavelength [m], an amplitude [N], and the frequency [Hz] at which it appears at the speed of the log.
     """
 
     wavelength: float

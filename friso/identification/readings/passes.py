@@ -38,10 +38,10 @@ class Pass:
 
 
 def passes(log: Log) -> tuple[Pass, ...]:
-    """Find all stretches over which the reference, or the body itself without one, goes at
-    constant velocity.
+    """Find all stretches of constant velocity.
 
-    With a reference the motion may be unsteady, which each states. Raises InputError for missing position or force.
+    They are stretches of constant velocity of the reference; without a reference, of the body itself. Each pass states
+    whether its motion was steady. Raises InputError for missing position or force.
     """
     settings = ReadingSettings.current()
     position, velocity = on_bearing(log), _velocity(log)

@@ -19,12 +19,11 @@ MASS, DRAG, SPRING, BEYOND = range(4)
 
 
 def needs_two(model: TwoMass, driven: FrequencyResponse, other: FrequencyResponse | None = None) -> bool:
-    """Tell whether two masses explain responses, over the band of their model, much better than
-    one mass does.
+    """Tell whether two masses explain the responses much better than one mass does.
 
-    The one mass has viscous friction and a spring to ground, and like the two what the drive and all that lies above
-    the band add. An F-test says whether chance explains the difference; since the mode may lie at any line, its level
-    is divided by their number.
+    The one mass has viscous friction and a spring to ground; both models have the same delay and compliance, and both
+    cover the band of the `model`. An F-test says whether the difference may be chance. As the mode could lie at any
+    line, the level of the test is divided by the number of lines.
     """
     settings = ResponseSettings.current()
     responses = [response for response in (driven, other) if response is not None]

@@ -121,8 +121,9 @@ def _near(change: np.ndarray, expected: float) -> int:
 
 
 def _repeating(signal: np.ndarray, samples: int) -> tuple[int, int]:
-    """Return the stretch that repeats: no late start or ragged end, where most samples are
-    unlike those a period off.
+    """Return the first and the last sample of the stretch of a signal that repeats itself.
+
+    Parts at the beginning and the end are cut off if most of their samples differ from those one period away.
     """
     change = np.abs(signal[samples:] - signal[:-samples])
     unlike = change > 8 * 1.4826 * np.median(change) + 1e-5 * np.ptp(signal)

@@ -120,8 +120,10 @@ def _linear_parameters(columns: np.ndarray, values: np.ndarray, deviation: np.nd
 
 
 def bounds(shape: RationalShape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return limits of all parameters: modes within an octave of the band, damping ratios 1e-4
-    to 2, delays of a turn.
+    """Return the lowest and the highest value that the fit allows for each parameter.
+
+    Modes lie within an octave of the band, damping ratios between 1e-4 and 2, and delays turn the phase by at most one
+    radian at the highest frequency.
     """
     low, high, linear = np.abs(s[0]), np.abs(s[-1]), int(shape.rigid) + shape.modes + int(shape.constant)
     rest = np.full(linear, np.inf)

@@ -55,10 +55,10 @@ class TwoMass:
 
 
 def two_masses(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Return responses of two masses to a force on the driven one, shape (outputs, lines), over
-    frequencies [Hz].
+    """Return the responses of two masses to a force on the driven one, over frequencies [Hz].
 
-    The other mass has one where there is a compliance for it.
+    Shape (outputs, lines): one output is the driven mass; a second one, for which `parameters` then have a further
+    compliance, is the other mass.
     """
     driven, other, stiffness, damping = np.exp(parameters[:DRAG])
     outputs = len(parameters) - BEYOND - COMPLIANCES
