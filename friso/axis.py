@@ -55,7 +55,7 @@ class AxisKind:
         return sentence if self.plain else _NUMBERS.sub(lambda match: self.unit(match[0]), sentence)
 
     def with_units(self, dataset: Any) -> Any:
-        """An xarray.Dataset on this axis, the units of whose variables are those of a linear one."""
+        """Return an xarray.Dataset in the units of this axis; it comes in those of a linear one."""
         for array in dataset.variables.values():
             array.attrs.update({key: self.unit(array.attrs[key]) for key in ("units",) if key in array.attrs})
             array.attrs.update({key: self.text(array.attrs[key]) for key in ("criterion",) if key in array.attrs})

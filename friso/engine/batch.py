@@ -74,7 +74,7 @@ class Runs:
         return self.results.statistics[:, STATISTICS.index(name)]
 
     def part(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the flat keys of these runs alone."""
+        """Return the flat keys of the stages that these runs belong to."""
         return part_of(flat, self.numbers)
 
 

@@ -56,7 +56,10 @@ def deviation(B, layout, lane, theta):
 
 
 def deviation_rate(B, layout, lane, theta):
-    """Velocity minus that of the reference [m/s] at the fraction theta of the step last tried."""
+    """Return velocity minus the reference's velocity [m/s], within the step last tried.
+
+    `theta` is the fraction of the step.
+    """
     t = B[ROW.old_time * layout.lanes + lane] + theta * B[ROW.taken * layout.lanes + lane]
     return between(B, layout, lane, layout.velocity, theta) - reference_at(B, layout, lane, t, 1)
 
@@ -249,7 +252,10 @@ def look_up(B, layout, lane, j, tables):
 
 
 def looked_up(layout, j, i, point, tables):
-    """A point of table i of run j, over places or over time: all runs may share those of one."""
+    """Return one point of table i for run j: a table over places, or over time.
+
+    All runs may share one set of tables.
+    """
     if i < layout.places:
         return tables.places[min(j, tables.places.shape[0] - 1), i, point]
     return tables.times[min(j, tables.times.shape[0] - 1), i - layout.places, point]

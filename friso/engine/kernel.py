@@ -94,8 +94,10 @@ class Kernel:
 
     @property
     def cart_position(self) -> int:
-        """Return which state is the position of what the friction acts on;
-        that of the stage where it is rigid."""
+        """Return the index of the state that is the position of the body with friction.
+
+        It is the position of the cart, or of the stage if there is no joint.
+        """
         return self.module.CART_POSITION
 
     @property
@@ -310,7 +312,10 @@ def columns(rows: Iterable[Any], runs: int) -> np.ndarray:
 
 
 def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Results:
-    """Room for the results of so many runs, with turning points, samples, and numbers kept at each of these."""
+    """Return empty arrays for the results of runs, with turning points and samples.
+
+    Outputs are kept at samples and at turning points.
+    """
     return Results(
         statistics=np.zeros((runs, len(STATISTICS))),
         statuses=np.zeros(runs, np.int64),

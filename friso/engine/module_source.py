@@ -91,8 +91,10 @@ def _places(model: Model, body: Body) -> tuple[int, int]:
 
 
 def _looked_up(model: Model, writer: StepWriter) -> dict[str, tuple[int, ...]]:
-    """Return which states a drive with a clock measures and looks up over,
-    and over which of these each table is."""
+    """Return which states a sampled drive measures, and which its tables are looked up over.
+
+    Also return, for each table, the index of what it is looked up over.
+    """
     clock, states = model.clock, list(model.symbols)
     seen = tuple(states.index(x) for x in clock.seen.values()) if clock else ()
     over = tuple(dict.fromkeys(states.index(x) for x in clock.places.values())) if clock else ()

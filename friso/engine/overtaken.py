@@ -28,8 +28,7 @@ ASKER: ContextVar[object] = ContextVar("asker", default=None)
 
 
 def current_flag() -> np.ndarray:
-    """Return the flag, shape (1,), by which runs are cancelled now: that of `ended_by`,
-    or one that nobody sets."""
+    """Return the flag that cancels runs: of `ended_by`, or an unset one."""
     flag = _FLAG.get()
     return np.zeros(1, np.int64) if flag is None else flag
 

@@ -26,7 +26,7 @@ def reciprocals(expr: Any) -> Any:
 
 
 class _KernelPrinter(PythonCodePrinter):
-    """Scalar code without library calls other than those of `friso.engine.simd_math`."""
+    """Print expressions as scalar code that calls no library but `friso.engine.simd_math`."""
 
     def __init__(self, rename: Rename) -> None:
         super().__init__({"fully_qualified_modules": False})

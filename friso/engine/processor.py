@@ -51,7 +51,9 @@ def processor() -> Processor:
 
 
 def loadable(triple: str) -> str:
-    """Return the triple of a platform whose object files LLVM can load:
-    on Windows those of Linux (ELF), since it fails to place the constants of Windows' own (COFF); Numba does the same.
+    """Return the target triple whose object files LLVM can load on a platform.
+
+    On Windows it is that of Linux files (ELF), because LLVM misplaces the constants of Windows' own format (COFF).
+    Numba does the same.
     """
     return f"{triple}-elf" if "windows" in triple else triple

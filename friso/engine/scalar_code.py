@@ -40,8 +40,11 @@ def _types(kind: CompiledKind) -> Sequence[ir.Type]:
 
 
 def scalar_llvm(function: Callable[..., None], kinds: Sequence[CompiledKind]) -> ir.Module:
-    """Return a function of arguments of these kinds as LLVM has it, called `run`.
-    It takes the address at which the arguments lie one after another (`friso.engine.kinds.Packing`)."""
+    """Translate a function into LLVM code, with a function `run` that calls it.
+
+    `run` takes the address at which the arguments lie one after another (`friso.engine.kinds.Packing`); `kinds` are
+    their types.
+    """
     module = ir.Module()
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [ir.PointerType(_INT64)]), "run")
     builder: Any = ir.IRBuilder(entry.append_basic_block())
@@ -149,7 +152,7 @@ class _Writer:
     def _write(
         self, function: Callable[..., Any], kinds: tuple[CompiledKind, ...]
     ) -> tuple[ir.Function, NumberKind | None]:
-        """Write a function for arguments of these kinds as LLVM code."""
+        """Write a function as LLVM code, for arguments of the given kinds."""
         tree = syntax(function)
         signature = ir.FunctionType(_INT64, [part for kind in kinds for part in _types(kind)])
         code = ir.Function(self.module, signature, self.module.get_unique_name(function.__name__))

@@ -31,7 +31,7 @@ class _Beside:
 
     @property
     def cores(self) -> int:
-        """Return the share of one of those that have not ended."""
+        """Return the cores that one task may use: all cores divided by the tasks that still run."""
         cores = self.about.cores if self.about else usable_cores()
         return max(1, cores // (self.tasks - sum(job.done() for job in self.jobs)))
 

@@ -155,7 +155,10 @@ class Blocks(ABC):
 
     @contextmanager
     def loop(self, name: str) -> Iterator[None]:
-        """Blocks within it are those of a loop, "position" or "velocity", which a drive may carry out more slowly."""
+        """Mark the blocks made within as parts of the "position" or the "velocity" loop.
+
+        A drive may carry out that loop more slowly.
+        """
         yield
 
     def handed_on(self, signal: Signal, name: str) -> Signal:

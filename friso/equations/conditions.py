@@ -80,8 +80,10 @@ def factors(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def anywhere(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the flat keys for a machine that moves along its rail:
-    the factors are not those of one place."""
+    """Return the flat keys for a machine that moves along its rail.
+
+    Its friction then has no factor of a single place.
+    """
     if not has_conditions(flat):
         return dict(flat)
     free = {key: value for key, value in flat.items() if key != f"{CONDITIONS}.place"}

@@ -126,7 +126,10 @@ class _Integral:
 
 
 class Continuous(Blocks):
-    """Blocks whose memories are states; `rate` [1/s] is that of the motion."""
+    """Blocks of a controller in continuous time, whose memories are states.
+
+    `rate` [1/s] is the natural frequency of the motion, by which states are scaled.
+    """
 
     def __init__(self, rate: sp.Expr, form: ControllerForm | None = None) -> None:
         super().__init__(form)
@@ -291,7 +294,7 @@ class Continuous(Blocks):
         return tuple(states), (*far, *winding, *pauses, *self._begun_anew(error))
 
     def _limits(self, integral: _Integral, demand: Demand) -> list[tuple[sp.Expr, sp.Expr, str]]:
-        """Return the limited outputs of an integral, with their limits and the names of these."""
+        """Return the limited outputs of an integral, each with its limit and the limit's name."""
         limits = [] if integral.limit is None else [(integral.output, integral.limit, str(integral.symbol))]
         if self.settings.limit:
             force = sp.diff(demand.total.value, integral.symbol) * integral.symbol

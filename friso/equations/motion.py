@@ -133,15 +133,15 @@ def last_part(share: float, ended: np.ndarray, corner: np.ndarray | float) -> np
 
 
 def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the flat keys without those of the motion."""
+    """Return the flat keys without the keys of the motion."""
     return {key: value for key, value in flat.items() if not key.startswith("motion.")}
 
 
 def standing(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the flat keys of a stage whose reference stands from the start.
+    """Return the flat keys of a stage whose reference stands still from the start.
 
-    It stands where the reference of its own motion stands after the last corner. Magnitudes remain those of its own
-    motion, or of a step to where it ends.
+    It stands where the reference of the stage's own motion ends. Magnitudes remain those of that motion, or of a step
+    to its end.
     """
     rows = motion_of(flat).pieces(flat)
     if len(rows) == 1:

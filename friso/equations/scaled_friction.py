@@ -15,15 +15,16 @@ TABLES = ("friction", MOTOR_FRICTION)
 
 
 def static_frictions(flat: Mapping[str, Any]) -> dict[str, str]:
-    """Return the keys of static friction, each with that of the Coulomb friction below it;
-    none of laws without both."""
+    """Return the keys of static friction, each with its key of Coulomb friction.
+
+    Empty for laws that do not have both.
+    """
     pairs = {f"{table}.static": f"{table}.coulomb" for table in TABLES}
     return {static: coulomb for static, coulomb in pairs.items() if static in flat and coulomb in flat}
 
 
 def least_static_factor(flat: Mapping[str, Any]) -> float:
-    """Return by how much the static friction of a stage may be multiplied at least:
-    it is as large as Coulomb friction then, that of one law of those there are."""
+    """Return the least factor on static friction at which it still reaches Coulomb friction."""
     return max(float(np.max(flat[coulomb] / flat[static])) for static, coulomb in static_frictions(flat).items())
 
 

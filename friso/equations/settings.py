@@ -165,8 +165,10 @@ bandwidth, or with twenty samples a period."""
 
 
 def settings_named(names: tuple[str, ...], others: tuple[str, ...] = ()) -> tuple[Setting, ...]:
-    """Settings by their names, "all" for all of them, those of `others` being none. Raises InputError for an unknown
-    one."""
+    """Return the settings against friction with these names; "all" stands for all of them.
+
+    `others` are further names that are allowed and select none. Raises InputError for an unknown name.
+    """
     names_of_all = (*SETTINGS, *others)
     for name in names:
         if name not in (*names_of_all, "all"):

@@ -28,11 +28,10 @@ def along(name: str) -> str:
 
 
 def variational(model: Model, keys: Sequence[str] = ()) -> Model:
-    """Return the model with a deviation beside each state, the states first;
-    it takes no part in the control of the step.
+    """Return the model extended by a small deviation of each state, the states first.
 
-    The motion beside may be that of a stage some of whose `keys` differ, each by its parameter `along` (times the unit
-    of the deviation): then the deviations are the sensitivities to these keys.
+    The deviations take no part in the control of the step. With `keys`, they are sensitivities to these keys: each key
+    differs in the neighbouring motion by its parameter `along`, times the unit of the deviation.
     """
     beside = {part.symbol: state(f"{PREFIX}{part.symbol}") for part in model.states}
     small = beside | {key(name): key(along(name)) for name in keys}

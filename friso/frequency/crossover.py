@@ -31,14 +31,16 @@ WANTED = 0.5
 
 @dataclass(frozen=True)
 class Limits:
-    """The crossovers [Hz], from `searched_crossovers`, at which a stage is `stable` and those with a `comfortable`
-    modulus margin, as ranges, in all limit cases: stuck under any bias force or sliding fast, limiter free or touched.
+    """The crossovers [Hz] at which a stage is stable, and those with a `comfortable` margin.
 
-    Of both kinds, one range holds the stage's own crossover, or is the next one below it (or the lowest). The `highest`
-    stable and comfortable ones end it, possibly with the search (None if there is none). `first_lost` is the state that
-    is not stable just above, `closest` the one that comes closest to -1 there (None at the end of the search); where
-    there is no such range, those of the stage's own crossover. For a controller given by its gains all are factors of
-    its bandwidth instead.
+    They are ranges from `searched_crossovers`, valid in all limit cases: stuck under any bias force or sliding fast,
+    limiter free or touched.
+
+    Of both kinds, one range holds the stage's own crossover, or is the next one below it (or the lowest).
+    `highest_stable` and `highest_comfortable` are the upper ends of these ranges, None if there is no such range.
+    `first_lost` is the state that becomes unstable just above the first, `closest` the state that comes closest to -1
+    just above the second (None at the end of the search); if there is no such range, they are taken at the stage's own
+    crossover. For a controller given by gains all values are factors of its bandwidth.
     """
 
     searched: Range
@@ -89,8 +91,10 @@ def range_end(ranges: Sequence[Range], crossover: float) -> float | None:
 
 
 def searched_crossovers(flat: Mapping[str, Any]) -> Range:
-    """Return the crossovers that are searched;
-    those of a sampled drive end below half the sampling frequency."""
+    """Return the range of crossovers that is searched.
+
+    With a sampled drive it ends below half the sampling frequency.
+    """
     settings = FrequencySettings.current()
     drive = DriveTiming.of(flat)
     if bandwidth(flat) is None:

@@ -61,7 +61,7 @@ class DriveTiming:
 
     @property
     def highest(self) -> float:
-        """Angular frequency [rad/s] up to which the drive knows frequencies: half that of sampling."""
+        """Return half the sampling frequency [rad/s], the highest that the drive can represent."""
         return np.pi / self.sample_time if self.sample_time else np.inf
 
     @property

@@ -73,8 +73,10 @@ class Scan:
         return distance
 
     def worst(self, among: np.ndarray | None = None) -> int:
-        """Return the number of the worst (of those that `among` marks):
-        the least stable if any is unstable, else the one whose loop comes closest to -1."""
+        """Return the index of the worst state: the least stable, else the one closest to -1.
+
+        `among` marks the states to look at; all of them if it is None.
+        """
         among = np.ones(len(self.members), bool) if among is None else among
         if not self.stable[among].all():
             return int(np.where(among, self.abscissa, -np.inf).argmax())

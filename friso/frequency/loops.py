@@ -43,7 +43,7 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
     """Return the closed loop in continuous time, with all its inputs and outputs.
 
     Inputs are a force on the stage, the reference, a disturbance on the cart, noise of the sensor, and feedforward of
-    the reference. Outputs are those of the plant, and the actuator force.
+    the reference. Outputs are the outputs of the plant, and the actuator force.
     """
     machine, control = plant(flat, members), compensator(flat, len(members))
     ahead = reference_derivatives(control)
@@ -76,8 +76,11 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
 
 @dataclass(frozen=True)
 class Poles:
-    """Poles of the `closed` and of the `cut` loop of a drive, complex, both of shape (members, n): in the plane of s
-    [rad/s], or of z if it is sampled; and those of the closed loop in `continuous` time without delay."""
+    """Poles of the `closed` and of the `cut` loop with its drive, both of shape (members, n).
+
+    They lie in the plane of s [rad/s], or of z if the drive samples. `continuous` are the poles of the closed loop in
+    continuous time without delay.
+    """
 
     closed: Complex
     cut: Complex
@@ -126,9 +129,12 @@ class Poles:
 
 
 def poles(flat: Mapping[str, Any], members: Members, drive: DriveTiming, cut: str = "") -> Poles:
-    """Poles of the loop, of members all of which are stuck or none; those of a delay in continuous time are of rational
-    functions that stand for it. The way of what is measured on one `cut` channel, STAGE or VELOCITY, is left open.
-    Raises InputError for a delay that is too long for these."""
+    """Return the poles of the loop in each state.
+
+    All members are stuck, or none is. A delay in continuous time is replaced by a rational function. `cut` names the
+    measured channel, STAGE or VELOCITY, whose feedback is left open. Raises InputError for a delay that is too long
+    for that function.
+    """
     machine = _driven(flat, members, drive)
     bare = _cut(machine, _continuous(flat, len(members), cut))
     if drive.sample_time:

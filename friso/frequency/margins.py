@@ -90,8 +90,11 @@ def margins_of(at: LoopResponse, flat: Mapping[str, Any], member: Members, loop_
 def frequencies(
     flat: Mapping[str, Any], members: Members, drive: DriveTiming, density: float, resonant: Sequence[Complex]
 ) -> np.ndarray:
-    """Angular frequencies [rad/s] that show all that loops of these states do, up to the highest the drive knows: so
-    many per decade, and more about the resonances among the poles `resonant`."""
+    """Return angular frequencies [rad/s] that resolve the loops of all these states.
+
+    There are `density` per decade, up to the highest that the drive can represent, and more about the resonances among
+    the poles `resonant`.
+    """
     settings = FrequencySettings.current()
     size = np.concatenate([np.abs(poles(flat, kind, DriveTiming(0.0, 0.0)).closed).ravel() for kind in members.kinds])
     size = size[size > settings.negligible_pole * size.max(initial=0.0)] if size.any() else np.ones(1)
@@ -100,7 +103,7 @@ def frequencies(
 
 
 def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray:
-    """Ascending angular frequencies [rad/s] with those about the resonances of these poles among them."""
+    """Return ascending angular frequencies [rad/s], with more of them about resonances."""
     light = resonances(np.concatenate([roots.ravel() for roots in resonant]))
     near = (np.abs(light.imag)[:, None] + np.abs(light.real)[:, None] * AROUND).ravel()
     return np.unique(np.concatenate([even, near[(near > even[0]) & (near < even[-1])]]))
@@ -119,8 +122,9 @@ def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
 def of_loop(response: LoopResponse, poles: Complex, abscissa: float, omega: np.ndarray, ends: Complex) -> Margins:
     """Return the margins of a loop from its response.
 
-    `poles` are those of the closed loop, `abscissa` the real part of the rightmost, and `omega` frequencies [rad/s]
-    that show the loop. `ends` are its values where it is real at any gain: at rest, and at half the sampling frequency.
+    `poles` are those of the closed loop, `abscissa` the real part of the rightmost one, and `omega` frequencies
+    [rad/s] that resolve the loop. `ends` are its values where it is real at any gain: at rest, and at half the
+    sampling frequency.
     """
     seen = response(omega)
     crossovers = _roots(lambda w: _decades(response(np.array([w])))[0], omega, _decades(seen))

@@ -83,9 +83,12 @@ def locus_of(matrices: Complex, turn: np.ndarray) -> Complex:
 
 
 def samples_controller(flat: Mapping[str, Any], members: int, period: int) -> tuple[System, ...]:
-    """Return the controller at each sample of a period: from the position measured,
-    and that of which the velocity is the rate [m], to the force [N], and what is held for the next sample. A controller
-    that feeds back a position alone, of one encoder, does not see the second."""
+    """Return the controller at each sample of a period.
+
+    Its inputs are the measured position and the position whose rate is the measured velocity [m], its outputs the
+    force [N] and what is held for the next sample. A controller that feeds back one encoder's position does not use
+    the second input.
+    """
     form = shared_structure(flat)
     assert form.controller is not None
     both = form.controller.section.feeds_back == "velocity"

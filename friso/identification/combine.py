@@ -114,9 +114,9 @@ def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
 def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
     """Return the mean of values, shape (n,), that scatter by more than their variances.
 
-    A variance from one to the next is added with which they scatter as they do (Paule, Mandel 1982,
-    doi:10.6028/jres.087.022). The degrees of freedom are those of as many values as count equally: one that is hardly
-    known says little about the scatter.
+    A variance between the values is added, just large enough to explain their scatter (Paule, Mandel 1982,
+    doi:10.6028/jres.087.022). The degrees of freedom are those of the number of values that count equally: a value
+    that is hardly known says little about the scatter.
     """
 
     def excess(added: float) -> float:
@@ -147,7 +147,7 @@ def _intersection(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bo
 
 
 def _reasons(reasons: Sequence[str]) -> str:
-    """Join reasons; of those that differ in numbers alone the first one stands for all."""
+    """Join reasons; where some differ in numbers alone, name the first and count the others."""
     alike: dict[str, list[str]] = {}
     for reason in dict.fromkeys(reasons):
         alike.setdefault(re.sub(r"\d[\d.e+-]*", "#", reason), []).append(reason)

@@ -111,7 +111,7 @@ class FitCase(FittedCase):
         return not self.has_cause if self.leading is None else self.leading.doubt == doubt
 
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
-        """The case after a finding: its consequences for the fit, and the finding among those of the quality."""
+        """Return the case with a finding added, and with the finding's consequences for the fit."""
         quality = replace(
             self.quality, findings=(*self.quality.findings, finding), spoilt=self.quality.spoilt or finding.spoils
         )
@@ -130,7 +130,7 @@ class LeadingEffect:
 
 @dataclass(frozen=True, kw_only=True)
 class KeyCase(FitCase):
-    """A log of moves with estimates by key of the stage file and the `correlation` of those that are determined."""
+    """A log of moves with its estimates by key of the stage file, and their `correlation`."""
 
     estimates: tuple[Estimate, ...]
     correlation: np.ndarray
@@ -179,12 +179,12 @@ class RaisedDoubt:
 
 @dataclass(frozen=True)
 class Doubt:
-    """An effect that may be in a log and is not in the model. Its name is that of its module; see `DOUBTS`.
+    """An effect that may be in a log and is not in the model, named by its module (`DOUBTS`).
 
-    `find` yields findings for what it is given at its `moment`; it `looks_at` something, has a `consequence` in words,
-    and is `decided_by` a measurement: these stand in the reference. `after` names doubts that are asked before.
-    `forces` are those of an effect that may be in what a fit leaves: of all such doubts the one that explains most of
-    it leads, and the others do not name a cause.
+    `find` yields findings from the case at its `moment`. The reference shows what it `looks_at`, its `consequence`,
+    and by which measurement it is `decided_by`. `after` names doubts that are asked before. `forces` returns forces
+    that the effect would add, to be fitted to what is left: the doubt that explains most of it leads, and the others
+    do not name a cause.
     """
 
     moment: Moment

@@ -50,9 +50,7 @@ class Residual:
 
 
 def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> SimulationErrors:
-    """Compare a simulated record with some samples of a log; `bandwidth` [Hz] is that of the
-    motion.
-    """
+    """Compare a simulated record with some samples of a log; `bandwidth` [Hz] is the motion's."""
     settings = IdentificationSettings.current()
     measured = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * bandwidth)
     modelled = motion(simulated.position, log.sample_time, settings.smoothing_bandwidths * bandwidth)

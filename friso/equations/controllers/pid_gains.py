@@ -157,7 +157,7 @@ class PidGains(Pid):
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: Terms) -> Mapping[str, Signal]:
-        """Return the three shares [N] of Eq. 6, and that of the feedforward where there is any."""
+        """Return the three parts of the force [N] in Eq. 6, and the feedforward if there is any."""
         kp, ki, kd, tau = map(blocks.key, ("kp", "ki", "kd", "tau"))
         lag = tau if variant.filtered else None
         derivative = {

@@ -52,7 +52,7 @@ class RationalTerms(NamedTuple):
 
 
 def _divides(flat: Mapping[str, Any]) -> Any:
-    """Tell whether the drive's samples divide those of the controller."""
+    """Tell whether the controller's sample time is a whole multiple of the drive's."""
     if SAMPLE_TIME not in flat or DRIVE_TIME not in flat:
         return True
     ratio = flat[SAMPLE_TIME] / flat[DRIVE_TIME]
@@ -160,8 +160,11 @@ class RationalController(ControllerSection):
 
 
 def _timing(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the samples of the drive, where the controller alone tells them, and those of a controller that is
-    carried out less often than the drive's."""
+    """Return the keys of timing that follow from the controller's own sample time.
+
+    They are the drive's sample time if the file has none, or the period of a controller that runs less often than the
+    drive.
+    """
     if SAMPLE_TIME not in flat:
         return {}
     if DRIVE_TIME not in flat:

@@ -128,7 +128,7 @@ DIRECTION = "forward"
 
 
 def _is_direction(kink: Kink) -> bool:
-    """Tell whether a kink is that of the direction, at the guide or at the motor."""
+    """Tell whether a kink is the reversal of the velocity, at the guide or at the motor."""
     return kink.name.removeprefix(STATE_PREFIX) == DIRECTION
 
 

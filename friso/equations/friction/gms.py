@@ -61,8 +61,10 @@ class Elements(NamedTuple):
 
 
 def _as_many(key: str, what: str, two: str) -> Rule:
-    """Return the rule that a list is as long as that of the stiffnesses;
-    `two` are values of two elements."""
+    """Return the rule that a list has one value for each element stiffness.
+
+    `two` is an example with two elements.
+    """
     example = f'element_stiffness = ["70 N/mm", "30 N/mm"], {key.removeprefix("friction.")} = {two}'
     return Rule(
         (STIFFNESS, key),

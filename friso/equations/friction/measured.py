@@ -40,9 +40,12 @@ class Levels:
 
 @dataclass(frozen=True)
 class MeasuredFriction:
-    """Friction as measurements show it: `levels` over speed; `stiffness` [N/m] and `damping` [N s/m] of small motions
-    at rest; and `force` [N] over `displacement` [m] from rest without load, slowly, both of shape (n,), from 0 on. No
-    stiffness, 0, is that of a law that does not stick."""
+    """Friction as measurements show it.
+
+    `levels` is steady friction over speed; `stiffness` [N/m] and `damping` [N s/m] are of small motions at rest;
+    `force` [N] over `displacement` [m], both of shape (n,), is the virgin curve, from rest without load. A stiffness
+    of 0 means that the law does not stick.
+    """
 
     levels: Levels
     stiffness: float
@@ -91,7 +94,7 @@ def levels_under_conditions(flat: Mapping[str, Any]) -> Levels:
 
 
 def on_bristles(flat: Mapping[str, Any], displacement: np.ndarray, force: np.ndarray) -> MeasuredFriction:
-    """Return measured quantities of a law with a Stribeck curve and bristles.
+    """Return what measurements would show of a law with a Stribeck curve and bristles.
 
     The bristles are as stiff and damped as those of LuGre, and give the virgin curve `force` [N] over `displacement`
     [m].

@@ -67,8 +67,11 @@ class DrivenPlant:
         )
 
     def ends(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes [m] that need less than each of `forces` at each frequency, and more, shape (forces, frequencies):
-        well beyond those of a stuck and of a free cart, whatever the other forces are."""
+        """Return amplitudes [m] that need less and more than each force at each frequency.
+
+        Both have the shape (forces, frequencies). They lie well beyond the amplitudes of a stuck and of a free cart,
+        and do not depend on which other forces are asked for.
+        """
         settings = FrequencySettings.current()
         rows, shape = np.arange(len(self.frequencies)), (len(forces), len(self.frequencies))
         with np.errstate(over="ignore"):

@@ -158,7 +158,7 @@ class _Problem:
         return receptance(self.flat, self.basis.orders * speed / (2 * np.pi))[0]
 
     def residual(self, state: np.ndarray) -> np.ndarray:
-        """Return the residuals of the equations; the last is that of the phase."""
+        """Return the residuals of the equations; the last one is the condition on the phase."""
         cart, speed = self.split(state)
         force = self.basis.harmonics(self.answer(state).force[:, None])[:, 0]
         left = (cart - self.receptances(speed) * force) / self.length

@@ -230,8 +230,10 @@ def unclosed(landing_map: LandingMap) -> list[int]:
 
 
 def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[float]:
-    """Return starts half-way from some runs to their neighbours; `starts` ascend,
-    `numbers` are those of their runs."""
+    """Return starts half-way between some runs and their neighbours.
+
+    `starts` ascend, and `numbers` are the runs that they belong to.
+    """
     between = []
     for run in runs:
         for k in np.flatnonzero(numbers == run):

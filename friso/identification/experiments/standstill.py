@@ -40,7 +40,10 @@ class StandstillResult:
 
     @property
     def ratios(self) -> tuple[tuple[float, float], ...]:
-        """Return RMS and peak of every log over those of the first; NaN where that does not wander."""
+        """Return the RMS and the peak of every log over those of the first log.
+
+        A ratio is NaN if the first log does not wander.
+        """
         first = self.logs[0]
         pairs = ((log.rms / first.rms if first.rms else np.nan, log.peak, first.peak) for log in self.logs)
         return tuple((rms, peak / least if least else np.nan) for rms, peak, least in pairs)

@@ -290,10 +290,10 @@ def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Est
 
 
 def _both(forward: Estimate, backward: Estimate) -> Estimate:
-    """Return the mean of both directions, in which a common offset drops out.
+    """Return the mean of both directions, in which a common offset cancels.
 
-    Where the cart slips in one direction alone it is that one's. What one direction shows and the other bounds is a
-    bound: the offset is not known.
+    If the cart slips in one direction only, its value counts. If one direction gives a value and the other only a
+    bound, the result is a bound, because the offset is not known.
     """
     if not (forward.determined and backward.determined):
         seen, unseen = (forward, backward) if forward.determined else (backward, forward)
