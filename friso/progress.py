@@ -32,7 +32,10 @@ silent = _Silent()
 
 
 def share_of(progress: Progress, number: int, count: int) -> Progress:
-    """The progress of one of `count` equal pieces of work, the one with this number from 0 on, within that of all."""
+    """Return the progress of one of `count` equal pieces of work, within the progress of all.
+
+    `number` counts the pieces from 0.
+    """
 
     def report(done: int, total: int, label: str, /) -> None:
         progress(PERCENT * number + (PERCENT * done // total if total else 0), PERCENT * count, label)
@@ -41,8 +44,10 @@ def share_of(progress: Progress, number: int, count: int) -> Progress:
 
 
 def between(progress: Progress, first: float, last: float, label: str = "") -> Progress:
-    """The progress of work that goes from one share of all to another, 0 to 1; a `label` stands for those of its
-    pieces."""
+    """Return the progress of work that takes all work from one share to another, 0 to 1.
+
+    A `label` replaces the labels of the pieces.
+    """
 
     def report(done: int, total: int, piece: str, /) -> None:
         share = first + (last - first) * (done / total if total else 0.0)
@@ -70,7 +75,7 @@ class Tally:
 
 
 def together(progress: Progress, count: int) -> list[Progress]:
-    """The progresses of `count` equal pieces of work that are done side by side, within that of all."""
+    """Return the progresses of `count` equal pieces of work that are done side by side."""
     tally = Tally(progress, PERCENT * count)
 
     def piece() -> Progress:

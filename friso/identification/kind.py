@@ -51,9 +51,9 @@ NOTHING_CHOSEN = AnalysisSettings()
 class Prior:
     """What is known of the machine before an experiment is analysed.
 
-    `stage` is None where there is none; `from_user` says whether it is the user's, so that its controller is the
-    machine's. `estimates` are those of experiments analysed before, by key, and `made_up` the keys of that stage that
-    were made up around a log, since its file lacks their tables.
+    `stage` is None if there is none. `from_user` says whether the user gave it, so that its controller is the
+    machine's. `estimates` are results of experiments analysed before, by key. `made_up` are the keys of the stage that
+    were made up around a log, because the file lacks their tables.
     """
 
     stage: Stage | None = None

@@ -67,11 +67,11 @@ def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogF
 def read_usable(
     paths: Sequence[Path], options: Mapping, folder: Path, others: Sequence[Path] = ()
 ) -> tuple[list[LogFile], list[InputError]]:
-    """Read the files as `read_all` does, and leave out those that cannot be used, as long as one can.
+    """Read the files, and leave out unusable ones as long as one can be used.
 
     Returns the files and the errors of those left out. Of several files, and of `others` that are read beside them,
-    each takes what the options say about channels that it has. Raises OpenQuestions for all that they do not tell, and
-    InputError where no file can be used.
+    each takes what the options say about its own channels. Raises OpenQuestions for everything that is missing, and
+    InputError if no file can be used.
     """
     if options.experiment is not None:
         KINDS.checked(options.experiment, "--as", "--as {}")
@@ -97,7 +97,10 @@ def read_usable(
 
 
 def _recognised_together(files: list[LogFile]) -> list[LogFile]:
-    """Give files without a stated kind the kind that claims all of these together, if one does."""
+    """Give files without a stated kind the kind that recognises them as one experiment.
+
+    They stay as they are if no kind does.
+    """
     kindless = [number for number, file in enumerate(files) if file.mapping.experiment is None]
     courses = [Course(source) for number in kindless if isinstance(source := files[number].source, Log)]
     for name in KINDS if len(courses) > 1 else ():

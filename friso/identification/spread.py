@@ -99,11 +99,10 @@ def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
 
 
 def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
-    """Return the covariance of the sum of scores, shape (n, p), of which those of a group are
-    alike.
+    """Return the covariance of the sum of scores, shape (n, p), which are alike within a group.
 
-    It is one for normal intervals of `COVERAGE` deviations; the degrees of freedom are those of as many groups as are
-    equally large.
+    It is scaled for normal intervals of `COVERAGE` deviations. The degrees of freedom are those of the number of
+    groups that count equally.
     """
     names, members = np.unique(group, return_inverse=True)
     sums = np.stack([np.bincount(members, column, len(names)) for column in scores.T], axis=1)
@@ -115,8 +114,9 @@ def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
 
 
 def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Invert columns of length 1 times themselves, and tell which of these cannot be
-    distinguished from others.
+    """Invert X' X for columns X of length 1, and tell which columns others can replace.
+
+    Directions that the columns do not resolve are left out.
     """
     settings = IdentificationSettings.current()
     sizes, directions = np.linalg.eigh(square)

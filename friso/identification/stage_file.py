@@ -68,11 +68,10 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
 
 
 def identified_stage(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str]) -> Stage:
-    """Return the stage with the estimates of its keys, as values with 95 % intervals or as
-    ranges.
+    """Return the stage with its identified keys as values with intervals, or as ranges.
 
-    Their units are those of the stage's kind of axis. A stiffness that follows from a [flexure] stays as it follows.
-    Raises InputError where they do not fit together, which those of `fitting` do.
+    Units follow the stage's kind of axis. A stiffness that follows from a [flexure] is left to it. Raises InputError
+    if the values contradict each other; values from `fitting` do not.
     """
     changes: dict[str, object] = {}
     for estimate in estimates:

@@ -86,8 +86,10 @@ def remove_leftovers(root: Path, prefix: str, lock: str) -> None:
 
 @contextmanager
 def _unless_locked(folder: Path, lock: str) -> Iterator[bool]:
-    """Tell whether nobody else held the lock of a folder, which is held within;
-    never that of another user's folder, or of a link to one."""
+    """Hold the lock of a folder within the block, and tell whether it was free.
+
+    A folder of another user, or a link, counts as locked.
+    """
     try:
         status = folder.lstat()
         if not (stat.S_ISDIR(status.st_mode) and is_users_own(status)):

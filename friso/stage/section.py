@@ -112,8 +112,11 @@ class UncertainSection(Section):
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """Return the values by key; those of an array by key and number, from 1,
-        and those of tables in it by theirs."""
+        """Return the values by key.
+
+        Values of an array stand under key and number, counted from 1, and values of tables in it under their own keys
+        below that.
+        """
         values: dict[str, Any] = {}
         for key, value in self:
             if isinstance(value, Values):
@@ -171,8 +174,10 @@ class Variants:
 
     @property
     def classes(self) -> dict[str, type[Section]]:
-        """Return the variants by name; of those of modules of their own first friso's,
-        alphabetically, whichever was imported first."""
+        """Return the variants by name.
+
+        friso's own come first, alphabetically, whichever module was imported first.
+        """
         load_own(self.group)
         return self._classes
 

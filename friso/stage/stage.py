@@ -335,10 +335,10 @@ class Stage(Section):
 
 
 def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
-    """Return the stage of tables in which dotted keys are set, or removed by None; they themselves stay as they are.
+    """Return a new stage from tables in which dotted keys are set, or removed by None.
 
-    A controller that is set in another form, by its gains where the tables have a crossover, replaces that of the
-    tables. Raises StageError.
+    A controller that is set in another form, by its gains where the tables have a crossover, replaces the controller
+    of the tables. The tables passed in stay as they are. Raises StageError.
     """
     own, tables = {*tables}, deepcopy(dict(tables))
     for key, value in changes.items():
@@ -397,7 +397,7 @@ def numeric_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
 
 
 def declared_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
-    """Return the keys of a flat stage in their declared units, those of a linear axis."""
+    """Return the keys of a flat stage in their declared units, which are those of a linear axis."""
     keys: dict[str, Quantity | Number] = {}
     for name, cls in _tables(flat).items():
         keys |= _numeric_keys_of(flat, name, cls)

@@ -68,7 +68,7 @@ def constant(name: str, values: np.ndarray) -> bool:
 
 
 def rises_evenly(values: np.ndarray) -> bool:
-    """Tell whether values rise as those of a clock do, and no measured motion does."""
+    """Tell whether values rise evenly, as a clock does and no measured motion."""
     steps = np.diff(values)
     return bool(values.size > 2 and steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-3, atol=0))
 
@@ -125,9 +125,9 @@ def samples_held(values: np.ndarray) -> int:
 
 
 def interpolated(values: np.ndarray) -> int:
-    """Return over how many samples a signal runs in straight lines; 1 where it does not.
+    """Return how many samples lie on each straight piece of a signal; 1 if it has none.
 
-    Its bends all fall on every n-th sample, n up to 20, as those of a slower signal that was resampled.
+    A slower signal that was resampled bends only at every n-th sample, n up to 20.
     """
     settings = LogSettings.current()
     bends = np.abs(np.diff(values, 2))
@@ -146,11 +146,10 @@ def interpolated(values: np.ndarray) -> int:
 def velocity_factor(
     position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]
 ) -> tuple[float, float]:
-    """Return the ratio of the measured velocity [m/s] to the derivative of position [m], and
-    their correlation.
+    """Return measured velocity over the derivative of position, and their correlation.
 
-    Both are sampled every `period` [s], and smoothed over 11 samples; the ratio is that of least squares. NaN and 0
-    where there is nothing to compare.
+    Velocity [m/s] and position [m] are sampled every `period` [s], and smoothed over 11 samples; the ratio is by least
+    squares. Returns NaN and 0 if there is nothing to compare.
     """
     from scipy.signal import savgol_filter
 

@@ -48,10 +48,10 @@ class StraightLine:
 
 
 def mass_lines(response: FrequencyResponse, most: int = 3) -> tuple[StraightLine, ...]:
-    """Find the mass lines of a force-to-position response by frequency, at most so many; () is
-    an answer too.
+    """Find the mass lines of a force-to-position response, at most `most`, by frequency.
 
-    Below an antiresonance it is the line of the whole mass, above the resonance that of the driven part.
+    Below an antiresonance it is the line of the whole mass, above the resonance the line of the driven part. Returns
+    () if there is none.
     """
     return straight_lines(response, 2, most=most)
 

@@ -86,10 +86,10 @@ def _check_signal(name: str, values: np.ndarray, least: int) -> None:
 
 @dataclass(frozen=True)
 class Spectra:
-    """Spectra of one realisation at the harmonics `frequency` [Hz] (lines,), from the first on.
+    """Spectra of one realisation at the harmonics `frequency` [Hz], shape (lines,).
 
-    `input` and `output` are (periods, lines); `reference` (lines,) is that of the external signal, averaged. `excited`
-    (lines,) are the lines that the external signal holds.
+    `input` and `output` are (periods, lines). `reference` (lines,) is the spectrum of the external signal, averaged
+    over periods, and `excited` (lines,) marks the lines that this signal contains.
     """
 
     frequency: np.ndarray
