@@ -62,9 +62,7 @@ def fit_one_mass(
 
 
 def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Return responses of one mass as each output has it, shape (outputs, lines), over
-    frequencies [Hz].
-    """
+    """Return the responses of one mass at every output, shape (outputs, lines), over [Hz]."""
     mass, outputs = np.exp(parameters[MASS]), len(parameters) - BEYOND - COMPLIANCES
 
     def masses(frequency: np.ndarray) -> np.ndarray:
@@ -75,8 +73,9 @@ def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
 
 
 def _starts(values: np.ndarray, frequency: np.ndarray) -> list[np.ndarray]:
-    """Return starts with corners of friction and spring at none or some frequencies, as large as
-    the first response.
+    """Return starting points for a fit, with different corners of friction and spring.
+
+    All have the magnitude of the first response.
     """
     settings = ResponseSettings.current()
     places = 2 * np.pi * np.array([0.0, *np.geomspace(frequency[0] / 3, frequency[-1], 6)])
