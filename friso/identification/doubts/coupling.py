@@ -43,9 +43,9 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def coupling_force(case: FittedCase) -> np.ndarray | None:
-    """Return the force of a coupling [N], shape (n,), with the standard deviation of the inertia.
+    """Return the force of a coupling [N], (n,), scaled to the standard deviation of the inertia.
 
-    None where no mass is fitted, or the stage does not move.
+    None if no mass is fitted, or the stage does not move.
     """
     fit, step = case.fit, case.log.sample_time
     if MASS not in [fit.problem.parameters[number].name for number in fit.free]:

@@ -70,9 +70,7 @@ class LawComparison:
 
     @property
     def supported(self) -> tuple[LawPrediction, ...]:
-        """The laws that predict the record, and not clearly worse than the best; none where no law
-        predicts it.
-        """
+        """Return the laws that predict the record about as well as the best; none if none predicts it."""
         settings = LawSettings.current()
         best = self.predictions[0]
         if not self.explained:

@@ -166,8 +166,9 @@ def lvm_content(path: Path) -> dict[str, Any]:
 
 
 def tdms_channels(path: Path) -> dict[str, Any]:
-    """Read the channels of a TDMS file, and what the library said: a file that ends early is
-    read as far as it goes.
+    """Read the channels of a TDMS file, and the library's messages.
+
+    A file that ends early is read as far as it goes.
     """
     import nptdms
 

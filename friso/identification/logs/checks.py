@@ -9,10 +9,9 @@ from friso.identification.logs.settings import LogSettings
 
 
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Return a channel without samples that repeat the one before, stamp [s] and value; and how
-    many there were.
+    """Return a channel without samples that repeat the stamp [s] and value before, and their count.
 
-    Raises LogError for time that decreases and for another value at one stamp.
+    Raises LogError for time that decreases and for another value at the same stamp.
     """
     steps = np.diff(time)
     back = np.flatnonzero(steps < 0)
@@ -74,11 +73,10 @@ def rises_evenly(values: np.ndarray) -> bool:
 
 
 def clipped_share(values: np.ndarray) -> float:
-    """Return the share of samples in flat tops at the extremes that show that a signal is
-    clipped.
+    """Return the share of samples in flat tops that show that a signal is clipped.
 
-    A flat top has at least 3 equal samples. The signal enters it with a kink, the step before being at least a fifth of
-    the largest step, or it hardly ever repeats a value elsewhere.
+    A flat top lies at an extreme and has at least 3 equal samples. The signal enters it with a kink, the step before
+    being at least a fifth of the largest step, or it hardly ever repeats a value elsewhere.
     """
     settings = LogSettings.current()
     steps = np.abs(np.diff(values))
@@ -96,10 +94,9 @@ def clipped_share(values: np.ndarray) -> float:
 
 
 def jumps(values: np.ndarray) -> tuple[float, int]:
-    """Return the largest step of a signal and the sample behind it, where it is no part of a
-    motion.
+    """Return the largest step of a signal and the sample behind it, if it is no motion.
 
-    It is many times larger than all steps but a few; else 0 and 0.
+    It is many times larger than all steps but a few; otherwise 0 and 0.
     """
     settings = LogSettings.current()
     steps = np.diff(values)

@@ -45,10 +45,10 @@ class OutputErrorFit:
         return float(np.sqrt(np.sum(self.residual**2) / max(float(self.problem.counted.sum()), 1.0)))
 
     def explains(self, noise: float, closely: bool = False) -> bool:
-        """Tell whether the fit leaves about the `noise` [N] of the log's force, or `closely` no more
-        than that.
+        """Tell whether the fit explains the log up to about its `noise` [N].
 
-        Of a stage that is held to the log a part of the noise alone passes into the residual.
+        With `closely`, the limit is tighter. If the stage is held to the log, only a part of the noise passes into the
+        residual.
         """
         settings = OutputErrorSettings.current()
         times = settings.noise_ratio_of_a_closed_fit if closely else settings.noise_ratio_of_an_explained_record
@@ -113,8 +113,7 @@ def fit(problem: Problem, free: Sequence[int], starts: np.ndarray, progress: Pro
 def fits(
     problems: Sequence[Problem], free: Sequence[int], starts: np.ndarray, progress: Progress = silent
 ) -> list[OutputErrorFit]:
-    """Fit several problems that differ in nothing but the samples that count, from the same
-    starts.
+    """Fit several problems that differ only in the samples that count, from the same starts.
 
     The starts are simulated once for all of them.
     """
@@ -151,11 +150,10 @@ def _fit(
 
 
 def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.ndarray:
-    """Lay many starts over the ranges of the free parameters, shape (starts, parameters), behind
-    the `first`.
+    """Spread many starts over the ranges of the free parameters, (starts, parameters).
 
-    They find parameters that not every motion shows. Core parameters start about the inverse model's values, for a
-    first fit of them alone to motion that sticks and slips can end anywhere.
+    The start `first` comes first. They find parameters that not every motion shows. Core parameters start near the
+    inverse model's values, since a first fit of them alone to motion that sticks and slips can end anywhere.
     """
     settings = OutputErrorSettings.current()
     low, high = bounds_of(problem)

@@ -147,9 +147,7 @@ def _source(column: int, info: dict[str, str]) -> str:
 
 
 def _scaled(table: dict[str, list[str]]) -> list[str]:
-    """Write a line for the channels with an offset or a scale, which the exported values
-    contain.
-    """
+    """Write a line on channels with an offset or a scale, which exported values already contain."""
     scaled = []
     for i, name in enumerate(table["Name"]):
         offset, scale = (table.get(key, [])[i : i + 1] for key in ("Offset", "ScaleFactor"))
