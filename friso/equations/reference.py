@@ -99,7 +99,10 @@ def moved_on(form: ReferenceForm, rows: np.ndarray, elapsed: Any) -> np.ndarray:
 
 
 def at_rest(form: ReferenceForm, rows: np.ndarray, derivative: int = 1) -> np.ndarray:
-    """Tell which pieces stand still, or have no second `derivative` and so an even velocity, shape of the rows."""
+    """Tell which pieces stand still, in the shape of the rows.
+
+    With the second `derivative`, tell which ones have a constant velocity.
+    """
     rests = np.all(rows[..., 1 + derivative : form.degree + 2] == 0, axis=-1)
     for amplitude, *_ in _tones(form, rows):
         rests &= amplitude == 0

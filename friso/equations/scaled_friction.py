@@ -29,14 +29,15 @@ def least_static_factor(flat: Mapping[str, Any]) -> float:
 
 
 def with_static_friction(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Return stages with a multiple of their static friction,
-    Coulomb friction and all else held."""
+    """Return stages with a multiple of their static friction, Coulomb friction unchanged."""
     return {**flat, **{key: flat[key] * factor for key in static_frictions(flat)}}
 
 
 def with_friction(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Return stages with a multiple of their friction: every force is,
-    and every stiffness and damping in a law, so that deflections and speeds stay as they are."""
+    """Return stages with a multiple of their friction.
+
+    Every force, stiffness and damping of a law is multiplied, so that deflections and speeds stay.
+    """
     forces = [key for key, kind in numeric_keys(flat).items() if key.partition(".")[0] in TABLES and _is_force(kind)]
     return {**flat, **{key: flat[key] * factor for key in forces if key in flat}}
 

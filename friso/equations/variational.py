@@ -62,8 +62,10 @@ def _directional_derivative(expression: sp.Expr, small: Small) -> sp.Expr:
 
 
 def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Expr]:
-    """Return by how much the deviations jump at a kink:
-    (f+ - f-) times their share across it over the speed of crossing."""
+    """Return the jump of deviations at a kink.
+
+    It is (f+ - f-) times their share across the kink over the speed of crossing.
+    """
     speed = sp.diff(kink.surface, TIME)
     speed += sum((sp.diff(kink.surface, part.symbol) * part.derivative for part in model.states), start=sp.S.Zero)
     share = _directional_derivative(kink.surface, small) / speed
@@ -78,8 +80,10 @@ def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Exp
 
 
 def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
-    """Return the jump of deviations at a kink where states become R(x):
-    DR small + (f+ - DR f-) share, f+ taken at R(x)."""
+    """Return the jump of deviations at a kink where states become R(x).
+
+    It is DR small + (f+ - DR f-) share, with f+ taken at R(x).
+    """
     becomes = switch.becomes
     behind = {**becomes, switch.beyond: 1 - switch.beyond}
     before = {part.symbol: part.derivative for part in model.states}
@@ -95,8 +99,10 @@ def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.
 
 
 def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
-    """Tell whether a difference is zero all over the surface of a kink, tried at points of it;
-    not, where the surface is linear in no symbol: it bounds a window then, at which something is switched."""
+    """Tell whether a difference is zero all over the surface of a kink, tried at points of it.
+
+    It is not if the surface is linear in no symbol: such a surface bounds a window in which something is switched.
+    """
     if gap == 0:
         return True
     linear = (s for s in sorted(kink.surface.free_symbols, key=str) if sp.diff(kink.surface, s, 2) == 0)

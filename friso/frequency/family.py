@@ -37,8 +37,10 @@ NEAR = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 
 @dataclass(frozen=True)
 class Scan:
-    """The `members` of a stage, with the keys `flat`: whether they are stable, and their modulus margins, which are
-    computed once they are asked for; arrays of shape (members,)."""
+    """The stability of the `members` of a stage with keys `flat`, arrays of shape (members,).
+
+    Modulus margins are computed when they are first asked for.
+    """
 
     flat: Mapping[str, Any]
     members: Members
@@ -56,8 +58,11 @@ class Scan:
 
     @cached_property
     def distance(self) -> np.ndarray:
-        """Least distance of the loop from -1: on frequencies that all share and about a member's own closed-loop
-        resonances, and exactly for those that come closest to -1 there."""
+        """Return the least distance of each member's loop from -1.
+
+        It is computed on frequencies that all share and about each member's closed-loop resonances, and exactly for
+        the members that come closest to -1.
+        """
         settings = FrequencySettings.current()
         omega = frequency_grid(self.flat, settings.family_density)
 
@@ -89,15 +94,21 @@ def scan_stability(flat: Mapping[str, Any], members: Members) -> Scan:
 
 
 class PoleStability(NamedTuple):
-    """Real part of the rightmost closed-loop pole [1/s], 0 on the edge of stability, and the least abs(1 + L) about
-    closed-loop resonances, both of shape (members,)."""
+    """Stability of members by their closed-loop poles, both of shape (members,).
+
+    `abscissa` is the real part of the rightmost pole [1/s], 0 on the edge of stability; `resonant` is the least abs(1
+    + L) about closed-loop resonances.
+    """
 
     abscissa: np.ndarray
     resonant: np.ndarray
 
 
 def stability_by_poles(flat: Mapping[str, Any], members: Members) -> PoleStability:
-    """Every member by its own poles; `flat` may hold arrays of shape (members,), except in the drive's keys."""
+    """Return the stability of every member by its poles.
+
+    `flat` may hold arrays of shape (members,), except in the drive's keys.
+    """
     by_poles = PoleStability(np.empty(len(members)), np.empty(len(members)))
 
     def look(part: Poles) -> PoleStability:
@@ -112,8 +123,10 @@ def stability_by_poles(flat: Mapping[str, Any], members: Members) -> PoleStabili
 def for_poles(
     flat: Mapping[str, Any], members: Members, function: Callable[[Poles], _T]
 ) -> list[tuple[np.ndarray, _T]]:
-    """Return a function of the poles of every member, a few at a time, side by side:
-    their numbers, and what it returns; `flat` may hold arrays of shape (members,), except in the drive's keys."""
+    """Apply a function to the poles of all members, a few at a time, side by side.
+
+    Yields their numbers and the results. `flat` may hold arrays of shape (members,), except in the drive's keys.
+    """
     drive = DriveTiming.of(flat)
 
     def of_part(which: np.ndarray) -> tuple[np.ndarray, _T]:
@@ -125,13 +138,18 @@ def for_poles(
 
 
 def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
-    """Real part [1/s] of the rightmost closed-loop pole, shape (members,), 0 on the edge of stability."""
+    """Return the real part [1/s] of the rightmost closed-loop pole, shape (members,).
+
+    It is 0 on the edge of stability.
+    """
     return stability_by_poles(flat, members).abscissa
 
 
 def about_resonances(system: Poles) -> np.ndarray:
-    """Angular frequencies [rad/s] about the lightly damped closed-loop poles of each member, shape (members, k), NaN
-    where there are fewer."""
+    """Return angular frequencies [rad/s] about each member's lightly damped closed-loop poles.
+
+    Shape (members, k), NaN where there are fewer.
+    """
     settings = FrequencySettings.current()
     if system.drive.period > 1:  # its poles do not tell which alias resonates
         return np.full((len(system.closed), 1), np.nan)

@@ -53,10 +53,9 @@ class OpenQuestions(GapsError):
 
 
 def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogFile]:
-    """Read the files, mapped as the options say, or as kept from an earlier time beside them or
-    in `folder`.
+    """Read the files, mapped by the options or by what was kept beside them or in `folder`.
 
-    Raises OpenQuestions for all that they do not tell, InputError for what cannot be read.
+    Raises OpenQuestions for all that is missing, InputError for what cannot be read.
     """
     files, wrong = read_usable(paths, options, folder)
     if wrong:
@@ -208,10 +207,9 @@ def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
 
 
 def _without_clock(path: Path, mapping: Mapping) -> Log | None:
-    """Return a log whose instants are not told, sample by sample, by which its course can be
-    seen.
+    """Return a log without known instants, sample by sample, so that its course can be seen.
 
-    None where it cannot.
+    None if that is not possible.
     """
     try:
         return read_log(path, replace(mapping, sample_time=1.0), strict=False, needed=MOVED)
@@ -220,9 +218,7 @@ def _without_clock(path: Path, mapping: Mapping) -> Log | None:
 
 
 def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
-    """Return where the mapping of a log is kept for the next time: beside it, or in `folder`;
-    None for nothing to keep.
-    """
+    """Return where a log's mapping is kept, beside it or in `folder`; None if there is none."""
     return None if mapping == Mapping() else place_for(path, folder)
 
 

@@ -77,8 +77,7 @@ class VanDijk(Pid):
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Return the gains of Eq. 7 that follow from the controller's keys,
-        and the keys that every controller has."""
+        """Return the gains of Eq. 7 that follow from the keys, and the keys of every controller."""
         values = numbers(flat)
         times = {"tau_z": "lead", "tau_i": "integral", "tau_p": "low-pass, before all terms"}
         return (
@@ -125,8 +124,7 @@ class VanDijk(Pid):
 
 
 def controller_table(crossover: str) -> dict[str, Any]:
-    """Return the table [controller] of a stage file for a crossover such as "8 Hz";
-    alpha and beta as in the examples."""
+    """Return a [controller] table for a crossover such as "8 Hz", alpha and beta as in examples."""
     return {"kind": "pid", "crossover": crossover, "alpha": 0.1, "beta": 2}
 
 

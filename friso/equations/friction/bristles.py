@@ -55,9 +55,10 @@ def keeping_bristle(measured: MeasuredFriction, **shape: float) -> dict[str, Any
 
 
 def bristles_active(flat: Mapping[str, Any], softer: float = 1.0, power: str = "") -> str:
-    """Return the condition under which damped bristles on a Stribeck curve are passive,
-    where it is not met. Those bent most give way `softer` times as fast as LuGre's; `power` writes that in the
-    condition."""
+    """Return the condition of passivity that damped bristles do not meet; "" if they do.
+
+    The most bent bristles give way `softer` times as fast as in LuGre; `power` writes that in the condition.
+    """
     levels, damping = levels_under_conditions(flat), flat["friction.bristle_damping"]
     least = damping * (levels.static / levels.coulomb - 1) * softer
     viscous = levels.viscous * (1 - abs(levels.viscous_asymmetry))  # in the direction in which it damps less

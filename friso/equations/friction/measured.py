@@ -61,8 +61,10 @@ class MeasuredFriction:
         return np.minimum.accumulate(np.clip(slopes, 0.0, self.stiffness))
 
     def misfit(self, force: np.ndarray) -> float:
-        """Return how far another virgin curve [N], over the same displacements, is off at most,
-        as a share of static friction."""
+        """Return the largest deviation of another virgin curve [N], as a share of static friction.
+
+        Both have the same displacements.
+        """
         return float(np.max(np.abs(force - self.force)) / self.levels.static)
 
 
@@ -82,8 +84,7 @@ def virgin_displacements(static: float, stiffness: float, corners: Sequence[floa
 
 
 def levels_of(flat: Mapping[str, Any]) -> Levels:
-    """Return the Stribeck curve of a law that has one, as it was measured:
-    without what [conditions] make of it."""
+    """Return the Stribeck curve of a law as it was measured, without [conditions]."""
     values = {field.name: flat.get(f"friction.{field.name}", field.default) for field in fields(Levels)}
     return Levels(**{name: float(value) for name, value in values.items()})
 
@@ -104,9 +105,11 @@ def on_bristles(flat: Mapping[str, Any], displacement: np.ndarray, force: np.nda
 
 
 def power_law(static: float, stiffness: float, exponent: float, displacement: np.ndarray) -> np.ndarray:
-    """Return a virgin curve whose slope falls by a power of the force that is lacking,
-    Dahl's exponent: force [N] over displacement [m] from rest, both of shape (n,). Below 1 it ends at static friction,
-    at 0 straight."""
+    """Return a virgin curve whose slope falls by a power of the missing force (Dahl's exponent).
+
+    It is force [N] over displacement [m] from rest, both of shape (n,). Below an exponent of 1 it ends at static
+    friction, at 0 it is straight.
+    """
     way, more = stiffness * displacement / static, exponent - 1
     lacking = np.exp(-way) if more == 0 else np.maximum(1 + more * way, 0.0) ** (-1 / more)
     return static * (1 - lacking)

@@ -173,8 +173,7 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
 
 
 def nearby(fit: OutputErrorFit) -> np.ndarray:
-    """Draw starts that another problem's fit allows, shape (starts, parameters), behind that fit
-    itself.
+    """Draw starts that another problem's fit allows, (starts, parameters), beginning with that fit.
 
     They are drawn from its covariance, several times as wide: the loop of a stage that hunts has optima of its own.
     """
@@ -198,9 +197,7 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
 def _ranked(
     problems: Sequence[Problem], pieces: Sequence[slice], starts: np.ndarray, progress: Progress
 ) -> list[np.ndarray]:
-    """Return the best starts of each problem, shape (tried, parameters), the first start always
-    among them.
-    """
+    """Return the best starts of each problem, (tried, parameters), always with the first one."""
     settings = OutputErrorSettings.current()
     if len(starts) <= settings.starts_refined_first:
         return [starts] * len(problems)
@@ -252,11 +249,10 @@ def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progres
 
 
 def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.ndarray:
-    """Widen a covariance, shape (free, free), so that intervals hold what other inputs make of
-    the numbers.
+    """Widen a covariance, (free, free), so that intervals hold the results of other inputs.
 
-    Each of `moved`, shape (free,), says how far one of these inputs moves the fitted numbers. One input is true, and
-    not one in between: half of the distance would be an interval that never holds the truth.
+    Each of `moved`, shape (free,), says how far one of these inputs moves the fitted numbers. One input is true, not a
+    mean of them: an interval over half of the distance would never hold the truth.
     """
     if not moved:
         return covariance
@@ -269,9 +265,7 @@ def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.nd
 
 
 def _moved_by(inputs: Inputs, problem: Problem, best: np.ndarray, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Return how far other inputs, which a log allows just as well, move the fitted numbers,
-    shape (free,).
-    """
+    """Return how far other inputs that the log allows move the fitted numbers, shape (free,)."""
     settings = OutputErrorSettings.current()
     change = replace(problem, inputs=inputs).residuals(best[None])[0] - rest
     if not np.isfinite(change).all():

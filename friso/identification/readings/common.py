@@ -122,7 +122,7 @@ def rate(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
 
 
 def motion_bandwidth(position: np.ndarray, sample_time: float) -> float:
-    """Return the highest frequency [Hz] at which a position, shape (n,), stands out of its noise.
+    """Return the highest frequency [Hz] at which a position, (n,), stands out of its noise.
 
     The noise is taken to be white. Returns 0 if the position stands out nowhere.
     """
@@ -310,10 +310,10 @@ def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray)
 
 
 def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.ndarray:
-    """Return the deflection [m] of bristles, shape (n,), under a body that makes moves [m], (n - 1,).
+    """Return the deflection [m] of bristles, shape (n,), under a body that moves.
 
-    At the velocities of these moves the bristles come to rest at `ends` [m], shape (n - 1,); they begin from the
-    deflection `start` [m]. The solution is exact in each move.
+    The moves [m] have the shape (n - 1,). At their velocities the bristles come to rest at `ends` [m], shape (n - 1,);
+    they begin from the deflection `start` [m]. The solution is exact in each move.
     """
     kept = np.exp(-np.abs(moves) / ends)
     after = np.append(start, np.sign(moves) * ends * (1 - kept))  # each deflection without that before
@@ -330,7 +330,7 @@ def by_direction(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
 def stribeck_curve(
     speeds: np.ndarray, coulomb: float, static: float, velocity: float, exponent: float = 2.0
 ) -> np.ndarray:
-    """Return friction [N] at steady speeds [m/s] by Eq. 4 of the thesis, without the viscous part.
+    """Return friction [N] at steady speeds [m/s] by Eq. 4 of the thesis, not the viscous part.
 
     Arguments are Coulomb and static friction [N], the Stribeck velocity [m/s] and the exponent.
     """

@@ -44,7 +44,10 @@ class Course:
 
     @property
     def signal(self) -> str:
-        """Return the role of the signal that drives the log: injected force, moving reference, or force."""
+        """Return the role of the signal that drives the log.
+
+        It is the injected force, or a moving reference, or else the force.
+        """
         return external(self.log) or "force"
 
     @cached_property
@@ -131,7 +134,7 @@ class Course:
 
     @cached_property
     def against_a_spring(self) -> bool:
-        """Tell whether the position rests at several places with forces that the place alone decides."""
+        """Tell whether the position rests at several places, each with its own force."""
         settings = ReadingSettings.current()
         part = self.log.longest
         position, force = self.log["position"][part], self.log["force"][part]

@@ -92,10 +92,10 @@ def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None
 
 
 def _row(stretch: Pass, mass: float) -> tuple[float, float, float, float]:
-    """Return velocity [m/s], friction force [N], its half-width [N], and relative swing of a pass.
+    """Return velocity [m/s], friction [N], its half-width [N], and relative swing of a pass.
 
-    The force is without inertia. The mean of a curve over a swing is off by the square of the swing, as a share of how
-    far the curve falls.
+    Friction is force without inertia. The mean of a curve over a swing is off by the square of the swing, as a share
+    of how far the curve falls.
     """
     return (
         stretch.velocity,

@@ -59,7 +59,7 @@ def passes(log: Log) -> tuple[Pass, ...]:
 
 
 def on_common_places(log: Log, stretches: Sequence[Pass]) -> tuple[Pass, ...]:
-    """Cut passes to the way that all of them cover, so that they see friction at the same places.
+    """Cut passes to the way that all of them cover, to compare friction at the same places.
 
     They stay as they are if that way is too short.
     """
@@ -170,9 +170,9 @@ def _digit(position: np.ndarray) -> float:
 
 
 def _quick_swing(position: np.ndarray, sample_time: float, digit: float) -> float:
-    """Return the standard deviation of fast oscillation of the velocity [m/s], above the cut-off.
+    """Return the standard deviation of fast oscillation of the velocity [m/s].
 
-    Only lines of the spectrum that stand clear of noise count. The low-pass hides such oscillation. Less than one
+    It is faster than the low-pass shows. Only lines of the spectrum that stand clear of noise count. Less than one
     digit [m] of the position is no motion.
     """
     settings = ReadingSettings.current()

@@ -61,7 +61,7 @@ def analyse(
     period: float | None = None,
     measured: MeasuredResponse | None = None,
 ) -> Bench:
-    """Analyse a frequency response: from logs that are realisations of one experiment, or measured.
+    """Analyse a frequency response, measured or estimated from logs of one experiment.
 
     `measured` is a response that another instrument has computed. `band` [Hz] is the band of the models (default:
     above where friction bends the response); `period` [s] is about the period of the excitation (default: found).

@@ -15,7 +15,7 @@ from friso.quantities import percent
 
 
 def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
-    """Say what suggests that a controller feeds the output back to the input; () if nothing does.
+    """Say what suggests that a controller feeds the output back to the input; () for nothing.
 
     Without a loop the output's past cannot help to predict the input beyond the input's own past (Granger 1969,
     doi:10.2307/1912791; for feedback: Caines, Chan 1975, doi:10.1109/TAC.1975.1101008). An input that repeats is taken
@@ -111,7 +111,7 @@ def measured_open_loop(plant: FrequencyResponse, controller: np.ndarray) -> Freq
 
 
 def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
-    """Return the frequencies [Hz] at which |L| passes 1, each with its interval, in rising order.
+    """Return the frequencies [Hz] at which |L| passes 1, each with its interval, rising.
 
     They are interpolated in logarithms; the interval follows from the interval of the magnitude and the slope over
     nearby lines. Three passages (or five, ...) that noise does not tell apart count as one. Returns () if there is
@@ -137,7 +137,7 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
 
 
 def _merged_passage(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
-    """Merge passages into one: the centre of the middle one, and the range that all of them span."""
+    """Merge passages into one: the centre of the middle one, and the range of them all."""
     return min(low for low, _, _ in group), group[len(group) // 2][1], max(high for _, _, high in group)
 
 

@@ -74,7 +74,10 @@ def _switched_off(signal: np.ndarray) -> int:
 
 
 def _shortest(change: np.ndarray) -> int:
-    """Return the shortest lag at which a signal that has changed repeats as well as at any other."""
+    """Return the shortest lag at which a signal repeats as well as at any other.
+
+    Lags before the signal has changed do not count.
+    """
     away = np.flatnonzero(change > 0.5)
     first = int(away[0]) if away.size else len(change)
     lags = np.arange(max(first, 2), len(change))

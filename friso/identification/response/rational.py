@@ -19,7 +19,7 @@ from friso.identification.response.settings import ResponseSettings
 
 @dataclass(frozen=True)
 class RationalShape:
-    """Structure of a rational model: a rigid body or not, modes, and a constant for higher modes."""
+    """Structure of a rational model: a rigid body or not, modes, and a constant beyond them."""
 
     rigid: bool
     modes: int

@@ -139,7 +139,7 @@ def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
 
 
 def _sign(response: np.ndarray) -> float:
-    """Return 1 if the mass follows the force on most lines (-180 degrees), -1 if it goes against it."""
+    """Return 1 if the mass follows the force (-180 degrees) on most lines, else -1."""
     return -1.0 if np.sum(np.cos(np.angle(response))) > 0 else 1.0
 
 
@@ -156,9 +156,9 @@ def _follows(values: np.ndarray, model: np.ndarray) -> None:
 
 
 def _from_modes(response: FrequencyResponse, outputs: int) -> list[np.ndarray]:
-    """Return a start from the first antiresonance and resonance of a rational fit, if it has them.
+    """Return a start from the first antiresonance and resonance of a rational fit.
 
-    The whole mass is 1. Returns [] without them.
+    The whole mass is 1. Returns [] if it has none.
     """
     try:
         modes = fit_modes(response)
