@@ -68,7 +68,10 @@ class Tally:
         self._turn = Lock()
 
     def add(self, steps: int, label: str) -> None:
-        """So many more steps are done; `label` says what is being done now. Several threads may tell."""
+        """Count more steps as done; `label` says what is being done now.
+
+        Several threads may call it.
+        """
         with self._turn:
             self.done += steps
             self.progress(self.done, self.total, label)
@@ -93,8 +96,10 @@ def together(progress: Progress, count: int) -> list[Progress]:
 
 
 class WorkClock:
-    """Seconds of work: it stands still during what is done once, such as compiling, which does not tell how long the
-    rest takes."""
+    """A clock of work in seconds that can be stopped.
+
+    It stands still during what is done once, such as compiling, which does not tell how long the rest takes.
+    """
 
     def __init__(self) -> None:
         self._stood = self._since = 0.0

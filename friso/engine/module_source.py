@@ -102,8 +102,7 @@ def _looked_up(model: Model, writer: StepWriter) -> dict[str, tuple[int, ...]]:
 
 
 def _numpy_functions(model: Model, writer: StepWriter) -> str:
-    """Write the functions of a model for NumPy arrays: constants, scales, steady states,
-    outputs and others."""
+    """Write the functions of a model for NumPy: constants, scales, steady states, outputs."""
     names: dict[sp.Symbol, str] = {p: f"p[{i}]" for i, p in enumerate(model.parameters)}
     names |= {s: f"x[{i}]" for i, s in enumerate(model.symbols)}
     names |= {r: f"r[{i}]" for i, r in enumerate(model.fixed)} | {TIME: "t"}
@@ -126,8 +125,7 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
 
 
 def _function(head: str, expressions: Iterable[sp.Expr], names: Mapping[sp.Symbol, str]) -> str:
-    """Return a function of what stands in its head; what has cases is worked out once,
-    however often it occurs."""
+    """Return a function with this head; expressions with cases are evaluated once."""
     expressions = [sp.sympify(e) for e in expressions]
     cases = sorted({case for e in expressions for case in e.atoms(sp.Piecewise)}, key=sp.count_ops)
     shared = {case: sp.Symbol(f"w{k}") for k, case in enumerate(cases)}

@@ -35,7 +35,10 @@ def current_flag() -> np.ndarray:
 
 @contextmanager
 def ended_by(flag: np.ndarray) -> Iterator[None]:
-    """Let all runs within end once another thread sets ``flag[0] = 1``; `flag` is of int64 and of shape (1,)."""
+    """Let all runs within the block end once another thread sets ``flag[0] = 1``.
+
+    `flag` is of int64 and of shape (1,).
+    """
     token = _FLAG.set(flag)
     try:
         yield
@@ -63,7 +66,10 @@ _turn = Condition()
 
 @contextmanager
 def going_first() -> Iterator[None]:
-    """Let what is computed within go first: all other work of this process waits at its next batch of runs."""
+    """Give priority to runs within the block: other work of this process waits meanwhile.
+
+    It waits at its next batch of runs.
+    """
     token, own = _FIRST.set(True), object()
     with _turn:
         _ahead[own] = time.monotonic() + AHEAD

@@ -128,7 +128,7 @@ class Constants:
         return {symbol: i for i, symbol in enumerate(self._symbols.values())}
 
     def hoist(self, expr: Any) -> Any:
-        """`expr` with every largest subexpression in parameters alone replaced by a constant's symbol."""
+        """Replace every largest subexpression in parameters alone by a constant's symbol."""
         if expr.is_number or not expr.free_symbols & self._parameters:
             return expr
         if expr.free_symbols <= self._parameters:

@@ -29,7 +29,10 @@ def at_bandwidth(flat: Mapping[str, Any], bandwidth: Any) -> dict[str, Any]:
 
 
 def faster(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Return stages whose controller is faster by a factor, with poles, zeros and bandwidth scaled."""
+    """Return stages with the whole controller faster by a factor, bandwidth included.
+
+    All its poles and zeros are scaled.
+    """
     return {**flat, **sped_up(flat, factor)}
 
 

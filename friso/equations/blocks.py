@@ -324,7 +324,7 @@ def unwinding_time() -> sp.Symbol:
 
 
 def wound_up(force: sp.Expr, integrals: list[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
-    """Return the integrals in a steady motion, in which the controller exerts the force of `STEADY`.
+    """Return the integrals in a steady motion, so that the force is that of `STEADY`.
 
     The innermost integral, which is made last, supplies that force; the others are 0. `force` is the controller's own
     in that motion, in terms of the integrals.

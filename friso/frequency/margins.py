@@ -54,8 +54,7 @@ class Margins:
 
     @property
     def on_the_edge(self) -> bool:
-        """Tell whether a deviation neither dies out nor grows: a position that is not controlled,
-        an undamped swing."""
+        """Tell whether a deviation neither dies out nor grows, as an undamped swing."""
         return self.abscissa == 0
 
     @property
@@ -66,7 +65,9 @@ class Margins:
 
 def margins(flat: Mapping[str, Any], member: Members) -> Margins:
     """Return the margins of a stage in one of its states.
-    Raises InputError for too long a delay (see `DriveTiming`)."""
+
+    Raises InputError for too long a delay (see `DriveTiming`).
+    """
     drive = DriveTiming.of(flat)
     return margins_of(response(flat, member, drive), flat, member, poles(flat, member, drive))
 
@@ -156,8 +157,10 @@ def _decades(loop: Complex) -> np.ndarray:
 
 
 def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return where a function of the frequency, known at some, passes zero; not where it jumps,
-    as a locus does that goes over to an alias."""
+    """Return where a function of frequency, known at some frequencies, passes zero.
+
+    Jumps, as where a locus goes over to an alias, do not count.
+    """
     settings = FrequencySettings.current()
     with np.errstate(invalid="ignore"):
         passes = np.flatnonzero(values[:-1] * values[1:] < 0)

@@ -32,7 +32,9 @@ class HelperProcess:
 
     def ask(self, question: object) -> Any:
         """Ask the process a question, and return its answer.
-        Raises EOFError where it has ended instead."""
+
+        Raises EOFError if it has ended.
+        """
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         with suppress(OSError):  # nobody reads it any more: the process ended, and says why

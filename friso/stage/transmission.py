@@ -67,8 +67,7 @@ class Encoder(UncertainSection):
 
 
 def motor_mass(flat: Mapping[str, Any]) -> Any:
-    """Return the mass of the motor at the load [kg] that follows from its inertia;
-    None where none does."""
+    """Return the mass of the motor at the load [kg] from its inertia; None without one."""
     lead = flat[LEAD] if LEAD in flat else 2 * pi / flat[RATIO] if RATIO in flat else None
     return None if INERTIA not in flat or lead is None else flat[INERTIA] * (2 * pi / lead) ** 2
 

@@ -120,7 +120,7 @@ class PidGains(Pid):
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Return the controller's gains, with times and, if it is one, the gains of a P over PI loop."""
+        """Return the controller's gains and times and, if it is one, those of a P over PI loop."""
         kp, ki, kd = flat[KP], flat[KI], flat[KD]
         listed = [*super().gains(flat)]
         if ki and kp:

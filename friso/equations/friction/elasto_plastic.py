@@ -93,7 +93,7 @@ class ElastoPlastic(StribeckSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Return bristles as measured, with the break-away deflection that fits the virgin curve best."""
+        """Return bristles as measured, with the break-away deflection that fits best."""
         return keeping_bristle(measured, breakaway_deflection=best(*_break_away_candidates(measured)))
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {"elastic_share": (0.02, 0.5, 0.98)}

@@ -97,7 +97,7 @@ class Rolling(StribeckSection):
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Return the condition of passivity if it is not met: sigma_2 >= sigma_1 ((F_s - F_c)/F_c)^i.
+        """Return the condition of passivity, sigma_2 >= sigma_1 ((F_s - F_c)/F_c)^i, if not met.
 
         It follows from z' v >= -v^2 ((F_s - F_c)/F_c)^i, with the power rounded.
         """

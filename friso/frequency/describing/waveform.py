@@ -125,7 +125,7 @@ def _middles(z: np.ndarray) -> np.ndarray:
 
 
 def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> FrictionAnswer:
-    """Return the friction on a motion with velocities [m/s] at the middles (M,) of intervals [s].
+    """Return the friction on a motion with velocities [m/s] (M,) in the middle of intervals [s].
 
     After the intervals the motion comes back (sign 1) or comes to its mirror image (-1).
     """
