@@ -28,8 +28,10 @@ _RANGE = re.compile(rf"(?P<first>[^:]*?)\.\.(?P<last>[^:]*?)(?::(?!\s*(?:linear|
 
 @dataclass(frozen=True)
 class SweptAxis:
-    """A swept key, a scaling, or a free name that links use: SI values (or words and booleans), their unit, and their
-    scale."""
+    """A swept key, a scaling, or a free name that links use.
+
+    It has SI values (or words and booleans), their unit, and their scale.
+    """
 
     name: str
     values: np.ndarray
@@ -40,7 +42,7 @@ class SweptAxis:
 
 @dataclass(frozen=True)
 class SweptRange:
-    """The ends of a range [SI unit], how many points it has (None: not said) and how they are spaced."""
+    """The ends of a range [SI], its number of points (None: not stated), and their spacing."""
 
     name: str
     first: float
@@ -62,11 +64,10 @@ class SweptRange:
 
 
 def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool = False) -> SweptAxis | SweptRange:
-    """Return an axis of a stage, a key or a scaling, from a text,
-    a list or an array with a unit; a range stays a `SweptRange`.
+    """Return an axis from a text, a list or an array with a unit; a range stays a `SweptRange`.
 
-    `free`: links use the name, so it need not be a key. With `log` a range that does not say how it is spaced is
-    logarithmic. Raises InputError.
+    `name` is a key or a scaling, or with `free` a name that links use. With `log` a range that does not state its
+    spacing is logarithmic. Raises InputError.
     """
     field, scales = stage.numeric_keys().get(name), name in SCALINGS and not free
     if field is None and not free and not scales:
@@ -86,9 +87,10 @@ def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool
 
 
 class _Reader:
-    """Reads the numbers of an axis, of any sign: a value that no stage may have makes its cells invalid, not the axis.
+    """Reads the numbers of an axis, of any sign.
 
-    A free name (`field` None) takes the SI unit of the first key of the same kind that it meets.
+    A value that no stage may have makes its cells invalid, not the axis. A free name (`field` None) takes the SI unit
+    of the first key of the same kind.
     """
 
     def __init__(self, field: Quantity | Number | None, kind: AxisKind) -> None:

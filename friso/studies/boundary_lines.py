@@ -53,7 +53,7 @@ class Line:
 
 
 class _Row(NamedTuple):
-    """A point of a line: its place in the box of the keys, by how much that may be wrong, its cycle and its kind."""
+    """A point of a line: its place in the box of the keys, its error, its cycle and its kind."""
 
     at: np.ndarray
     error: np.ndarray
@@ -62,8 +62,7 @@ class _Row(NamedTuple):
 
 
 def lines(result: Diagram | Plane) -> tuple[Line, ...]:
-    """Return all branches of a diagram, each with its special points where they lie on it;
-    or all curves of a plane."""
+    """Return all branches of a diagram with their special points, or all curves of a plane."""
     if isinstance(result, Diagram):
         pairs = zip(result.branches, result.special, strict=True)
         return tuple(_line(result, branch, _of_branch(branch, special)) for branch, special in pairs)
@@ -123,8 +122,10 @@ def _values(space: Space, at: np.ndarray) -> np.ndarray:
 
 
 def place_verdicts(result: Diagram) -> list[str]:
-    """Return the verdicts at the stages evenly over the range,
-    by simulations and by all branches that reach them."""
+    """Return the verdicts at stages spaced evenly over the range.
+
+    They are by simulations and by all branches that reach them.
+    """
     verdicts = _verdicts(result)
     return [
         ATTRACTS if _attracts_at(result, place) else verdict
@@ -139,9 +140,11 @@ def end_verdicts(result: Diagram) -> tuple[str, str]:
 
 
 class StabilityChange(NamedTuple):
-    """A change from stages that something attracts to such that nothing does, or back: whether hunting `begins` there
-    as the key rises, and the values [SI] between which it does; one value twice where a cycle that was followed ceases
-    to attract there, or begins to."""
+    """A change between stages that something attracts and stages that nothing does.
+
+    `begins` tells whether hunting begins there as the key rises. It lies between the two values [SI], which are equal
+    if a followed cycle begins or ceases to attract there.
+    """
 
     begins: bool
     low: float
@@ -150,8 +153,10 @@ class StabilityChange(NamedTuple):
 
 def stability_changes(result: Diagram) -> list[StabilityChange]:
     """Return where hunting begins and ends over the range, in order.
+
     Verdicts within the error of a special point do not tell where: there cycles repel so little that runs may stay on
-    them. They do tell that there is hunting between stages that nothing attracts."""
+    them. They do tell that there is hunting between stages that nothing attracts.
+    """
     special = [spot for own in result.special for spot in own if np.isfinite(spot.error)]
     doubtful = np.any([np.abs(result.places - spot.point.place) < spot.error for spot in special], axis=0)
     values = _values(result.space, result.places[:, None])[:, 0].tolist()
@@ -173,8 +178,10 @@ def stability_changes(result: Diagram) -> list[StabilityChange]:
 
 
 def followed_changes(result: Diagram) -> list[tuple[float, bool]]:
-    """Return the values [SI] at which a cycle that was followed begins to attract (true),
-    or ceases to, as the key rises."""
+    """Return the values [SI] at which a followed cycle begins (true) or ceases to attract.
+
+    They are taken as the key rises.
+    """
     return sorted(
         (float(line.at[k, 0]), begins)
         for line in lines(result)
@@ -184,8 +191,10 @@ def followed_changes(result: Diagram) -> list[tuple[float, bool]]:
 
 
 def begins_at(line: Line, k: int) -> bool | None:
-    """Tell whether a cycle begins to attract at a special point as the key rises;
-    None if it attracts on both sides of the point along its branch, or on neither."""
+    """Tell whether a cycle begins to attract at a special point as the key rises.
+
+    None if it attracts on both sides of the point along its branch, or on neither.
+    """
     beside = [bool(0 <= j < len(line.attracts) and line.attracts[j]) for j in (k - 1, k)]
     if beside[0] == beside[1]:
         return None
@@ -203,8 +212,10 @@ def _attracts_at(result: Diagram, place: float) -> bool:
 
 
 def node_verdicts(result: Plane) -> list[tuple[float, float, str]]:
-    """Return the values [SI] of both keys at every node of the grid, the first key the slowest,
-    and the verdict there."""
+    """Return the values [SI] of both keys at every node of the grid, and the verdict there.
+
+    The first key varies slowest.
+    """
     verdicts = np.full(result.nodes**2, INVALID, object)
     verdicts[result.allowed] = _verdicts(result)
     values = _values(result.space, result.space.grid(result.nodes)).tolist()
@@ -212,8 +223,10 @@ def node_verdicts(result: Plane) -> list[tuple[float, float, str]]:
 
 
 def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
-    """Return the values [SI] of both keys, and the verdict, at the corners: both low,
-    second high, first high, both high."""
+    """Return the values [SI] of both keys, and the verdict, at the four corners.
+
+    Their order is both low, second high, first high, both high.
+    """
     nodes, last = node_verdicts(result), result.nodes - 1
     return [nodes[k] for k in (0, last, result.nodes * last, -1)]
 
@@ -263,8 +276,7 @@ def plane_edge(result: Plane) -> PlaneEdge | None:
 
 
 def _crossings(result: Plane, along: int, value: float) -> list[float]:
-    """Return the values [SI] of the key with a number at which curves pass the `value` [SI] of
-    the other one."""
+    """Return the values [SI] of one key at which curves pass a `value` [SI] of the other one."""
     crossings = []
     for line in lines(result):
         at, other = line.at[:, along], line.at[:, 1 - along] - value
@@ -279,7 +291,7 @@ EndKind = Literal["range", "closed", "meets", "lost"]
 
 
 class CurveEnd(NamedTuple):
-    """One of the two ends of the curve with number `line`: where it is [SI], shape (2,), and how it ends."""
+    """An end of the curve with number `line`: its place [SI], shape (2,), and how it ends."""
 
     line: int
     at: np.ndarray

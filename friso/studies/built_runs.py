@@ -27,7 +27,7 @@ TIMING = tuple(
 
 
 def runs_as_built(stage: Stage, names: Sequence[str]) -> bool:
-    """Tell whether cells of a stage run with its drive as built: where only metrics of runs are asked for.
+    """Tell whether cells run with the drive as built: if only metrics of runs are asked for.
 
     A verdict is on the ideal machine, and so are the runs that it looks at.
     """

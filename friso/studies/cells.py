@@ -52,13 +52,13 @@ def run_cells(
     threads: int | None = 1,
     cancel: np.ndarray | None = None,
 ) -> Columns:
-    """Run one stage per entry of the columns: axis names to SI values, words or booleans, each of shape (cells,).
+    """Run one stage per entry of the columns, shape (cells,) each.
 
-    The drive runs as built where only metrics of runs are named and the file tells how it is carried out
-    (`friso.studies.built_runs`). The result holds the usual metrics of a run, and those named
-    (`friso.studies.metric`), each of shape (cells,). A cell that no stage may have has the word "invalid" and the
-    reason in its status; one that a run did not complete for has the outcome "failed". Setting cancel[0] from another
-    thread ends the work early: cells not run by then keep the outcome "".
+    Columns are axis names to SI values, words or booleans. The drive runs as built if only metrics of runs are named
+    and the file describes the drive (`friso.studies.built_runs`). The result holds the usual metrics of a run and
+    those named (`friso.studies.metric`), each of shape (cells,). A cell that no stage may have has the word "invalid"
+    and the reason in its status; a cell whose run was not completed has the outcome "failed". Setting cancel[0] from
+    another thread ends the work early: cells not run by then keep the outcome "".
     """
     table = _Table(len(next(iter(columns.values()))), in_order((*usual_metrics(), *names)))
     parts = list(by_words(stage, links, columns))
@@ -105,11 +105,10 @@ def cell_attractors(
     threads: int | None = None,
     cancel: np.ndarray | None = None,
 ) -> Iterator[tuple[dict[str, Any], np.ndarray, StageAttractors]]:
-    """Yield what attracts the stages of the cells that are chosen, shape (cells,),
-    by the equations they need: their flat SI form, their numbers, and what attracts them, by a function as
-    `find_attractors`.
+    """Yield what attracts the stages of the chosen cells, by the equations they need.
 
-    The motion plays no part: of cells that differ in it alone one is surveyed.
+    `chosen` has the shape (cells,). Each part has flat SI values, numbers of cells, and what attracts them, by a
+    function such as `find_attractors`. The motion plays no part: of cells that differ in it alone one is surveyed.
     """
     for flat, cells, _ in by_equations(parts, chosen):
         yield flat, cells, _once(flat, len(cells), find, threads, cancel)
@@ -122,8 +121,7 @@ def _once(
     threads: int | None,
     cancel: np.ndarray | None,
 ) -> StageAttractors:
-    """Find the attractors of stages of one structure,
-    once for all that differ in their motion alone."""
+    """Find the attractors of stages of one structure, once for all that differ in motion only."""
     varied = [np.zeros(count)]
     varied += [value for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")]
     _, first, again = np.unique(np.stack(varied), axis=1, return_index=True, return_inverse=True)
@@ -150,8 +148,10 @@ def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.
 
 
 def by_equations(parts: Parts, chosen: np.ndarray) -> Iterator[tuple[dict[str, Any], np.ndarray, Structure]]:
-    """Yield the cells that are chosen, shape (cells,), by the equations they need:
-    their flat SI form, numbers, structure."""
+    """Yield the chosen cells, shape (cells,), by the equations they need.
+
+    Each part has flat SI values, numbers of cells, and the structure.
+    """
     for flat, cells in parts:
         for shape, members in _by_structure(flat, chosen[cells], len(cells)):
             of_group = {key: value[members] if np.ndim(value) else value for key, value in flat.items()}
@@ -161,7 +161,10 @@ def by_equations(parts: Parts, chosen: np.ndarray) -> Iterator[tuple[dict[str, A
 def by_words(
     stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]
 ) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
-    """For each combination of words and booleans among the columns: the flat SI form and the numbers of its cells."""
+    """Yield flat SI values and cell numbers for each combination of words among the columns.
+
+    Booleans count as words.
+    """
     words = {name: column for name, column in columns.items() if column.dtype.kind in "bU"}
     count = len(next(iter(columns.values())))
     if not words:
@@ -197,8 +200,10 @@ _STATUS = np.array([status.text for status in Status], dtype=object)
 
 
 class _Table:
-    """The growing variables of a study, one entry per cell; and when each run has settled within 10 um for good,
-    wherever it is then, `settled` [s], shape (count,)."""
+    """The growing variables of a study, one entry per cell.
+
+    `settled` [s], shape (count,), is when each run has settled within 10 um for good, wherever it is then.
+    """
 
     def __init__(self, count: int, names: Iterable[str]) -> None:
         self.count, self.settled, every = count, np.full(count, np.nan), metrics()
@@ -244,5 +249,5 @@ class _Table:
 
 
 def unfilled(variable: str, shape: int | tuple[int, ...]) -> np.ndarray:
-    """Return an array for a variable of a study before any cell was run: of empty texts, or of NaN."""
+    """Return an array for a variable before any cell was run: of empty texts, or of NaN."""
     return np.full(shape, "", dtype=object) if is_text(variable) else np.full(shape, np.nan)

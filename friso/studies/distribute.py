@@ -23,8 +23,7 @@ logger = logging.getLogger("friso")
 
 @contextmanager
 def connected(scheduler: str) -> Iterator[Crew]:
-    """Return a crew made of the workers of the scheduler at an address such as
-    "tls://10.0.0.1:8786".
+    """Return a crew made of the workers of a Dask scheduler, "tls://10.0.0.1:8786".
 
     Every thread of a worker computes one block at a time, in that thread alone. Certificates are those of Dask's
     configuration (distributed.comm.tls). Without TLS, whoever reaches the address can run code: that is logged. Raises
@@ -68,7 +67,10 @@ def run_checked(
     metrics: Sequence[str],
     expected: str,
 ) -> Columns:
-    """`run_cells` on a worker whose friso has to be the expected one: one that joined later was not asked before."""
+    """Run cells on a worker after checking the version of its friso.
+
+    A worker that joined later was not asked before.
+    """
     if equations_version() != expected:
         raise _stranger("a worker", equations_version())
     return run_cells(stage, links, columns, rtol, metrics)

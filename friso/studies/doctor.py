@@ -28,8 +28,10 @@ from friso.version import VERSION
 
 @dataclass(frozen=True)
 class DoctorCheck:
-    """One check of the installation: its subject, the result in words, whether it works,
-    and a `remedy` if it does not."""
+    """One check of the installation: its subject, the result in words, and whether it works.
+
+    `remedy` helps if it does not.
+    """
 
     subject: str
     text: str
@@ -38,8 +40,10 @@ class DoctorCheck:
 
 
 def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
-    """Yield all that is looked at, one by one;
-    folders below the user's own begin with ~ unless `full_paths`."""
+    """Yield all checks of the installation, one by one.
+
+    Folders below the user's own begin with ~ unless `full_paths`.
+    """
     yield DoctorCheck("friso", VERSION)
     yield DoctorCheck(
         "Python", f"{platform.python_implementation()} {platform.python_version()}, {8 * struct.calcsize('P')} bit"
@@ -101,8 +105,7 @@ def _processor() -> str:
 
 
 def _kept_code(full_paths: bool) -> str:
-    """Return the folder of compiled code: how much is in it, whether it stays,
-    and where modes tell it, who may look in."""
+    """Check the folder of compiled code: its size, whether it stays, and who may look in."""
     from friso.engine.cache import ENTRY, cache_folder, is_passing
 
     folder = cache_folder()
@@ -129,7 +132,10 @@ def _compiling() -> str:
 
 
 def _running() -> str:
-    """Run the stage of the template, which hunts with its joint locked. Raises RuntimeError for another result."""
+    """Run the stage of the template, which hunts with its joint locked.
+
+    Raises RuntimeError for another result.
+    """
     tuning = StudySettings.current()
     from friso.engine.batch import run_chunks
     from friso.engine.kernel import kernel

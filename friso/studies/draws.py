@@ -22,11 +22,11 @@ from friso.studies.settings import StudySettings
 
 @dataclass(frozen=True)
 class Fates:
-    """The verdicts on drawn stages, words of `friso.hunting.criteria.VERDICTS`, and the loops of which are `unstable`,
-    sticking or sliding, both of shape (count,).
+    """The verdicts on drawn stages, and which of their loops are unstable, both (count,).
 
-    `amplitudes` [m], half of peak to peak, and `periods` [s] are those of the hunting of the first draws, shape
-    (count,) or shorter; NaN where nothing attracts, or nothing certain is known.
+    Verdicts are words of `friso.hunting.criteria.VERDICTS`; a loop is `unstable` sticking or sliding. `amplitudes`
+    [m], half of peak to peak, and `periods` [s] are those of the first draws that hunt, shape (count,) or shorter; NaN
+    where nothing attracts, or nothing certain is known.
     """
 
     verdicts: np.ndarray
@@ -44,11 +44,11 @@ class Fates:
         return share(np.isin(self.verdicts, words), self.verdicts != "failed")
 
     def separations(self, keys: Mapping[str, np.ndarray]) -> dict[str, float]:
-        """Return how well each key separates stages with an attracting cycle from those without,
-        the most decisive first.
+        """Return how well each key separates hunting stages from others, the most decisive first.
 
-        It is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1): 1 where all that hunt have the larger
-        values, -1 where all have the smaller ones, 0 where the key separates nothing. Empty where all share one fate.
+        Hunting stages have an attracting cycle. The measure is the rank-biserial correlation (Kerby 2014, doi
+        10.2466/11.IT.3.1): 1 if all that hunt have the larger values, -1 if all have the smaller ones, 0 if the key
+        separates nothing. Empty if all share one fate.
         """
         from scipy.stats import mannwhitneyu  # 0.7 s to import
 
@@ -95,9 +95,10 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
 
 @dataclass(frozen=True)
 class DrawnEdges:
-    """Where the hunting of drawn stages ends in bandwidth [Hz]: between `low` and `high` for each, shape (count,).
+    """Where the hunting of drawn stages ends in bandwidth [Hz], shape (count,).
 
-    Both are NaN for a stage that does not begin to hunt, or cease to, within the bandwidths that were tried.
+    It lies between `low` and `high`. Both are NaN for a stage that does not begin or cease to hunt within the
+    bandwidths that were tried.
     """
 
     low: np.ndarray
@@ -105,9 +106,9 @@ class DrawnEdges:
 
 
 def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | None:
-    """Find the edge of hunting in bandwidth of the first stages of a sample, near that of the stage itself.
+    """Find the edge of hunting in bandwidth of some drawn stages, near the stage's own `margin`.
 
-    `margin` is the latter. Returns None where there is none, or where no key states a bandwidth.
+    They are the first of the sample. Returns None if there is no margin, or no key states a bandwidth.
     """
     settings = StudySettings.current()
     own = bandwidth(stage.flat())
@@ -128,8 +129,10 @@ def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | N
 
 
 def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float) -> int:
-    """Return how many stages may be drawn for a fixed work,
-    a power of two (Sobol' points are even then)."""
+    """Return how many stages may be drawn for a fixed amount of work.
+
+    It is a power of two, for which Sobol's points are even.
+    """
     settings = StudySettings.current()
     with allowance() as spent:
         fates(stage, draw(stage, correlations, settings.trial_draws, seed), rtol)
@@ -161,7 +164,10 @@ class Draws:
         margin: Margin | None = None,
         progress: Progress = silent,
     ) -> Draws:
-        """Judge the stages of a sample (see `fates`), and find the edges of the first near the stage's own `margin`."""
+        """Judge the stages of a sample, and find the edges of the first near the stage's `margin`.
+
+        See `fates`.
+        """
         judged = fates(stage, sample, rtol, progress)
         count = len(next(iter(judged.values())).verdicts)
         keys = {key: values[:count] for key, values in sample.keys.items()}

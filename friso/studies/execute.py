@@ -23,8 +23,11 @@ _T = TypeVar("_T")
 
 @dataclass
 class Crew:
-    """An executor, how many blocks are computed side by side, and how many a study needs at least for all to have
-    work; a flag, shape (1,), that has blocks in flight end early; and what it raises where it is to blame itself."""
+    """An executor with its size and its way to be ended.
+
+    `size` is how many blocks are computed side by side, and `shares` how many a study needs for all to have work. A
+    flag, shape (1,), ends blocks in flight early. It also holds what it raises if it is to blame itself.
+    """
 
     executor: Executor
     size: int
@@ -69,8 +72,7 @@ class Crew:
                 wait(flying, timeout=settings.block_timeout)
 
     def jobs(self, studies: Sequence[Study]) -> Iterator[tuple[Study, CellBlock]]:
-        """Yield the blocks of studies, as large as memory allows,
-        but enough of them for the whole crew."""
+        """Yield the blocks of studies, as large as memory allows, but enough for the whole crew."""
         settings = StudySettings.current()
         for study in studies:
             largest = settings.largest_survey_block if study.cycles else settings.largest_memory_block
@@ -97,7 +99,7 @@ class Crew:
 
 
 class _Threads(ThreadPoolExecutor):
-    """Threads for which holds what holds for whoever asks: whether anybody waits, and whether that goes first."""
+    """Threads that inherit who waits for their results, and whether that goes first."""
 
     def submit(self, fn: Callable[..., _T], /, *args: Any, **kwargs: Any) -> Future[_T]:
         """As any executor does."""
@@ -105,10 +107,9 @@ class _Threads(ThreadPoolExecutor):
 
 
 def local_crew(threads: int | None = None) -> Crew:
-    """Return the threads of this process, by default one per processor;
-    all of them work on one block.
+    """Return the threads of this process, by default one per processor, for one block at a time.
 
-    A second block is prepared, or its results written, while they do.
+    A second block is prepared, or its results written, meanwhile.
     """
     stop = np.zeros(1, np.int64)
     arguments = {"threads": threads, "cancel": stop}

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 def export(runs: xr.Dataset, path: Path) -> None:
-    """Write a study as NetCDF (".nc") or as CSV with one row per cell (".csv"); ValueError for another suffix.
+    """Write a study as NetCDF (".nc") or as CSV with one row per cell (".csv").
 
-    Columns of a CSV file are named with their units.
+    Columns of a CSV file are named with their units. Raises ValueError for another suffix.
     """
     if path.suffix == ".nc":
         texts = [name for name in every_variable() if name in runs and is_text(name)]

@@ -89,8 +89,10 @@ def harmonic_balance(
 
 
 def _symmetric(stages: Ensemble, rtol: float) -> Cycles:
-    """Return the cycle of every stage that is its own mirror image.
-    Raises InputError where one has none."""
+    """Return the symmetric cycle of every stage.
+
+    Raises InputError if a stage has none.
+    """
     cycles = find_cycles(stages, rtol)
     if cycles.sign >= 0 or not cycles.closed.all():
         why = "; ".join({str(reason) for reason in cycles.reasons if reason}) or "a cycle that is not symmetric"
@@ -101,7 +103,10 @@ def _symmetric(stages: Ensemble, rtol: float) -> Cycles:
 def _errors(
     stages: Ensemble, cycles: Cycles, number: int, harmonics: Sequence[int], rtol: float
 ) -> list[tuple[float, float, str]]:
-    """Errors of period and amplitude, relative, and status, of one stage for every highest harmonic."""
+    """Return relative errors of period and amplitude, and status, for every highest harmonic.
+
+    They are of one stage.
+    """
     single, period = stages.take(np.array([number])), float(cycles.period[number])
     interval = period / SAMPLES
     run = single.run(cycles.states[[number]], np.array([period]), rtol, interval=interval)

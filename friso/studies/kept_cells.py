@@ -17,8 +17,10 @@ from friso.studies.study import Study
 
 
 class KeptCells:
-    """Answers about the cells of a study, of such a digest, kept in a folder; what is damaged there, or another's, is
-    asked for again."""
+    """Answers about the cells of a study, kept in a folder under the study's digest.
+
+    What is damaged there, or belongs to another study, is asked for again.
+    """
 
     def __init__(self, folder: Path, study: Study, digest: str) -> None:
         self.folder, self.metrics, self.digest = folder, asked_for(study).metrics, digest

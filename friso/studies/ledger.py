@@ -15,7 +15,7 @@ from friso.studies.store_files import BLOCKS, digest_of, put, stored
 
 @dataclass(frozen=True)
 class Ledger:
-    """The digests of the blocks of the store at `path`, of the study with such a digest and these metrics."""
+    """The digests of the blocks of a store at `path`, for a study and its metrics."""
 
     path: Path
     study: str
@@ -36,7 +36,9 @@ class Ledger:
 
     def is_whole(self, number: str) -> bool:
         """Tell whether all chunks of a block are what was written.
-        Raises PermissionError where they cannot be read."""
+
+        Raises PermissionError if they cannot be read.
+        """
         try:
             return stored(self._file(number)) == self._entry(number)
         except PermissionError:
@@ -45,8 +47,10 @@ class Ledger:
             return False
 
     def digest(self, number: str, name: str) -> str | None:
-        """Return the digest of a chunk as it was entered; None where its block was not,
-        "" where the entry is damaged. Raises PermissionError."""
+        """Return the digest of a chunk as it was entered.
+
+        None if its block was not entered, "" if the entry is damaged. Raises PermissionError.
+        """
         try:
             entry = json.loads(stored(self._file(number)))
             return entry["sha256"][name] if (entry["study"], entry["block"]) == (self.study, number) else ""

@@ -52,7 +52,10 @@ def names(links: Mapping[str, str]) -> frozenset[str]:
 
 
 def check_links(stage: Stage, links: Mapping[str, str], axes: frozenset[str]) -> None:
-    """Refuse links to no key, and expressions with names that are neither keys nor `axes`. Raises InputError."""
+    """Check that links lead to keys, and that their expressions use only keys or `axes`.
+
+    Raises InputError.
+    """
     numeric = stage.numeric_keys()
     for key in links:
         if key not in numeric:
@@ -66,8 +69,10 @@ def check_links(stage: Stage, links: Mapping[str, str], axes: frozenset[str]) ->
 
 
 def linked(links: Mapping[str, str], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the SI values of the linked keys from those of keys and axes (numbers or arrays);
-    a link sees those before it."""
+    """Return the SI values of linked keys, from values of keys and axes (numbers or arrays).
+
+    A link can use the links before it.
+    """
     numbers = dict(values)
     for key, text in links.items():
         with np.errstate(all="ignore"):  # what comes out as no number makes the cell invalid

@@ -48,8 +48,11 @@ _EXAMPLE = "friso map STAGE.toml ... --out study.zarr"
 
 @dataclass(frozen=True)
 class Metadata:
-    """Metadata of a store: the contents of Zarr's files beside the arrays,
-    friso's digest of the study as it was made, the SHA-256 of each file of the axes, and its notes."""
+    """Metadata of a store.
+
+    They are the contents of Zarr's files beside the arrays, friso's digest of the study as it was made, the SHA-256 of
+    each file of the axes, and notes.
+    """
 
     document: Mapping[str, Any]
     study: str
@@ -89,7 +92,10 @@ class Metadata:
 
 
 def seal_metadata(path: Path, axes: Iterable[str]) -> None:
-    """Seal the metadata of a store that is new, with the digests of its `axes`, by name. Raises OSError."""
+    """Seal the metadata of a new store, with the digests of its `axes`, by name.
+
+    Raises OSError.
+    """
     document = json.loads(stored(path / _FILE))
     files = [
         f"{name}/{file.name}" for name in axes for file in (path / name).iterdir() if not file.name.startswith(".")
@@ -124,8 +130,10 @@ def _text(content: Any) -> bytes:
 
 
 def checked_metadata(path: Path) -> Metadata:
-    """Return what the metadata of the store at `path` say.
-    Raises StoreError where there is no store, or it is damaged or of another version."""
+    """Return the metadata of the store at `path`, after checking them.
+
+    Raises StoreError if there is no store, or it is damaged or of another version.
+    """
     if not path.exists():
         raise StoreError("", "nothing there", _EXPECTED, _EXAMPLE, str(path))
     if not path.is_dir():
@@ -203,8 +211,10 @@ def _mentions(file: Path, words: bytes) -> bool:
 
 
 def _are_of_a_store(files: Mapping[str, Any], axes: Mapping[str, Any]) -> bool:
-    """Tell whether the files that metadata name are such as a store has, none elsewhere;
-    the arrays hold numbers or texts as friso writes them, for other codecs may run code; and all of each axis is there.
+    """Tell whether the files named by metadata are such as a store has.
+
+    None lies elsewhere; arrays hold numbers or texts as friso writes them, because other codecs may run code; and all
+    of each axis is there.
     """
     if not all(name.fullmatch(file) for name, group in zip(_NAMES, (files, axes), strict=True) for file in group):
         return False
@@ -227,8 +237,7 @@ def _are_of_a_store(files: Mapping[str, Any], axes: Mapping[str, Any]) -> bool:
 
 
 def _is_plain(array: Mapping[str, Any]) -> bool:
-    """Tell whether chunks decode to numbers or texts, compressed and checked as friso does,
-    of a size that it writes."""
+    """Tell whether chunks hold numbers or texts, compressed and sized as friso writes them."""
     kind = _KIND.fullmatch(array["dtype"])
     codecs = {codec["id"] for codec in [array["compressor"], *(array["filters"] or ())] if codec}
     laid_out = (array["order"], array.get("dimension_separator", "."))

@@ -26,7 +26,7 @@ MetricBasis = Literal["run", "sketch", "survey"]
 
 @dataclass(frozen=True)
 class RunEvidence:
-    """Runs of cells: the flat keys of their stages, the runs as simulated, and friso's measures of them."""
+    """Runs of cells: the flat keys of their stages, the simulated runs, and their measures."""
 
     flat: Mapping[str, Any]
     runs: Runs
@@ -65,10 +65,9 @@ class Word:
 
 @dataclass(frozen=True)
 class MapFinding:
-    """A finding that sentences on a map state: the share of cells with one of the `words`,
-    and where they lie.
+    """A statement on a map: the share of cells with one of the `words`, and where they lie.
 
-    For counts, it is the share of cells with more than 0. With `if_any` the finding is left out if no cell has the
+    For counts, it is the share of cells with more than 0. With `if_any` the statement is left out if no cell has the
     word.
     """
 
@@ -148,8 +147,10 @@ class Metric:
 
     @property
     def form(self) -> str:
-        """Return the NumPy type in which it is stored;
-        words have room for "invalid" and all of friso's own."""
+        """Return the NumPy type in which the metric is stored.
+
+        Words have room for "invalid" and all words of friso.
+        """
         return f"<U{max(9, *(len(word.text) for word in self.words))}" if self.words else "f8"
 
     def attributes(self, kind: AxisKind) -> dict[str, Any]:
@@ -172,12 +173,12 @@ def metrics() -> dict[str, Metric]:
 
 
 def usual_metrics() -> tuple[str, ...]:
-    """Return the variables that every study holds: what is measured of every run, and its status."""
+    """Return the variables of every study: all measures of a run, and its status."""
     return *(name for name, metric in metrics().items() if metric.usual and metric.source == "run"), STATUS
 
 
 def with_usual(metric: str) -> tuple[str, ...]:
-    """Return the variables of a study for a map of this metric: whatever costs nothing more comes along."""
+    """Return the variables of a study for a map of this metric, with all that cost nothing more."""
     every = metrics()
     wanted = every[every[metric].shown_as or metric]
     along = [name for name, other in every.items() if other.usual and other.source in ("run", wanted.source)]
@@ -185,7 +186,10 @@ def with_usual(metric: str) -> tuple[str, ...]:
 
 
 def in_order(names: Iterable[str]) -> tuple[str, ...]:
-    """Sort variables as studies hold them; outcome, status and the reasons for missing numbers are added."""
+    """Sort variables as studies hold them.
+
+    Outcome, status and the reasons for missing numbers are added.
+    """
     every, wanted = metrics(), {"outcome", STATUS, *names}
     wanted |= {every[name].reasons for name in wanted if name in every}
     return tuple(name for name in every_variable() if name in wanted)

@@ -28,8 +28,10 @@ _cancel = np.zeros(1, np.int64)
 
 @contextmanager
 def processes(workers: int) -> Iterator[Crew]:
-    """Return a crew of so many processes on this machine,
-    each of which computes one block at a time, in one thread. They end with this process, however it ends."""
+    """Return a crew of worker processes on this machine.
+
+    Each computes one block at a time, in one thread. They end with this process, however it ends.
+    """
     context = get_context("spawn")
     with interrupts_held(), _modules_of_this_folder_ignored():
         shared: Any = context.RawArray("q", 1)
@@ -66,8 +68,11 @@ def run_block(*arguments: Any) -> Columns:
 
 
 def _prepare(shared: Any, cache: Path) -> None:
-    """Make a process a worker: Ctrl-C is for the process that started it, with which it ends and whose cache of kernels
-    it uses, a temporary one too."""
+    """Make this process a worker.
+
+    Ctrl-C is left to the process that started it, with which it ends. It uses that process's cache of kernels, even a
+    temporary one.
+    """
     global _cancel
     _cancel = np.frombuffer(shared, np.int64)
     os.environ[FOLDER_VARIABLE] = str(cache.parent)

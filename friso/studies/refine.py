@@ -39,8 +39,10 @@ def finer(study: Study) -> Study:
 
 
 def _finer(axis: SweptAxis) -> SweptAxis:
-    """Return the axis with cells between its own:
-    those of a range as if it had been given so many points."""
+    """Return the axis with cells between its own.
+
+    The result is as if a range had been given with so many points.
+    """
     settings = StudySettings.current()
     log = axis.scale == "log"
     space, ends = np.geomspace if log else np.linspace, (axis.values[0], axis.values[-1])
@@ -55,8 +57,7 @@ def _finer(axis: SweptAxis) -> SweptAxis:
 
 
 def asked_for(study: Study) -> Study:
-    """Return the study of what is asked about cells:
-    refining it takes what is usually known of them."""
+    """Return the study with the variables needed to refine it."""
     return replace(study, metrics=in_order((*usual_metrics(), *study.metrics)))
 
 
@@ -117,8 +118,10 @@ class _Grid:
         return distance, np.asarray(np.ravel_multi_index(tuple(places), self.shape))
 
     def _changes(self, nearest: np.ndarray) -> np.ndarray:
-        """Return which cells have a neighbour with other words,
-        where each has those of the nearest cell computed."""
+        """Return which cells have a neighbour with other words.
+
+        Each cell has the words of the nearest one computed.
+        """
         both = np.sum([self.columns[name] + " " for name in self.words], axis=0).astype(str)
         words = np.unique(both, return_inverse=True)[1].ravel()[nearest]
         changes = np.zeros(self.shape, bool)

@@ -24,8 +24,10 @@ TRIED = 512
 
 @dataclass(frozen=True)
 class Request:
-    """A stage, what is varied in it and what follows, as given (see `friso.sweep`); with `log`, ranges that do not say
-    how they are spaced are logarithmic."""
+    """A stage, what is varied in it, and links, as given (see `friso.sweep`).
+
+    With `log`, ranges that do not state their spacing are logarithmic.
+    """
 
     stage: Stage
     axes: Mapping[str, AxisValues]
@@ -37,14 +39,18 @@ class Request:
         return read_axes(self.stage, axes, linking.names(self.links), self.log)
 
     def size(self) -> int:
-        """Return the number of cells, without any array being made.
-        Raises InputError as `study` does."""
+        """Return the number of cells, without making any array.
+
+        Raises InputError as `study` does.
+        """
         samples = 1 if self.samples is None or self.samples.count is None else self.samples.count
         return math.prod(_points(axis) for axis in self._read(self.axes)) * samples
 
     def trial(self) -> Study:
         """Return a few cells drawn evenly from a study that may be too large to be made.
-        Raises InputError."""
+
+        Raises InputError.
+        """
         rng = np.random.default_rng(0)
         axes = []
         for axis in self._read({**self.axes, **(self.samples.ranges if self.samples else {})}):
@@ -92,7 +98,10 @@ def _gridded(axis: SweptAxis | SweptRange) -> SweptAxis:
 
 
 def _checked_metrics(names: Sequence[str] | None) -> tuple[str, ...]:
-    """Return the variables asked for, the usual ones by default, in their usual order. Raises InputError."""
+    """Return the variables asked for, by default the usual ones, in their usual order.
+
+    Raises InputError.
+    """
     for name in names or ():
         if name not in every_variable():
             raise InputError("metrics", name, f"some of {', '.join(every_variable())}", '["peaks", "period"]')

@@ -24,10 +24,12 @@ class Rejection(NamedTuple):
 
 
 def rejecting(stage: Stage, crossings: Sequence[float]) -> Stage:
-    """Return the stage with active disturbance rejection,
-    its limit of the force and its filters kept: as fast, in that the loop of the sliding machine crosses 0 dB at the
-    first of the present `crossings` [Hz], and for the mass believed now. Raises InputError where there is none, or the
-    drive is too slow for it."""
+    """Return the stage with active disturbance rejection as fast as its controller is now.
+
+    The loop of the sliding machine crosses 0 dB at the first of the present `crossovers` [Hz], `crossings`, for the
+    mass believed now. Force limit and filters are kept. Raises InputError if there is no crossing, or the drive is too
+    slow.
+    """
     if not crossings:
         raise InputError(CONTROLLER, "a loop that crosses 0 dB nowhere", "one that does", 'crossover = "8 Hz"')
     kept = {
@@ -46,6 +48,5 @@ def rejecting(stage: Stage, crossings: Sequence[float]) -> Stage:
 
 
 def rejection(flat: Mapping[str, Any]) -> Rejection | None:
-    """Return the numbers of a disturbance-rejecting controller from flat keys;
-    None with another controller."""
+    """Return the numbers of a disturbance-rejecting controller; None for another controller."""
     return Rejection(flat[BANDWIDTH], flat[OBSERVER_RATIO]) if flat[KIND] == ADRC else None

@@ -75,9 +75,12 @@ FROM_LEAVES = ("joint.stiffness", "parasitic.")
 
 @dataclass(frozen=True)
 class Machines:
-    """The stage whose drive states a sample time; keys to SI arrays of shape (count,) that differ between the machines;
-    the seeds of their noise; the sign, 1 or -1, with which the model of each is wrong; how they were `drawn`, from
-    which keys of the file and from which default `spreads` [%]; and what to know of that."""
+    """Machines drawn around a stage whose drive states a sample time.
+
+    `keys` that differ are SI arrays of shape (count,). There are the seeds of their noise, and the sign, 1 or -1, of
+    the error of each machine's model. `drawn` and `spreads` [%] say from which keys of the file and from which default
+    spreads they were drawn; notes say what to know of that.
+    """
 
     stage: Stage
     keys: Mapping[str, np.ndarray]
@@ -94,8 +97,10 @@ class Machines:
         return len(self.seeds)
 
     def flat(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return keys of all machines as an option has them, its stage and changes being given;
-        the controller is tuned as it is and does not know the masses that were drawn."""
+        """Return keys of all machines under an option, with its stage and changes.
+
+        The controller is tuned as it is and does not know the masses that were drawn.
+        """
         return stage.flat(self.changes(stage, changes))
 
     def changes(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -135,8 +140,10 @@ def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: in
 
 
 def _with_clock(stage: Stage) -> tuple[Stage, list[str]]:
-    """Return the stage with a sample time, and whether it had to be chosen.
-    Raises InputError where it is too long."""
+    """Return the stage with a sample time, and a note if it had to be chosen.
+
+    Raises InputError if it is too long.
+    """
     if "drive.sample_time" in stage.flat():
         return stage, []
     chosen = stage.with_numbers({"drive.sample_time": SAMPLE_TIME})

@@ -71,8 +71,10 @@ def concatenate_chunks(parts: Sequence[AnyMeasures]) -> AnyMeasures:
 
 @np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
 def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) -> MachineMeasures:
-    """Return the measures of a chunk of runs whose reference comes to stand at `stands`;
-    in position is `within` [m]. What the drive logs counts for the peaks, what really moves for the rest."""
+    """Measure a chunk of runs whose reference comes to stand at `stands`.
+
+    In position means `within` [m]. What the drive logs counts for peaks, the true motion for everything else.
+    """
     time, reference = recorded.time, recorded.logged["reference"]
     deviation = recorded.true["position"] - reference
     done = recorded.statuses == Status.DONE
@@ -90,8 +92,11 @@ def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) ->
 
 @dataclass(frozen=True)
 class Later:
-    """Some of the runs followed for longer, arrays of shape (some,): whether they were completed (`done`), and whether
-    the stage `stays` in position throughout the last half (it rests, and has done so for that long)."""
+    """Runs that were followed for longer, arrays of shape (some,).
+
+    `done` tells whether they were completed, `stays` whether the stage is in position throughout the last half (it
+    rests, and has done so for that long).
+    """
 
     done: np.ndarray
     stays: np.ndarray
@@ -136,8 +141,7 @@ def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> LoopRobus
 
 
 def _robustness(loops: Poles) -> tuple[np.ndarray, np.ndarray]:
-    """Return which loops are stable, and the least distance of each from -1,
-    both of shape (members,)."""
+    """Return which loops are stable, and the least distance of each from -1, both (members,)."""
     size, rows = np.abs(loops.continuous), np.arange(len(loops.closed))
     low = SLOWEST * float(np.median(size.min(axis=1)))
     high = min(loops.drive.highest, FASTEST * float(size.max()))

@@ -24,7 +24,7 @@ from friso.studies.settings import StudySettings
 
 @dataclass(frozen=True)
 class NeededBandwidth:
-    """Shares of machines that a controller brings to rest alone, over its bandwidth, arrays of shape (n,).
+    """Shares of machines that come to rest by the controller alone, over its bandwidth, (n,).
 
     The bandwidths [Hz] are those at which the open loop last crosses 0 dB, from the present one to the highest with
     enough margin. The joint is locked, and the controller in continuous time.
@@ -34,7 +34,7 @@ class NeededBandwidth:
     shares: np.ndarray
 
     def turning(self, enough: float) -> int | None:
-        """Return the number of the bandwidth from which on `enough` machines come to rest; None if there is none."""
+        """Return the index of the bandwidth from which on `enough` machines come to rest, or None."""
         missed = np.flatnonzero(self.shares < enough)
         first = int(missed[-1]) + 1 if missed.size else 0
         return first if first < len(self.shares) else None
@@ -42,7 +42,7 @@ class NeededBandwidth:
 
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
 def needed_bandwidth(machines: Machines, locked: Stage, within: float) -> NeededBandwidth | None:
-    """Run the moves of the first machines with the joint `locked` and controllers of many bandwidths.
+    """Run moves of some machines, joint `locked`, with controllers of many bandwidths.
 
     Returns None if no higher bandwidth keeps the margin.
     """

@@ -65,8 +65,10 @@ class Situation:
 
     @property
     def integrating(self) -> Stage:
-        """Return the stage with its joint locked.
-        Raises UnavailableError where its controller does not integrate."""
+        """Return the stage with its joint locked, if its controller integrates.
+
+        Raises UnavailableError otherwise.
+        """
         flat = self.machines.stage.flat()
         if not controller_of(flat).integrates(flat):
             raise UnavailableError("the controller does not integrate")
@@ -128,7 +130,7 @@ class OptionKind:
 
 @dataclass(frozen=True)
 class Option:
-    """An option that the machines can have: its kind, and stage, changes and factor as in `Variant`."""
+    """An option for the machines: its kind, with stage, changes and factor as in `Variant`."""
 
     kind: OptionKind
     stage: Stage
@@ -148,8 +150,10 @@ class Option:
 
 @dataclass(frozen=True)
 class CompareOptions:
-    """The options that the machines can have; why others, by letter, are left out; the deadband of the integrator
-    [m]."""
+    """The options that the machines can have.
+
+    `left_out` gives the reason for others, by letter; the deadband of the integrator is in [m].
+    """
 
     options: tuple[Option, ...]
     left_out: Mapping[str, str]
@@ -157,8 +161,11 @@ class CompareOptions:
 
 
 def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return keys for the linear loop: the current loop is that of the stage for all machines,
-    and the motor's constant over the one believed is part of the controller's gains. The cable is left out."""
+    """Return keys for the linear loop of machines.
+
+    The current loop is that of the stage for all machines, and the true over the believed motor constant is part of
+    the controller's gains. The cable is left out.
+    """
     current_loop = {key: value for key, value in stage.flat().items() if key == "drive.current_bandwidth"}
     ratio, controller = flat.get("drive.motor_constant_ratio", 1.0), controller_of(flat)
     return {
@@ -192,7 +199,7 @@ def _faster(stage: Stage, situation: Situation) -> Variant:
     """Return a stage with the highest bandwidth at which the machine of the file keeps its margin.
 
     It lies below the limit of the bandwidth. An engineer tunes one machine, and all others get its settings. Raises
-    UnavailableError where it is that fast already.
+    UnavailableError if it is that fast already.
     """
     flat = stage.flat()
     highest = limits(linear_flat(stage, flat)).highest_comfortable
@@ -214,8 +221,10 @@ def _faster(stage: Stage, situation: Situation) -> Variant:
 
 
 def _feedforward(situation: Situation) -> Variant:
-    """Return the locked stage with feedforward of each machine's Coulomb and viscous friction, both off by the model
-    error. Raises UnavailableError where there is no such friction."""
+    """Return the locked stage with feedforward of each machine's Coulomb and viscous friction.
+
+    Both are off by the model error. Raises UnavailableError if there is no such friction.
+    """
     machines = situation.machines
     flat = anywhere(machines.flat(machines.stage, {}))
     coulomb = level_under_conditions(flat, "coulomb") if "friction.coulomb" in flat else 0.0
@@ -236,7 +245,7 @@ def _with_setting(setting: Setting, situation: Situation) -> Variant:
 
 
 def _rejecting(situation: Situation) -> Variant:
-    """Return the locked stage with active disturbance rejection, as fast as its controller is now."""
+    """Return the locked stage with active disturbance rejection, as fast as it is now."""
     flat = situation.locked.flat()
     crossings = margins(linear_flat(situation.locked, flat), limit_cases(flat)["sliding"]).crossovers
     try:

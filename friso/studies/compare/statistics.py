@@ -28,9 +28,11 @@ def median(values: np.ndarray) -> EstimatedValue:
 
 
 def quantile_interval(values: np.ndarray, share: float) -> tuple[float, float]:
-    """Return the 95 % interval of what a share of all there are does not exceed, by values,
-    shape (n,), that were drawn of them: that of order statistics (David, Nagaraja 2003, Order Statistics, Sec. 7.1),
-    which holds for any distribution. Infinite where there are too few."""
+    """Return the 95 % interval of a quantile of a population, from values (n,) drawn from it.
+
+    `share` of the population does not exceed it. The interval by order statistics (David, Nagaraja 2003, Order
+    Statistics, Sec. 7.1) holds for any distribution. It is infinite for too few values.
+    """
     ranked = np.concatenate([[-np.inf], np.sort(values), [np.inf]])
     low, high = (int(binom.ppf(tail, values.size, share)) for tail in (0.025, 0.975))
     return float(ranked[low]), float(ranked[high + 1])
@@ -43,8 +45,10 @@ def _middle(ordered: np.ndarray) -> float:
 
 
 def difference(flags: np.ndarray, before: np.ndarray) -> EstimatedValue:
-    """Return how much more probable something is than before, on the same machines (Agresti,
-    Min 2005, doi:10.1002/sim.1781: the interval of Wald, half a machine being added to every cell)."""
+    """Return how much more probable something is than before, on the same machines.
+
+    Agresti, Min 2005, doi:10.1002/sim.1781: the interval of Wald, with half a machine added to every cell.
+    """
     count = len(flags)
     if not count:
         return EstimatedValue(np.nan, np.nan, np.nan)

@@ -50,8 +50,11 @@ LATEST = 0.5
 
 @dataclass(frozen=True)
 class OptionResult:
-    """An option with the measures of each machine's run, those of longer runs of the first machines (`later`), and the
-    linear loop of each. There are no longer runs if too few machines are in position at the end of the shorter ones."""
+    """An option with the measures of each machine's run, and the linear loop of each.
+
+    `later` holds longer runs of the first machines; there are none if too few machines are in position at the end of
+    the shorter ones.
+    """
 
     option: Option
     measures: MachineMeasures
@@ -80,8 +83,7 @@ class OptionResult:
 
     @property
     def stays(self) -> Share:
-        """Return the probability of staying in position throughout the last half of a run that is
-        `LONGER`."""
+        """Return the probability of staying in position in the last half of a `LONGER` run."""
         if not self.later.done.size:
             return Share(np.nan, np.nan, np.nan)
         return share(self.later.stays, self.later.done)
@@ -118,8 +120,7 @@ class OptionResult:
 
     @property
     def rests(self) -> bool:
-        """Tell whether `ENOUGH` of the machines are in position by the end,
-        and of those that are followed stay there."""
+        """Tell whether `ENOUGH` machines are in position by the end and, if followed, stay there."""
         in_position = self.in_position_count >= ENOUGH * len(self.measures.settling)
         return bool(in_position and self.later.stays.size and self.later.stays.mean() >= ENOUGH)
 
@@ -143,10 +144,10 @@ class Paired:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The results of the options on the machines drawn with a seed, tolerance [m] included; and notes.
+    """The results of all options on machines drawn with a seed, with tolerance [m] and notes.
 
-    `needed` says which bandwidth the controller needs alone. No faster controller exceeds `bandwidth_limit` [Hz]. The
-    options `not_run` are those that an interruption left.
+    `needed` says which bandwidth the controller alone needs. No faster controller exceeds `bandwidth_limit` [Hz]. The
+    options `not_run` were left by an interruption.
     """
 
     machines: Machines
@@ -165,8 +166,10 @@ class Comparison:
 
     @property
     def shaken(self) -> bool:
-        """Tell whether a floor shakes the machines: without,
-        their standstill shows whether they rest, and not how still."""
+        """Tell whether a floor shakes the machines.
+
+        Without one their standstill shows whether they rest, and not how still.
+        """
         return self.stage.floor is not None
 
     def paired(self, result: OptionResult) -> Paired:
@@ -198,12 +201,12 @@ def compare(
     begins: Callable[[], None] = lambda: None,
     bandwidth_limit: float | None = None,
 ) -> Comparison:
-    """Settle `count` machines drawn around a stage in up to seven ways, `within` [m] being in position, and by what is
-    named `also`: settings against friction (`friso.equations.settings`), or "adrc". No faster controller exceeds the
-    `bandwidth_limit` [Hz]. `begins` is called before the first
-    work that takes time, once nothing of the input is wrong.
+    """Run `count` machines drawn around a stage under up to seven options.
 
-    Raises InputError for a number, a seed or a tolerance that is not allowed, and for a motion that ends too late.
+    In position means `within` [m]. `also` adds settings against friction (`friso.equations.settings`), or "adrc". No
+    faster controller exceeds the `bandwidth_limit` [Hz]. `begins` is called before the first long work, once the input
+    has been checked. Raises InputError for a number, a seed or a tolerance that is not allowed, and for a motion that
+    ends too late.
     """
     if not 0 < within < np.inf:
         raise InputError("--within", f"{within:g} m", "a length greater than 0", '--within "1 um"')
@@ -234,8 +237,10 @@ def compare(
 
 
 def _places(stage: Stage) -> list[Stand]:
-    """Return where the reference comes to stand. Raises InputError where that is too late,
-    or never."""
+    """Return where the reference comes to stand.
+
+    Raises InputError if that is too late, or never.
+    """
     flat = stage.flat()
     corner, duration = float(last_corner(flat)), flat["motion.duration"]
     if not rests(flat):
@@ -295,8 +300,7 @@ def _loops(machines: Machines, option: Option) -> LoopRobustness:
 
 
 def _missing(stage: Stage) -> list[str]:
-    """List the effects on machines in a real room that are missing here,
-    and those that the linear loops leave out."""
+    """List effects on real machines that are missing here, also in the linear loops."""
     notes = []
     if stage.floor is None:
         notes.append(

@@ -15,9 +15,12 @@ from friso.studies.settings import StudySettings
 
 @dataclass(frozen=True)
 class ConcaveFit:
-    """A curve from 0 to its end over `knots`, increasing, of shape (n,): `strength` gives how much of it ends there,
-    of two kinds, shape (2, n): straight up to the knot, and bent so that its slope falls to 0. With the standard
-    error of its first slope, -2 times the logarithm of its likelihood, and how many numbers are free in it."""
+    """A concave curve from 0 to its end over increasing `knots`, shape (n,).
+
+    `strength`, shape (2, n), says how much of it ends at each knot, of two kinds: straight up to the knot, and bent so
+    that its slope falls to 0. It has the standard error of its first slope, -2 times the logarithm of its likelihood,
+    and the number of free parameters.
+    """
 
     knots: np.ndarray
     strength: np.ndarray
@@ -50,14 +53,19 @@ _SLOPES = np.array([1.0, 2.0])
 
 
 def _shapes(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
-    """Both kinds of curves with ends of 1 at x, shape (m, 2 n): below 0, where noise leads, straight on."""
+    """Return both kinds of curves with ends of 1 at x, shape (m, 2 n).
+
+    Below 0, where noise may lead, they go straight on.
+    """
     reached = np.minimum(x[:, None] / knots, 1.0)
     return np.hstack([reached, reached * (2 - np.maximum(reached, 0.0))])
 
 
 def knots_of(x: np.ndarray) -> np.ndarray:
-    """Return where points, of shape (m,), let a curve bend: at each of them but 0, or at some,
-    the closer the nearer to 0, but not as near as x itself scatters."""
+    """Return where points, shape (m,), let a curve bend: at each but 0, or at some of them.
+
+    They are closer together near 0, but not closer than x itself scatters.
+    """
     settings = StudySettings.current()
     back = np.minimum(np.diff(x), 0.0)
     places = np.unique(x[x > settings.blurred_scatters * np.sqrt(np.mean(back**2))])
@@ -73,9 +81,11 @@ def knots_of(x: np.ndarray) -> np.ndarray:
 
 
 def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFit]:
-    """Yield the nearest curves to points x and y, both of shape (m,), that reach `end`:
-    straight between their knots, or bent too if there are many, and with the first few knots left out. Beyond the
-    points they go on as these end, as far again at most."""
+    """Yield the nearest curves to points x and y, both of shape (m,), that reach `end`.
+
+    They are straight between their knots, or bent too if there are many, and with the first few knots left out. Beyond
+    the points they go on as these end, at most as far again.
+    """
     settings = StudySettings.current()
     knots = knots_of(x)
     rows = _rows(x, y, knots)
@@ -97,8 +107,10 @@ def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFi
 
 
 def _rows(x: np.ndarray, y: np.ndarray, knots: np.ndarray) -> np.ndarray:
-    """Equations that say the same as those of the points, as few as they have unknowns: shape (2 n + 1, 2 n + 1) at
-    most, the right-hand side last."""
+    """Return equivalent equations for a fit, as few as there are unknowns.
+
+    Their shape is (2 n + 1, 2 n + 1) at most, with the right-hand side last.
+    """
     return np.asarray(np.linalg.qr(np.column_stack([_shapes(x, knots), y]), mode="r"))
 
 

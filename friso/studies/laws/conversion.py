@@ -91,8 +91,7 @@ class LawConversion:
 
 
 def convertible() -> list[str]:
-    """Return the laws that can be made from measurements, in the order of their names,
-    whatever is imported first."""
+    """Return the laws that can be made from measurements, in alphabetical order."""
     return sorted(name for name, law in friction_laws().items() if law.keeping is not FrictionSection.keeping)
 
 
@@ -114,8 +113,7 @@ def measure_friction(flat: Mapping[str, Any]) -> MeasuredFriction:
 def convert(
     stage: Stage, law: str, elements: int = ELEMENTS, virgin: str | os.PathLike[str] | None = None
 ) -> LawConversion:
-    """Replace the friction law of a stage by the named `law`,
-    with measured behaviour as nearly equal as possible.
+    """Replace the friction law of a stage by another that measurements can hardly tell apart.
 
     `elements` lie side by side, in a law that has several. Before sliding, the stage's own law counts as measured, or
     the points in the file `virgin`. Raises InputError for a law that cannot be made from measurements, for a stage
@@ -159,8 +157,10 @@ def compared(
     left_open: Mapping[str, tuple[float, float]] = MappingProxyType({}),
     points: VirginPoints | None = None,
 ) -> LawConversion:
-    """Return a stage `made` from another, whose friction was measured `before`,
-    if need be by `points`; and what that leaves open in it."""
+    """Compare a stage `made` from another with the friction measured `before`.
+
+    The measurement may be given by `points`. Also holds what it leaves open in the new stage.
+    """
     flat = made.flat()
     after = measure_friction(flat)
     items = (
@@ -176,7 +176,7 @@ def compared(
 
 
 def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[MeasuredChange]:
-    """Yield area and stiffness of slow loops at shares of the deflection of break-away, under both laws."""
+    """Yield area and stiffness of slow loops under both laws, at shares of break-away's deflection."""
     settings = StudySettings.current()
     deflection, speed = before.levels.static / before.stiffness, settings.loop_speed * before.levels.stribeck_velocity
     for share in settings.loop_amplitudes:
@@ -188,8 +188,7 @@ def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[Mea
 
 
 def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the table [friction] with such keys, as a stage file has it,
-    in the units of the stage's axis."""
+    """Return the table [friction] with these keys, in the units of the stage's axis."""
     cls, kind = friction_law(law), stage.axis_kind
     table: dict[str, Any] = {"model": law}
     for name, field in numeric_fields(cls).items():
@@ -203,8 +202,7 @@ def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _elements_of(law: str, flat: Mapping[str, Any]) -> set[str]:
-    """Return the keys of the law's lists among flat keys, but those that are 0,
-    as if they were not there."""
+    """Return the keys of the law's lists among flat keys, without those that are 0."""
     lists = tuple(f"friction.{name}." for name in list_fields(friction_law(law)))
     return {key for key in flat if key.startswith(lists) and flat[key]}
 

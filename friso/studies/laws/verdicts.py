@@ -33,8 +33,10 @@ NEEDED: frozenset[MeasuredKind] = frozenset(("curve", "static", "stiffness", "vi
 
 @dataclass(frozen=True)
 class Trial:
-    """A stage under a law, with the keys that were `drawn` [SI] within what the measurements leave open, and its cases
-    (see `friso.hunting.check`)."""
+    """A stage under a law, with the keys `drawn` [SI] from what is left open, and its cases.
+
+    See `friso.hunting.check`.
+    """
 
     stage: Stage
     drawn: Mapping[str, float]
@@ -50,8 +52,7 @@ class Trial:
         return shown.verdict != "failed" and shown.judgement.hunting.certain
 
     def edge_sought(self, case: str) -> bool:
-        """Tell whether the search for the edge of hunting in a case found one,
-        or came to its end without."""
+        """Tell whether the search for the edge in a case found one or ended without one."""
         shown = self.cases[case]
         judgement = shown.judgement
         unsought = shown.verdict == "failed" or CheckPart.BANDWIDTHS in judgement.given_up
@@ -79,8 +80,10 @@ class LawVerdict:
         return tuple(dict.fromkeys(trial.cases[case].verdict for trial in self.trials))
 
     def answers(self, case: str) -> set[bool]:
-        """Tell whether the stage hunts under the law in a case,
-        by the trials whose verdict is certain: both where that depends on what is open."""
+        """Return the certain answers to whether the stage hunts under the law in a case.
+
+        There are both if that depends on what is left open.
+        """
         return {trial.attracted(case) for trial in self.trials if trial.certain(case)}
 
     def certain(self, case: str) -> bool:
@@ -88,15 +91,19 @@ class LawVerdict:
         return all(trial.certain(case) for trial in self.trials)
 
     def hunts(self, case: str) -> bool | None:
-        """Tell whether the stage hunts under the law in a case; None if that is not certain,
-        or depends on what is open."""
+        """Tell whether the stage hunts under the law in a case.
+
+        None if that is not certain, or depends on what is left open.
+        """
         answers = self.answers(case)
         return answers.pop() if len(answers) == 1 and self.certain(case) else None
 
     def edges(self, case: str) -> tuple[float, float] | None:
-        """Lowest and highest edge of hunting [Hz], or in factors of the bandwidth where there is no crossover, in a
-        case; None without any. One that is certain reaches as far as it is known to both sides, one that is not up to
-        where none was found."""
+        """Return the lowest and highest edge of hunting [Hz] in a case; None without any.
+
+        They are factors of the bandwidth if there is no crossover. A certain edge extends as far as it is known to
+        both sides, an uncertain one up to where none was found.
+        """
         margins = [margin for trial in self.trials if (margin := trial.cases[case].judgement.margin)]
         units = [1.0 if edge.crossover is None else edge.crossover / edge.factor for edge in margins]
         ends = [
@@ -127,7 +134,7 @@ class LawVerdict:
 
 @dataclass(frozen=True)
 class VerdictsByLaw:
-    """The verdicts law by law, the stage's own first, and the laws that were `left_out`: what they cannot keep."""
+    """The verdicts by law, the stage's own first, and the laws `left_out`, with what they lose."""
 
     stage: Stage
     verdicts: tuple[LawVerdict, ...]
@@ -139,8 +146,10 @@ class VerdictsByLaw:
         return bandwidth(self.stage.flat()) is not None
 
     def hunts(self, case: str) -> bool | None:
-        """Tell whether the stage hunts in a case, whatever the law;
-        None where that depends on the law or is not certain."""
+        """Tell whether the stage hunts in a case, whatever the law.
+
+        None if that depends on the law or is not certain.
+        """
         answers = {verdict.hunts(case) for verdict in self.verdicts}
         return answers.pop() if len(answers) == 1 else None
 
@@ -157,8 +166,7 @@ class VerdictsByLaw:
         return [verdict.law for verdict in self.verdicts if not verdict.certain(case)]
 
     def deciding(self, case: str) -> list[str]:
-        """Return the experiments that would decide between the answers under different friction
-        laws.
+        """Return the experiments that would decide between different answers of friction laws.
 
         If the answer depends on values left open in a law, they are the experiments that show these values. Otherwise
         they separate laws that disagree, or are not certain, from the others.
@@ -186,8 +194,10 @@ class VerdictsByLaw:
 def verdicts_by_law(
     stage: Stage, rtol: float = LONG_RUN_RTOL, elements: int = ELEMENTS, progress: Progress = silent
 ) -> VerdictsByLaw:
-    """Return what becomes of a stage under each law that keeps what is measured of its own.
-    Raises InputError for a law that does not declare what that is."""
+    """Check a stage under each law that keeps what is measured of its own.
+
+    Raises InputError for a law that does not declare what that is.
+    """
     conversions, left_out = kept_laws(stage, elements)
     planned = [(conversion, [*trials_left_open(conversion).values()]) for conversion in conversions]
     total, done = sum(len(draws) for _, draws in planned), 0
@@ -206,8 +216,10 @@ def verdicts_by_law(
 
 
 def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[MeasuredKind, ...]]]:
-    """Return the stage as it is, and under the other laws that keep what is measured of it;
-    and what the others lose."""
+    """Return the stage under its own and other laws that keep what is measured of it.
+
+    Also returns what the remaining laws lose.
+    """
     own = stage.flat()["friction.model"]
     kept = [compared(stage, stage, measure_friction(stage.flat()))]
     left_out: dict[str, tuple[MeasuredKind, ...]] = {}
@@ -230,10 +242,12 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
 
 
 def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> OtherLaws:
-    """Return the friction of stages that differ in its numbers under every other law that keeps
-    what is measured of each of them: as converted and at both ends of what that leaves open, by the name of the law and
-    of what is open. Laws that keep it of some alone are lost. Raises InputError for a law that does not declare what is
-    measured of it."""
+    """Return the friction of stages under every other law that keeps what is measured of each.
+
+    The stages differ in numbers of their friction. Friction is given as converted and at both ends of what is left
+    open, by the name of the law and of what is open. Laws that keep it for some stages only are lost. Raises
+    InputError for a law that does not declare what is measured of it.
+    """
     kept = [{conversion.law: conversion for conversion in kept_laws(stage, elements)[0][1:]} for stage in stages]
     frictions, lost = {}, {}
     for law in dict.fromkeys(law for conversions in kept for law in conversions):
@@ -258,8 +272,10 @@ def _together(values: Sequence[Any]) -> Any:
 
 
 def trials_left_open(conversion: LawConversion) -> dict[str, dict[str, float]]:
-    """Return what the measurements leave open [SI]: as the conversion has it, "",
-    and at the "least" and "most" of the ranges; as it is for the stage's own law."""
+    """Return the values to try of what the measurements leave open [SI].
+
+    They are as converted, "", and at the "least" and "most" of the ranges; the stage's own law has one trial.
+    """
     trials: dict[str, dict[str, float]] = {"": {}}
     if conversion.stage == conversion.source:
         return trials

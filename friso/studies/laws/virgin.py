@@ -58,8 +58,7 @@ class VirginPoints:
 
 
 def read_virgin_curve(path: str | os.PathLike[str], kind: AxisKind) -> tuple[np.ndarray, np.ndarray]:
-    """Read displacement [m] from rest and force [N], both of shape (n,),
-    from a file of any log format.
+    """Read displacement [m] from rest and force [N], both (n,), from any log format.
 
     The file has one channel of each, recognised by their units on such an axis. Raises InputError, LogError for a file
     that holds none.

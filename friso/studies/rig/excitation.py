@@ -55,8 +55,10 @@ def excite(
     changes: Mapping[str, Any] | None = None,
     kind: Excitation = SLIDING,
 ) -> RecordedRuns:
-    """Excite runs at a standstill at a place [m] with the multisine of a seed;
-    `changes` are arrays of shape (runs,)."""
+    """Excite runs at a standstill at a place [m] with the multisine of a seed.
+
+    `changes` are arrays of shape (runs,).
+    """
     step, slow = as_built_keys(stage)["drive.sample_time"], interval(stage, 1 / (kind.samples * pace(stage)))
     period = round(PERIOD / pace(stage) / slow) * slow
     lines = np.geomspace(1, min(kind.top * PERIOD, FINEST * period / slow), kind.lines)
@@ -67,8 +69,10 @@ def excite(
 
 
 def sines(count: int, lines: np.ndarray, seed: int) -> np.ndarray:
-    """One period of `count` samples of a sum of sines of one amplitude at whole `lines`, of RMS 1, with random
-    phases."""
+    """Return a period of a sum of sines at whole `lines`, with RMS 1 and random phases.
+
+    All have one amplitude; the period has `count` samples.
+    """
     phases = np.random.Generator(np.random.Philox(key=[seed, PHASES])).uniform(0, 2 * np.pi, len(lines))
     spectrum = np.zeros(count // 2 + 1, complex)
     spectrum[lines] = np.exp(1j * phases)
@@ -77,8 +81,10 @@ def sines(count: int, lines: np.ndarray, seed: int) -> np.ndarray:
 
 
 def estimate_plant(logs: Sequence[RigLog]) -> FrequencyResponse:
-    """From the commanded force to the position, of realisations: the indirect estimate. Raises InputError for a loop
-    that was not stable."""
+    """Return the indirect estimate from commanded force to position, over realisations.
+
+    Raises InputError for a loop that was not stable.
+    """
     for log in logs:
         if log.failure:
             raise stopped(log)

@@ -65,8 +65,10 @@ class PlaceOnRail:
 
     @property
     def friction(self) -> np.ndarray:
-        """Friction [N] of the steady passes, shape (passes,), less what does not turn with the motion, as the pull of a
-        cable."""
+        """Return friction [N] of the steady passes, shape (passes,), without the constant force.
+
+        Such a force does not turn with the motion: the pull of a cable, for example.
+        """
         bias = self.velocity.bias.value if self.velocity.bias.determined else 0.0
         return np.abs(self.velocity.forces - bias)
 
@@ -94,8 +96,10 @@ def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
 
 
 def many_speeds_logs(stage: Stage, seed: int) -> tuple[RigLog, ...]:
-    """Return the logs, one for each place, at the fastest setting at which most of the passes
-    are steady; if there is none, at that with the most."""
+    """Return the logs at the fastest setting at which most passes are steady, one per place.
+
+    If there is none, the setting with the most steady passes is taken.
+    """
     tried = []
     for factor in FASTER:
         quick = stage.with_numbers(quicker(stage, factor))

@@ -39,8 +39,10 @@ ROUND = (1.0, 2.0, 5.0, 10.0)
 
 
 def distance(stage: Stage) -> float:
-    """Distance of the move [m]: that of the stage's own motion, rounded to 1, 2 or 5 times a power of ten: 100 mm for
-    the 90 mm of the thesis's rig (Sec. 4.3.2). Raises InputError for a motion that goes nowhere."""
+    """Return the distance [m] of the move: the stage's own, rounded to 1, 2 or 5 times 10^n.
+
+    It is 100 mm for the 90 mm of the thesis's rig (Sec. 4.3.2). Raises InputError for a motion that goes nowhere.
+    """
     exact = float(motion.size(stage.flat()))
     if not exact:
         raise InputError("motion.kind", repr(stage.flat()["motion.kind"]), "a motion that moves the stage", '"step"')
@@ -54,9 +56,11 @@ def duration(stage: Stage) -> float:
 
 
 def move(stage: Stage) -> MoveTask:
-    """Return the move from 0 with the acceleration of the stage's motion,
-    after which it stands; of a motion that states none, with one that the loop can just follow (a move then takes two
-    of its time constants)."""
+    """Return the move from 0 with the acceleration of the stage's motion, standing afterwards.
+
+    For a motion that states none, it has an acceleration that the loop can just follow (a move then takes two of its
+    time constants).
+    """
     flat, travel = stage.flat(), distance(stage)
     rate = 2 * np.pi * (bandwidth(flat) or 1.0)
     acceleration = flat.get("motion.acceleration", travel * rate**2)
@@ -71,18 +75,25 @@ def released(stage: Stage, displacement: float) -> MoveTask:
 
 def with_joint(stage: Stage, locked: bool) -> Stage:
     """Return the stage with its joint locked or free.
-    Raises InputError where it has none that can be so."""
+
+    Raises InputError if it has no such joint.
+    """
     return locked_stage(stage) if locked else free_stage(stage)
 
 
 def crossover(stage: Stage) -> float:
-    """Crossover of the stage's controller [Hz]. Raises InputError for one that is given by its gains."""
+    """Return the crossover of the stage's controller [Hz].
+
+    Raises InputError for one that is given by its gains.
+    """
     return float(stage.flat()[crossover_key(stage)])
 
 
 def crossover_key(stage: Stage) -> str:
-    """Return the key that states it. Raises InputError for a controller that is given by its
-    gains."""
+    """Return the key that states the crossover.
+
+    Raises InputError for a controller that is given by its gains.
+    """
     key = stage.controller.bandwidth_key
     if key is None:
         actual, expected = "gains", "a controller tuned by its crossover, which the experiment varies"
@@ -91,23 +102,27 @@ def crossover_key(stage: Stage) -> str:
 
 
 def at_crossovers(stage: Stage, frequencies: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the keys of the controller at crossovers [Hz], their values of the same shape:
-    one that states none is made faster as a whole, from that of a van Dijk controller of the same proportional gain
-    (`pace`)."""
+    """Return the keys of the controller at crossovers [Hz], with values of the same shape.
+
+    A controller that states none is made faster as a whole, from the crossover of a van Dijk controller with the same
+    proportional gain (`pace`).
+    """
     key = stage.controller.bandwidth_key
     return quicker(stage, frequencies / pace(stage)) if key is None else {key: frequencies}
 
 
 def rails(stage: Stage) -> np.ndarray:
-    """Seeds of the rails, shape (rails,), the stage's own first; of a stage with an even rail there is one, of no
-    seed (NaN)."""
+    """Return the seeds of the rails, shape (rails,), the stage's own first.
+
+    A stage with an even rail has one, of no seed (NaN).
+    """
     if stage.rail is None:
         return np.array([np.nan])
     return stage.flat()["rail.seed"] + np.arange(float(RAILS))
 
 
 def on_rails(stage: Stage, cases: Mapping[str, np.ndarray], seeds: np.ndarray) -> dict[str, np.ndarray]:
-    """Changes of cases, each of shape (cases,), repeated on every rail: shape (cases * rails,), rails fastest."""
+    """Repeat changes of cases, each (cases,), on every rail: (cases * rails,), rails fastest."""
     count = len(next(iter(cases.values())))
     repeated = {key: np.repeat(values, len(seeds)) for key, values in cases.items()}
     return repeated if stage.rail is None else {**repeated, "rail.seed": np.tile(seeds, count)}
@@ -228,8 +243,11 @@ def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 
 
 def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: float) -> tuple[float, ...]:
-    """Return the swings in the last half of a run, from its turning points,
-    times [s] and values [m]: above, below, rising, scatter of period and of height, as in `RailRuns`."""
+    """Return the swings in the last half of a run: above, below, rising, and two scatters.
+
+    They follow from turning points, times [s] and values [m]; the scatters are those of period and of height, as in
+    `RailRuns`.
+    """
     nothing = (np.nan,) * 5
     if not lasts(np.asarray(swing), 0.0, BAND):
         return nothing

@@ -19,9 +19,12 @@ from friso.virtual_rig.run import RecordedRuns
 
 @dataclass(frozen=True)
 class RigLog:
-    """A log as the drive writes it: its name, the kind of experiment for `friso identify` (None: it is recognised
-    without), the sample time [s], what was logged and what is true, SI arrays of shape (n,) by role; the stage that
-    ran, the seed of its noise, and why the run ended early (empty: it did not)."""
+    """A log as the drive writes it, with the truth behind it.
+
+    It has a name, the kind of experiment for `friso identify` (None: it is recognised), the sample time [s], logged
+    and true SI arrays of shape (n,) by role, the stage that ran, the seed of its noise, and why the run ended early
+    (empty: it did not).
+    """
 
     name: str
     kind: str | None
@@ -40,7 +43,7 @@ class RigLog:
 
 @dataclass(frozen=True)
 class Outcome:
-    """An experiment on a stage: its logs, and its result, a class of its own; `notes` tell what to know of it."""
+    """The outcome of an experiment on a stage: logs, a result of its own class, and `notes`."""
 
     experiment: str
     stage: Stage
@@ -79,8 +82,10 @@ either limit where it is not."""
 
 
 def _swings_between_limits(force: np.ndarray, stage: Stage) -> int:
-    """Return the number of samples after which a command [N] of shape (n,) does nothing but
-    swing between its limits; 0 where it comes to rest, or has none."""
+    """Return the number of samples after which a command [N], (n,), only swings between limits.
+
+    It is 0 if it comes to rest, or has no limits.
+    """
     limit = stage.flat().get(FORCE_LIMIT, np.inf)
     parts = np.array_split(force, WINDOWS)
     ways = [(np.mean(part >= 0.999 * limit), np.mean(part <= -0.999 * limit)) for part in parts]

@@ -42,8 +42,10 @@ def jointed(stage: Stage) -> Stage:
 
 
 def freed(stage: Stage) -> Stage:
-    """Return the stage with its joint free and its limiters far off.
-    Raises InputError where it has no joint that can be free, or no stroke."""
+    """Return the stage with its joint free and its limiters far away.
+
+    Raises InputError if it has no joint that can be free, or no stroke.
+    """
     free = free_stage(stage)
     stroke = free.flat()["joint.stroke"]
     if not stroke > 0:
@@ -52,8 +54,10 @@ def freed(stage: Stage) -> Stage:
 
 
 def free_stage(stage: Stage) -> Stage:
-    """Return the stage with its joint free. Raises InputError where it has none,
-    or does not tell what that takes."""
+    """Return the stage with its joint free.
+
+    Raises InputError if it has none, or lacks the keys for that.
+    """
     free = jointed(stage).variants().get("free")
     if free is None:
         expected = "a joint with stiffness (or a [flexure]), damping and stroke, which this experiment frees"
@@ -67,8 +71,10 @@ def locked_stage(stage: Stage) -> Stage:
 
 
 def pace(stage: Stage) -> float:
-    """Return the controller's crossover [Hz]; for plain gains,
-    that of a van Dijk controller of the same proportional gain."""
+    """Return the controller's crossover [Hz].
+
+    For plain gains it is that of a van Dijk controller with the same proportional gain.
+    """
     flat = stage.flat()
     named = bandwidth(flat)
     if named is not None:
@@ -77,14 +83,15 @@ def pace(stage: Stage) -> float:
 
 
 def friction(stage: Stage) -> float:
-    """Return the break-away friction [N]; without any, what moves the mass at 1 m/s^2,
-    our choice."""
+    """Return the break-away friction [N]; without friction, the force for 1 m/s^2 (our choice)."""
     return float(breakaway(stage.flat())) or float(moving_mass(stage.flat()))
 
 
 def travel(stage: Stage) -> tuple[float, float]:
-    """Return the ends [m] of the stage's own motion;
-    one that does not move has a hundred strokes to either side."""
+    """Return the ends [m] of the stage's own motion.
+
+    A motion that does not move has a hundred strokes to either side.
+    """
     low, high = own_motion(stage).span
     reach = 0.0 if high > low else 100 * stage.flat().get("joint.stroke", 1e-3)
     return low - reach, high + reach

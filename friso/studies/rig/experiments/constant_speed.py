@@ -55,8 +55,10 @@ class ConstantSpeedResult:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Passes at two speeds there and back, the joint free and locked; at many, and slow sliding, with it locked. Raises
-    InputError for a stage without joint."""
+    """Run passes at two speeds with the joint free and locked, then many speeds with it locked.
+
+    Slow sliding follows, also with the joint locked. Raises InputError for a stage without joint.
+    """
     cases = []
     for number, (name, machine) in enumerate((("free", freed(stage)), ("locked", locked_stage(stage)))):
         progress(number, 4, f"constant speed, joint {name}")
@@ -88,7 +90,7 @@ def _passes(name: str, stage: Stage, seed: int) -> Passes:
 
 
 def passes_log(name: str, stage: Stage, seed: int) -> RigLog:
-    """Return the log of passes there and back at both speeds, of a stage whose joint is as its `name` says."""
+    """Return the log of passes there and back at both speeds; `name` says if the joint is free."""
     period, parts = 1 / pace(stage), [(0.0, STANDS / pace(stage))]
     for speed, periods in zip(pass_speeds(stage), DURATIONS, strict=True):
         for velocity in (speed, -speed):

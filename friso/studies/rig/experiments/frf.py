@@ -43,8 +43,11 @@ a loop whose error in the last quarter is larger than that is not stable."""
 
 @dataclass(frozen=True)
 class Plant:
-    """Identifications one by one, and all together; the frequency [Hz] of the first mode of a free joint (NaN:
-    locked), and the mass line with the frequencies [Hz] between which it is read."""
+    """The plant as identified: single identifications, and all together.
+
+    It has the frequency [Hz] of the first mode of a free joint (NaN: locked), and the mass line with the frequencies
+    [Hz] between which it is read.
+    """
 
     single: tuple[FrequencyResponse, ...]
     averaged: FrequencyResponse
@@ -55,8 +58,10 @@ class Plant:
 
 @dataclass(frozen=True)
 class MeasuredLoop:
-    """An open loop at a tuned crossover [Hz], and where it truly crosses 0 dB [Hz]. Without lines where the closed one
-    was not stable."""
+    """An open loop tuned to a crossover [Hz], and where it truly crosses 0 dB [Hz].
+
+    It has no lines if the closed loop was not stable.
+    """
 
     tuned: float
     response: FrequencyResponse
@@ -70,9 +75,12 @@ class MeasuredLoop:
 
 @dataclass(frozen=True)
 class Frf:
-    """The plants; the open loops locked at several settings, and free; apparent masses [kg], shape (2, ratios), locked
-    and free, for the motor constants of `RATIOS`; the settings [Hz] tried free, shape (STEPS,), and which of them were
-    stable."""
+    """Results of the frequency-response experiment.
+
+    They are the plants, the open loops locked at several settings and free, and apparent masses [kg], shape (2,
+    ratios), locked and free, for the motor constants of `RATIOS`. With the joint free there are the settings [Hz]
+    tried, shape (STEPS,), and which of them were stable.
+    """
 
     locked: Plant
     free: Plant
@@ -89,8 +97,10 @@ class Frf:
 
 
 def highest_stable(settings: np.ndarray, stable: np.ndarray) -> float:
-    """Return the last of rising settings before the first that is not stable,
-    both of shape (n,); NaN if the first is not."""
+    """Return the last of rising settings before the first unstable one, both (n,).
+
+    NaN if the first one is unstable.
+    """
     first = len(stable) if stable.all() else int(np.argmin(stable))
     return float(settings[first - 1]) if first else np.nan
 
@@ -102,8 +112,10 @@ def crossing_near_target(loop: MeasuredLoop) -> float:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Return all plants and loops, and the stable settings.
-    Raises InputError for a stage without a joint."""
+    """Identify all plants and loops, and find the stable settings.
+
+    Raises InputError for a stage without a joint.
+    """
     fixed, free = locked_stage(jointed(stage)), freed(stage)
     places = np.linspace(*travel(stage), PLACES)
     progress(0, 4, f"plant, joint locked, at {PLACES} places")
@@ -136,8 +148,10 @@ def plant_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
 def open_loops(
     stage: Stage, place: float, seed: int, settings: tuple[float, ...]
 ) -> tuple[tuple[RigLog, ...], tuple[MeasuredLoop, ...]]:
-    """Logs of one excitation with the controller at each of the settings, crossovers over the stage's, and what they
-    show."""
+    """Return logs of one excitation at several settings of the controller, with their loops.
+
+    `settings` are crossovers over the stage's.
+    """
     factors = np.array(settings)
     recorded = excite(stage, place, seed, len(factors), quicker(stage, factors))
     rows = []
@@ -150,8 +164,7 @@ def open_loops(
 
 
 def measured_loop(log: RigLog, tuned: float) -> MeasuredLoop:
-    """Return the open loop of a log of one excitation, tuned to a crossover [Hz];
-    of one that was not stable, no lines."""
+    """Return the open loop of a log, tuned to a crossover [Hz]; no lines if it was unstable."""
     if log.failure:
         none = np.zeros(0)
         return MeasuredLoop(tuned, FrequencyResponse(none, none + 0j, none, none, none, none, "multisine"), ())
@@ -180,8 +193,10 @@ def free_plant(logs: list[RigLog]) -> Plant:
 
 
 def mass_between(response: FrequencyResponse, low: float, high: float) -> Estimate:
-    """Return the median [kg] of force over acceleration between two frequencies [Hz],
-    with the range of the middle half."""
+    """Return the median [kg] of force over acceleration between two frequencies [Hz].
+
+    Its range is that of the middle half.
+    """
     inside = (response.frequency >= low) & (response.frequency <= high)
     method = f"force over acceleration, {low:.3g} to {high:.3g} Hz"
     if not inside.any():
@@ -202,7 +217,7 @@ def apparent_masses(stage: Stage, place: float, seed: int) -> np.ndarray:
 
 
 def stable_settings(stage: Stage, place: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Crossovers [Hz] that were tried, and which of them brought the stage back to its reference."""
+    """Return the crossovers [Hz] tried, and which of them brought the stage to its reference."""
     factors = SETTINGS[-1] / 3 * FASTER ** np.arange(STEPS)
     off = RELEASED * stage.flat()["joint.stroke"] / WIDE
     task = replace(standing(place, WAIT / pace(stage)), displacement=off)

@@ -58,10 +58,10 @@ class Trace:
 
 @dataclass(frozen=True)
 class Startable:
-    """One machine `after_move`, where no peaks are counted, and `after_release`,
-    where it swings as long as it is observed.
+    """A machine that comes to rest `after_move` and swings `after_release`.
 
-    It has its crossover [Hz], the number of its rail, and the displacement [m] of the release.
+    No peaks are counted after the move, and after the release it swings as long as it is observed. It has its
+    crossover [Hz], the number of its rail, and the displacement [m] of the release.
     """
 
     after_move: Trace
@@ -73,13 +73,15 @@ class Startable:
 
 @dataclass(frozen=True)
 class HuntingResult:
-    """By `case` (locked, free) what became of the moves, arrays of shape (crossovers, rails), at `crossovers` [Hz] on
-    `rails` (seeds, the stage's own first).
+    """Results of the hunting experiment.
+
+    By `case` (locked, free) there are the outcomes of the moves, arrays of shape (crossovers, rails), at `crossovers`
+    [Hz] on `rails` (seeds, the stage's own first).
 
     `started`: of releases with the joint locked, shape (displacements, crossovers, rails), by `displacements` [m].
     `rail` is the number of the rail that the `traces` (by case and number of the crossover) and the logs show: the
     first with counted peaks locked at the stage's own crossover, or else the stage's own; the crossovers `shown`
-    (numbers) are the thesis's. `startable` is a machine that comes to rest after the move, None where there is none.
+    (numbers) are the thesis's. `startable` is a machine that comes to rest after the move, None if there is none.
     """
 
     distance: float
@@ -98,22 +100,28 @@ class HuntingResult:
         return [self.cases[case].share(row) for row in range(len(self.crossovers))]
 
     def limit(self, case: str, rail: int | None = None) -> float:
-        """Return the highest crossover [Hz] at which peaks are counted on one rail (None: any);
-        NaN for none."""
+        """Return the highest crossover [Hz] at which peaks are counted on a rail; NaN for none.
+
+        `rail` None means any rail.
+        """
         counted = self.cases[case].counted if rail is None else self.cases[case].counted[:, [rail]]
         rows = np.flatnonzero(counted.any(axis=1))
         return float(self.crossovers[rows[-1]]) if len(rows) else np.nan
 
     @property
     def can_start(self) -> np.ndarray:
-        """Tell whether peaks are counted after the move or a release with the joint locked,
-        shape (crossovers, rails)."""
+        """Tell whether peaks are counted after the move or a release, joint locked.
+
+        Shape (crossovers, rails).
+        """
         return self.started.counted.any(axis=0) | self.cases["locked"].counted
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Return the move at all crossovers on all rails, and releases with the joint locked.
-    Raises InputError without a joint or a motion that moves the stage."""
+    """Run the move at all crossovers on all rails, and releases with the joint locked.
+
+    Raises InputError without a joint or a motion that moves the stage.
+    """
     stages = {case: with_joint(stage, locked) for case, locked in CASES.items()}
     frequencies, seeds = pace(stage) * CROSSOVERS, rails(stage)
     moves, started = _moves_and_releases(stages, move(stage), seed, frequencies, seeds, progress)
@@ -150,8 +158,11 @@ def _moves_and_releases(
     seeds: np.ndarray,
     progress: Progress,
 ) -> tuple[dict[str, RailRuns], RailRuns]:
-    """Return the move `there` of each case at crossovers [Hz] on all rails, shape (crossovers,
-    rails), and releases with the joint locked, shape (displacements, crossovers, rails)."""
+    """Run the move of each case, and releases with the joint locked.
+
+    Moves at crossovers [Hz] on all rails have the shape (crossovers, rails), releases (displacements, crossovers,
+    rails).
+    """
     stage, shape = stages["locked"], (len(frequencies), len(seeds))
     changes = on_rails(stage, at_crossovers(stage, frequencies), seeds)
     numbers = numbers_of(seed, *shape)
@@ -171,8 +182,10 @@ def _moves_and_releases(
 def _startable(
     stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarray, moved: RailRuns, started: RailRuns
 ) -> Startable | None:
-    """Among the rails on which no peaks are counted after the move, those which swing at the end after a release, one
-    at the lowest crossover."""
+    """Return a machine that hunts after a release but not after the move, or None.
+
+    It is one at the lowest crossover, on a rail on which no peaks are counted after the move.
+    """
     lasts = started.counted & started.swings & ~moved.counted
     places = np.argwhere(lasts.swapaxes(0, 1))
     if not len(places):

@@ -41,8 +41,10 @@ crossover (0.5 s and 1 ms on the thesis's rig)."""
 
 @dataclass(frozen=True)
 class Bristles:
-    """Results of the presliding experiment: for each place the fit to its log,
-    the bristles' true stiffness [N/m] and damping [N s/m], and the logs of the loops."""
+    """Results of the presliding experiment: a fit for each place, and the true bristles.
+
+    The true stiffness is in [N/m], damping in [N s/m]; also the logs of the loops.
+    """
 
     by_place: tuple[Presliding, ...]
     stiffness: float
@@ -51,8 +53,10 @@ class Bristles:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Return a small multisine at each place, and loops at the middle one.
-    Raises InputError for a stage whose friction has no bristles."""
+    """Run a small multisine at each place, and loops at the middle one.
+
+    Raises InputError for a stage whose friction has no bristles.
+    """
     flat = stage.flat()
     measured = friction_law(flat["friction.model"]).shown(flat) if "friction.model" in flat else None
     if measured is None or not measured.stiffness > 0:
@@ -86,8 +90,10 @@ def presliding_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
 
 
 def loop_log(stage: Stage, name: str, place: float, seed: int, share: float) -> RigLog:
-    """Return the log of a loop at a place [m]: a sine of force,
-    up to a `share` of static friction."""
+    """Return the log of a loop at a place [m]: a sine of force up to a share of friction.
+
+    `share` is that of static friction.
+    """
     step = as_built_keys(stage)["drive.sample_time"]
     samples = round(PERIOD / pace(stage) / step)
     turn = share * friction(stage) * np.sin(2 * np.pi * np.arange(samples) / samples)

@@ -55,8 +55,10 @@ class Stiction:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Slow motion there and back on several rails. Raises InputError for a stage without a joint, or static
-    friction."""
+    """Run slow motion there and back on several rails.
+
+    Raises InputError for a stage without a joint, or static friction.
+    """
     if "friction.static" not in stage.flat():
         actual = f"model = {stage.flat().get('friction.model', 'none')!r}"
         raise InputError("friction.model", actual, "friction with a static level", 'model = "lugre"')
@@ -79,12 +81,15 @@ def _note(flat: Mapping[str, Any]) -> str:
 
 
 def slow_speed(stage: Stage) -> float:
-    """Velocity [m/s] at which friction would be reached in `LOADS` periods while the cart sticks."""
+    """Return the speed [m/s] at which a sticking cart reaches friction in `LOADS` periods."""
     return friction(stage) / freed(stage).flat()["joint.stiffness"] * pace(stage) / LOADS
 
 
 def slow_legs(stage: Stage, seed: int, rails: int = RAILS) -> tuple[RigLog, ...]:
-    """Logs of slow legs there and back, on rails drawn from one seed after the other, all from the same place."""
+    """Return logs of slow legs there and back, on rails of successive seeds.
+
+    All start from the same place.
+    """
     free, period, slow = freed(stage), 1 / pace(stage), slow_speed(stage)
     parts = [(0.0, STANDS * period / 4)]
     for factor in SPEEDS:

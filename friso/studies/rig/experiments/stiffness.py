@@ -30,8 +30,7 @@ states neither."""
 
 @dataclass(frozen=True)
 class Stiffness:
-    """Results of the stiffness experiment: the fit to the log,
-    and the joint's true stiffness [N/m].
+    """Results of the stiffness experiment: the fit to the log, and the true stiffness [N/m].
 
     The motor's true constant over the assumed one is the factor by which the drive's newtons are smaller than true
     ones.
@@ -72,8 +71,11 @@ def steps(stage: Stage, seed: int) -> RigLog:
 
 
 def pulling_time(stage: Stage) -> float:
-    """Time constant [s] with which the integrator pulls the joint the last bit of the way, the cart fixed:
-    proportional gain plus the joint's stiffness over the integral gain; 0 without an integrator."""
+    """Return the time constant [s] with which the integrator pulls the joint to the reference.
+
+    The cart is fixed. It is proportional gain plus the joint's stiffness, over the integral gain; 0 without an
+    integrator.
+    """
     flat = stage.flat()
     proportional, integral = slow_gains(flat)
     return float((proportional + flat["joint.stiffness"]) / integral) if integral > 0 else 0.0
