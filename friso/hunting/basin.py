@@ -126,8 +126,10 @@ def _ends_closed(
 def _ends_observed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run stages towards swings that were only observed, as `ends_in` does,
-    at a tighter tolerance."""
+    """Run stages towards swings that were only observed, at a tighter tolerance.
+
+    See `ends_in`.
+    """
     settings = BasinSettings.current()
     after = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
     swing, completed, _ = _last_swing(flat, after, settings.judged_periods * target.period, starts, TIGHT, **options)
@@ -140,8 +142,7 @@ def _ends_observed(
 
 
 def swings_seldom(target: Target, ends: np.ndarray, swing: np.ndarray) -> np.ndarray:
-    """Return which runs swing as far as an observed attractor,
-    but not during the last of its periods.
+    """Return which runs swing as far as an observed attractor, but not in its last period.
 
     It is unknown how such runs (see `ends_in`) end.
     """
@@ -156,10 +157,10 @@ def _last_swing(
     rtol: float,
     **run_options: Any,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run stages to the time `end` [s], (count,),
-    and measure peak to peak over the time `last` [s] before it.
+    """Run stages to the time `end` [s], and measure peak to peak over the time `last` [s].
 
-    Returns the swing [m], which runs were completed, and the final states, (count, kept).
+    Both have the shape (count,), and the second ends with the first. Returns the swing [m], which runs were completed,
+    and the final states, (count, kept).
     """
     long, count = {**flat, "motion.duration": end}, len(end)
     window = float(np.min(1 - last / end))
@@ -180,8 +181,7 @@ def _caught(
     landing_map: LandingMap | None,
     starts: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return which runs end in an attractor, and for which runs this is known,
-    both of shape (count,).
+    """Return which runs end in an attractor, and for which this is known, both (count,).
 
     The return map decides where it is reliable, long runs elsewhere. A run that swings by more than `widest` at its
     end, peak to peak [m], may grow or die out, so it counts as unknown. A run that swings less often than an observed
@@ -207,22 +207,22 @@ def displacements_that_hunt(
     flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Release the stage from some displacements: return which end in hunting,
-        and for which this is known."""
+        """Release the stage from displacements; return which hunt, and which are known."""
         return _caught({**flat, "motion.displacement": kicks}, len(kicks), target, widest, landing_map)
 
     return kick_windows(hunts, target.amplitude)
 
 
 def displacements_that_run_away(stage: Stage) -> Kick:
-    """Find the displacements after which a stage with a force limit and no anti-windup diverges
-    from its reference."""
+    """Find the displacements after which a stage diverges from its reference.
+
+    The stage has a force limit and no anti-windup.
+    """
     flat, stages = {**without_motion(stage.flat()), "motion.kind": "release"}, Ensemble.held(stage.flat(), 1)
     end = BasinSettings.current().runaway_periods * float(typical_period(stages)[0])
 
     def runs_away(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Run the stage from some displacements: return which make it diverge,
-        and for which this is known."""
+        """Run the stage from displacements; return which diverge, and which are known."""
         options = RunOptions(rtol=RTOL, record_from=np.inf, least_swing=np.inf)
         motions = run_motions({**flat, "motion.displacement": kicks, "motion.duration": end}, len(kicks), options)
         return motions.away, motions.away | motions.completed
@@ -233,16 +233,15 @@ def displacements_that_run_away(stage: Stage) -> Kick:
 def pushes_that_hunt(
     stage: Stage, target: Target, widest: float = np.inf, landing_map: LandingMap | None = None
 ) -> Kick:
-    """Find the pushes, velocities [m/s] of all masses,
-    after which a stage at rest ends in its `target`.
+    """Find the pushes after which a stage at rest ends in its `target`.
 
-    Swings wider than `widest`, peak to peak [m], count as unknown. A resolved return map saves long runs.
+    Pushes are velocities [m/s] of all masses. Swings wider than `widest`, peak to peak [m], count as unknown. A
+    resolved return map saves long runs.
     """
     stages = Ensemble.held(stage.flat(), 1)
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Push the stage at some velocities: return which end in hunting,
-        and for which this is known."""
+        """Push the stage at velocities; return which hunt, and which are known."""
         several = stages.take(np.zeros(len(kicks), np.int64))
         released = {**several.flat, "motion.displacement": float(stages.length[0])}
         return _caught(released, len(kicks), target, widest, landing_map, pushed(several, kicks))
@@ -251,8 +250,7 @@ def pushes_that_hunt(
 
 
 def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: float) -> Kick:
-    """Find the windows of kicks that hunt: search a grid around `unit`,
-    then narrow down each edge.
+    """Find the windows of kicks that hunt: search a grid around `unit`, then narrow each edge.
 
     `hunts` runs some kicks and returns which of them hunt and which runs were completed.
     """
@@ -280,8 +278,7 @@ def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], u
 def moves_that_hunt(
     stage: Stage, target: Target, widest: float = np.inf, landing_map: LandingMap | None = None
 ) -> MoveShare | None:
-    """Estimate the share of moves, drawn around the one in the stage's file,
-    that ends in the `target`.
+    """Estimate the share of moves around the stage's own that end in the `target`.
 
     Swings wider than `widest`, peak to peak [m], are left out. A resolved return map saves long runs. Returns None for
     motions that are no moves, or if every run fails.
@@ -297,11 +294,10 @@ def moves_that_hunt(
 
 
 def evenly(count: int) -> np.ndarray:
-    """Spread points evenly over the unit square, shape (2, count),
-    by the Kronecker sequence of the plastic number.
+    """Spread points evenly over the unit square, shape (2, count).
 
-    See Roberts 2018, "The unreasonable effectiveness of quasirandom sequences". SciPy's Sobol points would do as well,
-    but take 0.7 s to import.
+    They are the Kronecker sequence of the plastic number; see Roberts 2018, "The unreasonable effectiveness of
+    quasirandom sequences". SciPy's Sobol points would do as well, but take 0.7 s to import.
     """
     plastic = 1.32471795724474602596  # x^3 = x + 1
     return (0.5 + np.outer([1 / plastic, 1 / plastic**2], np.arange(1, count + 1))) % 1.0

@@ -14,6 +14,8 @@ from friso.hunting.turns import KINDS
 
 
 def build(folder: Path, task: bytes) -> str:
-    """Compile the loops over turning points into a folder of the cache;
-    return the name of the entry."""
+    """Compile the loops over turning points into a folder of the cache.
+
+    Returns the name of the entry.
+    """
     return keep(folder, inspect.getsource(turning), lambda module: object_code(scalar_llvm(module.run, KINDS)))

@@ -43,8 +43,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Solver:
-    """Course of a run for the solver: status in words, steps attempted and rejected,
-    relative tolerance."""
+    """A run as the solver saw it: status in words, steps attempted and rejected, tolerance."""
 
     status: str
     steps: int
@@ -106,14 +105,18 @@ class Case:
 
     @property
     def verdict(self) -> Verdict:
-        """Return the verdict: "hunts", "bistable", "transient",
-        "settles" or "failed" (see `Judgement`); "none" while the reference keeps moving."""
+        """Return the verdict: "hunts", "bistable", "transient", "settles" or "failed".
+
+        See `Judgement`. It is "none" while the reference keeps moving.
+        """
         return self.judgement.verdict
 
     @property
     def runs_away(self) -> bool:
-        """Tell whether the motion diverges because the loop is unstable,
-        so that there is no other verdict."""
+        """Tell whether the motion diverges because the loop is unstable.
+
+        There is no other verdict then.
+        """
         return self.verdict == "failed" and self.judgement.runs_away
 
     @property
@@ -144,13 +147,13 @@ def check(
     margins: bool = True,
     tell: Callable[[str, Verdict], None] = lambda name, verdict: None,
 ) -> dict[str, Case]:
-    """Check a stage as given ("given"), with its joint locked ("locked") and with it free
-    ("free").
+    """Check a stage as given, with its joint locked, and with it free.
 
-    A stage without a joint has only the case "given". A file that leaves out the joint's stiffness gives no case
-    "free". With `traces`, each case has its time response, and with `margins` its margin in static friction. `progress`
-    is called as work is done. `tell` is called with the name of a case and its verdict as soon as the verdict is
-    certain. Both may be called from worker threads. Raises InputError for an `rtol` that is not usable.
+    The cases are called "given", "locked" and "free". A stage without a joint has only the case "given". A file that
+    leaves out the joint's stiffness gives no case "free". With `traces`, each case has its time response, and with
+    `margins` its margin in static friction. `progress` is called as work is done. `tell` is called with the name of a
+    case and its verdict as soon as the verdict is certain. Both may be called from worker threads. Raises InputError
+    for an `rtol` that is not usable.
     """
     settings = CheckSettings.current()
     checked_rtol(rtol)
@@ -173,8 +176,7 @@ def check(
 
 
 def needed_kernels(stage: Stage) -> set[KernelRequest]:
-    """Return the kernels that a check of a stage needs,
-    so that those of several stages can be compiled side by side."""
+    """Return the kernels that a check of a stage needs, to be compiled side by side."""
     return set[KernelRequest]().union(*map(_needed, stage.variants().values()))
 
 
@@ -209,8 +211,10 @@ def _case(
     tell: Callable[[Verdict], None] = lambda verdict: None,
     margins: bool = False,
 ) -> Case:
-    """Check one stage with so much work; `tell` is called with the verdict,
-    `done` counts the parts."""
+    """Check one stage within some work.
+
+    `tell` is called with the verdict; `done` counts the parts.
+    """
     survey_settings = SurveySettings.current()
     flat, ended = stage.flat(), 0
 
@@ -266,8 +270,10 @@ def _case(
 
 
 def _fed(stage: Stage, work: float) -> Feeding | None:
-    """Find the cause that feeds the cycle of a stage with a backlash;
-    None if that takes too much work."""
+    """Find the cause that feeds the cycle of a stage with a backlash.
+
+    None if that takes too much work.
+    """
     try:
         with allowance(work):
             return feeding(stage)
@@ -293,8 +299,7 @@ def _friction(stage: Stage, judgement: Judgement, work: float) -> tuple[Paramete
 
 
 def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, breakaway: float) -> float | None:
-    """Return the force limit [N] that keeps a stage off its reference for ever;
-    None if there is no such limit.
+    """Return the force limit [N] that keeps a stage off its reference for ever, or None.
 
     Either break-away takes more force, `breakaway` [N], or the run ends with the force at the limit. A stage that
     settles, swings, or may still move gives None.

@@ -65,8 +65,7 @@ def cycle_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], rtol: floa
 def flow_derivatives(
     stages: Ensemble, keys: tuple[str, ...], state: np.ndarray, time: np.ndarray, rtol: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Follow a stage from a state (1, states) for a time [s] (1,),
-    and differentiate its final state.
+    """Follow a stage from a state (1, states) for a time [s] (1,), with derivatives.
 
     Returns the final state (states,), its derivatives by the start (states, states) and by flat keys (states, keys).
     None if a run was not completed.
@@ -111,12 +110,11 @@ def _extremes(
 
 @np.errstate(all="ignore")
 def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: float, rtol: float) -> np.ndarray | None:
-    """Return the relative change of the bandwidth at the edge of hunting per relative change of
-    each key, shape (keys,).
+    """Return the relative change of the bandwidth at the edge of hunting by key, (keys,).
 
-    The edge lies at `factor` times the bandwidth of the stage, everything else unchanged. Along the edge the multiplier
-    keeps its value. Its derivatives are central differences of an exact derivative of the flow. Returns None if no
-    cycle flips there.
+    It is per relative change of each key. The edge lies at `factor` times the bandwidth of the stage, everything else
+    unchanged. Along the edge the multiplier keeps its value. Its derivatives are central differences of an exact
+    derivative of the flow. Returns None if no cycle flips there.
     """
     settings = EdgeSettings.current()
     inside = faster(flat, factor * (1 - settings.inside_edge_share))
@@ -142,10 +140,9 @@ def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: flo
 def _multipliers(
     inside: Mapping[str, Any], changed: Sequence[Mapping[str, Any]], first: Cycles, rtol: float
 ) -> np.ndarray | None:
-    """Return the multipliers of stages that differ a little from one whose cycle is given,
-    shape (stages,).
+    """Return the multipliers of stages that differ a little from a given one, (stages,).
 
-    None if an orbit could not be closed, or a multiplier is complex.
+    The cycle of that stage is `first`. None if an orbit could not be closed, or a multiplier is complex.
     """
     count = len(changed)
     names = {name for change in changed for name, value in change.items() if value != inside[name]}

@@ -43,16 +43,17 @@ class Decline:
 
 @dataclass(frozen=True)
 class Feeding:
-    """Decline of hunting without the dry friction (None: there is none),
-    and without the backlash."""
+    """How hunting declines without dry friction (None: there is none) or without backlash."""
 
     friction: Decline | None
     backlash: Decline
 
 
 def feeding(stage: Stage) -> Feeding | None:
-    """Find the cause that feeds the hunting of a stage with a backlash;
-    None for a stage without backlash."""
+    """Find the cause that feeds the hunting of a stage with a backlash.
+
+    None for a stage without backlash.
+    """
     flat = stage.flat()
     if not structure(flat).plays:
         return None

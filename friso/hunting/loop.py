@@ -27,10 +27,10 @@ def winds_up_at_a_limit(stages: Ensemble) -> bool:
 
 
 def far_beyond_a_limit(stages: Ensemble) -> np.ndarray | None:
-    """Return the stability of loops for swings far beyond a force limit without anti-windup,
-    words of shape (count,).
+    """Return the stability of loops for swings far beyond a force limit, words (count,).
 
-    Swings grow where the loop is unstable, and shrink where it is stable. Returns None if there is no such limit.
+    There is no anti-windup. Swings grow where the loop is unstable, and shrink where it is stable. Returns None if
+    there is no such limit.
     """
     return at_lower_gains(stages) if winds_up_at_a_limit(stages) else None
 
@@ -49,12 +49,12 @@ def surely_run_away(stages: Ensemble) -> np.ndarray:
 
 @np.errstate(all="ignore")
 def at_lower_gains(stages: Ensemble) -> np.ndarray:
-    """Judge the stability of sliding stages at their own gain and all lower ones:
-    a `LowerGains` each, shape (count,).
+    """Judge the stability of sliding stages at their own and all lower gains, shape (count,).
 
-    A loop is "unstable" if it is so at one of the gains. The viscous friction is that of the direction with less. The
-    result is "unknown" if the controller does not name the keys of its gain. It is also unknown if the controller acts
-    differently about the reference than far from it, which the linear loop at rest does not show.
+    Each gets a `LowerGains`. A loop is "unstable" if it is so at one of the gains. The viscous friction is that of the
+    direction with less. The result is "unknown" if the controller does not name the keys of its gain. It is also
+    unknown if the controller acts differently about the reference than far from it, which the linear loop at rest does
+    not show.
 
     A force limit acts as a lower gain, the lower the larger the motion. Without anti-windup, only the force limit and
     the viscous friction matter for the largest motions. With a mass m and viscous friction b, they shrink if b k_p > m
@@ -70,8 +70,10 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
 
 
 def _at_lower_gains(stages: Ensemble) -> np.ndarray:
-    """Judge the stability at lower gains of few enough stages for the memory,
-    whose gain is a known key."""
+    """Judge the stability at lower gains of stages that fit into memory together.
+
+    Their gain is a known key.
+    """
     settings = CheckSettings.current()
     shares = np.geomspace(*settings.lower_gain_shares)
     controller, form = controller_of(stages.flat), stages.structure
@@ -140,18 +142,19 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
 
 
 def _growths(stages: Ensemble, touched: bool = False) -> dict[LoopState, np.ndarray]:
-    """Return the fastest growth rates [1/s] in each state, shape (count,);
-    NaN where equations are not finite.
+    """Return the fastest growth rates [1/s] in each state, (count,).
 
-    A limiter may be `touched`.
+    NaN where equations are not finite. A limiter may be `touched`.
     """
     stuck = _rates(stages, touched)
     return {"sticks": _growth(stuck), "slides": _growth(_sliding(stages, stuck, np.mean))}
 
 
 def _growth(matrices: np.ndarray) -> np.ndarray:
-    """Return the fastest growth rates [1/s] of linear equations, (count, states, states);
-    NaN where they are not finite."""
+    """Return the fastest growth rates [1/s] of linear equations, (count, states, states).
+
+    NaN where they are not finite.
+    """
     rates = np.full(len(matrices), np.nan)
     finite = np.isfinite(matrices).all(axis=(1, 2))
     rates[finite] = np.linalg.eigvals(matrices[finite]).real.max(axis=1)
@@ -159,15 +162,16 @@ def _growth(matrices: np.ndarray) -> np.ndarray:
 
 
 def _motor_state(stages: Ensemble, which: int) -> int:
-    """Return the index of the motor's position (0) or velocity (1);
-    the first state without a transmission."""
+    """Return the index of the motor's position (0) or velocity (1).
+
+    It is the first state without a transmission.
+    """
     names = stages.kernel.states
     return names.index(MOTOR_STATES[which]) if stages.structure.transmission else 0
 
 
 def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
-    """Yield each state moved a little from rest at the reference, all others at rest, (count,
-    states)."""
+    """Yield each state moved a little from rest, all others at rest, (count, states)."""
     settings = CheckSettings.current()
     for k, scale in enumerate(stages.scales.T):
         moved = np.zeros(stages.scales.shape)
@@ -176,10 +180,9 @@ def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
 
 
 def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
-    """Return the derivatives of the rates at rest by the states, scaled by their magnitudes,
-    (count, states, states).
+    """Return the scaled derivatives of the rates at rest by the states.
 
-    A limiter that is `touched` is far enough beyond the stroke.
+    Their shape is (count, states, states). A limiter that is `touched` is far enough beyond the stroke.
     """
     settings = CheckSettings.current()
     flank = np.zeros((stages.count, len(stages.kernel.states)))
@@ -221,15 +224,16 @@ def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., n
 
 
 def _viscous(stages: Ensemble, speed: np.ndarray, output: str) -> np.ndarray:
-    """Return by how much a friction force rises with speed [N s/m] beyond a high speed [m/s],
-    both (count,)."""
+    """Return how much friction rises with speed [N s/m] beyond a high speed [m/s], (count,)."""
     slow, fast = (_force(stages, _slid(stages, times * speed), output) for times in (1.0, 2.0))
     return (fast - slow) / speed
 
 
 def _slid(stages: Ensemble, speed: np.ndarray) -> np.ndarray:
-    """Return states of stages that have slid for long at a speed [m/s] each,
-    so that friction is steady."""
+    """Return states of stages that have slid for long at a speed [m/s] each.
+
+    Friction is steady then.
+    """
     states = stages.settled(Steady(0.0, 0.0, speed))
     bristles = stages.kernel.having(Role.BRISTLE)
     begun = stages.rates(states)[:, bristles]

@@ -87,8 +87,7 @@ def can_hunt(flat: Mapping[str, Any]) -> bool:
 
 
 def kernels_to_judge(form: Structure) -> set[KernelRequest]:
-    """Return the kernels that a verdict on stages of a structure needs,
-    so that several can be built at once."""
+    """Return the kernels that verdicts on stages of a structure need, to be built at once."""
     variational = set() if why_not(form) else {KernelRequest(form.standing, variational=True)}
     return {KernelRequest(form), KernelRequest(form.standing), *variational}
 
@@ -117,11 +116,11 @@ def find_attractors(
 def sketch_attractors(
     flat: Mapping[str, Any], count: int, threads: int | None = None, cancel: np.ndarray | None = None
 ) -> StageAttractors:
-    """Sketch the attractors of stages of one structure,
-    by coarse return maps where these suffice.
+    """Sketch the attractors of stages of one structure, by coarse return maps.
 
-    A sketch is faster than `find_attractors`, and wrong where an attractor has a narrow basin. `threads` and `cancel`
-    as in `RunOptions`. Raises Exhausted where an allowance is used up.
+    Where these do not suffice, simulations follow. A sketch is faster than `find_attractors`, and wrong where an
+    attractor has a narrow basin. `threads` and `cancel` as in `RunOptions`. Raises Exhausted where an allowance is
+    used up.
     """
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = surveyed_roughly(stages) if can_hunt(flat) else None
@@ -137,8 +136,10 @@ def find_swings(flat: Mapping[str, Any]) -> tuple[Swinging, ...]:
 
 
 def loops_unstable(flat: Mapping[str, Any], count: int) -> np.ndarray:
-    """Return which stages of one structure have an unstable loop, sticking or sliding,
-    regardless of friction, shape (count,)."""
+    """Return which stages have an unstable loop regardless of friction, (count,).
+
+    They have one structure; the loop is unstable sticking or sliding.
+    """
     states = unstable_among(Ensemble.held(flat, count, form=shared_structure(flat)))
     return np.any([*states.values()], axis=0)
 
@@ -163,8 +164,7 @@ def judge_runs(
     threads: int | None = None,
     cancel: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Judge stages as `judge_many` does, from motions that were run already and attractors found
-    already.
+    """Judge stages as `judge_many` does, from motions and attractors found already.
 
     `rtol` is the relative tolerance of further runs; `threads` and `cancel` as in `RunOptions`.
     """
@@ -208,6 +208,5 @@ def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions
 
 
 def _stands(flat: Mapping[str, Any], rest: FollowedMotions) -> np.ndarray:
-    """Return which motions were followed, as far as necessary, until they no longer swing,
-    shape (count,)."""
+    """Return which motions were followed until they no longer swing, shape (count,)."""
     return ~rest.unknown & (~rest.moving | (rest.swing <= resting(flat, len(rest.moving))))

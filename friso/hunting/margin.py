@@ -119,8 +119,10 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
 
 
 class _Grid:
-    """Factors of the bandwidth, ascending, with the attractors at each;
-    all from number `lowest` on were searched."""
+    """Factors of the bandwidth, ascending, with the attractors at each.
+
+    All from number `lowest` on were searched.
+    """
 
     def __init__(self, flat: Mapping[str, Any], factors: np.ndarray, first: int) -> None:
         """Survey the stages at factors from number `first` on. Raises Exhausted."""
@@ -141,10 +143,10 @@ class _Grid:
         self.lowest = 0
 
     def _survey(self, numbers: np.ndarray) -> None:
-        """Sketch the stages at some factors, by number,
-        and simulate those whose maps are not resolved.
+        """Sketch the stages at some factors; simulate those whose maps are not resolved.
 
-        Factors nearest to the stage come first, until a share of the work is used up. Raises Exhausted.
+        Factors are given by number. Those nearest to the stage come first, until a share of the work is used up.
+        Raises Exhausted.
         """
         settings = EdgeSettings.current()
         sketch = sketched(self._stages(numbers))
@@ -177,8 +179,7 @@ class _Grid:
             self.settled = float(self.factors[index])
 
     def last_edge(self, index: int, above: bool) -> tuple[int, AttractionEnd, bool] | None:
-        """Find the last factor, by number, at which something attracts while nothing does at the
-        next one.
+        """Find the last factor at which something attracts while nothing does at the next.
 
         The search runs from a number on if `above`, else below it. Returns the number, the end of attraction and
         whether it is certain. None if there is no such factor.
@@ -200,8 +201,10 @@ class _Grid:
             return at, end, bool(end.certain and self.decided[upper].all())
 
     def _proved_at_the_top(self) -> bool:
-        """Tell whether something attracts at the highest factor; also if that is undecided,
-        with the allowance used up."""
+        """Tell whether something attracts at the highest factor.
+
+        If that stays undecided with the allowance used up, the answer is yes.
+        """
         try:
             return self.proved(len(self.factors) - 1, 1)
         except Exhausted:
@@ -209,12 +212,11 @@ class _Grid:
             return True
 
     def end(self, at: int, ahead: int) -> AttractionEnd | None:
-        """Find the end of attraction between a factor, by number,
-        and the next one above (`ahead` 1) or below (-1).
+        """Find the end of attraction between a factor and the next one.
 
-        Returns None if attraction reaches the end of the search, which is then recorded for all factors up to there.
-        Returns None as well if closer inspection shows no attractor. Where the allowance is used up, the end is not
-        certain.
+        The next one lies above (`ahead` 1) or below (-1). Returns None if attraction reaches the end of the search,
+        which is then recorded for all factors up to there. Returns None as well if closer inspection shows no
+        attractor. Where the allowance is used up, the end is not certain.
         """
         if (at, ahead) in self.ends:
             return self.ends[at, ahead]
@@ -292,8 +294,7 @@ class _Grid:
         return None
 
     def windows(self, besides: int) -> tuple[BandwidthWindow, ...]:
-        """Return the windows of factors with an attractor,
-        except the window of factor number `besides`."""
+        """Return the windows of factors with an attractor, except that of number `besides`."""
         while True:
             before = self.attracts.copy()
             windows = tuple(self._window(a, b) for a, b in self._spans() if not a <= besides <= b)

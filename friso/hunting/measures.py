@@ -93,7 +93,10 @@ def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarra
 
 
 def corner_of(flat: Mapping[str, Any]) -> np.ndarray | float:
-    """Return the time [s] from which the references of stages stand or move evenly; 0 for all others."""
+    """Return the time [s] from which the references of stages stand or move evenly.
+
+    It is 0 for all others.
+    """
     return np.asarray(last_corner(flat)) if ends_evenly(flat) else 0.0
 
 
@@ -109,8 +112,10 @@ def turns_of(runs: Runs, corner: np.ndarray | float = 0.0) -> Turns:
 
 
 def swing_of(runs: Runs) -> np.ndarray:
-    """Return the peak-to-peak deviation [m] over the window at the end of each run (see
-    `RunOptions`), shape (runs,)."""
+    """Return the peak-to-peak deviation [m] over the window at the end of runs, (runs,).
+
+    See `RunOptions`.
+    """
     return runs.statistic("deviation_max") - runs.statistic("deviation_min")
 
 
@@ -128,8 +133,10 @@ def run_ends(runs: Runs, turns: Turns, outside: str) -> End:
 
 
 def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
-    """Measure a chunk of runs of the stages `flat`,
-    arrays of which have one entry per run of the chunk."""
+    """Measure a chunk of runs of the stages `flat`.
+
+    Arrays in it have one entry per run of the chunk.
+    """
     results = runs.results
     ended, turns = runs.statistic("ended"), turns_of(runs, corner_of(flat))
     passing = np.nan_to_num(turns.period) / 2  # a cycle that crosses the reference as the run ends has not settled
@@ -203,7 +210,7 @@ def measure_traces(
 
 @dataclass(frozen=True)
 class SampledSolver:
-    """What the solver says of sampled runs: status, and steps attempted and rejected, arrays of shape (runs,)."""
+    """The solver's report on sampled runs: status, steps attempted and rejected, (runs,)."""
 
     status: np.ndarray
     steps: np.ndarray

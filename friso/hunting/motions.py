@@ -134,8 +134,10 @@ def followed_motions(
 
 
 def resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
-    """Return the peak-to-peak swings [m] up to which stages of one structure count as at rest,
-    shape (count,)."""
+    """Return the peak-to-peak swings [m] up to which stages count as at rest, (count,).
+
+    The stages have one structure.
+    """
     return 2 * SurveySettings.current().least_swing * Ensemble.held(flat, count, form=shared_structure(flat)).length
 
 

@@ -53,8 +53,10 @@ class AttractionEnd:
 
 @dataclass(frozen=True)
 class BandwidthWindow:
-    """Bandwidths at which something attracts, by its two ends in factors of the stage's own;
-    None at the end of the search."""
+    """A window of bandwidths in which something attracts, by its two ends.
+
+    They are factors of the stage's own; None at the end of the search.
+    """
 
     low: AttractionEnd | None
     high: AttractionEnd | None
@@ -67,8 +69,10 @@ class BandwidthWindow:
 
 @dataclass
 class _Place:
-    """Progress of a search: motions that attract `at` a factor,
-    and a factor `outside` at which nothing seems to."""
+    """Progress of a search: motions that attract `at` a factor, and a factor `outside`.
+
+    At the latter nothing seems to attract.
+    """
 
     at: float
     motions: tuple[Swinging, ...]
@@ -81,10 +85,10 @@ class Beyond(Exception):
 
 @dataclass(frozen=True)
 class EdgeSearch:
-    """Search for an edge of hunting of a stage, given as flat keys,
-    towards the `farthest` factor of its bandwidth.
+    """A search for an edge of hunting, towards the `farthest` factor of the bandwidth.
 
-    Nothing attracts at the factor `settled`, if given: an attractor beyond it belongs to another window.
+    The stage is given as flat keys. Nothing attracts at the factor `settled`, if given: an attractor beyond it belongs
+    to another window.
     """
 
     flat: Mapping[str, Any]
@@ -121,8 +125,7 @@ class EdgeSearch:
         return self._bracketed(place)
 
     def _proved(self, next_to: float, farther: np.ndarray, distances: np.ndarray) -> tuple[np.ndarray, Attractors]:
-        """Look for attractors beyond the end of an orbit: next to it,
-        and at the factors farther off.
+        """Look for attractors just beyond the end of an orbit, and farther off.
 
         Returns the factors that were searched, and the attractors there. Without a map, factors farther off are only
         searched if a simulation shows an attractor.
@@ -137,8 +140,10 @@ class EdgeSearch:
         return beyond, survey if decided else replace(survey, decided=survey.decided & survey.attracts)
 
     def _just_beyond(self, end: float) -> tuple[float, np.ndarray]:
-        """Return the factor next to the end of an orbit, and the factors farther off,
-        at which to look for attractors."""
+        """Return the factors beyond an orbit's end at which to look for attractors.
+
+        The first is next to the end, the others are farther off.
+        """
         ahead = self._ahead(end)
         next_to, farther = end * EdgeSettings.current().beyond_edge_factor ** ahead, end * FARTHER**ahead
         if self.settled is not None and ahead * (self.settled - end) > 0:
@@ -178,8 +183,10 @@ class EdgeSearch:
                 return replace(end, certain=end.certain and self._surely_attracts(place))
 
     def _surely_attracts(self, place: _Place) -> bool:
-        """Tell whether something surely attracts at a place: a closed orbit,
-        or a swing seen by a thorough survey."""
+        """Tell whether something surely attracts at a place.
+
+        It is a closed orbit, or a swing seen by a thorough survey.
+        """
         if any(motion.cycles is not None for motion in place.motions):
             return True
         distances = np.outer([motion.distance for motion in place.motions], ALONG).reshape(1, -1)
@@ -187,10 +194,10 @@ class EdgeSearch:
         return bool(survey.attracts[0] and survey.decided[0])
 
     def _told(self, factors: np.ndarray, distances: np.ndarray, confirm: tuple[int, ...] = ()) -> Attractors:
-        """Find the attractors at some factors; where maps do not decide,
-        runs also start from `distances` [m], shape (n,).
+        """Find the attractors at some factors.
 
-        Runs confirm the maps of the factors numbered `confirm`.
+        Where maps do not decide, runs also start from `distances` [m], shape (n,). Runs confirm the maps of the
+        factors numbered `confirm`.
         """
         begun = np.broadcast_to(distances, (len(factors), len(distances)))
         return what_attracts(self._stages(factors), distances=begun, confirm=confirm)
@@ -204,8 +211,7 @@ class EdgeSearch:
         return 1.0 if self.farthest >= at else -1.0
 
     def _still_ahead(self, at: float, outside: float) -> float:
-        """Return the factor `outside` without an attractor,
-        or one further ahead if the search has passed it."""
+        """Return the factor `outside` without an attractor, or one further ahead if passed."""
         ahead = self._ahead(at)
         return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * EdgeSettings.current().reach_log))
 
@@ -244,8 +250,7 @@ class EdgeSearch:
         farthest = start
 
         def over(_: Point, point: Point) -> bool:
-            """Tell whether the orbit has lost stability or turned back;
-            otherwise note the farthest point."""
+            """Tell whether the orbit has lost stability or turned back; else note the farthest point."""
             nonlocal farthest
             ended = not abs(point.multiplier) < 1 or point.place <= farthest.place
             farthest = farthest if ended else point

@@ -47,11 +47,11 @@ class MarginEnd:
 
 @dataclass(frozen=True)
 class ParameterMargin:
-    """Range of a parameter of a stage before hunting ends, if something `attracts` the stage,
-    or begins.
+    """The range of a parameter within which hunting goes on, or does not begin.
 
-    `below` and `above` are the nearest factors of the parameter at which it does (None: at no factor tried up to the
-    end of the `range`). On the `open_sides`, -1 or 1, this is not known.
+    Which one depends on whether something `attracts` the stage. `below` and `above` are the nearest factors of the
+    parameter at which that changes (None: at no factor tried up to the end of the `range`). On the `open_sides`, -1 or
+    1, this is not known.
     """
 
     attracts: bool
@@ -98,8 +98,7 @@ def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: flo
 
 
 class _Side:
-    """Factors of a parameter on one side of its own value, from 1 outward,
-    and the result at each.
+    """Factors of a parameter on one side of its own value, from 1 outward, with results.
 
     `changed`: hunting has begun or ended. `decided`: this is known. `searched`: the stage was searched thoroughly.
     `certain`: the thorough search was certain.
@@ -135,8 +134,10 @@ class _Side:
         raise Undecided
 
     def _bracketed(self) -> int | None:
-        """Return the number of the first changed factor, after trying others close to it;
-        None if nothing changes."""
+        """Return the number of the first changed factor, after trying others close to it.
+
+        None if nothing changes.
+        """
         settings = EdgeSettings.current()
         while (changed := np.flatnonzero(self.changed)).size:
             first = int(changed[0])

@@ -10,10 +10,10 @@ import numpy as np
 
 
 class ArrayRows:
-    """Base of dataclasses whose arrays, and parts with rows of their own,
-    have one row for every stage or run.
+    """Base of dataclasses with one row for every stage or run.
 
-    Everything that all rows share, such as numbers and words, stays unchanged.
+    Their arrays, and parts with rows of their own, have these rows. Everything that all rows share, such as numbers
+    and words, stays unchanged.
     """
 
     def take(self, numbers: Any) -> Self:

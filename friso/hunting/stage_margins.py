@@ -35,10 +35,10 @@ def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | Non
 
 
 def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMargin]:
-    """Find the margins of a stage with a free joint in the joint's stroke and stiffness,
-    by their keys.
+    """Find the margins of a stage with a free joint in the joint's stroke and stiffness.
 
-    The range is given by `SEARCH_LIMITS`. There are none for a stage that cannot hunt, or whose attractors are unknown.
+    They stand by their keys. The range is given by `SEARCH_LIMITS`. There are none for a stage that cannot hunt, or
+    whose attractors are unknown.
     """
     flat = stage.flat()
     if stage.joint is None or stage.joint.locked or not _is_known(judgement):
@@ -66,11 +66,10 @@ def _margin(scaled: Scaled, judgement: Judgement, lowest: float) -> ParameterMar
 
 
 def keeps_friction_margin(stage: Stage, factor: float, work: float) -> bool | None:
-    """Tell whether nothing attracts a stage with a faster controller,
-    also with more or less static friction.
+    """Tell whether nothing attracts a stage with a faster controller and other friction.
 
-    The controller is faster by `factor`; friction changes by the factor by which advice keeps away from an edge. None
-    if this takes more than so much work, or is not certain.
+    The controller is faster by `factor`; static friction is more or less by the factor by which advice keeps away from
+    an edge. None if this takes more than the given work, or is not certain.
     """
     flat = stage.flat()
     if not static_frictions(flat):

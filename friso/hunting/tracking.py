@@ -22,9 +22,10 @@ from friso.stage.motion import DURATION, motion_of
 
 @dataclass(frozen=True)
 class Dwell:
-    """A place at which the reference stands: its `number` from 1, the position [m], and since when [s].
+    """A place at which the reference stands: its `number` from 1, position [m], and time [s].
 
-    `settling`: for each band [m] the time [s] until the stage stays within it; None: it does not while it stands.
+    `since` is the time from which it stands. `settling`: for each band [m] the time [s] until the stage stays within
+    it; None: it does not while the reference stands.
     """
 
     number: int
@@ -41,7 +42,10 @@ class Dwell:
 
 @dataclass(frozen=True)
 class Reversal:
-    """A turning point of the reference: when [s], where [m], and the largest error [m] half-way to the next one."""
+    """A reversal of the reference: time [s], place [m], and the error [m] until half-way on.
+
+    The error is the largest one half-way to the next reversal.
+    """
 
     time: float
     position: float
@@ -50,10 +54,10 @@ class Reversal:
 
 @dataclass(frozen=True)
 class Tracking:
-    """How far a stage is off a reference that keeps moving: at most, and as root mean square [m].
+    """How far a stage is off a reference that keeps moving [m]: at most, and RMS.
 
     Over a `period` [s] the response has been `closed` as a periodic orbit; else it is over the last quarter of the
-    run. `multiplier`: by how much small deviations from that orbit grow in a period, None where it was not closed.
+    run. `multiplier`: by how much small deviations from that orbit grow in a period, None if it was not closed.
     """
 
     largest: float
@@ -104,7 +108,7 @@ def dwells(stage: Stage, rtol: float) -> tuple[Dwell, ...]:
 
 
 def dwells_of_trace(stage: Stage, time: np.ndarray, deviation: np.ndarray) -> tuple[Dwell, ...]:
-    """Return how a sampled run settles at each place where its reference stands, the slowest first.
+    """Return how a sampled run settles at each place of its reference, the slowest first.
 
     The deviations [m] are those at the times [s], both of shape (n,).
     """
@@ -120,10 +124,11 @@ def dwells_of_trace(stage: Stage, time: np.ndarray, deviation: np.ndarray) -> tu
 
 
 def tracking(stage: Stage, rtol: float) -> Tracking | None:
-    """Return how a stage follows a reference that keeps moving; None if its run was not completed.
+    """Return how a stage follows a reference that keeps moving.
 
-    A periodic reference gets the response of the same period, which is closed by Newton's method on the states a
-    period later (with derivatives from runs side by side), from the end of the stage's own motion.
+    None if its run was not completed. A periodic reference gets the response of the same period, which is closed by
+    Newton's method on the states a period later (with derivatives from runs side by side), from the end of the stage's
+    own motion.
     """
     flat, settings = stage.flat(), TrackingSettings.current()
     shape, period = kernel(structure(flat)), motion_of(flat).period(flat)
@@ -168,9 +173,9 @@ def _reversals(
 
 
 def _closed(shape: Kernel, flat: Mapping[str, Any], period: float, rtol: float) -> tuple[np.ndarray, float] | None:
-    """Return the states at the start of a periodic response, shape (1, kept), and its multiplier.
+    """Return the start of a periodic response, shape (1, kept), and its multiplier.
 
-    Returns None where none could be closed.
+    Returns None if none could be closed.
     """
     settings = TrackingSettings.current()
     values = shape.values({**flat, "motion.size": motion.size(flat)}, 1)

@@ -31,10 +31,10 @@ def clear(kinds, count):
 
 
 def maxima(values, count, kinds):
-    """Mark the local maxima with 1 and all others with 0;
-    the first point of a level stretch stands for all of it.
+    """Mark the local maxima with 1 and all others with 0.
 
-    The ends count as maxima if they are higher than their neighbours; turning points usually are.
+    The first point of a level stretch stands for all of it. The ends count as maxima if they are higher than their
+    neighbours; turning points usually are.
     """
     clear(kinds, count)
     k = 0
@@ -75,8 +75,7 @@ def zigzag(values, count, least, kinds):
 
 
 def keep_tallest(times, values, count, kinds, peaks):
-    """Mark the counted peaks: of maxima that are late and tall enough,
-    the tallest within `SEPARATION` stays.
+    """Mark the counted peaks: of late and tall maxima, the tallest within `SEPARATION`.
 
     MATLAB's findpeaks does so with MinPeakDistance.
     """
@@ -138,8 +137,7 @@ def last_turn(times, count, kinds):
 
 
 def run(times, values, counts, swing, ended, since, kinds, peaks, distinct, period, turned, earlier):
-    """Fill `peaks` and `distinct`, shape (runs, room), and `period`, `turned` and `earlier`,
-    shape (runs,).
+    """Fill `peaks` and `distinct`, (runs, room), `period`, `turned` and `earlier`, (runs,).
 
     See `friso.hunting.turns.scan_turning_points`. `kinds`, shape (room,), holds marks in between.
     """

@@ -76,12 +76,11 @@ UNCHECKED = "runs with hardly different masses, which show whether chance decide
 
 
 class CheckPart(StrEnum):
-    """A part of a check, reported as it begins,
-    and named if it is given up (`Judgement.given_up`) for lack of work.
+    """A part of a check, reported as it begins, and named if it is given up.
 
-    The first three are computed in this order; `STARTS` is left out without an attractor. `LOWER_BANDWIDTHS` replaces
-    `BANDWIDTHS` if something attracts up to the highest bandwidth. `FRICTION` comes after these, and `FEEDING` for a
-    hunting stage with a backlash.
+    It is given up for lack of work (`Judgement.given_up`). The first three are computed in this order; `STARTS` is
+    left out without an attractor. `LOWER_BANDWIDTHS` replaces `BANDWIDTHS` if something attracts up to the highest
+    bandwidth. `FRICTION` comes after these, and `FEEDING` for a hunting stage with a backlash.
     """
 
     ATTRACTION = "what attracts the stage"
@@ -191,8 +190,10 @@ def _without_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
-    """Judge a stage without an attractor: whether its own motion comes to rest,
-    and where hunting begins."""
+    """Judge a stage without an attractor.
+
+    It says whether its own motion comes to rest, and where hunting begins.
+    """
     with allowance(CheckSettings.current().rest_work_share * work) as spent:
         rest = followed_motions(
             stage.flat(),
@@ -244,8 +245,10 @@ def _with_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
-    """Judge a stage with an attractor: whether its own motion ends in it,
-    and which starts cause hunting."""
+    """Judge a stage with an attractor.
+
+    It says whether its own motion ends in it, and which starts cause hunting.
+    """
     settings = CheckSettings.current()
     with allowance() as spent:
         own = own_motion(stage, target, settings.rest_work_share * work)
@@ -292,11 +295,10 @@ class OwnMotion:
 
 
 def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
-    """Run the stage's own motion, also with slightly different masses,
-    and see how it ends (see `ends_in`).
+    """Run the stage's own motion, also with slightly different masses, and see how it ends.
 
-    A motion that still swings, but less far or less often than the attractor, may be dying out. It is followed for
-    longer if so much work suffices.
+    See `ends_in`. A motion that still swings, but less far or less often than the attractor, may be dying out. It is
+    followed for longer if the given work suffices.
     """
     settings = CheckSettings.current()
     flat = stage.flat()
@@ -332,8 +334,10 @@ def _widest(attraction: Hunting) -> float:
 def _starts(
     stage: Stage, attraction: Hunting, target: Target, work: float
 ) -> tuple[tuple[Kick | None, Kick | None, MoveShare | None], tuple[CheckPart, ...]]:
-    """Find the kicks and moves that start hunting, within so much work,
-    and the part that was given up."""
+    """Find the kicks and moves that start hunting, within some work.
+
+    Also returns the part that was given up.
+    """
     settings = CheckSettings.current()
     starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
     if attraction.passing:  # what swings less at its end may be passing as well
@@ -354,8 +358,7 @@ def _starts(
 
 
 def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) -> str:
-    """Return why a motion that does not end in the known attractor need not come to rest;
-    "" if it does.
+    """Return why a motion outside the known attractor need not come to rest; "" if it does.
 
     `swing` [m] is its final swing, peak to peak; `within` [s] the time from which on it stays near its reference (NaN:
     not within its run).
@@ -368,16 +371,17 @@ def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) ->
 
 
 def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare | None) -> bool:
-    """Tell whether no kick, or no move, was seen to start hunting while some runs were not
-    completed."""
+    """Tell whether runs were lost while no kick, or no move, was seen to start hunting."""
     kicks = [kick for kick in (displacement, push) if kick]
     lost = any(kick.unknown and not kick.windows for kick in kicks)
     return lost or (moved is not None and not moved.hunting and moved.count < BasinSettings.current().drawn_moves)
 
 
 def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[CheckPart, ...]]:
-    """Search the bandwidths within so much work;
-    return the result and the part that was given up."""
+    """Search the bandwidths within some work.
+
+    Returns the result and the part that was given up.
+    """
     attracting = attraction.target is not None
     with allowance(work) as search:
         sought = search_bandwidths(stage, attracting, attraction.surveyed)
@@ -386,8 +390,10 @@ def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBan
 
 
 def _as_sure(stage: Stage, sought: SearchedBandwidths, attraction: Hunting) -> SearchedBandwidths:
-    """Make the ends found by a search no more certain than the verdict,
-    and uncertain where the stage may diverge."""
+    """Make the ends found by a search no more certain than the verdict.
+
+    They are uncertain where the stage may diverge.
+    """
 
     def sure(end: AttractionEnd) -> bool:
         if not (end.certain and attraction.certain):

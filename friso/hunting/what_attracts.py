@@ -38,8 +38,7 @@ SKETCH_RTOL = ToleranceSettings().sketch_rtol
 def what_attracts(
     stages: Ensemble, rtol: float = RTOL, distances: np.ndarray | None = None, confirm: Sequence[int] = ()
 ) -> Attractors:
-    """Find the attractors of stages that may hunt: closed orbits,
-    by their return maps where these are resolved.
+    """Find the attractors of stages that may hunt: closed orbits, by maps where resolved.
 
     A map shows that nothing attracts under three conditions. No cycle that Newton's method closes from the map of
     stages at rest is stable. No unstable cycle, from there or from the map itself, has a lasting motion beside it. For
@@ -69,10 +68,10 @@ def what_attracts(
 
 @dataclass(frozen=True)
 class _Cycles(ArrayRows):
-    """Cycles that Newton's method closes from the maps of stages at rest,
-    and starts of lasting motions beside them.
+    """Cycles closed from the maps of stages at rest, and lasting motions beside them.
 
-    `held` [m], shape (count, n), are sticking distances of motions beside unstable cycles, NaN for none.
+    Newton's method closes them. `held` [m], shape (count, n), are sticking distances of motions beside unstable
+    cycles, NaN for none.
     """
 
     families: tuple[Cycles, ...]
@@ -85,8 +84,10 @@ class _Cycles(ArrayRows):
         return cls(cycles, np.hstack([held_beside(stages, family) for family in cycles]))
 
     def beside(self, survey: MapSurvey, numbers: np.ndarray) -> _Cycles:
-        """Add lasting motions beside the unstable orbits that a survey of maps closed,
-        for the stages with these numbers."""
+        """Add lasting motions beside the unstable orbits that a survey of maps closed.
+
+        They are added for the stages with these numbers.
+        """
         more = [np.full((len(numbers), 1), np.nan)]
         for motion in survey.repelling:
             if motion.cycles is not None and (rows := np.flatnonzero(numbers == motion.stage)).size:
@@ -98,21 +99,27 @@ class _Cycles(ArrayRows):
 
     @property
     def attract_or_hold(self) -> np.ndarray:
-        """Return which stages have a stable cycle,
-        or an unstable one with a lasting motion beside it, shape (count,)."""
+        """Return which stages have a stable cycle, or a lasting motion beside an unstable one.
+
+        Shape (count,).
+        """
         return np.any([family.attracting for family in self.families], axis=0) | np.isfinite(self.held).any(axis=1)
 
 
 def _searched(stages: Ensemble, rtol: float, distances: np.ndarray | None, cycles: _Cycles) -> Attractors:
-    """Search the attractors of stages by simulation: from many starts, from distances [m],
-    and beside cycles."""
+    """Search the attractors of stages by simulation.
+
+    Runs start from many states, from distances [m], and beside cycles.
+    """
     starts = cycles.held if distances is None else np.hstack([cycles.held, distances])
     return attractors(stages, False, rtol, starts, suggested=cycles.families)
 
 
 def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | None:
-    """Return the return map of one stage if its attractors are exactly the given `motions`;
-    None if not."""
+    """Return the return map of one stage if its attractors are exactly the given `motions`.
+
+    None if they are not.
+    """
     if not has_a_map(stages) or stages.remember:
         return None
     survey = survey_maps(stages)
@@ -150,8 +157,7 @@ def sketched(stages: Ensemble) -> Sketch:
 
 
 def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
-    """Return coarse maps of stages, None if they have none, and which are resolved,
-    shape (count,)."""
+    """Return coarse maps of stages, None if they have none, and which are resolved, (count,)."""
     if not has_a_map(stages):
         return None, np.zeros(stages.count, bool)
     mapped = map_stages(stages, SKETCH_DISTANCES, 1, SKETCH_RTOL, sparse=True)
@@ -220,8 +226,10 @@ _SEARCHES_ALONE = ContextVar("searches alone", default=False)
 
 @contextmanager
 def search_alone() -> Iterator[None]:
-    """Search from many starts within the block, without return maps;
-    comparing both shows whether maps are right."""
+    """Search from many starts within the block, without return maps.
+
+    Comparing both shows whether maps are right.
+    """
     token = _SEARCHES_ALONE.set(True)
     try:
         yield

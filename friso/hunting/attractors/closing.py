@@ -63,8 +63,10 @@ def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> 
 
 
 def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.ndarray:
-    """Return which orbits, (count,), are the simpler orbit `once` passed so many times,
-    by sticking distance and time."""
+    """Return which orbits are the simpler orbit `once` passed several times, shape (count,).
+
+    They are compared by sticking distance and time; `passes` is the number of times.
+    """
     settings = SurveySettings.current()
     distances = np.abs(once.states[:, sticking]) / np.abs(orbits.states[:, sticking])
     return (np.abs(distances - 1) < settings.repeated_orbit_share) & (
@@ -73,11 +75,10 @@ def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.nda
 
 
 def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
-    """Return a state of each run, (runs, states), while it sticks within the next times [s],
-    (runs,).
+    """Return a state of each run, (runs, states), while it sticks within the next times [s].
 
-    It is the instant at which the integrator balances the constant forces on a stage at rest. If there are several, the
-    one after the longest standstill counts.
+    It is the instant at which the integrator balances the constant forces on a stage at rest. If there are several,
+    the one after the longest standstill counts. Times have the shape (runs,).
     """
     settings = SurveySettings.current()
     stages, size = pending.stages, len(pending.stages.kernel.states)
@@ -93,10 +94,10 @@ def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
 
 
 def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
-    """Return the sample, with a fraction, at which the integrator's imbalance passes zero after
-    the longest standstill.
+    """Return the sample at which the integrator is balanced after the longest standstill.
 
-    `residuals` are the imbalance of the integrator, `place` [m] the position that sticks, both of shape (samples,).
+    The sample has a fraction. `residuals` are the imbalance of the integrator, `place` [m] the position that sticks,
+    both of shape (samples,).
     """
     settings = SurveySettings.current()
     if not np.isfinite(place).any():  # the run failed

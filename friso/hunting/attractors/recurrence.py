@@ -63,8 +63,10 @@ def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> R
 
 
 def _deviation(values: np.ndarray, swings: int, end: int) -> np.ndarray:
-    """Return by how much the swings before the column `end` differ from those `swings` earlier
-    [m], shape (runs,)."""
+    """Return how much the last swings differ from those `swings` earlier [m], shape (runs,).
+
+    The last swings come before the column `end`.
+    """
     compared = _compared(swings)
     last, before = values[:, end - compared : end], values[:, end - compared - swings : end - swings]
     return np.asarray(np.abs(last - (-1) ** swings * before).max(axis=1))

@@ -68,15 +68,16 @@ class Ends(ArrayRows):
 
 
 def typical_period(stages: Ensemble) -> np.ndarray:
-    """Estimate the period of a hunting cycle [s], shape (count,),
-    from the wait while sticking and the loop's frequency."""
+    """Estimate the period of a hunting cycle [s], shape (count,).
+
+    It follows from the wait while sticking and the loop's frequency.
+    """
     settings = SurveySettings.current()
     return 2 * (wait(stages, settings.typical_distance * stages.length) + 2 * np.pi / stages.number("rate"))
 
 
 def loose_from(stages: Ensemble) -> np.ndarray:
-    """Return the distance [m] from which a stage breaks away instead of creeping home,
-    shape (count,)."""
+    """Return the distance [m] from which a stage breaks away rather than creeps home, (count,)."""
     settings = SurveySettings.current()
     shares = np.geomspace(*settings.creep_distances)
     distances = shares * stages.length[:, None]
@@ -88,8 +89,10 @@ def loose_from(stages: Ensemble) -> np.ndarray:
 
 
 def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
-    """Run each stage for its duration, within a `budget` of steps,
-    and return the runs at their new states and how they ended."""
+    """Run each stage for its duration, within a `budget` of steps.
+
+    Returns the runs at their new states and how they ended.
+    """
     settings = SurveySettings.current()
     stages, count = runs.stages, runs.stages.count
     least = settings.least_swing * stages.length
@@ -121,8 +124,10 @@ def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
 def _stands_still(
     stages: Ensemble, ends: np.ndarray, swing: np.ndarray, durations: np.ndarray, loose: np.ndarray
 ) -> np.ndarray:
-    """Return which runs have moved so little, for so long, that they cannot break away again,
-    shape (runs,)."""
+    """Return which runs have moved so little for so long that they cannot break away again.
+
+    Shape (runs,).
+    """
     settings = SurveySettings.current()
     distances = np.abs(ends[:, stages.sticking])
     home = (swing < loose / 2) & (distances < loose / 2) & (durations / 2 > settings.rest_waits * wait(stages, loose))

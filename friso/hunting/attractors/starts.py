@@ -38,8 +38,7 @@ force: for a thorough survey, and for others."""
 
 
 class Starts:
-    """Runs that are about to begin: their states (runs,
-    states) and the numbers of their stages (runs,)."""
+    """Runs about to begin: their states (runs, states) and the numbers of their stages (runs,)."""
 
     def __init__(self, stages: Ensemble, rtol: float = RTOL, loose: np.ndarray | None = None) -> None:
         self.stages, self.rtol = stages, rtol
@@ -53,10 +52,10 @@ class Starts:
         return Starts(self.stages.take(numbers), self.rtol, self.loose[numbers])
 
     def spread(self, thorough: np.ndarray | bool) -> None:
-        """Add runs stuck at distances on both sides of the reference,
-        or on one side of symmetric stages.
+        """Add runs stuck at distances on both sides of the reference.
 
-        Stages that are `thorough`, (count,) or all, get twice as many distances, and pushes as well.
+        Symmetric stages get one side only. Stages that are `thorough`, (count,) or all, get twice as many distances,
+        and pushes as well.
         """
         settings = SurveySettings.current()
         controller = self.stages.structure.controller
@@ -138,10 +137,10 @@ class Starts:
             self._add(owners, stuck(self.stages.take(owners), distances[owners, which]))
 
     def seen(self, owner: int, state: np.ndarray) -> None:
-        """Add runs a little farther from rest and nearer to it than the final state (kept,) of a run
-        of stage `owner`.
+        """Add runs a little farther from rest, and nearer to it, than the end of a run.
 
-        A run from the state itself could stay on a cycle that is only weakly unstable.
+        `state`, (kept,), is the final state of a run of stage `owner`. A run from the state itself could stay on a
+        cycle that is only weakly unstable.
         """
         settings = SurveySettings.current()
         states = np.outer(1 + np.array(settings.beside_cycle_shares), state[: self.stages.kernel.initial_size])
@@ -175,8 +174,10 @@ class Starts:
         return self._begun(which, cycles.states[which])
 
     def _begun(self, owners: np.ndarray, states: np.ndarray) -> Pending:
-        """Prepare runs for their first round: set its length,
-        and note where mirror images are motions too."""
+        """Prepare runs for their first round.
+
+        Its length is set, and it is noted where mirror images are motions too.
+        """
         settings = SurveySettings.current()
         stages, mirrored = self.stages.take(owners), self.stages.symmetric[owners]
         begins = stages.kernel.with_modes(states, np.zeros(3), stages.values)

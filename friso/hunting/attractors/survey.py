@@ -15,8 +15,7 @@ from friso.hunting.rows import ArrayRows
 
 @dataclass(frozen=True)
 class Swinging:
-    """A swing that a stage does not leave: an attractor that was closed as an orbit,
-    or only observed.
+    """A swing that a stage does not leave: an attractor, closed as an orbit or observed.
 
     - `stage`: number of the stage; `amplitude` [m]: half of peak to peak.
     - `time` [s]: after which the motion, or its mirror image, repeats; NaN if it does not.
@@ -59,8 +58,10 @@ class Swinging:
 
     @property
     def time_constant(self) -> float:
-        """Return the time [s] in which a deviation from the motion shrinks by the factor e;
-        NaN if it is unknown."""
+        """Return the time [s] in which a deviation from the motion shrinks by the factor e.
+
+        NaN if it is unknown.
+        """
         if self.cycles is not None:
             return float(self.cycles.time_constant[self.number])
         return -self.time / float(np.log(self.slope)) if 0 < self.slope < 1 else float("nan")
@@ -88,8 +89,7 @@ class _Beside(ArrayRows):
 
     @property
     def leave_first(self) -> np.ndarray:
-        """Choose the runs that are followed for all runs on their side of an unstable cycle,
-        (runs,).
+        """Choose the runs to follow for all runs on their side of an unstable cycle, (runs,).
 
         The farthest runs leave the cycle first, so a few of the outer ones stand for the rest.
         """
@@ -104,8 +104,10 @@ class _Beside(ArrayRows):
 
 
 def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
-    """Return which runs, of the stages `owners`,
-    repeat themselves like one of some kinds of motion, (runs,)."""
+    """Return which runs repeat themselves like one of some kinds of motion, (runs,).
+
+    The runs belong to the stages `owners`.
+    """
     settings = SurveySettings.current()
     motions_of: dict[int, list[tuple[float, float]]] = {}
     for stage, size, time in kinds:
@@ -120,8 +122,10 @@ def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
 
 
 def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int, which: np.ndarray | None = None) -> list[Swinging]:
-    """Return the stable cycles of the stages with some numbers as motions,
-    or the cycles marked in `which`, (count,)."""
+    """Return the stable cycles of numbered stages as motions.
+
+    With `which`, (count,), return the cycles marked there.
+    """
     return [
         Swinging(
             int(numbers[k]),
@@ -188,8 +192,7 @@ class Survey:
 
     @property
     def runs_away(self) -> np.ndarray:
-        """Return which stages diverge from the farthest starts tried, and so from beyond them,
-        shape (count,)."""
+        """Return which stages diverge from the farthest starts tried, and from beyond, (count,)."""
         return self.unbounded & (self.away > self.rested)
 
     def add(self, motions: list[Swinging]) -> None:
@@ -250,10 +253,10 @@ class Survey:
             runs = lengthened(runs.take(swinging), ends.swing[swinging])
 
     def _still_swinging(self, runs: Pending, owners: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
-        """Close orbits from runs that are ready, and return the numbers of the runs that still swing
-        without an attractor.
+        """Close orbits from runs that are ready; return the runs still swinging elsewhere.
 
-        `early` restricts closing to runs that repeat themselves well and resemble no unstable cycle.
+        These are numbered, and have no attractor yet. `early` restricts closing to runs that repeat themselves well
+        and resemble no unstable cycle.
         """
         self.unknown[owners[~ends.completed & ~(ends.away & self.unbounded[owners])]] = True
         swinging = ends.completed & ~ends.rest & ~self._known_to_attract(owners, ends)
@@ -303,8 +306,7 @@ class Survey:
         return _Beside(cycles, np.where(cycles < 0, 0.0, offsets))
 
     def _repels(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return which runs resemble an unstable cycle,
-        or a run from which no stable orbit could be closed."""
+        """Return which runs resemble an unstable cycle, or one that could not be closed stably."""
         return _like(self._closed, owners, ends) | _like(self._unclosed, owners, ends)
 
     def _known_to_attract(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
@@ -370,8 +372,7 @@ class Survey:
         self.add(of_cycles(owners[which], cycles.take(which), runs.stages.sticking))
 
     def _regular(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> np.ndarray:
-        """Return which runs repeat so well, and changed so little in the last round,
-        that they will stay.
+        """Return which runs repeat so well, and changed so little lately, that they will stay.
 
         Runs near an unstable cycle are left out.
         """
@@ -395,8 +396,10 @@ class Survey:
         return unlike & ((repeats.deviation < settings.converged_swing_share) | approaches)
 
     def _stay(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return which runs beside an unstable cycle repeat too exactly to be leaving it:
-        they are on another cycle."""
+        """Return which runs beside an unstable cycle repeat too exactly to be leaving it.
+
+        They are on another cycle.
+        """
         settings = SurveySettings.current()
         offsets = np.abs(self._beside(owners, ends).offsets)
         return (ends.repeats.swings > 0) & (ends.repeats.deviation < settings.exact_repetition_share * offsets)

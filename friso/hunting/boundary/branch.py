@@ -76,13 +76,12 @@ class Branch:
 
 
 class Tracer:
-    """Follows one cycle along a line of stages (a family of one),
-    from place 0 to the `farthest`.
+    """Follows one cycle along a line of stages, from place 0 to the `farthest`.
 
-    `sign` and `swings` are those of the cycle; None means the fewest swings possible. Steps are `pace` times as long as
-    for drawing a curve, at least `shortest` long, and the first has the length `first`. The cycle is followed while its
-    multiplier is below `steepest`. `hundredth` gives, at a place, the length of the line over which the key changes by
-    a hundredth.
+    The line is a family of one. `sign` and `swings` are those of the cycle; None means the fewest swings possible.
+    Steps are `pace` times as long as for drawing a curve, at least `shortest` long, and the first has the length
+    `first`. The cycle is followed while its multiplier is below `steepest`. `hundredth` gives, at a place, the length
+    of the line over which the key changes by a hundredth.
     """
 
     def __init__(
@@ -112,12 +111,11 @@ class Tracer:
     def solve(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
     ) -> Point | None:
-        """Find the cycle on a plane in the space of place, log distance and log time,
-        from a cycle `near` it.
+        """Find the cycle on a plane in the space of place, log distance and log time.
 
-        The plane passes through `target` with the normal `normal`. The search starts from the nearby cycle, or from its
-        own approximate `states` (1, states). It uses the Jacobian of the nearby cycle first, then a new one. Returns
-        None if no cycle is found.
+        The plane passes through `target` with the normal `normal`. The search starts from the cycle `near` it, or from
+        its own approximate `states` (1, states). It uses the Jacobian of the nearby cycle first, then a new one.
+        Returns None if no cycle is found.
         """
         point = self._solved(near, target, normal, states)
         if point is None and near.jacobians is not None:
@@ -127,8 +125,7 @@ class Tracer:
     def _solved(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
     ) -> Point | None:
-        """Find the cycle as `solve` does, but only with the Jacobian of the nearby cycle,
-        if it has one."""
+        """Find the cycle as `solve` does, but only with the nearby cycle's Jacobian, if any."""
         border = Border(normal[None, :], np.array([normal @ target]))
         begin, times, place = near.cycle.states, near.cycle.orbits.times, np.array([near.place])
         if states is not None or near.jacobians is None:
@@ -148,8 +145,7 @@ class Tracer:
     def walk(
         self, start: Point, ahead: float, until: Callable[[Point, Point], bool] | None = None
     ) -> tuple[list[Point], str]:
-        """Follow the branch from a point to one side,
-        and return the points and the reason for the end.
+        """Follow the branch from a point to one side; return its points and why it ends.
 
         `ahead` is 1 or -1. The walk ends with the first point for which `until` holds, given the point before it and
         the point itself. Without `until`, a branch of asymmetric cycles also ends where it meets the symmetric cycle.
@@ -196,8 +192,10 @@ class Tracer:
         return reason == END_OF_RANGE and bool(points) and points[-1].place > self.farthest * (1 - 1e-6)
 
     def _at_the_end(self, last: Point, beyond: Point) -> list[Point]:
-        """Return the cycle at the end of the range,
-        between the last point inside and the first beyond; none if it is not found."""
+        """Return the cycle at the end of the range, in a list that is empty if it is not found.
+
+        It lies between the last point inside and the first beyond.
+        """
         end = 0.0 if beyond.place < 0 else self.farthest
         share = (end - last.place) / (beyond.place - last.place)
         terminal = self.solve(last, last.vector + share * (beyond.vector - last.vector), np.array([1.0, 0.0, 0.0]))

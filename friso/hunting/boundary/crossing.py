@@ -44,8 +44,7 @@ def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
 
 
 class FoldBack(NamedTuple):
-    """A fold of a branch: the length along the branch, the place there,
-    and the error bound of the place."""
+    """A fold of a branch: the length along the branch, the place, and the place's error bound."""
 
     length: float
     place: float

@@ -49,8 +49,7 @@ class Spot:
 
 @dataclass(frozen=True)
 class Curve:
-    """Spots in order along a curve on which cycles of one kind change,
-    and how the curve ends on either side.
+    """A curve on which cycles of one kind change: its spots in order, and its two ends.
 
     `sign` is -1 for cycles closed over half a period, 1 for a whole one. Both ends are "closed" for a ring.
     """
@@ -81,8 +80,10 @@ class Expected:
 
     @classmethod
     def beyond(cls, spots: Sequence[Spot], step: float) -> Expected:
-        """Extrapolate a curve one step: by a parabola through the last three points,
-        or a straight line through two."""
+        """Extrapolate a curve one step, by a parabola through its last three points.
+
+        With two points it is a straight line.
+        """
         last = spots[-3:]
         away = [-float(np.linalg.norm(spot.at - last[-1].at)) for spot in last]
         rows = [np.concatenate([spot.at, spot.size, spot.special.point.cycle.states[0]]) for spot in last]
@@ -92,8 +93,7 @@ class Expected:
 
 
 class CurveTracer:
-    """Follows the points of one kind of change, a flip, a fold or a torus,
-    through the box of two keys."""
+    """Follows the points of a flip, a fold or a torus through the box of two keys."""
 
     def __init__(self, space: Space, kind: Bifurcation, sign: float, rtol: float = RTOL) -> None:
         self.space, self.sign, self.rtol = space, sign, rtol
@@ -102,10 +102,10 @@ class CurveTracer:
     def on_line(
         self, origin: np.ndarray, across: np.ndarray, near: Spot, reach: float, expected: Expected | None = None
     ) -> Spot | None:
-        """Find the point of the curve on a line through the box,
-        no farther than `reach` from its `origin`.
+        """Find the point of the curve on a line through the box, near the line's `origin`.
 
-        The search starts from the point `near` it, or from the `expected` one. Returns None if it fails.
+        It lies no farther than `reach` from it. The search starts from the point `near` it, or from the `expected`
+        one. Returns None if it fails.
         """
         hundredth = self.space.hundredth(origin, across)
         tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol, hundredth=hundredth)
@@ -157,8 +157,7 @@ class CurveTracer:
         return Curve(self.kind, self.sign, (*before[:1:-1], *after), (beginning, last))
 
     def walk(self, spots: list[Spot]) -> tuple[list[Spot], str]:
-        """Follow a curve from two neighbouring points; return these with the points that follow,
-        and the reason for the end."""
+        """Follow a curve from two neighbouring points; return all points, and why it ends."""
         settings = ContinuationSettings.current()
         start, step = spots[0], settings.first_curve_step
         direction = unit_vector(spots[1].at - spots[0].at)

@@ -25,12 +25,11 @@ BRANCHES = "following branches of cycles"
 
 @dataclass(frozen=True)
 class Diagram:
-    """Bifurcation diagram over the range of one key: branches of cycles,
-    and the special points of each.
+    """Bifurcation diagram over a range of one key: branches of cycles, and special points.
 
-    The arrays belong to stages spaced evenly over the range, at `places`. `cycles` are their hunting cycles. `attracts`
-    says whether there is an attractor, `decided` whether that is known. `unstable` says whether the loop is unstable
-    regardless of friction. Each has the shape (places,).
+    The arrays belong to stages spaced evenly over the range, at `places`. `cycles` are their hunting cycles.
+    `attracts` says whether there is an attractor, `decided` whether that is known. `unstable` says whether the loop is
+    unstable regardless of friction. Each has the shape (places,).
     """
 
     space: Space
@@ -51,8 +50,10 @@ class Diagram:
         return abs(self.value(special.point.place + special.error) - self.value(special.point.place))
 
     def in_doubt(self, places: np.ndarray) -> np.ndarray:
-        """Return which places, (n,), lie within the error of a special point,
-        where multipliers decide nothing."""
+        """Return which places, (n,), lie within the error of a special point.
+
+        There multipliers decide nothing.
+        """
         return _in_doubt(self.special, places)
 
 
@@ -79,8 +80,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress
     special: list[tuple[LocatedPoint, ...]] = []
 
     def follow(number: int, cycle: Cycles) -> bool:
-        """Follow the branch through a cycle unless an earlier branch passes it;
-        tell whether it was followed."""
+        """Follow the branch through a cycle unless an earlier one passes it; tell whether it was."""
         start = Point.of(stages.take(np.array([number])), float(places[number]), cycle)
         if any(_passes(branch, start) for branch in branches):
             return False
@@ -133,8 +133,10 @@ def each_once(
 
 
 def _same(first: LocatedPoint, second: LocatedPoint, close: float) -> bool:
-    """Tell whether two special points are one: equal in kind and cycle,
-    and no farther apart than `close` or their errors."""
+    """Tell whether two special points are the same.
+
+    They are equal in kind and cycle, and no farther apart than `close` or their errors.
+    """
     settings = ContinuationSettings.current()
     close = max([close, *(spot.error for spot in (first, second) if np.isfinite(spot.error))])
     apart = np.abs(first.point.vector - second.point.vector)

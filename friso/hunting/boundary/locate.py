@@ -37,16 +37,17 @@ class LocatedPoint:
     slope: float = np.nan
 
     def in_doubt(self, point: Point) -> bool:
-        """Tell whether a point of the branch lies within the error of this one,
-        so that its stability is unknown."""
+        """Tell whether a point of the branch lies within the error of this special point.
+
+        Its stability is then unknown.
+        """
         settings = ContinuationSettings.current()
         apart = np.abs(self.point.vector - point.vector)
         return bool(np.isfinite(self.error) and apart[0] < self.error and apart[1:].max() < settings.same_cycle_log)
 
 
 def distance_to(kind: Bifurcation, point: Point) -> float:
-    """Return the distance of the multiplier from its value at this kind of point;
-    it changes sign there."""
+    """Return how far the multiplier is from its value at this kind of point, with a sign."""
     if kind == "torus":
         return abs(point.multiplier) - 1
     return point.multiplier + (1 if kind == "flip" else -1)
@@ -67,8 +68,10 @@ def _complex(point: Point) -> bool:
 
 
 def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> LocatedPoint | None:
-    """Locate the special point between two neighbours on a branch, with its error;
-    None if it is not reached."""
+    """Locate the special point between two neighbours on a branch, with its error.
+
+    None if it is not reached.
+    """
     direction = towards(first, second)
     points = _enclosed(tracer, first, second, kind, ContinuationSettings.current().special_point_step)
     if points is None:
@@ -78,8 +81,7 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> L
 
 
 def last_inside(tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float) -> Point | None:
-    """Return the last point between two neighbours on a branch at which the cycle is still
-    stable.
+    """Return the last point between two neighbours on a branch with a stable cycle.
 
     It lies within `precise` of the special point, along the branch. Returns None if a cycle on the way cannot be
     closed.
@@ -99,10 +101,9 @@ def towards(first: Point, second: Point) -> np.ndarray:
 def _enclosed(
     tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float
 ) -> dict[float, Point] | None:
-    """Search for a special point between two neighbours,
-    and return all points on the way by place along the branch.
+    """Search for a special point between two neighbours; return all points on the way.
 
-    Returns None if a cycle cannot be closed.
+    They stand by their place along the branch. Returns None if a cycle cannot be closed.
     """
     settings = ContinuationSettings.current()
     from scipy.optimize import brentq  # 0.4 s to import
@@ -133,8 +134,10 @@ class Unreached(Exception):
 
 
 def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
-    """Return the change of the multiplier's distance along the branch,
-    from the two points nearest to zero."""
+    """Return the slope of the multiplier's distance along the branch, near zero.
+
+    It is taken from the two points nearest to zero.
+    """
     (a, first), (b, second) = sorted(points.items(), key=lambda item: abs(distance_to(kind, item[1])))[:2]
     return (distance_to(kind, second) - distance_to(kind, first)) / (b - a)
 
@@ -166,8 +169,7 @@ def _special_point(
 
 
 def _turning_point(tracer: Tracer, point: Point, direction: np.ndarray, slope: float) -> LocatedPoint:
-    """Locate a fold with a limiter that chatters,
-    starting from a point at which the multiplier is 1."""
+    """Locate a fold with a limiter that chatters, from a point with a multiplier of 1."""
     at = turned(tracer, point, direction)
     there = at and tracer.solve(point, point.vector + at.length * direction, direction)
     if not at or not there:
@@ -189,11 +191,11 @@ def smoothed(tracer: Tracer, guess: Point, kind: Bifurcation) -> Crossing | None
 
 
 def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | None:
-    """Locate a fold by a curve through the places of orbits near a first guess,
-    along a direction.
+    """Locate a fold by a curve through the places of orbits near a first guess.
 
-    Where a limiter chatters, the multiplier belongs to a range of distances and passes 1 beside the fold. The reserve
-    is that of the curve, or the distance to the first guess if larger. Returns None if it is unknown.
+    Orbits are found along a direction. Where a limiter chatters, the multiplier belongs to a range of distances and
+    passes 1 beside the fold. The reserve is that of the curve, or the distance to the first guess if larger. Returns
+    None if it is unknown.
     """
     orbits = _beside(tracer, guess, direction, ContinuationSettings.current().chattering_fold_reach)
     lengths = np.array([(point.vector - guess.vector) @ direction for point in orbits])
@@ -202,8 +204,7 @@ def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | No
 
 
 def _beside(tracer: Tracer, guess: Point, direction: np.ndarray, reach: float) -> list[Point]:
-    """Return orbits on either side of a point of a branch,
-    along a direction and not farther than `reach`."""
+    """Return orbits on either side of a point of a branch, along a direction, within `reach`."""
     settings = ContinuationSettings.current()
     orbits: list[Point] = []
     for way in (-1.0, 1.0):
@@ -224,11 +225,11 @@ def corrected(
     states: np.ndarray,
     slope: float = np.nan,
 ) -> LocatedPoint | None:
-    """Find the special point along a direction from an origin (place, log distance, log time),
-    by the secant method.
+    """Find the special point along a direction from an origin, by the secant method.
 
-    The point lies no farther than `reach` from the origin; None if there is none. The search starts from a nearby
-    cycle, from its approximate `states` (1, states), and from the `slope` of the multiplier if that is known.
+    The space is place, log distance and log time. The point lies no farther than `reach` from the origin; None if
+    there is none. The search starts from a nearby cycle, from its approximate `states` (1, states), and from the
+    `slope` of the multiplier if that is known.
     """
     settings = ContinuationSettings.current()
     places, points = [0.0], [tracer.solve(near, origin, direction, states)]
@@ -257,8 +258,7 @@ def special_points(tracer: Tracer, branch: Branch) -> list[LocatedPoint]:
 
 
 def _meets_symmetric(tracer: Tracer, special: LocatedPoint) -> bool:
-    """Tell whether an apparent fold of an asymmetric branch is its meeting with the symmetric
-    cycle."""
+    """Tell whether an apparent fold of an asymmetric branch is where it meets the symmetric one."""
     cycle = special.point.cycle
     leans = abs(cycle.middle[0]) > 0.02 * cycle.amplitude[0]
     stages = tracer.family(np.zeros(1, np.int64), np.array([special.point.place]))

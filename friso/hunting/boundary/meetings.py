@@ -65,16 +65,17 @@ def _lies_on(place: np.ndarray, meeting: Meeting) -> bool:
 
 
 def _closed_path(curve: Curve) -> tuple[np.ndarray, list[Spot]]:
-    """Return the points of a curve, shape (n, 2), with their cycles;
-    a ring repeats its first point at the end."""
+    """Return the points of a curve, (n, 2), with their cycles; a ring repeats its first point."""
     again = CLOSED in curve.ends
     spots = [*curve.spots, *curve.spots[:1]] if again else [*curve.spots]
     return (np.vstack([curve.points, curve.points[:1]]) if again else curve.points), spots
 
 
 class _Nearest(NamedTuple):
-    """Point of a curve nearest to a place: its distance `away`,
-    and its cycle's log amplitude and log period, shape (2,)."""
+    """The point of a curve nearest to a place, `away` from it, with its cycle's size.
+
+    `cycle` holds log amplitude and log period, shape (2,).
+    """
 
     away: float
     cycle: np.ndarray
@@ -100,22 +101,22 @@ def leg_shares(path: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def _size(spot: Spot) -> np.ndarray:
-    """Return logarithms of the amplitude [m] and period [s] of the cycle at a point of a curve,
-    shape (2,)."""
+    """Return log amplitude [m] and log period [s] of the cycle at a point of a curve, (2,)."""
     cycle = spot.special.point.cycle
     return np.log([cycle.amplitude[0], cycle.period[0]])
 
 
 def _alike(one: np.ndarray, other: np.ndarray) -> bool:
-    """Tell from log amplitude and log period whether two cycles are one,
-    or one is the period-doubled form of the other."""
+    """Tell from log amplitude and log period whether two cycles are the same.
+
+    The period-doubled form of a cycle counts as the same.
+    """
     size, period = np.abs(one - other)
     return bool(max(size, min(period, abs(period - np.log(2)))) < MeetingSettings.current().same_cycle_log)
 
 
 def _stretches(curves: Sequence[Curve], first: int, second: int) -> Iterator[Meeting]:
-    """Find stretches over which the second curve runs on top of the first and changes the same
-    cycle.
+    """Find stretches over which the second curve repeats the first, with the same cycle.
 
     This happens where a curve was lost and then followed again. A curve that crosses at an angle stays near over a
     shorter stretch.
@@ -201,16 +202,17 @@ def _refined(
 
 
 def _turned(way: np.ndarray, chord: np.ndarray) -> np.ndarray:
-    """Return a curve's direction after the step `chord` to another point;
-    unchanged if the step is hardly along the curve."""
+    """Return a curve's direction after the step `chord` to another point.
+
+    It is unchanged if the step hardly goes along the curve.
+    """
     along, length = abs(float(chord @ way)), float(np.linalg.norm(chord))
     settings = MeetingSettings.current()
     return unit_vector(chord) if along > max(settings.crossing_precision, settings.chord_along * length) else way
 
 
 def _ends_on(curves: Sequence[Curve], number: int, other: int) -> Iterator[Meeting]:
-    """Find the ends of a curve inside the range that lie on another curve,
-    with the same cycle there."""
+    """Find the ends of a curve inside the range that lie on another curve, with the same cycle."""
     curve = curves[number]
     for how, spot in zip(curve.ends, (curve.spots[0], curve.spots[-1]), strict=True):
         if how not in (END_OF_RANGE, CLOSED):

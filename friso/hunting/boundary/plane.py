@@ -99,10 +99,10 @@ def _sought(
     rtol: float,
     tally: Tally,
 ) -> tuple[list[Curve], list[np.ndarray]]:
-    """Follow the curves between neighbours of which only the first has the cycle,
-    and list places where none began.
+    """Follow the curves between neighbours of which only the first has the cycle.
 
-    `changing` are pairs of neighbours, and `allowed` the numbers of the valid stages among all points (points, 2).
+    Also list places where none began. `changing` are pairs of neighbours, and `allowed` the numbers of the valid
+    stages among all points (points, 2).
     """
     curves: list[Curve] = []
     gaps: list[np.ndarray] = []
@@ -150,8 +150,7 @@ def _on_grid(numbers: np.ndarray, nodes: int) -> np.ndarray:
 
 
 def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Return pairs of neighbours on the grid, by number,
-    of which the first is inside and the second outside."""
+    """Return pairs of neighbours on the grid, the first inside and the second outside."""
     numbers = np.arange(inside.size).reshape(inside.shape)
     pairs = [(numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:])]
     for first, second in [*pairs, *(pair[::-1] for pair in pairs)]:
@@ -171,10 +170,9 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
 
 
 def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:
-    """Follow a cycle from a stage towards a neighbour to the first point at which it loses
-    stability or folds.
+    """Follow a cycle from a stage towards a neighbour until it loses stability or folds.
 
-    Returns the point, if there is one, and whether the cycle reaches the neighbour unchanged.
+    Returns that point, if there is one, and whether the cycle reaches the neighbour unchanged.
     """
     settings = ContinuationSettings.current()
     mesh = float(np.linalg.norm(end - start))

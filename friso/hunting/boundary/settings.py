@@ -112,7 +112,9 @@ class ContinuationSettings(Settings):
 @dataclass(frozen=True)
 class MeetingSettings(Settings):
     """Settings of the search for meetings of curves of the edge of hunting.
-    The range of either key is one unit."""
+
+    The range of either key is one unit.
+    """
 
     crossing_refinements: int = setting(8, "")
     """A crossing that needs more steps stays where the straight lines between points cross."""

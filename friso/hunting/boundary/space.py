@@ -80,16 +80,18 @@ class Space:
 
     @cached_property
     def form(self) -> Structure:
-        """Return the structure shared by all stages in the box,
-        taken where no key is zero or a whole number.
+        """Return the structure shared by all stages in the box.
 
-        Simpler stages, with a stroke of zero or a whole exponent, use it too.
+        It is taken where no key is zero or a whole number. Simpler stages, with a stroke of zero or a whole exponent,
+        use it too.
         """
         return shared_structure(self.flat(self.values(np.full((1, len(self.ranges)), GENERIC))))
 
     def grid(self, nodes: int) -> np.ndarray:
-        """Return points spaced evenly over the box, `nodes` along every side, shape (points, keys);
-        the first key varies slowest."""
+        """Return points spaced evenly over the box, `nodes` along every side, (points, keys).
+
+        The first key varies slowest.
+        """
         sides = np.meshgrid(*[np.linspace(0, 1, nodes)] * len(self.ranges), indexing="ij")
         return np.stack([side.ravel() for side in sides], axis=1)
 
@@ -99,8 +101,10 @@ class Space:
         return ~np.any([np.zeros(len(points), bool), *broken], axis=0)
 
     def lines(self, origins: np.ndarray, directions: np.ndarray) -> Family:
-        """Return the family of stages along lines through the box, from origins (count,
-        keys) along directions (count, keys)."""
+        """Return the family of stages along lines through the box.
+
+        Lines have origins (count, keys) and directions (count, keys).
+        """
 
         def family(which: np.ndarray, places: np.ndarray) -> Ensemble:
             """Return the stages at places along the lines with these numbers."""
@@ -109,10 +113,9 @@ class Space:
         return family
 
     def hundredth(self, origin: np.ndarray, direction: np.ndarray) -> Callable[[float], float]:
-        """Return a function of place: the length of a line over which its fastest key changes by a
-        hundredth.
+        """Return a function of place: the length of line over which a key changes by a hundredth.
 
-        The line runs through the box from an origin (keys,) along a direction (keys,).
+        It is that of the fastest key. The line runs through the box from an origin (keys,) along a direction (keys,).
         """
 
         def length(place: float) -> float:

@@ -41,22 +41,20 @@ DISTINCT_CRITERION = f"{PEAK_CRITERION}; of maxima with valleys of {1e6 * DISTIN
 
 
 def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Mark the counted peaks among turning points or samples, shape (runs, room);
-    sums over rows are the counts.
+    """Mark the counted peaks among turning points or samples, shape (runs, room).
 
-    `times` [s] and `values` [m] of position minus reference have the shape (runs, room) and are valid up to `counts`,
-    shape (runs,).
+    Sums over rows are the counts. `times` [s] and `values` [m] of position minus reference have the shape (runs, room)
+    and are valid up to `counts`, shape (runs,).
     """
     nothing = np.zeros(len(counts))
     return scan_turning_points(times, values, counts, nothing, nothing).peaks
 
 
 def distinct_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Mark the distinct peaks: counted peaks with valleys at least `DISTINCT` deep on both
-    sides, shape (runs, room).
+    """Mark the distinct peaks, shape (runs, room).
 
-    `times` [s] and `values` [m] of position minus reference have the shape (runs, room) and are valid up to `counts`,
-    shape (runs,).
+    They are counted peaks with valleys at least `DISTINCT` deep on both sides. `times` [s] and `values` [m] of
+    position minus reference have the shape (runs, room) and are valid up to `counts`, shape (runs,).
     """
     nothing = np.zeros(len(counts))
     return scan_turning_points(times, values, counts, nothing, nothing).distinct
@@ -75,8 +73,10 @@ def peaks_in_traces(time: np.ndarray, deviation: np.ndarray) -> np.ndarray:
 
 
 def _until_last_fall(values: np.ndarray) -> np.ndarray:
-    """Count the samples of each row up to the end of the last fall by `DISTINCT`;
-    0 if nothing falls."""
+    """Count the samples of each row up to the end of the last fall by `DISTINCT`.
+
+    It is 0 if nothing falls.
+    """
     ahead = np.minimum.accumulate(values[:, ::-1], axis=1)[:, ::-1]
     falls = values - ahead >= DISTINCT
     last = values.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)

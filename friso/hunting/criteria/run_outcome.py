@@ -92,8 +92,7 @@ def end_of_traces(
     completed: np.ndarray | None = None,
     corner: np.ndarray | float = 0.0,
 ) -> End:
-    """Describe how sampled runs end: deviations [m], shape (runs, n), over times [s],
-    shape (n,).
+    """Describe how sampled runs end: deviations [m], (runs, n), over times [s], (n,).
 
     All runs count as `completed` unless given; their references stand from the `corner` [s] on. A run outside the band
     at its last sample was outside when it ended.
@@ -112,10 +111,9 @@ def end_of_traces(
 
 
 def last_outside(time: np.ndarray, deviation: np.ndarray, band: float) -> np.ndarray:
-    """Return the last time [s] at which deviations were outside the band [m] or NaN,
-    shape (runs,); -inf if never.
+    """Return the last time [s] at which deviations were outside the band [m], (runs,).
 
-    The deviations [m] have the shape (runs, n), the times [s] (n,).
+    NaN counts as outside; -inf if they never were. The deviations [m] have the shape (runs, n), the times [s] (n,).
     """
     outside = ~(np.abs(deviation) <= band)
     last = len(time) - 1 - outside[:, ::-1].argmax(axis=1)

@@ -31,8 +31,7 @@ def settling_of_runs(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.
 
 
 def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.ndarray:
-    """Return the settling times [s] of runs at the last place where the reference stands,
-    shape (runs,).
+    """Return the settling times [s] of runs where the reference stands last, (runs,).
 
     The verdict on a stage needs no other place (see `settling_of_runs`).
     """
@@ -40,15 +39,17 @@ def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: BandName) -> 
 
 
 def _at_stands(flat: Mapping[str, Any], runs: Runs, band: BandName) -> list[np.ndarray]:
-    """Return settling times [s] of runs: the longest at places that the reference leaves again, and at the last."""
+    """Return two settling times [s] of runs: at places left again, and at the last place.
+
+    The first is the longest at any place that the reference leaves.
+    """
     last, before = runs.statistic(f"{band}_exit"), runs.statistic(f"{band}_before")
     in_the_end = _since(stands(flat)[-1], np.where(last < runs.statistic("ended"), last, np.inf))
     return [np.maximum(before, 0.0), in_the_end]
 
 
 def settling_of_traces(places: list[Stand], time: np.ndarray, deviation: np.ndarray, within: float) -> np.ndarray:
-    """Return the settling times [s] of sampled runs, shape (runs,),
-    at the places where the reference stands.
+    """Return the settling times [s] of sampled runs at each place of the reference, (runs,).
 
     The deviations [m] have the shape (runs, n), the times [s] (n,). A run has settled at the sample after the last one
     outside of the band, `within` [m].

@@ -86,8 +86,7 @@ class Ensemble:
 
     @cached_property
     def symmetric(self) -> np.ndarray:
-        """Tell whether the mirror image of every motion is a motion too, shape (count,),
-        from random states."""
+        """Tell whether mirror images of motions are motions too, (count,), from random states."""
         states = np.random.default_rng(0).normal(size=(8, 1, self.scales.shape[1])) * self.scales
         pairs = ((self.rates(family), self.rates(-family)) for family in states)
         return np.all([np.all(np.abs(a + b) <= 1e-9 * np.abs(a), axis=1) for a, b in pairs], axis=0)
@@ -113,8 +112,7 @@ class Ensemble:
 
     @property
     def friction_at_rest(self) -> np.ndarray:
-        """Return the largest friction force at rest [N], shape (count,),
-        the mean of both directions.
+        """Return the friction force at rest [N], the mean of both directions, (count,).
 
         It is the break-away force less the controller's force half a backlash off its reference, which moves nothing.
         """
@@ -134,14 +132,18 @@ class Ensemble:
 
     @property
     def sticking(self) -> int:
-        """Return the index of the state that stays put while a stage sticks:
-        the position of the body with friction."""
+        """Return the index of the state that stays put while a stage sticks.
+
+        It is the position of the body with friction.
+        """
         return self.kernel.cart_position
 
     @property
     def integral(self) -> int:
-        """Return the index of the integrator's state; with several integrators, of the innermost,
-        which holds the force."""
+        """Return the index of the integrator's state.
+
+        With several integrators it is the innermost, which holds the force.
+        """
         return self.kernel.having(Role.INTEGRAL)[-1]
 
     @property
@@ -154,14 +156,18 @@ class Ensemble:
         return self.kernel.settled_at(self.values, steady, self.count)
 
     def displaced(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the states of stages at rest that are displaced [m]: filters have followed,
-        everything else is zero."""
+        """Return the states of stages at rest that are displaced [m].
+
+        Filters have followed, everything else is zero.
+        """
         return self.kernel.unwound_at(self.values, Steady(-displacement, displacement), self.count)
 
     @cached_property
     def relaxed(self) -> np.ndarray:
-        """Return the integrator state per displacement [s] at which the actuator's force is as at
-        the reference, shape (count,)."""
+        """Return the integrator state per displacement [s] that relaxes the actuator, (count,).
+
+        Its force is then as at the reference.
+        """
         return self.settled(Steady(-1.0, 1.0))[:, self.integral]
 
     @cached_property
@@ -175,8 +181,7 @@ class Ensemble:
         return np.where(held, 0.0, -constant) + np.zeros(self.count)
 
     def unbalanced(self, states: np.ndarray, number: int | None = None) -> np.ndarray:
-        """Return how far integrators are from balancing the constant forces on a sticking stage,
-        shape (count,).
+        """Return how far integrators are from balancing a sticking stage, shape (count,).
 
         Only constant forces that friction does not hold need balance. `states` have the shape (count, states), or (n,
         states) for the stage with one `number` alone; then the result has the shape (n,).
@@ -197,8 +202,7 @@ class Ensemble:
         return columns(self.kernel.module.right_hand_side(states.T, modes, 0.0, np.zeros(3), self.values), self.count)
 
     def steady_friction(self, velocities: np.ndarray) -> np.ndarray | None:
-        """Return the friction force [N] in steady motion of the cart at velocities [m/s],
-        both of shape (count,).
+        """Return the friction force [N] in steady motion at velocities [m/s], both (count,).
 
         Returns None for a law without a steady force.
         """
@@ -238,8 +242,10 @@ class Ensemble:
         return results if with_modes else results._replace(ends=results.ends[:, : starts.shape[1]])
 
     def same_modes(self, states: np.ndarray, ends: np.ndarray) -> np.ndarray:
-        """Return which runs end, in `ends` (count, kept),
-        with the switched modes they began with in `states`, shape (count,)."""
+        """Return which runs end with the switched modes they began with, shape (count,).
+
+        They begin in `states` and end in `ends` (count, kept).
+        """
         begun, ended = (self.kernel.modes(state.T, 0.0, np.zeros(3), self.values) for state in (states, ends))
         switches = list(self.kernel.switches)
         return np.all(begun[switches] == ended[switches], axis=0)

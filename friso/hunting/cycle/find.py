@@ -36,8 +36,10 @@ UNCERTAIN = (NOT_CLOSED, NO_MULTIPLIER)
 
 
 def time_constant(returned: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
-    """Return the time [s] in which a deviation changes by the factor e,
-    if it is multiplied once per time `returned` [s]."""
+    """Return the time [s] in which a deviation changes by the factor e.
+
+    It is multiplied once per time `returned` [s].
+    """
     return returned / np.maximum(np.abs(np.log(np.abs(multiplier))), 1e-12)
 
 
@@ -77,8 +79,7 @@ class Cycles(ArrayRows):
 
     @property
     def time_constant(self) -> np.ndarray:
-        """Return the time [s] in which a small deviation from the cycle shrinks or grows by the
-        factor e, shape (count,)."""
+        """Return the time [s] in which a small deviation changes by the factor e, (count,)."""
         return time_constant(self.orbits.times, self.multiplier)
 
     @property
@@ -100,8 +101,10 @@ class Cycles(ArrayRows):
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap | None = None) -> Cycles:
-    """Find the symmetric cycle of every stage, its own mirror image,
-    for stages with symmetric equations."""
+    """Find the symmetric cycle of every stage with symmetric equations.
+
+    It is its own mirror image.
+    """
     positive = positive or return_map(stages, COARSE_RTOL)
     return _closed(stages, symmetric_guess(stages, positive, COARSE_RTOL), -1.0, rtol)
 
@@ -141,10 +144,9 @@ def families(stages: Ensemble, rtol: float = RTOL) -> tuple[Cycles, ...]:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def asymmetric_cycles(stages: Ensemble, positive: ReturnMap, rtol: float = RTOL) -> Cycles:
-    """Find one of the pair of asymmetric cycles that a symmetric stage may have,
-    from its return map.
+    """Find one of the pair of asymmetric cycles that a symmetric stage may have.
 
-    The other of the pair is its mirror image.
+    It is found from the return map. The other of the pair is its mirror image.
     """
     settings = OrbitSettings.current()
     cycles = _closed(stages, whole_guess(stages, positive, positive, settings.least_asymmetry_share), 1.0, rtol)

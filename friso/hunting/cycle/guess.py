@@ -14,8 +14,10 @@ from friso.hunting.cycle.settings import OrbitSettings
 
 @dataclass(frozen=True)
 class Guess:
-    """Distance [m] at which each stage sticks again and again, and time [s] of its return,
-    (count,); NaN for no guess."""
+    """A guess of each cycle: the sticking distance [m] and the time [s] of its return.
+
+    Both have the shape (count,), NaN for no guess.
+    """
 
     distances: np.ndarray
     times: np.ndarray
@@ -27,8 +29,7 @@ class Guess:
 
 
 def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess:
-    """Guess the symmetric cycle: the largest distance from which a stage lands as far on the
-    other side.
+    """Guess the symmetric cycle: the largest distance with an equal landing opposite.
 
     The return map falls through its diagonal there.
     """
@@ -48,8 +49,7 @@ def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess
 
 
 def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apart: float = 0.0) -> Guess:
-    """Guess the cycle over a whole period: the distance from which a stage comes back to where
-    it was.
+    """Guess the cycle over a whole period: a distance from which a stage comes back there.
 
     The distance on the other side differs from it by a share of at least `apart`. Of several, the least different one
     is taken if `apart` is 0, else the most different one. `positive` and `negative` are the maps of stages that stick
@@ -73,8 +73,7 @@ def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apar
 
 
 def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.ndarray, apart: float) -> float | None:
-    """Return the distance that returns to itself, among those numbered `goes`;
-    None if there is none.
+    """Return the distance that returns to itself, among those numbered `goes`, or None.
 
     If no distance does, the one that almost does is returned: near a fold both fixed points lie between two points of
     the map. With `apart`, places near the symmetric fixed point are left out, because the map almost returns there
@@ -101,8 +100,10 @@ def _ascending(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _falling(distances: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the last neighbouring distances between which a function falls through zero;
-    NaN if there are none."""
+    """Return the last neighbouring distances between which a function falls through zero.
+
+    NaN if there are none.
+    """
     falls = (rise[:, :-1] > 0) & (rise[:, 1:] <= 0)
     last = falls.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)
     rows = np.arange(len(rise))

@@ -15,12 +15,11 @@ from friso.hunting.settings import ToleranceSettings
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> np.ndarray:
-    """Return distances [m] at which stages stick in motions that the return map keeps close to
-    an unstable cycle.
+    """Return distances [m] at which stages stick in motions beside an unstable cycle.
 
-    Close means within a few per cent. The shape is (count, KEPT), NaN where there is none. The map is interpolated, so
-    a simulation has to decide whether the motions are attractors. Where a limiter chatters, the map is too rough and
-    the result is NaN.
+    The return map keeps these motions within a few per cent of the cycle. The shape is (count, KEPT), NaN where there
+    is none. The map is interpolated, so a simulation has to decide whether the motions are attractors. Where a limiter
+    chatters, the map is too rough and the result is NaN.
     """
     settings = OrbitSettings.current()
     tolerances = ToleranceSettings.current()
@@ -45,8 +44,7 @@ def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> np.ndar
 
 
 def _returns(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
-    """Measure how far stages swing [m] when they begin beside their orbits, shape (count, runs,
-    RETURNS).
+    """Measure how far stages swing [m] from beside their orbits, (count, runs, RETURNS).
 
     Runs first span the range, with the orbit in the middle. More runs follow where, on either side, the next return
     leaves the range.
@@ -64,11 +62,10 @@ def _returns(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: floa
 
 
 def held_by(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Return the deviations, ascending, at which motions are after many returns of a map that
-    keeps them in its range.
+    """Return the deviations, ascending, at which a map keeps motions in its range.
 
-    The map takes the deviations `before` a return to those `after` it, each of shape (runs,). A motion that only ever
-    grew is not kept: near a multiplier of 1 or -1 it merely leaves slowly.
+    They are reached after many returns. The map takes the deviations `before` a return to those `after` it, each of
+    shape (runs,). A motion that only ever grew is not kept: near a multiplier of 1 or -1 it merely leaves slowly.
     """
     settings = OrbitSettings.current()
     inside = (np.abs(before) <= settings.held_range_share) & (np.abs(after) <= settings.held_range_share)

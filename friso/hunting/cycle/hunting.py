@@ -132,16 +132,14 @@ class Cycle:
 
     @property
     def time_constant(self) -> float:
-        """Return the time [s] in which a small deviation from the cycle shrinks or grows by the
-        factor e."""
+        """Return the time [s] in which a small deviation from the cycle changes by the factor e."""
         returned = self.period / 2 if self.symmetric else self.period
         return float(time_constant(np.array(returned), np.array(self.multiplier)))
 
 
 @dataclass(frozen=True)
 class Swing:
-    """A lasting swing that a long simulation shows,
-    but of which no stable orbit could be closed.
+    """A lasting swing seen in a long simulation, without a closed stable orbit.
 
     `amplitude` [m] is half of peak to peak. `period` [s] is approximate unless the swing is `regular`. `swings` counts
     swings to either side in a period.
@@ -184,8 +182,7 @@ class Hunting:
 
     @property
     def passing(self) -> bool:
-        """Tell whether an observed swing may be transient: it may grow without bound,
-        or die out slowly.
+        """Tell whether an observed swing may be transient, growing or slowly dying out.
 
         Its size is then only the size at which the run was stopped.
         """
@@ -198,14 +195,18 @@ class Hunting:
 
 
 def cannot_hunt(stage: Stage) -> str:
-    """Return why a stage cannot hunt whatever its numbers,
-    or why its cycles are not searched (`DITHERS`); "" if they are."""
+    """Return why a stage cannot hunt whatever its numbers; "" if it may.
+
+    It also says why cycles are not searched (`DITHERS`).
+    """
     return why_not(structure(stage.flat()))
 
 
 def why_not(form: Structure) -> str:
-    """Return why stages of this structure cannot hunt, or why their cycles are not searched;
-    "" if they are."""
+    """Return why stages of this structure cannot hunt, or why cycles are not searched.
+
+    "" if they may hunt.
+    """
     drive = form.transmission
     if form.friction == "none" and (drive is None or (drive.friction == "none" and not drive.backlash)):
         return "there is no friction to stick to"
@@ -264,8 +265,7 @@ def surely_surveyed(stages: Ensemble, survey: Attractors | None) -> np.ndarray:
 
 
 def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
-    """Return why something may attract stages beyond a survey, words of shape (count,),
-    "" for no reason."""
+    """Return why something may attract stages beyond a survey, words (count,), "" for nothing."""
     why = np.full(stages.count, "", dtype=object)
     far, farther = far_beyond_a_limit(stages), np.zeros(stages.count, bool)
     if far is not None:
@@ -279,10 +279,9 @@ def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
 
 
 def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
-    """Return why something may attract stages without an attractor, words of shape (count,),
-    "" for no reason.
+    """Return why something may attract stages without an attractor, words of shape (count,).
 
-    `farther`, (count,), marks stages that may swing on from farther off than was tried.
+    It is "" for no reason. `farther`, (count,), marks stages that may swing on from farther off than was tried.
     """
     settings = OrbitSettings.current()
     if stages.outer_integrals:
@@ -312,8 +311,10 @@ def small_cycles_possible(stages: Ensemble) -> np.ndarray:
 
 
 def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
-    """Return which stages with friction may have cycles smaller than the survey covers,
-    shape (count,)."""
+    """Return which stages may have cycles smaller than the survey covers, shape (count,).
+
+    They have friction.
+    """
     settings = OrbitSettings.current()
     breakaway = stages.number("breakaway")[:, None]
     sizes = np.geomspace(1e-3 * settings.least_certain_swing, settings.least_certain_swing, 60)

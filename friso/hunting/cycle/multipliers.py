@@ -33,10 +33,9 @@ class Multipliers:
 
 
 def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
-    """Compute the multipliers of closed orbits, one orbit per stage,
-    from runs to a relative tolerance.
+    """Compute the multipliers of closed orbits, one orbit per stage.
 
-    They belong to half a period if the orbits were closed over half a period.
+    Runs have a relative tolerance. Multipliers belong to half a period if the orbits were closed over half a period.
     """
     shot = shoot(stages, orbits.states, orbits.times, orbits.sign, rtol)
     flows = np.where(shot.done[:, None, None], shot.flows, np.nan)
@@ -47,8 +46,7 @@ def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
 
 
 def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return multipliers and leading directions of the flow on the section of constant
-    integrator state."""
+    """Return multipliers and leading directions of the flow at constant integrator state."""
     phase = stages.integral
     sections = flows - rates[:, :, None] * flows[:, None, phase, :] / rates[:, phase, None, None]
     sections[:, :, phase] = 0.0
@@ -74,10 +72,9 @@ def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float)
 
 
 def _straight(pairs: np.ndarray) -> float:
-    """Fit a straight line through pairs (points, 2) without outliers, and return its slope;
-    NaN with too few.
+    """Fit a straight line through pairs (points, 2) without outliers; return its slope.
 
-    An outlier arises where the stage does not break away.
+    NaN with too few pairs. An outlier arises where the stage does not break away.
     """
     settings = OrbitSettings.current()
     if len(pairs) < settings.least_slope_runs:
@@ -94,10 +91,9 @@ def _straight(pairs: np.ndarray) -> float:
 def returns_of(
     stages: Ensemble, orbits: Orbits, direction: np.ndarray, away: np.ndarray, returns: int, rtol: float
 ) -> np.ndarray:
-    """Measure how far stages swing [m] on each return when they begin beside their orbits,
-    shape (count, points, returns).
+    """Measure how far stages swing [m] on each return, (count, points, returns).
 
-    The starts lie along a direction (count, states), at shares (1, points) of the sticking distance.
+    They begin beside their orbits, along a direction (count, states), at shares (1, points) of the sticking distance.
     """
     count, points = stages.count, away.shape[1]
     distance = orbits.states[:, stages.sticking]

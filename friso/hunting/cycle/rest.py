@@ -39,19 +39,20 @@ def bent(stages: Ensemble, displacement: np.ndarray, *travels: np.ndarray) -> np
 
 
 def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
-    """Return states of stages at their reference, all masses moving at a velocity [m/s],
-    everything else zero."""
+    """Return states of stages at their reference, all masses moving at a velocity [m/s].
+
+    Everything else is zero.
+    """
     states = np.zeros((stages.count, len(stages.kernel.states)))
     states[:, stages.kernel.having(Role.VELOCITY)] = velocity[:, None]
     return states
 
 
 def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
-    """Return the time [s] that the integrator takes to wind up to break-away while a stage
-    sticks, shape (count,).
+    """Return the time [s] in which the integrator winds up to break-away, (count,).
 
-    Where the integrator pauses, it is a time in which the loop moves. It is never longer than an integrator with a leak
-    winds.
+    The stage sticks meanwhile. Where the integrator pauses, it is a time in which the loop moves. It is never longer
+    than an integrator with a leak winds.
     """
     settings = OrbitSettings.current()
     rate = np.abs(stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton)

@@ -51,8 +51,10 @@ def _columns(return_map: ReturnMap) -> tuple[np.ndarray, ...]:
 
 
 def trace_returns(stages: Ensemble, distances: np.ndarray, rtol: float, side: float) -> ReturnMap:
-    """Release every stage from each of the distances [m], shape (count, points), ascending,
-    and measure its first swing."""
+    """Release every stage from each distance [m], (count, points), and measure its first swing.
+
+    Distances ascend.
+    """
     settings = OrbitSettings.current()
     shape = distances.shape
     several = stages.take(np.repeat(np.arange(stages.count), shape[1]))

@@ -50,11 +50,11 @@ class Orbits(ArrayRows):
 
 
 def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Shot:
-    """Follow orbits from states (count, states) over times [s] (count,),
-    with a small deviation along every state.
+    """Follow orbits for times [s] (count,), with a small deviation along every state.
 
-    One deviation is computed rather than run, along the state with the largest rate: the flow carries the rates at the
-    start to those at the end. Where modes remember, a state alone does not give the rates, so all deviations are run.
+    They start in states (count, states). One deviation is computed rather than run, along the state with the largest
+    rate: the flow carries the rates at the start to those at the end. Where modes remember, a state alone does not
+    give the rates, so all deviations are run.
     """
     count, size = states.shape
     rows, before = np.arange(count)[:, None], stages.rates(states)
@@ -86,16 +86,15 @@ def swings_of_simplest(sign: float) -> int:
 def close(
     stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float, swings: int | None = None
 ) -> Orbits:
-    """Close orbits from guesses: states (count, states) at which the stage sticks,
-    and times [s] (count,).
+    """Close orbits from guesses: states (count, states) that stick, and times [s] (count,).
 
     `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one. `swings` are those in that time, by default
     as few as possible. The phase is fixed where the integrator makes the actuator balance the constant forces on a
     stage at rest, or exert none without these.
 
-    A Jacobian is kept for as long as steps with it shrink the gap fast. Where a limiter chatters, the flow's derivative
-    changes from one nanometre to the next and is useless. The last Jacobian from farther away is then kept for all
-    further steps.
+    A Jacobian is kept for as long as steps with it shrink the gap fast. Where a limiter chatters, the flow's
+    derivative changes from one nanometre to the next and is useless. The last Jacobian from farther away is then kept
+    for all further steps.
     """
     orbits = _iterated(_Shooting(lambda which, places: stages.take(which), states, times, sign, rtol)).orbits
     return replace(orbits, swings=swings or orbits.swings)
@@ -140,12 +139,11 @@ def close_along(
     swings: int | None = None,
     jacobians: np.ndarray | None = None,
 ) -> Followed:
-    """Close orbits as `close` does, while their stages change their places until each orbit lies
-    on its border.
+    """Close orbits as `close` does, while stages move until each orbit lies on its border.
 
-    The orbits start from states and times [s]. The method passes folds, beyond which there is no orbit at a place. With
-    `jacobians` of closed orbits at or near the start, the first step to the border needs no run. The Jacobians may
-    belong to another line through the keys: further steps learn the derivative along this one.
+    The orbits start from states and times [s]. The method passes folds, beyond which there is no orbit at a place.
+    With `jacobians` of closed orbits at or near the start, the first step to the border needs no run. The Jacobians
+    may belong to another line through the keys: further steps learn the derivative along this one.
     """
     following = _Following(family, states, times, sign, rtol, places)
     following.border = border
@@ -159,8 +157,10 @@ _S = TypeVar("_S", bound="_Shooting")
 
 
 class _Shooting:
-    """Orbits on their way to being closed, all at once;
-    an orbit that is closed or has failed is left alone."""
+    """Orbits on their way to being closed, all at once.
+
+    An orbit that is closed or has failed is left alone.
+    """
 
     def __init__(
         self,
@@ -232,13 +232,11 @@ class _Shooting:
         return jacobians
 
     def _residual(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
-        """Return the phase error, shape (orbits, 1):
-        how far the integrator is from balancing the constant forces."""
+        """Return the phase error, (orbits, 1): the integrator's imbalance with constant forces."""
         return stages.unbalanced(self.states[which])[:, None]
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
-        """Keep orbits that are closer than before; deactivate those that are closed,
-        fail or get no closer."""
+        """Keep orbits that are closer than before; stop those that are closed, fail or stall."""
         better = which[gaps < self.gaps[which]]
         self.idle[which] = np.where(gaps < 0.5 * self.gaps[which], 0, self.idle[which] + 1)
         for best, current in ((self.best_states, self.states), (self.best_times, self.times)):
@@ -255,8 +253,10 @@ class _Shooting:
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
 
     def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
-        """Take a Newton step of one orbit, shortened to the stride, and return it.
-        `scales` are those of its states."""
+        """Take a Newton step of one orbit, limited in length, and return it.
+
+        `scales` are those of its states.
+        """
         settings = OrbitSettings.current()
         step, size = self.inverses[k] @ -residual, self.states.shape[1]
         far = abs(step[sticking]) / (settings.newton_stride * abs(self.states[k, sticking]))
@@ -307,8 +307,10 @@ class _Following(_Shooting):
         self.serves[:] = True
 
     def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
-        """Take a step after updating the Jacobian by the last one (Broyden 1965,
-        doi:10.2307/2003941)."""
+        """Take a step after updating the Jacobian by the last one.
+
+        Broyden 1965, doi:10.2307/2003941.
+        """
         if latest := self.latest[k]:
             step, before = latest
             inverse, weights = self.inverses[k], np.concatenate([scales, [self.times[k], 1.0]]) ** -2.0

@@ -14,8 +14,10 @@ from friso.hunting.cycle.settings import OrbitSettings
 
 @dataclass(frozen=True)
 class Swings:
-    """The first swings of runs, shape (runs, swings): turning points [m] and their times [s];
-    NaN beyond the last."""
+    """The first swings of runs, (runs, swings): turning points [m] and times [s].
+
+    NaN beyond the last.
+    """
 
     values: np.ndarray
     times: np.ndarray
@@ -38,8 +40,7 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
 
 
 def last_swings(results: Results, legs: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return where [m] and when [s] runs turned last, shape (runs, most),
-    the last swing in the last column.
+    """Return where [m] and when [s] runs turned last, (runs, most), the last swing last.
 
     The columns before the first swing are NaN. Legs are at least `legs` [m] long, shape (runs,). The swing in which a
     run ends does not count.

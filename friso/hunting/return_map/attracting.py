@@ -39,8 +39,10 @@ class MapSurvey:
 
     @property
     def doubts(self) -> np.ndarray:
-        """Return why the map of a stage does not decide what attracts it, words of shape (count,),
-        "" if it does."""
+        """Return why the map of a stage does not decide what attracts it, words (count,).
+
+        "" if it does.
+        """
         settings = ReturnMapSettings.current()
         why = np.full(self.mapped.stages.count, "", dtype=object)
         for stage, landing_map in enumerate(self.mapped.maps):
@@ -76,8 +78,10 @@ class _Proposal:
 
 
 def survey_maps(stages: Ensemble, rtol: float = RTOL) -> MapSurvey:
-    """Find the attractors of stages by their return maps;
-    orbits are closed to a relative tolerance."""
+    """Find the attractors of stages by their return maps.
+
+    Orbits are closed to a relative tolerance.
+    """
     settings = ReturnMapSettings.current()
     survey_settings = SurveySettings.current()
     mapped = map_stages(stages)
@@ -104,8 +108,7 @@ def survey_maps(stages: Ensemble, rtol: float = RTOL) -> MapSurvey:
 
 
 def _left(mapped: Mapped, motions: list[Swinging], repelling: list[Swinging]) -> list[_Proposal]:
-    """Return the attractors of all maps that were not closed as orbits yet,
-    if a run near them can be continued."""
+    """Return attractors of maps not closed as orbits yet, if a run near them can go on."""
     lengths = mapped.stages.length
 
     def is_any(new: _Proposal, closed: list[Swinging], exactly: bool) -> bool:
@@ -120,8 +123,7 @@ def _swings(attractor: MapAttractor) -> int:
 
 
 def _proposals(mapped: Mapped) -> list[_Proposal]:
-    """Return the attractors of all maps, each with the run in its basin that ended nearest to
-    it."""
+    """Return the attractors of all maps, each with the run of its basin that ended nearest."""
     proposals = []
     for stage, landing_map in enumerate(mapped.maps):
         for attractor in landing_map.attractors:
@@ -138,11 +140,10 @@ def _proposals(mapped: Mapped) -> list[_Proposal]:
 
 
 def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly: bool = False) -> bool:
-    """Tell whether an attractor of a map is a given closed cycle of its stage,
-    by size and number of landings.
+    """Tell whether an attractor of a map is a given closed cycle of its stage.
 
-    With `exactly`, the numbers of landings must be equal; otherwise one may be a multiple. `length` [m] is the
-    deflection of the loop by the break-away force.
+    They are compared by size and number of landings. With `exactly`, the numbers of landings must be equal; otherwise
+    one may be a multiple. `length` [m] is the deflection of the loop by the break-away force.
     """
     distances = np.abs(attractor.distances) * length
     if exactly and not (attractor.periodic and motion.cycles and len(distances) == motion.cycles.swings):
@@ -158,8 +159,7 @@ def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly:
 
 
 def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging], repelling: list[Swinging]) -> None:
-    """Close orbits from runs that repeat themselves,
-    and add each to the stable or the unstable ones."""
+    """Close orbits from runs that repeat themselves; sort them into stable and unstable."""
     landings, owners = mapped.landings.take(runs), mapped.owners[runs]
     sizes, times, swings = np.zeros(len(runs)), np.zeros(len(runs)), np.zeros(len(runs), np.int64)
     for k, owner in enumerate(owners.tolist()):
@@ -184,10 +184,9 @@ def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging
 
 
 def _repeats(path: np.ndarray, symmetric: bool, least: int) -> int:
-    """Return the smallest number of swings, from `least` on, after which a run's last landings,
-    (landings,), about repeat.
+    """Return the smallest number of swings after which a run's last landings repeat.
 
-    Returns 0 if they do not.
+    It is at least `least`, and 0 if they do not. `path` has the shape (landings,).
     """
     settings = ReturnMapSettings.current()
     sizes = np.abs(path) if symmetric else path

@@ -18,12 +18,11 @@ PLACES = np.array([1 / 6, 1 / 2, 5 / 6])
 
 
 def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
-    """Return for which stages, by number, runs land where the map predicts,
-    in the shape of `numbers`.
+    """Return for which stages runs land where the map predicts, in the shape of `numbers`.
 
     Runs begin stuck at three distances from which the stage rests, at three from which it swings on, and in the widest
-    gap between starts of the map. Each is followed for some landings, at the tolerance of the map and at a hundredth of
-    it. From the second landing on, each must lie where the map predicts it from the one before, within the allowed
+    gap between starts of the map. Each is followed for some landings, at the tolerance of the map and at a hundredth
+    of it. From the second landing on, each must lie where the map predicts it from the one before, within the allowed
     scatter.
     """
     begun = [_starts(survey, int(number)) for number in numbers]

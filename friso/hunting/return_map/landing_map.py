@@ -100,11 +100,10 @@ class LandingMap:
 
     @cached_property
     def _lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return straight pieces over places (see `_place`), ascending: begin, value at place 0,
-        and slope of each.
+        """Return straight pieces of the map over places: begin, value at place 0, and slope.
 
-        Between two points the logarithm of distance is linear. Where the map breaks off, each half has the gain of the
-        nearer point.
+        Places (see `_place`) ascend. Between two points the logarithm of distance is linear. Where the map breaks off,
+        each half has the gain of the nearer point.
         """
         settings = ReturnMapSettings.current()
         begins, values, slopes = [-np.inf], [REST], [0.0]
@@ -144,8 +143,7 @@ class LandingMap:
         return np.array(begins), np.array(values), np.array(slopes)
 
     def next(self, places: np.ndarray) -> np.ndarray:
-        """Return the places of the next landings after places (see `_place`), shape (count,),
-        by linear interpolation."""
+        """Return the places of the next landings (see `_place`), (count,), by interpolation."""
         settings = SurveySettings.current()
         begins, values, slopes = self._lines
         pieces = np.searchsorted(begins, places, side="right") - 1
@@ -161,8 +159,10 @@ class LandingMap:
         return tuple(self._told_apart(self._followed(at)))
 
     def _followed(self, at: np.ndarray) -> np.ndarray:
-        """Iterate the map from places until it is on an attractor, and return the last landings,
-        shape (points, landings)."""
+        """Iterate the map until it is on an attractor; return the last landings.
+
+        They have the shape (points, landings).
+        """
         settings = ReturnMapSettings.current()
         survey_settings = SurveySettings.current()
         iterations, before, paths = settings.map_iterations, np.full(len(at), np.inf), at[:, None]
@@ -190,8 +190,7 @@ class LandingMap:
         return paths
 
     def foretold(self, distances: np.ndarray) -> np.ndarray:
-        """Predict the signed distances of the next landings, shape (count,),
-        0 where the stage rests."""
+        """Predict the signed distances of the next landings, (count,), 0 where the stage rests."""
         return _distance(self.next(self._places(distances)))
 
     def goes_on(self, distances: np.ndarray) -> np.ndarray:
@@ -219,10 +218,9 @@ class LandingMap:
             left &= ~same
 
     def slope(self, attractor: MapAttractor) -> float:
-        """Return the growth of a small deviation from an attractor per repetition, by the map,
-        without sign.
+        """Return the growth of a small deviation from an attractor per repetition, by the map.
 
-        It is infinite if the attractor does not repeat itself.
+        It has no sign, and is infinite if the attractor does not repeat itself.
         """
         if not attractor.periodic:
             return np.inf
@@ -231,11 +229,11 @@ class LandingMap:
 
     @property
     def scatter(self) -> tuple[float, float]:
-        """Return the largest relative difference of a landing from the prediction by its neighbours,
-        and its distance.
+        """Return the largest relative error of a landing predicted by its neighbours.
 
-        It is infinite if a stage rests between two landings that go on alike, or the reverse. It is 0 if no three
-        points are close together. Only points count whose next landing is at more than half of their distance.
+        The second result is its distance. It is infinite if a stage rests between two landings that go on alike, or
+        the reverse. It is 0 if no three points are close together. Only points count whose next landing is at more
+        than half of their distance.
         """
         settings = ReturnMapSettings.current()
         worst, place = 0.0, np.nan
@@ -271,11 +269,10 @@ def _distance(places: np.ndarray) -> np.ndarray:
 
 
 def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Leave out landings beyond `farthest_sticking` from which a run comes back,
-    and count the rest after the start.
+    """Leave out landings beyond `farthest_sticking` from which a run comes back.
 
-    From so far a stage passes its reference without sticking, so distance alone does not decide what follows.
-    `distances` have the shape (runs, landings), the start first.
+    Also count the rest after the start. From so far a stage passes its reference without sticking, so distance alone
+    does not decide what follows. `distances` have the shape (runs, landings), the start first.
     """
     rows, order = np.arange(len(distances))[:, None], np.arange(distances.shape[1])
     near = (np.abs(distances) <= ReturnMapSettings.current().farthest_sticking) & (order <= count[:, None])
@@ -287,8 +284,10 @@ def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.nd
 
 
 def _strays(paths: np.ndarray) -> np.ndarray:
-    """Return the smallest difference between places of paths, shape (points, landings),
-    and those a cycle before, (points,)."""
+    """Return the smallest difference between places of paths and those a cycle before.
+
+    Paths have the shape (points, landings), the result (points,).
+    """
     settings = SurveySettings.current()
     return np.min(
         [np.abs(paths[:, n:] - paths[:, :-n]).max(axis=1) for n in range(1, settings.most_repeating_swings + 1)], axis=0

@@ -52,8 +52,7 @@ class Landings(ArrayRows):
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float = RTOL) -> Landings:
-    """Follow stages from states, shape (runs, states), until each has landed `most` times,
-    or rests.
+    """Follow stages from states, (runs, states), until each has landed `most` times or rests.
 
     Runs have the relative tolerance `rtol`. A round lasts as long as a stage may take to wind up where it sticks, and
     to cross its reference.
@@ -105,8 +104,7 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
 
 
 def _landings(values: np.ndarray, times: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the farthest place [m] of each run on each side of the reference in turn,
-    and its time [s].
+    """Return each run's farthest places [m] on alternating sides, and their times [s].
 
     Both have the shape (runs, landings), the start first; the third result counts them without the start, (runs,).
     `values` and `times` have the shape (runs, places), NaN for no place.

@@ -110,8 +110,7 @@ class Mapped:
         return self.begun(owners, np.concatenate(wanted)) if owners.size else self
 
     def _wanted(self, stage: int) -> np.ndarray:
-        """Return starts of more runs of a stage, which should land in gaps between neighbouring
-        points."""
+        """Return starts of more runs of a stage, which should land in gaps between points."""
         landing_map, starts = self.maps[stage], []
         which = np.flatnonzero((self.owners == stage) & np.isfinite(self.starts))
         which = which[np.argsort(self.starts[which], kind="stable")]
@@ -133,8 +132,7 @@ def map_stages(
     rtol: float = RTOL,
     sparse: bool = False,
 ) -> Mapped:
-    """Sample the return maps of stages by runs that begin stuck at distances `near` their
-    reference, and farther off.
+    """Sample the return maps of stages by runs stuck `near` their reference, and farther.
 
     A `sparse` map has every third of the farther starts only.
     """
@@ -153,10 +151,9 @@ def map_stages(
 
 
 def remembered(mapped: Mapped, stage: int) -> str:
-    """Return the name of the state that differs most between runs that land equally far off but
-    return differently.
+    """Return the state that best explains why runs land equally but return differently.
 
-    The stage still remembers this state from its past. Returns "" if no landings show one.
+    The stage still remembers this state from its past. Returns its name, or "" if no landings show one.
     """
     settings = ReturnMapSettings.current()
     landing_map = mapped.maps[stage]
@@ -178,8 +175,10 @@ def remembered(mapped: Mapped, stage: int) -> str:
 
 
 def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: int, rtol: float) -> Landings:
-    """Return the landings of runs of the stages `owners` that stick at first at `starts`,
-    both (runs,)."""
+    """Return the landings of runs that stick at first at `starts`, of the stages `owners`.
+
+    Both have the shape (runs,).
+    """
     several = stages.take(owners)
     return find_landings(several, stuck(several, starts * several.length), most, rtol)
 
@@ -217,8 +216,10 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
 
 
 def unclosed(landing_map: LandingMap) -> list[int]:
-    """Return the runs of the outermost points whose next landing is about as far:
-    the map must continue beyond them."""
+    """Return the runs of the outermost points whose next landing is about as far.
+
+    The map must continue beyond them.
+    """
     settings = ReturnMapSettings.current()
     runs = []
     for side in landing_map.sides:
@@ -244,10 +245,9 @@ def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[fl
 
 
 def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
-    """Return starts between neighbours, ascending, of which only one lands,
-    or lands far from the other.
+    """Return starts between neighbours of which only one lands, or lands far from the other.
 
-    An attractor may reach up to such a break of the map. `landings`, (runs,), are the first landings.
+    Starts ascend. An attractor may reach up to such a break of the map. `landings`, (runs,), are the first landings.
     """
     settings = ReturnMapSettings.current()
     lands = np.abs(np.nan_to_num(landings)) >= SurveySettings.current().least_swing
@@ -263,10 +263,10 @@ def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
 
 
 def _start_that_lands(starts: np.ndarray, seen: np.ndarray, place: float) -> float | None:
-    """Return a start whose run should land at a place,
-    between two neighbours that land on either side; None if none do.
+    """Return a start whose run should land at a place, or None.
 
-    `starts` (runs,) ascend; `seen` (runs, landings) are landings with the start first.
+    It lies between two neighbours that land on either side. `starts` (runs,) ascend; `seen` (runs, landings) are
+    landings with the start first.
     """
     best, start = np.inf, None
     for k in range(1, ReturnMapSettings.current().run_landings):

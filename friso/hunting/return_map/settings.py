@@ -9,8 +9,7 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class ReturnMapSettings(Settings):
-    """Settings of return maps: landings of a stage by distance,
-    and the prediction of further landings."""
+    """Settings of return maps: landings of a stage by distance, and their prediction."""
 
     hardly_attracting_share: float = setting(0.95, "")
     """With more of a deviation left per repetition, 51 of 149 sketched attractors did not attract."""
