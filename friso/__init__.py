@@ -104,8 +104,10 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is used for the first time: numbers with units and arrays take half a second. The functions of
-    questions, of friso and of installed packages, are found where these are declared."""
+    """Import a name when it is first used: numbers with units and arrays take half a second.
+
+    Functions of questions, of friso and of installed packages, are found where these are declared.
+    """
     if name in _LAZY:
         return getattr(importlib.import_module(_LAZY[name]), name)
     nearest = ""

@@ -19,8 +19,11 @@ LENGTH, FORCE, MASS = "m", "N", "kg"
 
 @dataclass(frozen=True)
 class AxisKind:
-    """A kind of axis: its name, and what stands for metre, newton and kilogram; of one of which the motor is known,
-    also what an ampere exerts [N, or N m], `per_ampere`, by which forces may be written in amperes."""
+    """A kind of axis: its name, and its units in place of metre, newton and kilogram.
+
+    If the motor is known, `per_ampere` [N, or N m] is what an ampere exerts, by which forces may be written in
+    amperes.
+    """
 
     name: str
     length: str = LENGTH
@@ -39,13 +42,17 @@ class AxisKind:
         return (self.length, self.force) == (LENGTH, FORCE)
 
     def per(self, unit: str) -> AxisKind:
-        """This axis with forces in another unit, as they were logged (amperes): masses are that unit times s^2 over
-        the length."""
+        """Return this axis with forces in the unit in which they were logged, such as amperes.
+
+        Masses are then in that unit times s^2 over the length.
+        """
         return replace(self, force=unit, mass=f"{unit}*s^2/{self.length}")
 
     def unit(self, unit: str) -> str:
-        """The unit on this axis for one of a linear axis: "N*s/m" is "N*m*s/rad" on a rotary one. A unit that is of
-        this axis already stays as it is."""
+        """Return a unit of a linear axis as it is on this one: "N*s/m" becomes "N*m*s/rad".
+
+        A unit that is of this axis already is unchanged.
+        """
         if self.plain or _TURNED.search(unit):
             return unit
         return _PARTS.sub(self._part, unit)

@@ -29,7 +29,7 @@ def one_line(text: str) -> str:
 
 
 def table_cell(text: str) -> str:
-    """The text as a cell of a CSV file: escaped, and with an apostrophe before what would be a formula."""
+    """Return the text as a cell of a CSV file, escaped; a formula gets an apostrophe."""
     return f"'{escaped(text)}" if text.startswith(_FORMULA) else escaped(text)
 
 

@@ -374,7 +374,10 @@ def _root(unit: str) -> tuple[float, dict[str, float], list[str]]:
 
 
 def by_pint(unit: str) -> tuple[float, dict[str, float], list[str]]:
-    """Ask pint for the factor to its root units, these with their powers, and the names in a unit. Raises _Refused."""
+    """Return pint's factor to its root units, their powers, and the names in a unit.
+
+    Raises _Refused.
+    """
     try:
         units = _registry().parse_units(unit)
         factor, root = _registry().get_root_units(units)
@@ -396,7 +399,10 @@ def _meant(unit: str) -> str:
 
 @lru_cache(maxsize=1024)
 def _factor(unit: str, si_unit: str, motor: Motor | None = None) -> float:
-    """SI value of 1 `unit`, which a `motor` may make of amperes. Raises _Refused if it is of another kind."""
+    """Return the SI value of 1 `unit`; a `motor` may convert amperes.
+
+    Raises _Refused if it is of another kind.
+    """
     factor, root, names = _root(unit)
     if si_unit == "Hz":
         return _hertz(factor, root, names)
@@ -420,7 +426,7 @@ def _per_radian(root: dict[str, float], si_root: dict[str, float]) -> bool:
 
 
 def _in_amperes(root: dict[str, float], si_root: dict[str, float], force: str) -> bool:
-    """Whether a unit is one of forces with amperes in their place: A/m for N/m; of an inertia, A*s^2/rad."""
+    """Tell whether a unit has amperes in place of forces: A/m for N/m, A*s^2/rad of an inertia."""
     if root.get("ampere") != 1 or "ampere" in si_root:
         return False
     _, per_ampere, _ = _root(f"{force}/A")
@@ -442,7 +448,10 @@ def _of_rotary_axis(root: dict[str, float], si_unit: str) -> str:
 
 
 def _hertz(factor: float, root: dict[str, float], names: list[str]) -> float:
-    """pint takes 1 Hz for 1 rad/s; they are distinguished here. A plain 1/s could be either and is refused."""
+    """Return the factor for frequencies, for which pint takes 1 Hz to be 1 rad/s.
+
+    They are distinguished here. A plain 1/s could be either and is refused.
+    """
     if root == {"radian": 1, "second": -1}:
         return factor / (2 * math.pi)
     if root != {"second": -1}:

@@ -56,8 +56,10 @@ class Registry(Generic[Item]):
         return name in self.added or name in self._own or name in self.installed
 
     def __getitem__(self, name: str) -> Item:
-        """What is declared under a name. Raises KeyError for an unknown one, InputError where another package's module
-        declares nothing."""
+        """Return what is declared under a name.
+
+        Raises KeyError for an unknown one, InputError if another package's module declares nothing.
+        """
         if name in self.added:
             return self.added[name][0]
         if name in self._own:
@@ -67,7 +69,10 @@ class Registry(Generic[Item]):
         return load_declared(self.group, name, self.installed[name], self.attribute, self.kind)
 
     def items(self) -> Iterator[tuple[str, Item]]:
-        """The names with what is declared; what another package's module does not declare is told, and left out."""
+        """Return the names with what is declared.
+
+        What another package's module does not declare is reported, and left out.
+        """
         for name in self:
             try:
                 yield name, self[name]

@@ -29,7 +29,7 @@ DECISIVE = (f"{CONDITIONS}.load_per_acceleration", f"{CONDITIONS}.load_share")
 
 
 def factor_key(level: str) -> str:
-    """Return the flat key of the factor of a level."""
+    """Return the flat key of the factor by which [conditions] multiply "static" or "coulomb"."""
     return f"{CONDITIONS}.{level}_factor"
 
 

@@ -160,7 +160,10 @@ def about_resonances(system: Poles) -> np.ndarray:
 
 
 def distance_to_lines(loop: Complex) -> np.ndarray:
-    """Least distance from -1 of loops over ascending frequencies, shape (..., k), joined by straight lines: (...)."""
+    """Return the least distance from -1 of loops over ascending frequencies, shape (...).
+
+    Loops have the shape (..., k) and are joined by straight lines.
+    """
     start, step = 1 + loop[..., :-1], np.diff(loop, axis=-1)
     length = np.maximum(np.abs(step) ** 2, np.finfo(float).tiny)
     along = np.clip(-(start * step.conj()).real / length, 0, 1)

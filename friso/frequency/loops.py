@@ -225,7 +225,7 @@ def _shut(loop: System) -> Complex:
 
 
 def _real_parts(poles: Complex) -> np.ndarray:
-    """Return real parts of poles, (members, n); 0 for poles on the imaginary axis, up to rounding."""
+    """Return real parts of poles, (members, n), 0 on the imaginary axis up to rounding."""
     settings = FrequencySettings.current()
     size = np.abs(poles)
     fastest = np.where(np.isfinite(size), size, 0.0).max(axis=1, keepdims=True)

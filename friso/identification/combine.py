@@ -49,7 +49,7 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
 
 
 def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return the keys of groups of estimates, and their correlations once combined, (keys, keys).
+    """Return the keys of groups of estimates, and correlations once combined, (keys, keys).
 
     `estimates` come from all experiments. A combined value is a mean of single ones with weights a_i, and experiments
     are independent: its covariance is the sum of A_i C_i A_i, with C_i the covariance within one experiment.
@@ -81,12 +81,12 @@ def _weight(estimate: Estimate) -> float:
 
 
 def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
-    """Return the weighted mean of estimates of one key, and whether they agree (chi-square test).
+    """Return the weighted mean of estimates of one key, and whether a test finds they agree.
 
-    If they scatter more than their own intervals say, the interval is wider by the Birge ratio (Birge 1932,
-    doi:10.1103/PhysRev.40.207), and for three or more by Student's t. Systematic parts do not average out. If the
-    estimates do not agree, as friction at several places, each gets an additional scatter from place to place
-    (`_between`); for two, which hardly show a scatter, the interval spans both.
+    The test is chi-square. If they scatter more than their own intervals say, the interval is wider by the Birge ratio
+    (Birge 1932, doi:10.1103/PhysRev.40.207), and for three or more by Student's t. Systematic parts do not average
+    out. If the estimates do not agree, as friction at several places, each gets an additional scatter from place to
+    place (`_between`); for two, which hardly show a scatter, the interval spans both.
     """
     values, weights = (
         np.array(column)

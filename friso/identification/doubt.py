@@ -156,7 +156,7 @@ class KeyCase(FitCase):
         return {estimate.name: estimate for estimate in self.estimates if estimate.determined}
 
     def with_answers(self, finding: RaisedDoubt) -> KeyCase:
-        """Return the case with estimates replaced by a finding's answers, or withheld if it refuses them."""
+        """Return the case with estimates replaced by a finding's answers, or withheld."""
         answers = {**finding.answers, **refused(self.estimates, finding.refuses)}
         estimates = tuple(answers.get(estimate.name, estimate) for estimate in self.estimates)
         pairs = zip(self.estimates, estimates, strict=True)

@@ -164,7 +164,7 @@ def _wider(estimate: Estimate, much: bool) -> Estimate:
 
 
 def _rid_of(model: InverseModel, inverse: InverseModel, name: str) -> tuple[Estimate, float]:
-    """Return a quantity of the inverse model with a cause removed, and how far it may still move.
+    """Return a quantity of the inverse model without a cause, and how far it may still move.
 
     What is left unexplained may have that cause too, at most by as much again.
     """

@@ -144,13 +144,19 @@ def _verdict(
 
 
 def steady_friction(flat: Mapping[str, Any], velocity: np.ndarray) -> np.ndarray:
-    """Friction [N] of a stage as flat keys at steady velocities [m/s], shape (n,), less its constant force."""
+    """Return friction [N] of a stage at steady velocities [m/s], without its constant force.
+
+    Both have the shape (n,).
+    """
     return _by_direction(flat, np.abs(velocity), np.sign(velocity))
 
 
 def whole_error(flat: Mapping[str, Any], inverse: InverseModel) -> float:
-    """The relative error of the force on the samples of the inverse model, by mass and steady friction of a stage as
-    flat keys; dry friction turns as gradually as the direction in the inverse model, whose columns are filtered."""
+    """Return the relative force error of a stage's mass and steady friction.
+
+    It is taken on the samples of the inverse model. Dry friction turns as gradually as the direction in the inverse
+    model, whose columns are filtered.
+    """
     mass = sum(flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage"))
     acceleration, velocity, sign, _ = inverse.columns.T
     dry = {**flat, "friction.viscous": 0.0}
@@ -160,8 +166,10 @@ def whole_error(flat: Mapping[str, Any], inverse: InverseModel) -> float:
 
 
 def _by_direction(flat: Mapping[str, Any], speed: np.ndarray, sign: np.ndarray) -> np.ndarray:
-    """Friction [N] at speeds [m/s] in directions from -1 to 1, which turn from one to the other, less the constant
-    force; each of shape (n,)."""
+    """Return friction [N] at speeds [m/s] in directions from -1 to 1, each of shape (n,).
+
+    It changes gradually from one direction to the other; the constant force is left out.
+    """
     from friso.frequency.friction import steady_force  # brings SymPy along
 
     forward, backward = (steady_force(flat, speed, forwards) for forwards in (True, False))

@@ -53,10 +53,11 @@ def _binned(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def spread_of(jacobian: np.ndarray, residual: np.ndarray, groups: Sequence[np.ndarray] = ()) -> np.ndarray:
-    """Return the covariance of fitted parameters, (p, p), from Jacobian (n, p) and residual (n,).
+    """Return the covariance of fitted parameters, (p, p).
 
-    Errors need be neither equal nor independent: Newey, West 1987, doi:10.2307/1913610, with a window as long as the
-    residuals, or their products with a column, stay correlated.
+    The Jacobian has the shape (n, p), the residual (n,). Errors need be neither equal nor independent: Newey, West
+    1987, doi:10.2307/1913610, with a window as long as the residuals, or their products with a column, stay
+    correlated.
 
     Errors may also be alike within each of some `groups` (Cameron, Miller 2015, doi:10.3368/jhr.50.2.317), numbers of
     shape (n,): each parameter has the largest of the resulting deviations, widened by Student's t for the number of

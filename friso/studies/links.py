@@ -39,7 +39,10 @@ _ARGUMENTS = {"min": 2, "max": 2, "sqrt": 1, "abs": 1}
 
 
 def names(links: Mapping[str, str]) -> frozenset[str]:
-    """Every name that the expressions use. Raises InputError."""
+    """Return every name that the expressions of links use.
+
+    Raises InputError.
+    """
     trees = [_parsed(key, text) for key, text in links.items()]
     called = {id(node.func) for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)}
     keys = set()

@@ -33,8 +33,10 @@ force."""
 
 
 def scaled(flat: Mapping[str, Any], columns: Mapping[str, np.ndarray], links: Mapping[str, str]) -> dict[str, Any]:
-    """Stages, given as flat keys, multiplied by the factors of the scalings among the columns; a name that links use is
-    a free one. Raises InputError where a stage has nothing to scale."""
+    """Return stages multiplied by the scaling factors among the columns.
+
+    They are flat keys; a name that links use is a free one. Raises InputError if a stage has nothing to scale.
+    """
     for name, scaling in SCALINGS.items():
         if name in columns and name not in names(links):
             if flat.get(scaling.needs, "none") == "none":

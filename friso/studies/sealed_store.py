@@ -23,8 +23,11 @@ if TYPE_CHECKING:
 
 
 class SealedStore(WrapperStore[LocalStore]):
-    """A store whose files of metadata say what `metadata` does, whatever stands in them: some versions of Zarr read
-    them one by one, others the one that holds them all. Chunks are those that were written, of blocks that are done."""
+    """A store whose metadata are taken from `metadata`, whatever its files say.
+
+    Some versions of Zarr read these files one by one, others the one that holds them all. Chunks are those that were
+    written, of blocks that are done.
+    """
 
     def __init__(self, store: LocalStore, metadata: Metadata) -> None:
         super().__init__(store)
@@ -40,8 +43,10 @@ class SealedStore(WrapperStore[LocalStore]):
         return type(self)(store, self.metadata)
 
     def with_read_only(self, read_only: bool = False) -> SealedStore:
-        """Return the store, for reading alone or not;
-        Zarr before 3.1.6 lacks this for a store of this kind."""
+        """Return the store, for reading alone or not.
+
+        Zarr before 3.1.6 lacks this for a store of this kind.
+        """
         return self._with_store(self._store.with_read_only(read_only))
 
     async def get(self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None) -> Buffer | None:

@@ -74,10 +74,10 @@ class Store:
     @classmethod
     @contextmanager
     def opened(cls, path: Path, study: Study, overwrite: bool = False) -> Iterator[Store]:
-        """Return the store of a study, made if it is not there;
-        with `overwrite` in place of that of another study, or of a damaged one.
+        """Return the store of a study, created if it is not there.
 
-        Raises StoreError if the folder holds anything else, another study, or is in use by another process.
+        With `overwrite` it replaces the store of another study, or a damaged one. Raises StoreError if the folder
+        holds anything else, another study, or is in use by another process.
         """
         remove_leftovers(path)
         path = where_links_lead(path)
@@ -96,7 +96,7 @@ class Store:
             yield store
 
     def _replace(self) -> None:
-        """Put this study in place of the store that is there, unless it is that of this study already."""
+        """Put this study in place of the store that is there, unless it is this study's already."""
         with lock_store(self.path) as lock:
             try:
                 refuse_other(self.path, self.study)
@@ -165,8 +165,10 @@ class Store:
                 yield block
 
     def done(self) -> list[str]:
-        """Return the numbers of the blocks that are done. Only what is there is counted:
-        a store may state any size."""
+        """Return the numbers of the blocks that are done.
+
+        Only files that are there count, since a store may state any size.
+        """
         return [number for number in self.ledger.entered() if self._is_of_block(number)]
 
     @property
@@ -303,8 +305,10 @@ class StoreState:
 
 
 def check_store(path: Path) -> StoreState:
-    """Read all of the store at `path` and compare it with its digests. Raises StoreError where its metadata or axes
-    are damaged, or there is none."""
+    """Read all of the store at `path` and compare it with its digests.
+
+    Raises StoreError if its metadata or axes are damaged, or there is none.
+    """
     return Store(path, study_of(read_store(path))).state()
 
 
@@ -318,8 +322,10 @@ def holds_all(path: Path, study: Study) -> bool:
 
 
 def in_memory(runs: xr.Dataset) -> xr.Dataset:
-    """Return the study of an opened store in memory, each text once: as stored,
-    a status takes a hundred times the room."""
+    """Return the study of an opened store in memory, with each text once.
+
+    As stored, a status takes a hundred times the room.
+    """
     words = [name for name in every_variable() if name in runs and is_text(name)]
     loaded = runs.drop_vars(words).load()
     return loaded.assign({name: (runs[name].dims, _shared(runs[name]), runs[name].attrs) for name in words})

@@ -29,14 +29,19 @@ MOST_EXPANDED = 1 << 30
 
 
 def stored(file: Path) -> bytes:
-    """Read a file of a store. Raises OSError, also for a link, a device,
-    a pipe and more than MOST_BYTES."""
+    """Read a file of a store.
+
+    Raises OSError, also for a link, a device, a pipe and more than MOST_BYTES.
+    """
     return content_of(file, MOST_BYTES, follow=False)
 
 
 def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
-    """Return the SHA-256 of a file of a store, or beside it; None where there is none, no file,
-    or one of more than `most` bytes. Raises PermissionError where it cannot be read, which does not tell of damage."""
+    """Return the SHA-256 of a file of a store, or beside it; None if there is none.
+
+    It is also None for what is no file, or has more than `most` bytes. Raises PermissionError if it cannot be read,
+    which does not mean that it is damaged.
+    """
     try:
         return hashlib.sha256(content_of(file, most, follow=False)).hexdigest()
     except PermissionError:
@@ -46,8 +51,11 @@ def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
 
 
 def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[str, np.ndarray] | None:
-    """Return the arrays that `keep_arrays` wrote into this file `about` the same;
-    None where they are damaged, another's, or of more than `most` bytes, of which none is expanded then."""
+    """Return the arrays that `keep_arrays` wrote into a file.
+
+    None if they are damaged, are `about` something else, or have more than `most` bytes, of which none is expanded
+    then.
+    """
     try:
         content = stored(file)
         digest, archive = content[:_DIGEST], io.BytesIO(content[_DIGEST:])
@@ -83,7 +91,10 @@ def _digest(file: Path, about: str, content: bytes) -> bytes:
 
 
 def put(file: Path, content: bytes) -> None:
-    """Write a file of a store, whole or not at all, for whom the user lets read files. Raises OSError."""
+    """Write a file of a store, whole or not at all, readable for whom the user allows.
+
+    Raises OSError.
+    """
     with whole_file(file) as stream:
         stream.write(content)
 
@@ -133,8 +144,10 @@ def refuse_foreign(path: Path, files: Collection[str]) -> None:
 
 
 def _entries(folder: Path | str, levels: int = 2) -> Iterator[os.DirEntry[str]]:
-    """Yield all that is in a folder and in those below it, as deep as a store has files,
-    each folder before what is in it; no link is followed."""
+    """Yield all entries of a folder and of those below it, each folder before its content.
+
+    They go as deep as a store has files; no link is followed.
+    """
     with os.scandir(folder) as entries:
         for entry in entries:
             yield entry

@@ -36,8 +36,10 @@ class ReadOnlyStoreError(StoreError):
 
 
 def where_links_lead(path: Path) -> Path:
-    """Return where a store is: what is made aside, and what is replaced, is there,
-    not at a link to it. Raises StoreError for a link that leads nowhere, as to a disk that is missing."""
+    """Return the real place of a store, where files are made and replaced, not a link to it.
+
+    Raises StoreError for a link that leads nowhere, as to a disk that is missing.
+    """
     if path.is_symlink() and not path.exists():
         actual = f"a link to {os.path.realpath(path)}, where nothing is"
         raise StoreError("", actual, "a store, or a new name", "--out study.zarr", str(path))
@@ -60,7 +62,7 @@ def make(path: Path, fill: Callable[[Path], object]) -> None:
 
 
 def refuse_others_files(path: Path) -> None:
-    """Refuse a store that has anything in its folder that no store has: it would go with the store.
+    """Refuse to replace a store whose folder holds other files: they would go with it.
 
     Raises:
         StoreError: naming the first of what friso did not write.
@@ -79,8 +81,11 @@ def refuse_others_files(path: Path) -> None:
 
 
 def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None:
-    """Put what `fill` writes in place of the store at `path`, whose lock is held, and which is deleted once that stands
-    there. Raises OSError, with the store as it was. Ctrl-C waits until one of the two stands there."""
+    """Replace the store at `path` by what `fill` writes.
+
+    Its lock is held, and it is deleted once the new one is in place. Raises OSError, with the store as it was. Ctrl-C
+    waits until one of the two is there.
+    """
     with _made_aside(path, fill) as new, hold_interrupts():
         old = _free_name(path, _OLD)
         if not MOVES_OPEN_FOLDERS:
@@ -95,8 +100,11 @@ def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None
 
 
 def remove_leftovers(path: Path) -> None:
-    """Remove what killed processes left beside the store at `path`, or put it back where it was being replaced:
-    nobody holds their lock. Raises OSError where it cannot be put back."""
+    """Remove what killed processes left beside the store at `path`.
+
+    A store that was being replaced is put back. Nobody holds the lock of such leftovers. Raises OSError if it cannot
+    be put back.
+    """
     path = Path(os.path.realpath(path))
     for old in path.parent.glob(f".{escape(path.name)}.{_DIGITS}{_OLD}"):
         if path.exists():
@@ -109,8 +117,10 @@ def remove_leftovers(path: Path) -> None:
 
 
 def remove_partial_files(path: Path) -> None:
-    """Remove files that were being written when their process was killed, from a store that is locked: whoever writes
-    into it holds the lock."""
+    """Remove files from a locked store that a killed process was writing.
+
+    Whoever writes into a store holds its lock.
+    """
     for file in (*path.glob(f"*{PARTIAL}"), *path.glob(f"*/*{PARTIAL}")):
         if is_partial(file) and file.is_file():
             delete_file(file)
@@ -118,8 +128,10 @@ def remove_partial_files(path: Path) -> None:
 
 @contextmanager
 def lock_store(path: Path, patience: float = 0.0) -> Iterator[FileLock]:
-    """Keep other processes out of a store; the lock. Raises StoreError if one is in, and still so after `patience`
-    [s], ReadOnlyStoreError where nothing can be written."""
+    """Keep other processes out of a store; return the lock.
+
+    Raises StoreError if another one is in it after `patience` [s], ReadOnlyStoreError if nothing can be written.
+    """
     lock = FileLock(path / LOCK)
     try:
         lock.acquire(timeout=patience)
@@ -137,8 +149,10 @@ def lock_store(path: Path, patience: float = 0.0) -> Iterator[FileLock]:
 
 @contextmanager
 def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
-    """Return what `fill` has written, to be moved away. Ctrl-C waits for its end:
-    else the threads of Zarr would go on writing into what is deleted here."""
+    """Return what `fill` has written, to be moved away.
+
+    Ctrl-C waits for its end: otherwise the threads of Zarr would go on writing into what is deleted here.
+    """
     draft = _free_name(path)
     try:
         draft.mkdir(mode=DRAFT_MODE, parents=True)

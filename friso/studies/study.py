@@ -98,8 +98,10 @@ class Study:
         }
 
     def block_shape(self, target: int) -> tuple[int, ...]:
-        """Return the shape of blocks of about `target` cells: whole trailing dimensions,
-        an equal share of the one before."""
+        """Return the shape of blocks of about `target` cells.
+
+        They have whole trailing dimensions, and an equal share of the one before.
+        """
         shape = [1] * len(self.shape)
         for i in reversed(range(len(shape))):
             room = max(1, target // math.prod(shape))
@@ -116,7 +118,9 @@ class Study:
 
     def cell_stage(self, index: Sequence[int]) -> Stage:
         """Return the stage of one cell, which run alone gives the same numbers.
-        Raises InputError for an invalid cell."""
+
+        Raises InputError for an invalid cell.
+        """
         columns = self.columns(np.array([np.ravel_multi_index(tuple(index), self.shape)]))
         numeric = {axis.name: axis for axis in self.axes if axis.numeric}
         words = {name: column[0].item() for name, column in columns.items() if name not in numeric}
@@ -147,8 +151,7 @@ class Study:
         return coordinates
 
     def attributes(self) -> dict[str, Any]:
-        """Return the attributes stored with the results,
-        so that any cell can be run again on its own."""
+        """Return the attributes stored with results, so that any cell can be run again alone."""
         return {
             "name": self.stage.name,
             "stage": self.stage.to_toml(),
@@ -166,7 +169,10 @@ class Study:
         return ", ".join(" with ".join(axis.name for axis in dimension.axes) for dimension in self.dimensions)
 
     def differences(self, other: Study, its_equations: str) -> list[str]:
-        """Differences between a stored study (`other`, made by `its_equations`) and this one, in words."""
+        """Return in words how a stored study, `other`, differs from this one.
+
+        It was made by `its_equations`.
+        """
         differences = _stage_differences(self.stage, other.stage)
         if its_equations != equations_version():
             differences.append(f"version of the equations: {its_equations} there, {equations_version()} here")

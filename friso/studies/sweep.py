@@ -78,7 +78,10 @@ def sweep(
 def run_in_memory(
     studies: Sequence[Study], crew: Crew, verify: float = 0.0, progress: Progress = silent
 ) -> list[xr.Dataset]:
-    """Run studies side by side (refined ones one by one), verify a share of each; their results as datasets."""
+    """Run studies side by side, verify a share of each, and return them as datasets.
+
+    Refined studies are run one by one.
+    """
     tally = Tally(progress, sum(study.cells for study in studies))
     refined = {id(study): _refined(study, crew, tally) for study in studies if study.refined}
     columns = [
@@ -97,8 +100,10 @@ def run_in_memory(
 
 
 def run_in_store(study: Study, path: Path, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:
-    """Run what a store lacks of its study, made if it is not there, and verify a share; the opened store. Raises
-    InputError."""
+    """Run the missing blocks of a study's store, verify a share, and return the opened store.
+
+    It is created if it is not there. Raises InputError.
+    """
     with Store.opened(path, study) as store:
         return fill(store, crew, verify, progress)
 
@@ -124,8 +129,10 @@ def fill(store: Store, crew: Crew, verify: float = 0.0, progress: Progress = sil
 
 
 def _refined(study: Study, crew: Crew, tally: Tally, keeping: Callable[[Ask], Ask] = lambda ask: ask) -> Columns:
-    """Return the measures of a refined study, each of its shape;
-    `keeping` may keep the answers of a resumed one."""
+    """Return the measures of a refined study, each of its shape.
+
+    `keeping` may keep the answers of a resumed study.
+    """
     everything = asked_for(study)
 
     def ask(cells: np.ndarray) -> Columns:

@@ -37,7 +37,9 @@ class Traces:
 
 def traces(study: Study, skipped: np.ndarray | None = None, progress: Progress = silent) -> Traces:
     """Return the runs of all cells of a study once more, at its tolerance.
-    Cells that no stage may have, and those `skipped`, shape (cells,), are NaN throughout."""
+
+    Cells that no stage may have, and those `skipped`, shape (cells,), are NaN throughout.
+    """
     settings = StudySettings.current()
     columns = study.columns(np.arange(study.cells))
     parts = list(by_words(study.stage, study.links, columns))
@@ -62,8 +64,7 @@ def traces(study: Study, skipped: np.ndarray | None = None, progress: Progress =
 
 
 def _references(flat: Mapping[str, Any], time: np.ndarray) -> Callable[[int], np.ndarray]:
-    """Return the reference [m] at the times of the run with a number: the same for all,
-    as a rule."""
+    """Return the reference [m] at the times of a numbered run; usually all have the same."""
     moved = {key: value for key, value in flat.items() if key.startswith("motion.")}
     if not any(np.ndim(value) for value in moved.values()):
         reference = motion.reference(moved, time)
@@ -80,8 +81,10 @@ def _deviation(position: np.ndarray, reference: np.ndarray) -> np.ndarray:
 
 
 def _extremes(values: np.ndarray) -> np.ndarray:
-    """Return the least and the largest value of each piece, as they follow each other;
-    NaN where a piece is not complete."""
+    """Return the least and the largest value of each piece, in their order.
+
+    NaN if a piece is not complete.
+    """
     settings = StudySettings.current()
     pieces = values.reshape(settings.trace_bins, settings.samples_per_bin)
     places = np.sort(np.stack([pieces.argmin(axis=1), pieces.argmax(axis=1)], axis=1), axis=1)

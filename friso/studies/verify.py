@@ -34,11 +34,11 @@ def checked_share(share: float) -> float:
 
 
 def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[str, Any]:
-    """Run a share of the cells again at rtol/100; attributes with the share of outcomes that survived.
+    """Run a share of the cells again at rtol/100; return attributes with the share that survived.
 
-    The same cells for the same study. Of a refined map cells that were inferred are run too, and counted apart
+    The cells are the same for the same study. Of a refined map, inferred cells are run too, and counted apart
     (inferred_checked, inferred_confirmed). Invalid and failed cells have no outcome that could survive; nothing is
-    stated where there are no others, no share was asked for, or the attributes of the runs state it.
+    stated if there are no others, no share was asked for, or the attributes of the runs state it.
     """
     settings = StudySettings.current()
     if (
@@ -67,8 +67,10 @@ def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> di
 
 
 def check_verified(attributes: Mapping[str, Any], cells: int) -> None:
-    """Raises ValueError, TypeError or KeyError for attributes that `verify_cells` never gives a study of so many cells:
-    a store may be of others."""
+    """Check attributes of a store, which others may have written.
+
+    Raises ValueError, TypeError or KeyError for attributes that `verify_cells` never gives a study of so many cells.
+    """
     for checked, same in (("verified_cells", "verified_surviving"), ("inferred_checked", "inferred_confirmed")):
         if checked in attributes and not 0 <= index(attributes[same]) <= index(attributes[checked]) <= cells:
             raise ValueError(f"{checked} is no number of cells")
@@ -104,7 +106,10 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
 
 
 def random_cells(study: Study, count: int, condition: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Up to `count` numbers of different cells for which `condition` holds, drawn evenly, rising; always the same."""
+    """Return up to `count` numbers of cells for which `condition` holds, ascending.
+
+    They are drawn evenly, and always the same.
+    """
     rng = np.random.default_rng(0)
     if study.cells <= 8 * count:
         order = rng.permutation(study.cells)
@@ -119,8 +124,7 @@ def random_cells(study: Study, count: int, condition: Callable[[np.ndarray], np.
 
 
 def _at(values: xr.DataArray, study: Study, cells: np.ndarray) -> np.ndarray:
-    """Return the values of single cells, of which a store reads those blocks only that they lie
-    in."""
+    """Return the values of single cells; a store reads only the blocks that contain them."""
     import xarray as xr
 
     places = np.unravel_index(cells, study.shape)

@@ -187,8 +187,10 @@ class Cascade(ControllerSection):
 
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: CascadeTerms) -> sp.Expr:
-        """Return the force on a stage that is displaced quickly [N/m]:
-        the integral of its velocity is its displacement."""
+        """Return the force on a stage that is displaced quickly [N/m].
+
+        The integral of its velocity is its displacement.
+        """
         rate = blocks.key("kv") if variant.proportional_on == "error" else 0
         rate = rate + (1 / blocks.key("velocity_integral_time") if variant.velocity_integral else 0)
         return blocks.key("kp") * rate

@@ -39,7 +39,7 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
 
 
 def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramps: Ramps) -> float | None:
-    """Return the friction [N] at which motions begin, if it exceeds the interval of static friction."""
+    """Return the friction [N] at which motions begin, if it exceeds static friction's interval."""
     static = determined.get("friction.static")
     sides = [side for _, side in by_direction(ramps.directions)]
     if static is None or len(ramps.forces) < ReadingSettings.current().fewest_ramps:

@@ -86,7 +86,10 @@ def changing_forces(
 
 
 def changes_beside(inverse: InverseModel) -> RecordDrift | None:
-    """Return what changes during the record of an inverse model with one friction for both directions."""
+    """Return what changes during the record of an inverse model.
+
+    The model has one friction for both directions.
+    """
     share = (inverse.time - inverse.time[0]) / np.ptp(inverse.time)
     counted = np.ones(len(share))
     bends = _bends(share, counted)

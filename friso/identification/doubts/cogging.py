@@ -14,7 +14,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name a force that differs along the way, and its pitch, if it explains most of what is left."""
+    """Name a force that differs along the way, and its pitch, if it explains most of the rest."""
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "cogging" or case.quality.failed or case.quality.rejected:
         return

@@ -32,7 +32,7 @@ class Half:
 
 
 def find(case: ValueCase) -> Iterator[RaisedDoubt]:
-    """Compare the inverse models of both halves of the record, if the whole model lacks something."""
+    """Compare inverse models of both halves of the record, if the whole model lacks something."""
     for one in halves(case.inverse) if case.lacks else ():
         unit = case.inverse.estimate(one.name).unit
         values = f"{one.first:.4g} and {one.second:.4g} {unit}"

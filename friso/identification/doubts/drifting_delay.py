@@ -15,7 +15,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name the delays at beginning and end, if a changing delay explains more than a constant one."""
+    """Name the delays at beginning and end, if a changing delay explains more than one."""
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "drifting-delay" or case.quality.failed or case.quality.rejected:
         return

@@ -18,7 +18,7 @@ EITHER = ("friction.viscous_asymmetry", "bias.cart", "bias.stage")
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Fit forward and backward motion separately, if the fit to both does not explain the record.
+    """Fit forward and backward motion separately, if the fit to both does not explain them.
 
     The model has one static friction, one Stribeck velocity and one set of bristles for both. If these differ, the fit
     to both need not lie between them. Deviations are widened to reach both results, beyond chance. If the model lacks

@@ -61,11 +61,11 @@ def fed_forward(case: RecordCase) -> tuple[InverseModel, np.ndarray] | None:
 
 
 def lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:
-    """Tell whether a fed-forward force [N], (rows,), is missing where the stage is fast, in both halves.
+    """Tell whether feedforward [N], (rows,), is missing from the force while the stage is fast.
 
-    If a servo follows well, the reference's acceleration differs from the measured one by the effects of friction at
-    low speed and of sticking. It can stand in for these where the inverse model lacks them, but not where the stage
-    slides.
+    It has to be missing in both halves of these rows. If a servo follows well, the reference's acceleration differs
+    from the measured one by the effects of friction at low speed and of sticking. It can stand in for these where the
+    inverse model lacks them, but not where the stage slides.
     """
     settings, speed = DoubtSettings.current(), np.abs(inverse.columns[:, 1])
     fast = np.flatnonzero(speed > settings.speed_share_of_a_fast_stage * speed.max())

@@ -17,7 +17,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Search for the shift of the force in time, and the average of force or motion, that fit best.
+    """Search for the shift of the force, and the average of force or motion, that fit best.
 
     Shifts and averages double from one to the next, and the best of them is refined once to both sides.
     """

@@ -46,7 +46,7 @@ def _stated_exponent(prior: Prior) -> float | None:
 
 
 def _estimates(result: FrictionAtSpeeds, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return friction in both directions, in the order of its covariance, and the constant force.
+    """Return friction in both directions, and the constant force, in the covariance's order.
 
     An exponent that the stage states is not included.
     """

@@ -77,7 +77,7 @@ def _of_stage_alone(mass: float, stage: Stage) -> bool:
 
 
 def _parasitic(model: TwoMass, stage: Stage) -> float | None:
-    """Return a resonance [Hz] that is the stage's parasitic mode instead of its joint's; else None."""
+    """Return a resonance [Hz] that is the stage's parasitic mode, not its joint's; else None."""
     flat = stage.flat()
     if "parasitic.frequency" not in flat or "joint.stiffness" not in flat:
         return None

@@ -50,7 +50,7 @@ def _claims(course: Course) -> str | None:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> IdentifiedMoves:
-    """Analyse a log of moves, in the machine's own loop if the user gave a stage and a reference.
+    """Analyse a log of moves, in the machine's own loop if the user gave stage and reference.
 
     Results of other experiments are taken into account.
     """

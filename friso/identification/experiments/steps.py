@@ -100,7 +100,10 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
 
 
 def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
-    """Find stretches of a segment with a constant reference, or position, long enough to average."""
+    """Find stretches of a segment at a constant place that are long enough to average.
+
+    The reference decides, or the position without one.
+    """
     least = int(np.ceil(4 / (cutoff * log.sample_time)))
     if part.stop - part.start < 2 * least:
         return []

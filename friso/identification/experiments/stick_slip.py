@@ -128,7 +128,10 @@ def _deflection(log: Log, cutoff: float) -> np.ndarray | None:
 
 
 def _actuator(log: Log, stage_mass: float, cutoff: float) -> np.ndarray | None:
-    """Return the actuator's force less the stage's inertia [N], low-passed; None if not measured."""
+    """Return the actuator's force less the stage's inertia [N], low-passed, or None.
+
+    It is None if the force is not measured.
+    """
     if "force" not in log:
         return None
     force = _smooth(log, channel(log, "force"), cutoff)

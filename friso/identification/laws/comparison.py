@@ -70,7 +70,10 @@ class LawComparison:
 
     @property
     def supported(self) -> tuple[LawPrediction, ...]:
-        """Return the laws that predict the record about as well as the best; none if none predicts it."""
+        """Return the laws that predict the record about as well as the best.
+
+        There are none if no law predicts it.
+        """
         settings = LawSettings.current()
         best = self.predictions[0]
         if not self.explained:

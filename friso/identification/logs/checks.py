@@ -9,9 +9,9 @@ from friso.identification.logs.settings import LogSettings
 
 
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Return a channel without samples that repeat the stamp [s] and value before, and their count.
+    """Return a channel without samples that repeat the one before, and their count.
 
-    Raises LogError for time that decreases and for another value at the same stamp.
+    They repeat stamp [s] and value. Raises LogError for time that decreases and for another value at the same stamp.
     """
     steps = np.diff(time)
     back = np.flatnonzero(steps < 0)

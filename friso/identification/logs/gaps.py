@@ -38,9 +38,10 @@ _INITIALS = {"reference": "rs", "position": "xyqps", "velocity": "v", "force": "
 
 
 class GapsError(LogError):
-    """What logs do not tell: the errors of which any one would stop the reading.
+    """What logs do not say and reading them needs, all in one error.
 
-    Each has the option that mends it as its example. `proposed` are channels for roles, by role.
+    Each of its errors alone would stop the reading, and has the option that mends it as its example. `proposed` holds
+    proposed channels by role.
     """
 
     def __init__(self, gaps: Sequence[LogError], proposed: Mapping[str, str] | None = None) -> None:
@@ -220,7 +221,7 @@ def _kinds(role: str) -> tuple[str, ...]:
 
 
 def _is_of_another(role: str, unit: str) -> bool:
-    """Tell whether a unit belongs to another quantity, which no scale converts: rpm of a position."""
+    """Tell whether a unit belongs to another quantity that no scale converts: rpm of a position."""
     others = {"Hz", *ROLES.values(), *map(ROTARY.unit, ROLES.values())} - {*_kinds(role)}
     return bool(unit) and any(unit_factor(unit, kind) is not None for kind in others)
 

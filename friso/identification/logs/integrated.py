@@ -43,7 +43,10 @@ def is_needed(
 
 
 def _may_be_a_position(channel: Channel) -> bool:
-    """Tell whether a channel may be a position: no role yet, a fitting unit or none, and it changes."""
+    """Tell whether a channel may be a position.
+
+    It has no role yet, a fitting unit or none, and it changes.
+    """
     finite = channel.values[np.isfinite(channel.values)]
     if not finite.size or not np.ptp(finite) > 0 or role_of(channel.name) is not None or is_ramp(channel):
         return False

@@ -202,9 +202,9 @@ def mapping_text(mapping: Mapping) -> str:
 
 
 def place_for(log: Path, folder: Path) -> Path:
-    """Return where a log's mapping can be kept: beside it, or in the folder if that is read-only.
+    """Return where a log's mapping can be kept: beside it, or in the folder if not.
 
-    A write-protected folder counts as such even for a superuser.
+    It cannot be kept in a read-only folder, which counts as such even for a superuser.
     """
     beside = sidecar(log)
     writable = os.access(beside.parent, os.W_OK) and beside.parent.stat().st_mode & stat.S_IWUSR

@@ -146,7 +146,7 @@ def _is_symbol(parts: Sequence[str], unit: str) -> bool:
 
 
 def is_wanted(name: str) -> bool:
-    """Tell whether a name says, or hints within a word, that the value was commanded, not measured."""
+    """Tell whether a name says, or hints, that the value was commanded, not measured."""
     return any(word in (name.lower() if len(word) > 2 else words(name)) for word in _SET)
 
 

@@ -213,9 +213,9 @@ def _span(values: np.ndarray) -> str:
 
 
 def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading, notes: Notes) -> np.ndarray | None:
-    """Return the instants of a channel [s] from the user's sample time, a time channel, or the file.
+    """Return the instants of a channel [s].
 
-    None if there are none. Raises LogError.
+    They come from the user's sample time, a time channel, or the file. None if there are none. Raises LogError.
     """
     channel = choice.channel
     if reading.mapping.sample_time is not None:
@@ -250,9 +250,9 @@ def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
 
 
 def _likely_unit(clock: Channel) -> tuple[str, str]:
-    """Return the unit in which a time channel's steps are typical of logs, with the step in words.
+    """Return the unit in which a time channel's steps are typical of logs, and the step.
 
-    Typical steps are between 0.1 ms and 100 ms.
+    The step is in words. Typical steps are between 0.1 ms and 100 ms.
     """
     steps = np.diff(clock.values)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0

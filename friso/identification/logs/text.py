@@ -112,7 +112,7 @@ class _WithoutDosEnd:
 
 
 def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
-    """Return the error for the first line with too many cells, or for an unclosed quotation mark.
+    """Return the error for a line with too many cells, or an unclosed quotation mark.
 
     It has the parser's own words if there is neither.
     """

@@ -173,7 +173,7 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
 
 
 def nearby(fit: OutputErrorFit) -> np.ndarray:
-    """Draw starts that another problem's fit allows, (starts, parameters), beginning with that fit.
+    """Draw starts that another problem's fit allows, (starts, parameters); the fit is first.
 
     They are drawn from its covariance, several times as wide: the loop of a stage that hunts has optima of its own.
     """

@@ -147,10 +147,11 @@ class Problem:
         return [(at[row], slopes[owner == row].T) for row in range(len(inner))]
 
     def linearised(self, inner: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residual of fitted numbers, (parameters,), and its derivatives to the `free` ones.
+        """Return the residual of fitted numbers, (parameters,), and its derivatives.
 
-        The derivatives have the shape (n, free). At each sample the smaller one of the differences to both sides
-        counts: a break-away that a step just causes, or prevents, appears on one side only and is no derivative.
+        The derivatives, to the `free` numbers, have the shape (n, free). At each sample the smaller one of the
+        differences to both sides counts: a break-away that a step just causes, or prevents, appears on one side only
+        and is no derivative.
         """
         numbers = np.flatnonzero(free)
         ahead = np.array([self._step(inner, int(i)) for i in numbers])

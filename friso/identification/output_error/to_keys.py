@@ -132,9 +132,7 @@ def _keys_at(fit: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
 
 
 def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
-    """Return the keys of the stage file, and their derivatives to the fitted numbers, shape
-    (keys, parameters).
-    """
+    """Return the stage-file keys, and their derivatives to fitted numbers, (keys, parameters)."""
     at = _keys_at(fit, fit.inner)
     step = 1e-6
     moved = [_keys_at(fit, fit.inner + step * row) for row in np.eye(len(fit.inner))]

@@ -118,7 +118,7 @@ def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the deviation of the mean, and its degrees of freedom, from how realisations differ."""
+    """Return the deviation of the mean, and its degrees of freedom, over realisations."""
     settings = ResponseSettings.current()
     outputs, inputs = _relative(records, excited)
     count = len(records)

@@ -196,7 +196,7 @@ def options(
 
 
 def _faster(stage: Stage, situation: Situation) -> Variant:
-    """Return a stage with the highest bandwidth at which the machine of the file keeps its margin.
+    """Return a stage with the highest bandwidth at which the file's machine keeps its margin.
 
     It lies below the limit of the bandwidth. An engineer tunes one machine, and all others get its settings. Raises
     UnavailableError if it is that fast already.

@@ -176,7 +176,10 @@ def compared(
 
 
 def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[MeasuredChange]:
-    """Yield area and stiffness of slow loops under both laws, at shares of break-away's deflection."""
+    """Yield area and stiffness of slow loops under both laws, at shares of break-away.
+
+    The shares are of the deflection of break-away.
+    """
     settings = StudySettings.current()
     deflection, speed = before.levels.static / before.stiffness, settings.loop_speed * before.levels.stribeck_velocity
     for share in settings.loop_amplitudes:

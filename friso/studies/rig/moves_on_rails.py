@@ -174,7 +174,7 @@ class RailRuns:
         return self.peaks > 0
 
     def shaped(self, *shape: int) -> RailRuns:
-        """With arrays of another shape."""
+        """Return the same results with arrays of another shape."""
         return RailRuns(**{entry.name: getattr(self, entry.name).reshape(shape) for entry in fields(self)})
 
     def share(self, which: Any = ...) -> Share:

@@ -109,6 +109,9 @@ def quicker(stage: Stage, factors: Any) -> dict[str, Any]:
 
 
 def interval(stage: Stage, length: float) -> float:
-    """Time between the samples of a log [s]: at most `length`, a whole number of the drive's samples."""
+    """Return the time between samples of a log [s], at most `length`.
+
+    It is a whole number of the drive's samples.
+    """
     step = as_built_keys(stage)["drive.sample_time"]
     return max(1, int(length / step * (1 + 1e-9))) * step

@@ -52,13 +52,15 @@ class Slow:
 
 
 def slow_sliding(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[Slow, ...]:
-    """Slow sliding of a stage whose joint is locked, or which has none, after the logs of its passes at many speeds."""
+    """Run slow sliding of a stage with a locked joint or none, after passes at many speeds."""
     return tuple(Slow(log, _analysed(log), _true(log)) for log in slow_sliding_logs(stage, passed, seed))
 
 
 def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[RigLog, ...]:
-    """Return the logs, one for each place; none where the friction has no bristles and Stribeck
-    curve, or no loop was stable."""
+    """Return logs of slow sliding, one for each place.
+
+    There are none if friction has no bristles and Stribeck curve, or no loop was stable.
+    """
     speeds, quick = _edge(passed), passed[0].stage
     falling_bristles = {"friction.bristle_stiffness", "friction.stribeck_velocity"} <= quick.flat().keys()
     if not falling_bristles or all(run_passes.failure for run_passes in passed):

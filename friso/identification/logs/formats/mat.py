@@ -114,7 +114,10 @@ def _dspace(node: dict[str, Any], name: str) -> list[Channel]:
 
 
 def _with_time(node: dict[str, Any], name: str, walk: _Contents) -> list[Channel]:
-    """Return the channels of Simulink's structure with time, `signals(i).values` over `time` [s]."""
+    """Return the channels of Simulink's structure with time.
+
+    They are `signals(i).values` over `time` [s].
+    """
     time = np.squeeze(np.asarray(node["time"], dtype=float))
     out = []
     for i, curve in enumerate(_structures(node["signals"])):

@@ -38,7 +38,7 @@ def is_uff(head: bytes) -> bool:
 
 
 def sets_58(path: Path) -> list[dict[str, Any]]:
-    """Return the datasets 58 of a universal file, each with the code of its units (`units_code`).
+    """Return the datasets 58 of a universal file, each with its code of units (`units_code`).
 
     Raises LogError for none.
     """
