@@ -10,8 +10,9 @@ _LONGEST = 1200
 
 
 class InputError(ValueError):
-    """A wrong input: which key, what was given, what was expected, a correct example, and which file; and what `also`
-    is wrong in the same file, as pairs of key and what was given.
+    """A wrong input: which key, what was given, what was expected, an example, and which file.
+
+    `also` tells what else is wrong in the same file, as pairs of key and what was given.
 
     Examples
     --------

@@ -17,15 +17,15 @@ from importlib.resources import files
 
 @dataclass(frozen=True)
 class Entry:
-    """A finding: what it is (`about`), its `values` by name (the unit in the name's suffix), and the `command` that
-    computes them.
+    """A finding: its subject, its values, and the command that computes them.
+
+    `about` says what it is, `values` stand by name (the unit in the name's suffix), and `command` computes them.
 
     `computed` is the day, `equations` the revision of the equations (of `evidence.toml`) it was computed with, and
     `code` the digest (`benchmarks.code_digest`) of the modules that it `rests_on` besides: criteria, methods and
     experiments, as paths of folders and files from the package friso (an empty `code`: it was computed before there
-    were digests).
-    `stated` holds, per document of the repository, the phrases that state the finding there. `note` says where the
-    values come from when the command did not write them itself.
+    were digests). `stated` holds, per document of the repository, the phrases that state the finding there. `note`
+    says where the values come from when the command did not write them itself.
     """
 
     name: str

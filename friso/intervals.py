@@ -65,8 +65,11 @@ class Interval:
 
 
 class UncertainValue(Value):
-    """The centre of an uncertain quantity (of a range over orders of magnitude, its geometric mean); `interval` is the
-    range of a ".." or the 95 % interval of a "+/-"."""
+    """The centre of an uncertain quantity, and its `interval`.
+
+    The centre of a range over orders of magnitude is its geometric mean. `interval` is the range of a ".." or the 95 %
+    interval of a "+/-".
+    """
 
     interval: Interval
 

@@ -132,3 +132,22 @@ def test_the_public_list(name: str) -> None:
         assert ">>>" in text
         arguments = set(inspect.signature(value).parameters) - COMMON
         assert {argument for argument in arguments if not re.search(rf"\b{argument}\b", text)} == set()
+
+
+def whole(body: list[ast.stmt], place: str) -> Iterator[tuple[str, str]]:
+    """Yield place and docstring of every function and class, the private and the inner ones too."""
+    for node in body:
+        if isinstance(node, ast.ClassDef | ast.FunctionDef):
+            yield f"{place}: {node.name}", ast.get_docstring(node) or ""
+            yield from whole(node.body, f"{place}: {node.name}")
+
+
+def test_a_docstring_begins_with_a_line_of_its_own() -> None:
+    """A first sentence that runs over the line says too much at once, and tools show the line alone."""
+    texts = [
+        entry
+        for path in sorted(PACKAGES[0].rglob("*.py"))
+        for entry in whole(ast.parse(path.read_text(encoding="utf-8")).body, str(path.relative_to(PACKAGES[0])))
+    ]
+    assert len(texts) > 5000
+    assert [place for place, text in texts if text.partition("\n")[2][:1] not in ("", "\n")] == []

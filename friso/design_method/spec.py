@@ -179,8 +179,11 @@ class Position(Section):
 
 
 class Load(Section):
-    """What the joint carries at the leaf ends: forces along the leaves (besides the weight of the stage) and along
-    their width, moments about all axes; and how stiff it has to be along leaves and width at full stroke."""
+    """What the joint carries at the leaf ends, and how stiff it has to be.
+
+    Forces along the leaves (besides the weight of the stage) and along their width, moments about all axes; required
+    stiffness along leaves and width at full stroke.
+    """
 
     force_x: Annotated[Value, _FORCE] = Value(0, "0 N")
     force_y: Annotated[Value, _FORCE] = Value(0, "0 N")

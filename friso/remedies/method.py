@@ -476,8 +476,10 @@ class _Session:
         self.outcomes[-1] = unsure or none
 
     def makes_leaves(self) -> None:
-        """Size leaf springs for every joint that works, and verify them; their search is over, so its work does not
-        limit this."""
+        """Size leaf springs for every joint that works, and verify them.
+
+        Their search is over, so its work does not limit this.
+        """
         for one in tuple(self.outcomes):
             if one.remedy.buys_joint and not one.remedy.makes and one.certainty == "works":
                 self._made_of_leaves(one)

@@ -63,8 +63,10 @@ def _settling(dwell: Dwell) -> str:
 
 
 def motion_sentences(stage: Stage) -> list[str]:
-    """Say which peaks the moves of a stage are too short to reach, and that a moving reference begins with a jump;
-    nothing otherwise."""
+    """Say which peaks the moves of a stage are too short to reach.
+
+    Also say that a moving reference begins with a jump; nothing otherwise.
+    """
     flat, kind = stage.flat(), axis_shown()
     jump = float(reference(flat, np.zeros(1))[0]) - float(initial_displacement(flat))
     jumps = [f"The reference begins with a jump of {with_unit(jump, 'm')}."] if jump and not rests(flat) else []

@@ -47,10 +47,10 @@ class Gain(NamedTuple):
 
 
 class ControllerSection(AgainstFriction):
-    """Base of the controllers, each of which declares its keys, `kind: Literal["name"]`, its blocks, and what the house
-    asks of any controller: nobody else asks for its keys.
+    """Base of the controllers: each declares its keys, `kind: Literal["name"]`, and its blocks.
 
-    Several forms of one kind, distinguished by their keys, derive from the class that declares the kind.
+    It also declares everything else that friso asks of a controller; no other module reads its keys. Several forms of
+    one kind, distinguished by their keys, derive from the class that declares the kind.
     """
 
     force_limit: Annotated[Value | None, Quantity("N", positive, "200 N")] = None

@@ -70,8 +70,10 @@ FILTER_ARRAY = TableArray(FILTERS, '[[controller.filters]] kind = "notch", frequ
 
 @FILTERS.register
 class NotchFilter(ContinuousFilter):
-    """(s^2 + (1 - depth) w s + w_0^2)/(s^2 + w s + w_0^2), w being the width between the points at -3 dB of a notch
-    that is as deep as can be."""
+    """A notch: (s^2 + (1 - depth) w s + w_0^2)/(s^2 + w s + w_0^2).
+
+    The width w lies between the points at -3 dB of a notch that is as deep as can be.
+    """
 
     kind: Literal["notch"]
     frequency: Annotated[Value, Quantity("Hz", positive, "300 Hz")]

@@ -41,8 +41,10 @@ class Rows(tuple[Any, ...]):
 
 @dataclass(frozen=True)
 class Several:
-    """A key that takes an array of at least `least` and, if stated, at most `most` values; the examples are theirs.
-    A value `alone` may stand for an array of one."""
+    """A key that takes an array of at least `least` and, if stated, at most `most` values.
+
+    `examples` are such values. A value `alone` may stand for an array of one.
+    """
 
     of: Quantity | Number
     examples: tuple[str, ...]

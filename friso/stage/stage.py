@@ -78,8 +78,9 @@ _MOVES = Table(lambda _: StatedMoves, '[moves] smallest = "10 um", largest = "32
 
 
 class Stage(Section):
-    """A positioning stage with its controller and motion, as a stage file describes them. It does not change;
-    `replace` makes another one.
+    """A positioning stage with its controller and motion, as a stage file describes them.
+
+    It does not change; `replace` makes another one.
 
     Examples
     --------

@@ -41,8 +41,11 @@ MOTOR_CONSTANT = MotorConstant("N/A", positive, "50 N/A")
 
 
 class Actuator(Section):
-    """By what a drive that thinks in amperes moves the machine: forces, also per length or time, may then be written in
-    A, A/mm, A*s/m, ... in every table. How far the true constant is off is drive.motor_constant_ratio."""
+    """What an ampere exerts, for drives whose gains are in amperes.
+
+    Forces, also per length or time, may then be written in A, A/mm, A*s/m, ... in every table. How far the true
+    constant is off is drive.motor_constant_ratio.
+    """
 
     motor_constant: Annotated[Value, MOTOR_CONSTANT]
     """Force of an ampere at the load: of a motor with a screw, its torque of an ampere times 2 pi / lead."""

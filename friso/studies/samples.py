@@ -22,9 +22,10 @@ METHODS = ("sobol", "latin")
 
 @dataclass(frozen=True)
 class Samples:
-    """Samples of the ranges (name to "1 Hz..40 Hz", with ":log" behind it if the points shall be even in the
-    logarithm): `count` points by a method of `METHODS`, the same for the same `seed`. Where `ranges` holds lists or
-    arrays of equal length instead, these are the points.
+    """Samples of ranges: `count` points by a method of `METHODS`, the same for the same `seed`.
+
+    `ranges` are name to "1 Hz..40 Hz", with ":log" behind it if the points shall be even in the logarithm. Lists or
+    arrays of equal length are the points themselves.
 
     Examples
     --------

@@ -25,8 +25,11 @@ CROSSOVER, ALPHA, BETA, TUNED_MASS, LOW_PASS = (
 
 @register_controller
 class VanDijk(Pid):
-    """PID by van Dijk's tuning rules (thesis, Eq. 7, 8): the low-pass comes first, and the three terms act on what it
-    lets through. With `low_pass` on the derivative alone, proportional and integral term act on the error itself."""
+    """PID by van Dijk's tuning rules (thesis, Eq. 7, 8).
+
+    The low-pass comes first, and the three terms act on what it lets through. With `low_pass` on the derivative alone,
+    proportional and integral term act on the error itself.
+    """
 
     crossover: Annotated[Value, Quantity("Hz", positive, "8 Hz")]
     alpha: Annotated[float, Number(inside_0_1, "0.1")]

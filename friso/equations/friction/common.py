@@ -150,8 +150,11 @@ class StribeckCurve(NamedTuple):
 
 
 class StribeckSection(FrictionSection):
-    """The keys of the laws with a Stribeck curve; static and Coulomb friction are larger by the share `asymmetry` when
-    moving forward, and smaller by it when moving back, viscous friction by the share `viscous_asymmetry`."""
+    """The keys of the laws with a Stribeck curve.
+
+    Static and Coulomb friction are larger by the share `asymmetry` when moving forward, and smaller by it when moving
+    back, viscous friction by the share `viscous_asymmetry`.
+    """
 
     static: Annotated[Value, Quantity("N", positive, "3 N")]
     coulomb: Annotated[Value, Quantity("N", positive, "1 N")]

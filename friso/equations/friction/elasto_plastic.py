@@ -39,11 +39,14 @@ BREAKAWAY_BELOW_COULOMB = Rule(
 
 @register_friction
 class ElastoPlastic(StribeckSection):
-    """LuGre bristles that are purely elastic up to a break-away deflection: a load below does not make them drift.
-    z' = v (1 - alpha(z, v) sigma_0 z sgn(v)/g(v)), F = sigma_0 z + sigma_1 z' + sigma_2 v.
+    """LuGre bristles that are purely elastic up to a break-away deflection.
 
-    alpha is 0 while abs(z) < z_ba, or while z and v have opposite signs; from there it rises as half a sine to 1 at the
-    deflection of steady sliding, z_max = g(v)/sigma_0, and stays 1 beyond (Eq. 15 and 16 of the source)."""
+    A load below does not make them drift: z' = v (1 - alpha(z, v) sigma_0 z sgn(v)/g(v)), F = sigma_0 z + sigma_1 z' +
+    sigma_2 v.
+
+    alpha is 0 while abs(z) < z_ba, or while z and v have opposite signs; from there it rises as half a sine to 1 at
+    the deflection of steady sliding, z_max = g(v)/sigma_0, and stays 1 beyond (Eq. 15 and 16 of the source).
+    """
 
     model: Literal["elasto_plastic"]
     bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]

@@ -75,8 +75,11 @@ def _as_many(key: str, what: str, two: str) -> Rule:
 
 @register_friction
 class GeneralisedMaxwellSlip(StribeckSection):
-    """Elements side by side, springs that stick or slip: F_i' = k_i v, or F_i' = C (alpha_i sgn(v) - F_i/s(v));
-    F = sum of F_i + sigma_i z_i' + sigma_2 v, z_i = F_i/k_i being the deflection of an element."""
+    """Elements side by side, springs that stick or slip.
+
+    F_i' = k_i v, or F_i' = C (alpha_i sgn(v) - F_i/s(v)); F = sum of F_i + sigma_i z_i' + sigma_2 v, z_i = F_i/k_i
+    being the deflection of an element.
+    """
 
     model: Literal["gms"]
     element_stiffness: Annotated[Values, Several(Quantity("N/m", positive, "70 N/mm"), ("70 N/mm", "30 N/mm"), 1, MOST)]

@@ -42,8 +42,11 @@ from_1_to_4 = Bound("from 1 to 4", lambda value: (value >= 1) & (value <= 4))
 
 @register_friction
 class Rolling(StribeckSection):
-    """Bristles that give way by a power of what they lack: z' = v r abs(r)^(i - 1), r = 1 - sigma_0 z sgn(v)/g(v),
-    F = sigma_0 z + sigma_1 z' + sigma_2 v, the power rounded at r = 0 (`softening`)."""
+    """Bristles that give way by a power of what they lack.
+
+    z' = v r abs(r)^(i - 1), r = 1 - sigma_0 z sgn(v)/g(v), F = sigma_0 z + sigma_1 z' + sigma_2 v, the power rounded
+    at r = 0 (`softening`).
+    """
 
     model: Literal["rolling"]
     fitted: ClassVar[bool] = True

@@ -157,8 +157,11 @@ _MOST = MotionSettings().most_moves
 
 @register_motion
 class MoveProfile(Motion):
-    """Moves planned as drives do, one after the other with a dwell after each: velocity, acceleration and, where given,
-    jerk and snap stay within their limits; a distance too short for a limit lowers its peak."""
+    """Moves planned as drives do, one after the other with a dwell after each.
+
+    Velocity, acceleration and, if given, jerk and snap stay within their limits; a distance too short for a limit
+    lowers its peak.
+    """
 
     kind: Literal["profile"]
     distance: Annotated[

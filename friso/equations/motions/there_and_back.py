@@ -24,8 +24,10 @@ def _time_there(flat: Mapping[str, Any]) -> Any:
 
 @register_motion
 class ThereAndBack(Motion):
-    """Two equal steps, there and back, each accelerating for acceleration_time and braking likewise; with a
-    cruise_ratio, at constant speed in between for so many times the acceleration_time."""
+    """Two equal steps, there and back, each accelerating for acceleration_time and braking so.
+
+    With a cruise_ratio, at constant speed in between for so many times the acceleration_time.
+    """
 
     kind: Literal["there_and_back"]
     acceleration: Annotated[Value, Quantity("m/s^2", non_negative, "100 m/s^2")]

@@ -8,7 +8,10 @@ def listed_laws() -> list[tuple[str, str]]:
     from friso.stage.tables import friction_law
     from friso.studies.laws.conversion import convertible
 
-    return [(name, (friction_law(name).__doc__ or "").split(":")[0].split("\n")[0]) for name in convertible()]
+    return [
+        (name, (friction_law(name).__doc__ or "").split(":")[0].split("\n")[0].removesuffix("."))
+        for name in convertible()
+    ]
 
 
 QUESTION = Question(

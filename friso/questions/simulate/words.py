@@ -19,10 +19,10 @@ GROWN = 1.1
 def conclusion(
     name: str, measures: Measures, deviation: np.ndarray, moves_on: bool = False, evenly: bool = True
 ) -> str:
-    """Say what the run of a stage does, whose reference stands in the end, or else `moves_on`, at an even velocity
-    or not.
+    """Say what the run of a stage does.
 
-    `deviation` holds samples of its deviation [m], evenly over time, shape (n,).
+    Its reference stands in the end, or else `moves_on`, at an even velocity or not. `deviation` holds samples of its
+    deviation [m], evenly over time, shape (n,).
     """
     before, late = np.split(np.abs(deviation), [int(WINDOW * len(deviation))])
     grows = bool(late.max() > GROWN * before.max(initial=0.0))
