@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import control
 import numpy as np
 import pytest
 from scipy import signal
@@ -70,6 +71,20 @@ def test_the_controller_is_its_transfer_function(transfer: tuple[list[float], li
     by_hand = np.polyval(transfer[0], 1j * OMEGA) / np.polyval(transfer[1], 1j * OMEGA)
     ours = response(controlled(ways(*transfer)[way]).flat(), 1j * OMEGA)
     assert np.abs(ours / by_hand - 1).max() < 1e-9
+
+
+@pytest.mark.parametrize("transfer", TRANSFERS.values(), ids=TRANSFERS)
+def test_loops_are_those_of_python_control(transfer: tuple[list[float], list[float]]) -> None:
+    """Open and closed loop of the mass without friction, by arithmetic on transfer functions."""
+    stage = controlled(ways(*transfer)["coefficients"], friction={"model": "none"})
+    plant = control.tf([1.0], [1.7, 0.0, 0.0])
+    opened = plant * control.tf(*transfer)
+    assert np.abs(friso.linear(stage, part="open")(1j * OMEGA) / opened(1j * OMEGA) - 1).max() < 1e-9
+    closed = friso.linear(stage, part="closed")
+    theirs = control.feedback(opened, 1)
+    at = [closed.output_labels.index("stage"), closed.input_labels.index("reference")]
+    ours = np.array([closed(1j * omega)[tuple(at)] for omega in OMEGA])
+    assert np.abs(ours / theirs(1j * OMEGA) - 1).max() < 1e-6
 
 
 def test_sections_are_factors() -> None:
