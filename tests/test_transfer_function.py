@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy import signal
 from scipy.io import savemat
+from variants import VARIANTS
 
 import friso
 from friso.engine.simulate import simulate
@@ -17,7 +18,10 @@ from friso.frequency.drive import DriveTiming
 from friso.frequency.loops import poles
 from friso.frequency.members import limit_cases
 from friso.frequency.parts import FORCE, REFERENCE, compensator
-from friso.hunting import hunting
+from friso.hunting import cannot_hunt, hunting
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import LAGS
+from friso.hunting.loop import lags
 from friso.shown.motion_words import motion_sentences
 from friso.stage import Stage
 
@@ -183,6 +187,33 @@ def test_a_slow_pole_winds_up_as_an_integral_does(pole: float) -> None:
     (cycle,) = hunting(controlled({"numerator": numerator, "denominator": denominator})).attracting
     assert cycle.amplitude == pytest.approx(157e-6, rel=0.02)
     assert cycle.period == pytest.approx(0.634, rel=0.02)
+
+
+@pytest.mark.inner
+def test_a_lag_that_winds_up_without_an_integral_is_not_surely_calm() -> None:
+    """Two slow poles: "cannot hunt" was told of a stage that simulation shows to hunt."""
+    fast = np.polymul([KD + KP * TAU, KP + KI * TAU, KI], [1.0, 5.0])
+    slow = np.polymul([1.0, 0.02, 0.0002], [TAU, 1.0])
+    half = 2.0 ** np.arange(3, -1, -1)  # C(2 s)/4, half as fast
+    keys = {"numerator": [*map(float, fast * half / 4)], "denominator": [*map(float, slow * half)]}
+    stage = controlled(keys, motion={"kind": "step", "size": "1 mm", "duration": "60 s"})
+    assert friso.simulate(stage).measures.outcome[0] == "swings"
+    verdict = hunting(stage)
+    assert not verdict.certain
+    assert verdict.reason == LAGS
+
+
+@pytest.mark.inner
+@pytest.mark.parametrize("name", [name for name, stage in VARIANTS.items() if cannot_hunt(stage)])
+def test_filters_of_controllers_without_integral_are_no_lags(name: str) -> None:
+    assert not lags(Ensemble.held(VARIANTS[name].flat(), 1)).any()
+
+
+@pytest.mark.inner
+def test_a_filter_that_lags_winds_up() -> None:
+    lag = {"kind": "lead_lag", "zero_frequency": "0.5 Hz", "pole_frequency": "0.005 Hz"}
+    stage = Stage(**{**TABLES, "controller": {**PID, "ki": "0 N/(m*s)", "filters": [lag]}})
+    assert lags(Ensemble.held(stage.flat(), 1)).all()
 
 
 def test_a_verdict_says_that_it_is_on_the_continuous_equivalent() -> None:
