@@ -243,6 +243,10 @@ def test_a_loop_of_samples_is_that_of_the_plant_at_them() -> None:
 
 BAD: dict[str, tuple[dict[str, Any], str]] = {
     "improper": ({"numerator": [1.0, 2.0, 3.0], "denominator": [1.0, 4.0]}, "proper"),
+    "more zeros than poles in z": (
+        {"zeros": [0.5, "0.2+0.1j"], "poles": [0.0, 0.3], "gain": 2e3, "sample_time": "1 ms"},
+        "no more zeros than poles",
+    ),
     "unstable": ({"numerator": [100.0, 200.0], "denominator": [1.0, -3.0, 0.0]}, "stable"),
     "unstable in z": ({"numerator": [5.0, 4.0], "denominator": [1.0, -1.1], "sample_time": "1 ms"}, "stable"),
     "lowest power first": (

@@ -86,7 +86,7 @@ def _at_stand(trace: xr.Dataset) -> np.ndarray:
     """
     reference = samples(trace, "reference")
     count = len(reference)
-    corners = np.unique([0, *np.flatnonzero(np.diff(reference)) + 1, count])
+    corners = np.unique(np.concatenate([[0], np.flatnonzero(np.diff(reference)) + 1, [count]]))
     late = np.zeros(count, bool)
     for begin, end in pairwise(corners.tolist()):
         if end - begin >= 0.1 * count:
