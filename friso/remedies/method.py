@@ -123,6 +123,11 @@ class Advice:
         works = (outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
         return tuple(sorted(works, key=self.size))
 
+    @property
+    def told(self) -> tuple[RemedyOutcome, ...]:
+        """Return the remedies that are told in full: the least change, and what settles soonest or the next best."""
+        return _told(self.working, self.goal)
+
     def made_of_leaves(self, outcome: RemedyOutcome) -> RemedyOutcome | None:
         """Return the outcome of a remedy's joint when made of leaf springs."""
         return next((other for other in self.outcomes if other.remedy.makes == outcome.remedy.name), None)
@@ -136,6 +141,17 @@ class Advice:
 def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
     """Return the settling time [s] of the slowest 5 % with a remedy; infinite if not measured."""
     return np.inf if outcome.measured is None else outcome.measured.slowest(goal)
+
+
+def _told(working: Sequence[RemedyOutcome], goal: Goal) -> tuple[RemedyOutcome, ...]:
+    """Choose which remedies to tell in full, of those that work, the least change first.
+
+    They are the least change and what settles soonest; if these are the same, the next larger change follows.
+    """
+    fastest = min(working, key=lambda outcome: slowest(outcome, goal), default=None)
+    if not working or fastest is working[0]:
+        return tuple(working[:2])
+    return (working[0], fastest) if fastest else ()
 
 
 def tune(
@@ -307,15 +323,15 @@ class _Session:
     ) -> None:
         """Try remedies, what changes least first; then the least change, and `further` remedies by what became of them.
 
-        Settings against friction with more keys than what works already changes are left out. Remedies that cannot be
-        verified come last, and only if nothing works.
+        Settings against friction with more keys than what works already changes are left out, and combinations of
+        remedies of which each works alone. Remedies that cannot be verified come last, and only if nothing works.
         """
         verifiable = [remedy for remedy in listed if remedy.verifiable]
         for own in (True, False):
             for remedy in verifiable:
                 keys = min((self._size(one).keys for one in self.outcomes if one.certainty == "works"), default=np.inf)
                 small = not remedy.of_setting or len(remedy.variables) <= keys
-                if small and (remedy.stage is self.stage) == own:
+                if small and (remedy.stage is self.stage) == own and not self._combines(remedy):
                     self.tries(remedy)
             self.tries_less()
         for remedy in further(self.outcomes, self.goal):
@@ -324,6 +340,13 @@ class _Session:
         for remedy in listed:
             if not remedy.verifiable and not self.works:
                 self.tries(remedy)
+
+    def _combines(self, remedy: Remedy) -> bool:
+        """Tell whether a remedy varies what several others vary, each of which works alone."""
+        names = {variable.name for variable in remedy.variables}
+        working = (outcome.remedy for outcome in self.outcomes if outcome.certainty == "works")
+        alone = [varied for one in working if (varied := {variable.name for variable in one.variables}) < names]
+        return set().union(*alone) == names
 
     def adds_windows(self) -> None:
         """Find how far each number of what is told first may vary: of the least change, and of what settles soonest."""
@@ -476,10 +499,11 @@ class _Session:
         self.outcomes[-1] = unsure or none
 
     def makes_leaves(self) -> None:
-        """Size leaf springs for every joint that works, and verify them; their search is over, so its work does not
-        limit this."""
-        for one in tuple(self.outcomes):
-            if one.remedy.buys_joint and not one.remedy.makes and one.certainty == "works":
+        """Size leaf springs for the joints of remedies that are told in full, and verify them; their search is over, so
+        its work does not limit this."""
+        working = (one for one in self.outcomes if one.certainty == "works" and not one.remedy.makes)
+        for one in _told(sorted(working, key=self._size), self.goal):
+            if one.remedy.buys_joint:
                 self._made_of_leaves(one)
 
     def _verified(self, search: Search, shares: np.ndarray, moves_from: float | None = None) -> RemedyOutcome:
@@ -505,7 +529,8 @@ class _Session:
             doubted = unsettled_parts(case, measured, goal)
         if not doubted:
             self.report(f"{remedy.name}: verified on more machines", settings.progress_steps)
-            for part in np.split(np.arange(further.count), [further.count // 3]):
+            ends = [round(part * further.count) for part in settings.further_parts]
+            for part in np.split(np.arange(further.count), ends):
                 if measured.decides(goal) is None:
                     measured = measured.with_further(tuned, further.take(part), goal, self.drive)
             doubted = () if measured.decides(goal) else ("together",)
@@ -533,9 +558,9 @@ def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
     if not search.tried:
         return outcome
     points = search.points
-    best = int(points.cost(search.goal).argmin())
-    if not points.meets(search.goal)[best]:
+    if not points.meets(search.goal).any():
         return outcome
+    best = int(points.cost(search.goal).argmin())
     shares = points.shares[best]
     return replace(outcome, stage=search.remedy.tuned(shares), points=points, shares=shares)
 

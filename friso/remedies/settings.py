@@ -100,8 +100,13 @@ class RemedySettings(Settings):
     """Longer than any move: a point that breaks a constraint is worse than any that does not."""
 
     survey_parts: int = setting(4, "")
-    """Parts in which fresh machines are surveyed: the first tells of most settings that fail, at a quarter of the cost;
-    more leave lanes idle."""
+    """The first of so many parts of the fresh machines is surveyed before the others: it tells of most settings that
+    fail, at a quarter of the cost; with more parts it tells of fewer."""
+
+    further_parts: tuple[float, ...] = setting((1 / 12, 1 / 6, 1 / 3, 2 / 3), "")
+    """Shares of the further machines after which it is looked whether they decide. With more looks fewer machines are
+    measured, but more settings pass by chance: with these, 4.3 % of those that are right for just the share wanted
+    (3 % with looks at a third and at all of them)."""
 
     survey_batch: int = setting(3, "")
     """Points whose machines are surveyed at once: fewer leave cores idle, more are surveyed in vain."""

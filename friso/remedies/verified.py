@@ -125,17 +125,24 @@ class Performance:
     def surveyed(self, stage: Stage, machines: Fleet, goal: Goal) -> Performance:
         """Return the performance with a survey of what attracts the machines that meet the rest of the goal.
 
-        Machines are surveyed a few at a time. As soon as something attracts so many that too few can meet the goal,
-        those not surveyed yet are left out: the share is that of fewer machines then.
+        A few machines are surveyed first. If something attracts so many of them that too few can meet the goal, the
+        others are left out: the share is that of fewer machines then.
         """
-        meets, remedy, measured = self._meets_all(goal), Remedy.settled_on("", stage), self
-        for part in np.array_split(np.arange(self.margin.size), RemedySettings.current().survey_parts):
-            if (some := part[meets[part]]).size:
-                surveyed = attraction(remedy, ONE, machines.take(some), goal)
-                measured = replace(measured, attraction=measured.attraction.of_some(surveyed, some))
-                if np.count_nonzero(meets & ~measured._meets_all(goal)) > (1 - goal.share) * self.margin.size:
-                    return measured._first(int(part[-1]) + 1)
-        return measured
+        first, others = np.split(np.arange(machines.count), [machines.count // RemedySettings.current().survey_parts])
+        measured = self._surveyed(stage, machines, first, goal)
+        if np.count_nonzero(self._meets_all(goal) & ~measured._meets_all(goal)) > (1 - goal.share) * machines.count:
+            return measured._first(first.size)
+        return measured._surveyed(stage, machines, others, goal, at_once=True)
+
+    def _surveyed(
+        self, stage: Stage, machines: Fleet, numbers: np.ndarray, goal: Goal, at_once: bool = False
+    ) -> Performance:
+        """Return the performance with a survey of some machines by their numbers, of those that meet the rest."""
+        some = numbers[self._meets_all(goal)[numbers]]
+        if not some.size:
+            return self
+        surveyed = attraction(Remedy.settled_on("", stage), ONE, machines.take(some), goal, at_once=at_once)
+        return replace(self, attraction=self.attraction.of_some(surveyed, some))
 
     def _first(self, count: int) -> Performance:
         """Return what was measured on the first machines alone."""
@@ -146,7 +153,8 @@ class Performance:
 
     def with_further(self, stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
         """Return the performance with further machines measured."""
-        meets = performance_of(stage, machines, goal, drive)._meets_all(goal)
+        numbers, moved = np.arange(machines.count), moving(stage, machines, goal, drive)
+        meets = moved._surveyed(stage, machines, numbers, goal, at_once=True)._meets_all(goal)
         sizes = np.append(self.sizes, machines.sizes)
         return replace(self, further=np.append(self.further, meets), sizes=sizes)
 

@@ -150,14 +150,11 @@ def answer(tuning: Advice) -> list[str]:
         ]
     if not tuning.working:
         return [*lines, *_nothing(tuning)]
-    least, fastest = tuning.least, tuning.fastest
-    assert least is not None
+    least, *others = tuning.told
     lines += _in_short(tuning)
     lines += _works(least, tuning, _least_words(tuning))
-    if fastest is not None and fastest is not least:
-        lines += _works(fastest, tuning, "What settles soonest")
-    elif len(tuning.working) > 1:
-        lines += _works(tuning.working[1], tuning, "The next best")
+    for other in others:
+        lines += _works(other, tuning, "What settles soonest" if other is tuning.fastest else "The next best")
     return [*lines, f"The goal: {goal_words(tuning.goal)}.{_of_the_drive(tuning)}", *unknown(tuning)]
 
 
@@ -661,6 +658,11 @@ def assumptions(tuning: Advice) -> list[str]:
             "Settings against friction were not tried together with the bandwidth, nor those of more keys than what "
             "works, as less works."
         )
+    alone = {outcome.remedy.name for outcome in tuning.working}
+    if {"gains", "isolator"} <= alone:
+        lines.append("Gains and isolator were not tried together, as each works alone.")
+    if any(outcome.remedy.buys_joint and outcome not in tuning.told for outcome in tuning.working):
+        lines.append("Leaf springs were sized only for joints of the remedies that are told first.")
     lines.append(
         "Margins include sampling, delay and current loop of the file; hunting and moves are those of a controller in "
         f"continuous time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), "
