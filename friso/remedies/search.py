@@ -172,7 +172,7 @@ class Search:
         for few in np.array_split(points, -(-len(points) // tuning.points_looked_at)):
             self.report(f"{self.remedy.name}: trying settings")
             with self._allowed(self._work):
-                self.tried.append(self.measured(few, tuning.worst_time))
+                self.tried.append(self.measured(few))
             if self.cut:
                 return
             yield few[self.tried[-1].meets(self.goal)]

@@ -47,12 +47,12 @@ from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
 from friso.stage.transmission import leading_friction
 
 DOUBTS = {
-    "verdict": "friso check does not say that it settles",
-    "certain": "friso check is not certain that nothing attracts it",
-    "given up": "friso check gave up the search for its edge of hunting",
-    "distance": "its edge of hunting is closer than wanted",
+    "verdict": "its own motion does not settle, or something attracts it",
+    "certain": "it is not certain that nothing attracts it",
+    "given up": "what attracts it takes too much computing",
+    "distance": "something attracts it at a bandwidth nearer below than wanted, or may",
     "bandwidth": "its bandwidth is above your limit, or not known",
-    "window": "something attracts it at a bandwidth nearby",
+    "window": "something attracts it at a bandwidth little above its own, or may",
     "own margin": "a settled state of the stage itself has less margin than wanted",
     "hunting": "something attracts too many of the machines, or may",
     "settling": "too many of the machines are not in position in time",
@@ -150,7 +150,7 @@ def answer(tuning: Advice) -> list[str]:
         ]
     if not tuning.working:
         return [*lines, *_nothing(tuning)]
-    least, *others = tuning.told
+    least, *others = tuning.recommended
     lines += _in_short(tuning)
     lines += _works(least, tuning, _least_words(tuning))
     for other in others:
@@ -661,8 +661,8 @@ def assumptions(tuning: Advice) -> list[str]:
     alone = {outcome.remedy.name for outcome in tuning.working}
     if {"gains", "isolator"} <= alone:
         lines.append("Gains and isolator were not tried together, as each works alone.")
-    if any(outcome.remedy.buys_joint and outcome not in tuning.told for outcome in tuning.working):
-        lines.append("Leaf springs were sized only for joints of the remedies that are told first.")
+    if any(outcome.remedy.buys_joint and outcome not in tuning.recommended for outcome in tuning.working):
+        lines.append("Leaf springs were sized only for joints of what is told first; friso design sizes others.")
     lines.append(
         "Margins include sampling, delay and current loop of the file; hunting and moves are those of a controller in "
         f"continuous time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), "
