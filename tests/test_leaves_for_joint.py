@@ -18,8 +18,9 @@ from friso.leaf_springs.beams import beams
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.questions.tune.page import stage_files
+from friso.questions.tune.present_words import DOUBTS
 from friso.questions.tune.question import TuneAnswer
-from friso.questions.tune.words import DOUBTS, UNMADE, answer
+from friso.questions.tune.words import UNMADE, answer
 from friso.remedies.catalogue import remedies
 from friso.remedies.goal import Goal
 from friso.remedies.method import Advice, Unmade, _Session, tune

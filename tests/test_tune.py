@@ -41,10 +41,10 @@ from friso.questions.tune.document import tune_document
 from friso.questions.tune.figures import _sensitivity, drawn_stages, tune_figures
 from friso.questions.tune.gain_words import gain_lines
 from friso.questions.tune.page import tune_files
+from friso.questions.tune.present_words import DOUBTS, as_it_is
 from friso.questions.tune.question import TuneAnswer
 from friso.questions.tune.sensitivity_words import ranked_sentences
 from friso.questions.tune.words import (
-    DOUBTS,
     _no_relaxation,
     _reasons,
     _without_friction,
@@ -1482,6 +1482,51 @@ def test_what_works_alone_is_not_tried_together(rigid: Stage, tuning: Advice) ->
     both = tuple(replace(works, remedy=listed[name]) for name in ("gains", "isolator"))
     lines = assumptions(replace(tuning, outcomes=both))
     assert any("not tried together, as each works alone" in line for line in lines)
+
+
+def test_the_parts_of_the_goal_that_the_stage_misses_are_told(tuning: Advice) -> None:
+    """It said "as it is: never (0 %)" of a stage without a limit cycle, 12 % of whose moves crept home too late."""
+    assert as_it_is(tuning) in answer(tuning)
+    assert as_it_is(tuning).startswith("As it is: a limit cycle, and ")
+    quiet = check_given(tuning.stage.replace({"controller.crossover": "12 Hz"}))
+
+    def says(*unmet: str, within: float | None = None, case: Any = quiet, **failing: Any) -> str:
+        goal, present = replace(FORCE_LIMITED, settle=within), made_up(50, **failing)[1]
+        return as_it_is(replace(tuning, case=case, goal=goal, present=present, unmet=unmet))
+
+    late = says("settling", within=2.0, settling=range(6))
+    assert late == "As it is: no limit cycle, but 12 % of 50 moves do not settle within 2.00 s."
+    assert "before the return or the end of the run" in says("settling", settling=range(6))
+    two = says("margin", "force", margin=range(5), force=range(10, 20))
+    assert "10 % of 50 machines have less modulus margin than 0.5 and 20 % of 50 moves take more force than 10" in two
+    attracted = says("hunting", settling=range(10), hunting=range(5, 20))
+    assert "something attracts 25 % of the machines that meet the rest, or may" in attracted
+    assert "6 % of 50 machines and moves miss one part" in says("together", margin=range(3))
+    assert says("distance") == f"As it is: no limit cycle, but {DOUBTS['distance']}."
+    doubtful = replace(
+        quiet, judgement=replace(quiet.judgement, hunting=replace(quiet.judgement.hunting, certain=False))
+    )
+    assert says("certain", case=doubtful).startswith("As it is: perhaps a limit cycle, but")
+
+
+def test_a_stage_that_was_not_confirmed_before_the_interrupt_is_not_said_to_meet_the_goal(
+    rigid: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its moves met the goal, and nobody had looked yet at what attracts it."""
+    checks: list[Stage] = []
+
+    def interrupted(stage: Stage) -> Any:
+        if not checks:
+            checks.append(stage)
+            raise KeyboardInterrupt
+        return check_given(stage)
+
+    monkeypatch.setattr("friso.remedies.method.checked", interrupted)
+    monkeypatch.setattr("friso.remedies.method.missed_parts", lambda measured, goal: ())
+    advice = tune(rigid, Goal(), budget=TINY, chosen=["gains"])
+    assert advice.interrupted
+    assert advice.needed
+    assert not any("meets the goal as it is" in line for line in answer(advice))
 
 
 def test_costs_order_settings() -> None:

@@ -48,7 +48,7 @@ class Confirmation:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Return what is not confirmed: names of `friso.questions.tune.words.DOUBTS`."""
+        """Return what is not confirmed: names of `friso.questions.tune.present_words.DOUBTS`."""
         if self.word is None:
             return ("given up",)
         parts = {

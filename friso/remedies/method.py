@@ -58,8 +58,8 @@ class Advice:
     """The outcomes of all remedies for a stage, in the order of the catalogue.
 
     `case` is the check of the stage, `present` its performance on machines, and `unmet` the parts of the goal that it
-    misses (names of `friso.questions.tune.words.DOUBTS`). `limits` gives the bandwidths with
-    enough margin, and `sensitivities` what the edge of hunting depends on. `relaxed` says what to relax if nothing
+    misses or may miss (names of `friso.questions.tune.present_words.DOUBTS`). `limits` gives the bandwidths with enough
+    margin, and `sensitivities` what the edge of hunting depends on. `relaxed` says what to relax if nothing
     works, `interrupted` whether the search was ended early, and `least_sought` whether the least change was sought
     before that.
 
@@ -198,9 +198,9 @@ def tune(
     session = _Session(ideal, stage, goal, machines, fresh, unseen, further, budget, report)
     relaxed: tuple[RelaxedGoal, ...] = ()
     sensitivities: Sensitivities | None = None
-    interrupted, unmet = False, missed_parts(present, goal)
+    interrupted, unmet = False, missed_parts(present, goal) or ("certain",)
     try:
-        if unmet and listed and listed[0].name == BANDWIDTH:
+        if missed_parts(present, goal) and listed and listed[0].name == BANDWIDTH:
             session.tries_one_factor(listed.pop(0), len(listed) > 0)
             answered(session.outcomes[0])
             session.adds_windows()

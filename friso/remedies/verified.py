@@ -275,7 +275,7 @@ def checked(stage: Stage) -> Case:
 def unmet_goals(confirmation: Confirmation, measured: Performance, goal: Goal) -> tuple[str, ...]:
     """Return which parts of the goal a stage misses, or may miss.
 
-    They are names of `friso.questions.tune.words.DOUBTS`.
+    They are names of `friso.questions.tune.present_words.DOUBTS`.
     """
     return (*unsettled_parts(confirmation, measured, goal), *missed_parts(measured, goal))
 

@@ -39,7 +39,7 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
                 "distance": goal.distance,
                 "share": goal.share,
             },
-            "as_is": _performance(tuning.present, tuning) | {"verdict": tuning.case.verdict},
+            "as_is": _performance(tuning.present, tuning) | {"verdict": tuning.case.verdict, "doubts": [*tuning.unmet]},
             "ways": {outcome.remedy.name: _remedy(outcome, tuning) for outcome in tuning.outcomes},
             "edge_moved_by_1_percent": dict(tuning.sensitivities.ranked()) if tuning.sensitivities else {},
             "relaxed": [
