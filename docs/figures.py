@@ -10,12 +10,14 @@ import inspect
 import json
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import friso
 from friso.interface.answer import Answer
 from friso.questions.flexure.svg import arrow, box, circle, leader, path, sheet, words
+from friso.shown.drawing.figure import BLUE, GREEN, VERMILLION, Axis, Figure, Panel, Series
 from friso.shown.drawing.matplotlib_renderer import image
 from friso.stage import Stage
 
@@ -85,6 +87,47 @@ def return_map() -> bytes:
     return image(next(figure for figure in figures if figure.name == "return-map"), "png")
 
 
+def limit_cycle() -> bytes:
+    """Releases of the locked rig: two end in the cycle; the shortest sticks outside its basin and ends at rest."""
+    starts = (("7 mm", VERMILLION), ("2 mm", BLUE), ("1.5 mm", GREEN))
+    tables = rig().replace({"joint.locked": True}).as_written()
+    runs = {}
+    for start, _ in starts:
+        motion = {"kind": "release", "displacement": start, "duration": "30 s"}
+        runs[start] = friso.simulate(Stage(**{**tables, "motion": motion}), sample_time="2 ms").data
+
+    def lines(across: str, up: str, span: slice) -> tuple[Series, ...]:
+        return tuple(
+            Series(runs[start][across].values[span], runs[start][up].values[span], f"let go at {start}", colour)
+            for start, colour in starts
+        )
+
+    position = Axis("Position", "m", (-9e-4, 9e-4))
+    panels = (
+        Panel("The first 12 s", Axis("Time", "s", (0, 12)), position, lines("time", "position", slice(6000))),
+        Panel("The last 2 s", position, Axis("Velocity", "m/s"), lines("position", "velocity", slice(-1000, None))),
+    )
+    return image(
+        Figure("limit-cycle", "A limit cycle, and starts within and outside its basin", "", panels, columns=2), "png"
+    )
+
+
+def branch() -> bytes:
+    """The symmetric hunting cycle of the locked rig over the crossover: amplitude and multiplier, flip and fold."""
+    ranges = {"controller" + ".crossover": "4 Hz..18 Hz"}
+    (figure, *_) = friso.boundary(rig(), ranges, set={"joint.locked": True}).figures()
+    panels = [
+        replace(
+            panel,
+            series=tuple(line for line in panel.series if line.colour != BLUE),
+            markers=tuple(points for points in panel.markers if points.colour != BLUE),
+        )
+        for panel in figure.panels
+    ]
+    title = "The multiplier passes −1 in a flip and 1 in a fold"
+    return image(replace(figure, title=title, panels=(panels[0], panels[2]), note=""), "png")
+
+
 def thesis_map() -> bytes:
     """Where the locked rig hunts, over the speed of its controller and its friction."""
     ranges = {"speed": "0.4..2.5:41:log", "friction": "0.3..3:41:log"}
@@ -102,6 +145,8 @@ FIGURES: Mapping[str, Callable[[], bytes]] = {
     "thesis_cycles.png": thesis_cycles,
     "thesis_loops.png": thesis_loops,
     "return_map.png": return_map,
+    "limit_cycle.png": limit_cycle,
+    "branch.png": branch,
     "thesis_map.png": thesis_map,
 }
 

@@ -51,11 +51,11 @@ class AxisKind:
         return _PARTS.sub(self._part, unit)
 
     def text(self, sentence: str) -> str:
-        """A sentence with lengths, forces and masses in numbers, on this axis: "0.1 mm" is "0.1 mrad"."""
+        """Return a sentence in the units of this axis: "0.1 mm" becomes "0.1 mrad"."""
         return sentence if self.plain else _NUMBERS.sub(lambda match: self.unit(match[0]), sentence)
 
     def with_units(self, dataset: Any) -> Any:
-        """An xarray.Dataset on this axis, the units of whose variables are those of a linear one."""
+        """Return an xarray.Dataset in the units of this axis; it comes in those of a linear one."""
         for array in dataset.variables.values():
             array.attrs.update({key: self.unit(array.attrs[key]) for key in ("units",) if key in array.attrs})
             array.attrs.update({key: self.text(array.attrs[key]) for key in ("criterion",) if key in array.attrs})
@@ -67,7 +67,7 @@ class AxisKind:
         return f"({part})" if below and re.search("[*/]", part) else part
 
     def suffix(self, key: str) -> str:
-        """A key of a JSON document with the unit that it ends with, "force_n", as it is on this axis: "force_n_m"."""
+        """Return a JSON key with the unit of this axis: "force_n" becomes "force_n_m"."""
         if self.plain:
             return key
         name, unit = _SUFFIX.fullmatch(key).group("name", "unit")  # type: ignore[union-attr]
@@ -101,7 +101,7 @@ _SPOKEN_OF: ContextVar[AxisKind] = ContextVar("axis", default=LINEAR)
 
 
 def speak_of(kind: AxisKind) -> None:
-    """What is shown in this context (`contextvars`) is in the units of an axis of that kind from here on."""
+    """Show everything in this context (`contextvars`) in the units of an axis from here on."""
     _SPOKEN_OF.set(kind)
 
 
@@ -126,7 +126,7 @@ def unit_shown(unit: str) -> str:
 
 
 def unit_of_key(key: str) -> tuple[str, str]:
-    """A key of a JSON document without the unit with which it ends, and that unit: "velocity_m_per_s" in "m/s"."""
+    """Split a JSON key into name and unit: "velocity_m_per_s" is a velocity in "m/s"."""
     for start in (match.start() for match in re.finditer("(?!^)_", key)):
         above, _, below = key[start + 1 :].partition("_per_")
         parts = [part.split("_") for part in (above, below) if part]

@@ -34,7 +34,10 @@ def table_cell(text: str) -> str:
 
 
 def toml_text(text: str) -> str:
-    r"""The text as TOML has it in quotes, the same again when it is read: what steers is written out, "\u202e"."""
+    r"""Return the text as a quoted TOML string that reads back as the same text.
+
+    Control characters are written as escapes, such as "\u202e".
+    """
     return _STEERING.sub(_as_in_toml, json.dumps(text, ensure_ascii=False))
 
 

@@ -47,8 +47,10 @@ class Entry:
 
 @dataclass(frozen=True)
 class Equations:
-    """A revision of the equations: its number, the day, and the reference numbers that tell it from others
-    (`benchmarks.canonical`), by stage and output [SI]."""
+    """A revision of the equations: its number, its day, and reference numbers.
+
+    The reference numbers (`benchmarks.canonical`), by stage and output [SI], distinguish it from other revisions.
+    """
 
     revision: int
     since: date
@@ -69,7 +71,10 @@ def equations() -> Equations:
 
 
 def value(entry: str, name: str) -> float:
-    """One number of a finding [SI, or as its unit says]. Raises KeyError for one that is not on file."""
+    """Return one number of a finding [SI, or as its unit says].
+
+    Raises KeyError for one that is not on file.
+    """
     return findings_on_file()[entry].values[name]
 
 

@@ -57,8 +57,10 @@ class Interval:
         return self.low + share * (self.high - self.low)
 
     def evenly(self, share: Any) -> Any:
-        """The values at shares, from 0 to 1, of an uncertain quantity known to be within: of a `wide` range by its
-        logarithm."""
+        """Return the values at shares, 0 to 1, of an uncertain quantity known to be within.
+
+        In a `wide` range the logarithm is uniform.
+        """
         return self.low * (self.high / self.low) ** share if self.wide else self.at(share)
 
 
@@ -149,8 +151,10 @@ def _reach(interval: Interval, of: Quantity | Number) -> str:
 
 
 def _read(entry: Any, of: Quantity | Number) -> tuple[float, Interval]:
-    """Centre and range of a text, or of a single value; ends beyond the bound of a quantity may come out of a
-    tolerance. Raises _Refused."""
+    """Return centre and range of a text, or of a single value.
+
+    A tolerance may put ends beyond the bound of a quantity. Raises _Refused.
+    """
     text = entry if isinstance(entry, str) else ""
     try:
         if ".." in text:

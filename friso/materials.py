@@ -16,8 +16,11 @@ STRENGTH = Quantity("Pa", positive, "1300 MPa")
 
 @dataclass(frozen=True)
 class Material:
-    """A material: Young's modulus [Pa], Poisson's ratio, density [kg/m^3], yield strength [Pa], the stress amplitude
-    [Pa] that it bears for ever (reversed bending, unnotched), and where these numbers come from."""
+    """A material: its elastic constants, density and strength, with their sources.
+
+    Young's modulus [Pa], Poisson's ratio, density [kg/m^3], yield strength [Pa], and the stress amplitude [Pa] that it
+    bears for ever (reversed bending, unnotched).
+    """
 
     name: str
     grade: str

@@ -32,7 +32,10 @@ silent = _Silent()
 
 
 def share_of(progress: Progress, number: int, count: int) -> Progress:
-    """The progress of one of `count` equal pieces of work, the one with this number from 0 on, within that of all."""
+    """Return the progress of one of `count` equal pieces of work, within the progress of all.
+
+    `number` counts the pieces from 0.
+    """
 
     def report(done: int, total: int, label: str, /) -> None:
         progress(PERCENT * number + (PERCENT * done // total if total else 0), PERCENT * count, label)
@@ -41,8 +44,10 @@ def share_of(progress: Progress, number: int, count: int) -> Progress:
 
 
 def between(progress: Progress, first: float, last: float, label: str = "") -> Progress:
-    """The progress of work that goes from one share of all to another, 0 to 1; a `label` stands for those of its
-    pieces."""
+    """Return the progress of work that takes all work from one share to another, 0 to 1.
+
+    A `label` replaces the labels of the pieces.
+    """
 
     def report(done: int, total: int, piece: str, /) -> None:
         share = first + (last - first) * (done / total if total else 0.0)
@@ -63,14 +68,17 @@ class Tally:
         self._turn = Lock()
 
     def add(self, steps: int, label: str) -> None:
-        """So many more steps are done; `label` says what is being done now. Several threads may tell."""
+        """Count more steps as done; `label` says what is being done now.
+
+        Several threads may call it.
+        """
         with self._turn:
             self.done += steps
             self.progress(self.done, self.total, label)
 
 
 def together(progress: Progress, count: int) -> list[Progress]:
-    """The progresses of `count` equal pieces of work that are done side by side, within that of all."""
+    """Return the progresses of `count` equal pieces of work that are done side by side."""
     tally = Tally(progress, PERCENT * count)
 
     def piece() -> Progress:
@@ -88,8 +96,10 @@ def together(progress: Progress, count: int) -> list[Progress]:
 
 
 class WorkClock:
-    """Seconds of work: it stands still during what is done once, such as compiling, which does not tell how long the
-    rest takes."""
+    """A clock of work in seconds that can be stopped.
+
+    It stands still during what is done once, such as compiling, which does not tell how long the rest takes.
+    """
 
     def __init__(self) -> None:
         self._stood = self._since = 0.0

@@ -33,7 +33,7 @@ ROUNDING = 1e-9
 
 
 def percent(share: float, digits: int = 2, signed: bool = False) -> str:
-    """A share in percent, to so many significant digits; a dash for none, 0 where it is mere rounding."""
+    """Write a share in percent to some digits; a dash for none, 0 for mere rounding."""
     if not math.isfinite(share):
         return NOTHING
     share = share if abs(share) > ROUNDING else 0.0
@@ -73,12 +73,12 @@ def as_toml(value: Any) -> str:
 
 
 def exactly(value: float, unit: str) -> str:
-    """A number and its unit as a stage file has them, read again as the same number: "19000000 N/m"."""
+    """Write a number and its unit so that it reads back as the same number: "19000000 N/m"."""
     return f"{repr(float(value) + 0.0).removesuffix('.0')} {unit}"  # + 0.0: no minus before a zero
 
 
 def quoted(value: Any, hint: str = "") -> str:
-    """What was given, for an error message: printable, one line, not long; and what is wrong with it."""
+    """Write a given value for an error message, short and printable, and what is wrong with it."""
     text = as_toml(value).encode(errors="backslashreplace").decode()
     text = text if len(text) <= 60 else f"{text[:57]}..."
     return f"{text} ({hint})" if hint else text
@@ -98,7 +98,10 @@ class Bound:
     test: Callable[[Any], Any]
 
     def holds(self, value: Any) -> Any:
-        """True where `value`, a number or an array, is no larger than any machine has it, and allowed."""
+        """Tell whether a value is allowed and no larger than any machine has it.
+
+        `value` is a number or an array.
+        """
         return (abs(value) <= LARGEST) & self.test(value)
 
 
@@ -171,7 +174,10 @@ class Quantity:
         return as_toml(self.example)
 
     def factor(self, unit: str) -> float:
-        """SI value of 1 `unit`, to convert arrays with. Raises InputError for a unit of another kind."""
+        """Return the SI value of 1 `unit`, to convert arrays with.
+
+        Raises InputError for a unit of another kind.
+        """
         try:
             return _factor(_checked_unit(unit), self.unit, self.motor)
         except _Refused as refused:
@@ -278,8 +284,10 @@ def _split(entry: str) -> tuple[str, str]:
 
 
 def in_unit_of(before: Any, entry: Any) -> Any:
-    """A number alone, or one whose unit is only wrong in its capitals, with the unit of the text that was there
-    `before`; any other entry as it is."""
+    """Return a number completed by the unit of the text `before`; other entries unchanged.
+
+    A unit that is only wrong in its capitals is corrected.
+    """
     bare = isinstance(entry, int | float) and not isinstance(entry, bool) and abs(entry) < LARGEST
     text = repr(entry) if bare else entry.strip() if isinstance(entry, str) else ""
     number = _NUMBER.match(text) if len(text) <= _LONGEST else None
@@ -318,9 +326,9 @@ def _checked_unit(text: str) -> str:
 
 
 def si_value(text: str) -> float:
-    """Return the SI value of a number with a unit of any kind, "2.4 N/mm", made of usual ones alone.
+    """Return the SI value of a number with any unit, such as "2.4 N/mm".
 
-    Raises InputError.
+    The unit is made of common ones, with * between factors. Raises InputError.
     """
     try:
         number, unit = _split(text)
@@ -341,13 +349,13 @@ TORQUES = ("newton_meter = newton * meter = Nm", "newton_centimeter = newton * c
 
 @cache
 def common_units() -> dict[str, tuple[float, dict[str, float], list[str]]]:
-    """What pint says of the units that are met every day (`_root`): with pint itself, reading a stage takes 0.8 s."""
+    """Return pint's data for common units; with pint itself, reading a stage takes 0.8 s."""
     return json.loads(files("friso").joinpath("units.json").read_text(encoding="utf-8"))
 
 
 @cache
 def _registry() -> Any:
-    """pint's registry: slow to import and to build, so not before a unit is met that is no common one."""
+    """Return pint's registry, which is slow to build, for units that are not common ones."""
     import pint
 
     registry = pint.UnitRegistry(on_redefinition="ignore")
@@ -358,7 +366,10 @@ def _registry() -> Any:
 
 @lru_cache(maxsize=1024)
 def _root(unit: str) -> tuple[float, dict[str, float], list[str]]:
-    """Factor to pint's root units, those with their powers, and the names in the unit. Raises _Refused."""
+    """Return the factor to pint's root units, their powers, and the names in the unit.
+
+    Raises _Refused.
+    """
     return common_units().get(unit) or by_pint(unit)
 
 

@@ -18,13 +18,13 @@ Item = TypeVar("Item")
 
 
 class Registry(Generic[Item]):
-    """What modules declare under the name `attribute`, by the name of the module, with dashes unless that is declined:
-    `break_away.py` declares "break-away".
+    """What modules declare under the name `attribute`, by the name of the module.
 
-    The modules are those of a `package`, and, where there is a `group` of entry points, those that installed packages
-    name in it; what the latter declare has to be of a `kind`. The names are read without importing any module, and so
-    is what each is in one line, the first one of its docstring; a module is imported when what it declares is first
-    asked for. `added` takes what is declared elsewhere, as (declared, one line), by name.
+    A module `break_away.py` declares "break-away", unless `dashes` are declined. The modules are those of a `package`,
+    and, if there is a `group` of entry points, those that installed packages name in it; what the latter declare must
+    be of a `kind`. Names and their descriptions, the first line of each module's docstring, are read without importing
+    any module. A module is imported when its declaration is first asked for. `added` takes what is declared elsewhere,
+    as (declared, description), by name.
     """
 
     def __init__(self, package: str, attribute: str, group: str = "", kind: type = object, dashes: bool = True) -> None:
@@ -75,7 +75,10 @@ class Registry(Generic[Item]):
                 leave_out(error)
 
     def one_line(self, name: str) -> str:
-        """What is declared under a name, in one line without a full stop. Raises KeyError for an unknown name."""
+        """Return the description of a registered name, the first line of its docstring.
+
+        Its full stop is removed. Raises KeyError for an unknown name.
+        """
         if name in self.added:
             return self.added[name][1]
         module = self._own.get(name) or self.installed[name]
@@ -87,8 +90,10 @@ class Registry(Generic[Item]):
         return (docstring or "").partition("\n")[0].removesuffix(".")
 
     def checked(self, name: str, option: str, example: str) -> str:
-        """The name, if it is one of these. Raises InputError for the `option` otherwise, whose `example`, with {} for
-        the name, shows the nearest one."""
+        """Return a name if it is registered.
+
+        Raises InputError for the `option` otherwise; its `example`, with {} for the name, shows the nearest name.
+        """
         names = tuple(self)
         if isinstance(name, str) and name in names:
             return name

@@ -12,8 +12,11 @@ DOUBT = 0.05
 
 @dataclass(frozen=True)
 class Share:
-    """The probability of something, by a share of runs (NaN: none is known), and its 95 % interval (Clopper, Pearson),
-    which holds whatever became of the runs that failed."""
+    """The probability of an outcome, estimated from runs, with its 95 % interval.
+
+    The interval (Clopper, Pearson) holds whatever the runs that failed would have done. The probability is NaN if no
+    run tells.
+    """
 
     probability: float
     low: float
@@ -21,8 +24,10 @@ class Share:
 
 
 def share(flags: np.ndarray, decided: np.ndarray) -> Share:
-    """The share of runs of which something holds, `flags`, among those where it is `decided`, both of any one shape;
-    the others count either way in the interval."""
+    """Return the share of runs with `flags` set, among those that are `decided`.
+
+    Both arrays have any one shape; undecided runs count either way in the interval.
+    """
     count, unknown = np.size(flags), int(np.count_nonzero(~decided))
     hits = int(np.count_nonzero(flags & decided))
     if not count:
@@ -32,8 +37,11 @@ def share(flags: np.ndarray, decided: np.ndarray) -> Share:
 
 
 def share_interval(hits: int, count: int) -> tuple[float, float]:
-    """The 95 % interval of a probability: `hits` of `count` independent trials came true (Clopper and Pearson 1934,
-    doi:10.1093/biomet/26.4.404). By SciPy's functions rather than its statistics, which take 0.7 s to import."""
+    """Return the 95 % interval of a probability: `hits` of `count` independent trials.
+
+    Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404. SciPy's special functions serve, because its statistics take
+    0.7 s to import.
+    """
     from scipy.special import betaincinv
 
     low = betaincinv(hits, count - hits + 1, DOUBT / 2) if hits else 0.0

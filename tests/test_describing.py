@@ -361,7 +361,7 @@ def driven(force: Callable[[float], float], frequency: float, start: list[float]
     ("size", "frequency", "error"), [(0.5, 5.0, 0.003), (5.0, 10.0, 0.02), (3.0, 20.0, 0.05), (10.0, 60.0, 0.01)]
 )
 def test_response_against_simulation(size: float, frequency: float, error: float) -> None:
-    """The first harmonic alone acts on the friction: a few percent (docs/describing.md has the table)."""
+    """The first harmonic alone acts on the friction: a few percent (docs/evidence/describing.md has the table)."""
     response = plant_response(rigid(LAWS["lugre"]), [size], [frequency])
     assert response["answers"].item() == 1
     start = complex(size * response["up"].item())
@@ -379,7 +379,7 @@ def test_two_motions_under_one_force() -> None:
     from_rest = driven(lambda t: 1.8 * min(1.0, t * 5 / 20), 5.0, [0.0, 0.0, 0.0], 60)
     start = [sliding.real, (10j * np.pi * sliding).real, 0.0]
     assert abs(from_rest / stuck - 1) < 0.15  # near break-away, of which the first harmonic knows little: it is 0.142
-    assert abs(driven(lambda _: 1.8, 5.0, start, 30) / sliding - 1) < 0.2  # docs/describing.md: 24 % too large, 0.193
+    assert abs(driven(lambda _: 1.8, 5.0, start, 30) / sliding - 1) < 0.2  # docs/evidence/describing.md: 24 % too large, 0.193
 
 
 @pytest.mark.parametrize(
@@ -459,7 +459,7 @@ def against_simulation(size: float, frequency: float, cycles: int = 25) -> compl
 
 @pytest.mark.parametrize(("size", "frequency", "error"), [(1.0, 3.0, 1e-3), (6.0, 20.0, 5e-3)])
 def test_free_joint_against_simulation(size: float, frequency: float, error: float) -> None:
-    """docs/describing.md has more of them."""
+    """docs/evidence/describing.md has more of them."""
     assert abs(abs(against_simulation(size, frequency)) - 1) < error
 
 

@@ -173,3 +173,21 @@ def test_the_sdist_holds_what_the_wheel_is_built_from(built: Path) -> None:
     listed = subprocess.run(["tar", "tzf", str(archive)], capture_output=True, text=True, check=True).stdout
     for name in ("CITATION.cff", "LICENSE", "CHANGELOG.md", "examples/specs/thesis.toml", "friso/py.typed", "setup.py"):
         assert f"/{name}\n" in listed
+
+
+def test_the_guideline_states_the_laws_and_factors_of_its_evidence() -> None:
+    guide, evidence = ((DOCS / place / "guideline.md").read_text(encoding="utf-8") for place in ("", "evidence"))
+    assert guide.split("```")[1] == evidence.split("```")[1]
+    rows = re.findall(r"^\| joint (locked|free)[^|]*\| (\d+) \| (\d+ %) .*\| ([\d.]+) \|$", evidence, re.MULTILINE)
+    stated = re.findall(r"^\| joint (locked|free) \| (\d+) \| (\d+ %) \| ([\d.]+) \|$", guide, re.MULTILINE)
+    assert len(stated) == 2
+    assert {*stated} <= {*rows}
+
+
+WORDS_OF_A_TOPIC = 1500
+"""Words of a page of the guide at most: longer ones were diaries of tests."""
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+def test_topics_are_short(page: Path) -> None:
+    assert len(page.read_text(encoding="utf-8").split()) <= WORDS_OF_A_TOPIC

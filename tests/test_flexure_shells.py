@@ -1,6 +1,6 @@
 """Both models of leaf springs against shells, on ten mechanisms spread over the design space.
 
-`python tests/test_flexure_shells.py` prints the errors of docs/flexure.md, on a finer mesh.
+`python tests/test_flexure_shells.py` prints the errors of docs/evidence/flexure.md, on a finer mesh.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ GHOST = "#a9a9a9"
 
 
 def ghosts_of(pinned: Answer | None) -> Callable[[Figure], Figure]:
-    """Return a function that draws the pinned machine's lines behind those of a figure.
+    """Return a function that adds the pinned machine's lines, in grey, to a figure.
 
     Figures are matched by name. Without a pinned answer, figures stay as they are.
     """
@@ -31,7 +31,7 @@ def ghosts_of(pinned: Answer | None) -> Callable[[Figure], Figure]:
 
 
 def _ghosted(figure: Figure, other: Figure) -> Figure:
-    """Draw the lines of another figure in grey behind those of this one.
+    """Add the lines of another figure, in grey, behind the lines of a figure.
 
     Panels are matched by title and axis labels.
     """

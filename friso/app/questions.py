@@ -70,7 +70,7 @@ class PageRequest:
         return cls(*both, options, uploads)
 
     def chosen(self, *names: str) -> dict[str, Any]:
-        """Return the options of these names that are set.
+        """Return the options with these names that are set.
 
         Raises InputError for other names or values.
         """
@@ -223,7 +223,7 @@ def loops(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def flexure(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield the leaf springs of the machine, beside those of the pinned one."""
+    """Yield the leaf springs of the machine, beside those of the pinned machine if it has any."""
     asked.chosen()
     pinned = asked.pinned if asked.pinned and asked.pinned.stage.flexure else None
     ghost = KEPT.answer(friso.flexure, pinned, work) if pinned else None

@@ -33,7 +33,7 @@ class CommandParameter:
 def command_function(question: Question) -> Callable[..., None]:
     """Return the function that typer calls for a question.
 
-    Its signature and docstring are those of the command.
+    Its signature and docstring are made from the question's function, so that typer shows the right options and help.
     """
 
     def command(**values: Any) -> None:

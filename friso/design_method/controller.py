@@ -48,8 +48,8 @@ class Damping:
 class DesignedController:
     """Gains by van Dijk's rules at the chosen `crossover` [Hz].
 
-    `margin` is the least modulus margin of the settled states as designed, and `corners` that of each corner, shape
-    (n,). `damping` tells what joint damping would add.
+    `margin` is the least modulus margin in the settled states as designed. `corners` is the least margin at each
+    corner of the specification, shape (n,). `damping` tells what more damping of the joint would add.
     """
 
     crossover: float
@@ -68,7 +68,7 @@ def comfortable_below(ranges: Sequence[Range], highest: float) -> float | None:
 def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tuple[Range, ...]:
     """Return the crossovers [Hz] with a modulus margin of 0.5 in all settled states.
 
-    They hold for the masses of the stage and for those of the whole population.
+    They hold for the masses of the stage and for all masses in the population.
     """
     flat = stage.flat()
     ranges = Modal.of(flat, leaves).comfortable

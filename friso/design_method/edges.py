@@ -101,10 +101,10 @@ def worst_edges(by_law: Mapping[str, Corners]) -> Corners:
 
 @dataclass(frozen=True)
 class OtherLaws:
-    """Friction of stages under other laws, as flat keys by the name of the law.
+    """The friction of stages converted to other laws, as flat keys by the name of the law.
 
     Keys that differ between stages are arrays of shape (stages,). `lost` names the laws that do not keep what is
-    measured, with the numbers of those stages.
+    measured, each with the indices of the stages where they lose it.
     """
 
     frictions: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)

@@ -21,7 +21,7 @@ STEEL = 190e9
 
 
 def split(flat: Mapping[str, Any]) -> dict[str, float]:
-    """Return the masses of cart and stage [kg]: those of the file, or shares of the only mass."""
+    """Return the masses of cart and stage [kg]; a stage file with one mass has it divided."""
     settings = DesignSettings.current()
     masses = {key: flat[key] for key in ("masses.cart", "masses.stage") if key in flat}
     if len(masses) == 2:

@@ -24,7 +24,7 @@ class Population:
     count: int
 
     def over(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the stage's flat keys with the numbers of these machines; the controller stays."""
+        """Return the stage's flat keys with the values drawn for each machine; the controller stays."""
         return {**flat, **self.keys}
 
     def of(self, number: int) -> dict[str, float]:

@@ -150,7 +150,7 @@ class DesignSettings(Settings):
     """More is asked of what is relaxed, for the same reason."""
 
     model_reserve: float = setting(1.015, "")
-    """Closed forms may be off by so much (docs/flexure.md): the beam model confirms what keeps it."""
+    """Closed forms may be off by so much (docs/evidence/flexure.md): the beam model confirms what keeps it."""
 
     verified_moves: int = setting(10_000, "")
     """Shows a share of 95 % to half a percent."""

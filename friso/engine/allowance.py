@@ -30,9 +30,12 @@ class Exhausted(Exception):
 
 @dataclass
 class Allowance:
-    """The `work` that runs may take together, in steps times what one of their kernel takes (`Kernel.work`; a unit is
-    about 12 ns on a core of 2024), and what of it is `used`; and whether it was `exhausted`: runs within were given up
-    for want of work, of its own or of an allowance `around` it, which limits it as well."""
+    """Work that runs may take together, and how much of it is `used`.
+
+    `work` counts steps times the work of a step of their kernel (`Kernel.work`; a unit is about 12 ns on a core of
+    2024). `exhausted` tells whether runs were given up for want of work, of this allowance or of one `around` it,
+    which limits it as well.
+    """
 
     work: float
     around: Allowance | None = None
@@ -46,8 +49,10 @@ class Allowance:
         return own if self.around is None else min(own, self.around.left)
 
     def most_steps(self, runs: int, step: float) -> float:
-        """Return how many steps, of so much work, each of some runs may take.
-        Raises Exhausted if nothing is left."""
+        """Return how many steps each of some runs may take, a step being so much work.
+
+        Raises Exhausted if nothing is left.
+        """
         left = self.left
         if left <= 0:
             self.exhaust()
@@ -63,8 +68,10 @@ class Allowance:
         raise Exhausted
 
     def charge(self, steps: np.ndarray, step: float) -> None:
-        """Count the work of a batch of runs by their steps, shape (runs,), each of so much work: a run alone takes as
-        long as eight."""
+        """Count the work of a batch of runs by their steps, shape (runs,).
+
+        `step` is the work of a step. A run alone takes as long as eight.
+        """
         work = PER_BATCH + step * max(float(np.sum(steps)), COUNTED_LANES * float(np.max(steps, initial=0.0)))
         at: Allowance | None = self
         while at is not None:
@@ -82,7 +89,7 @@ def current_allowance() -> Allowance | None:
 
 @contextmanager
 def allowance(work: float = np.inf) -> Iterator[Allowance]:
-    """Let all runs within use so much work together; where it does not suffice, the run raises Exhausted."""
+    """Limit the work of all runs within the block; a run that needs more raises Exhausted."""
     some = Allowance(work, _CURRENT.get())
     token = _CURRENT.set(some)
     try:

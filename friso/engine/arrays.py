@@ -84,8 +84,10 @@ class Results(NamedTuple):
 
 
 def new_queue() -> np.ndarray:
-    """Return a queue from which threads take the numbers of their runs, one by one,
-    so that all of them are busy to the end, shape (1,): next comes run 0."""
+    """Return a queue from which threads take the numbers of their runs one by one, shape (1,).
+
+    All threads stay busy to the end. The next run is 0.
+    """
     return np.zeros(1, np.int64)
 
 

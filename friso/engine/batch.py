@@ -74,7 +74,7 @@ class Runs:
         return self.results.statistics[:, STATISTICS.index(name)]
 
     def part(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the flat keys of these runs alone."""
+        """Return the flat keys of the stages that these runs belong to."""
         return part_of(flat, self.numbers)
 
 
@@ -86,13 +86,13 @@ def part_of(flat: Mapping[str, Any], numbers: np.ndarray) -> dict[str, Any]:
 def run_chunks(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, options: RunOptions, starts: np.ndarray | None = None
 ) -> Iterator[Runs]:
-    """Run `runs` stages of one structure, given as flat keys to SI numbers or arrays of shape (runs,).
+    """Run `runs` stages of one structure, in chunks.
 
-    They start at rest, displaced as the motion says, or else from the states `starts`, shape (runs, states); modes
-    that remember may stand behind these, else they are those in which a run begins in that state. They come chunk by
-    chunk, those with many turning points after the others of their chunk. Results do not depend on lanes, threads or
-    chunks. A failed run has a status; the others go on. Raises Exhausted where an allowance does not suffice (see
-    `friso.engine.allowance`).
+    They are given as flat keys to SI numbers or arrays of shape (runs,). They start at rest, displaced as the motion
+    says, or from the states `starts`, shape (runs, states). Modes with memory may follow the states there; otherwise
+    they follow from the states. In a chunk, runs with many turning points come last. Results do not depend on lanes,
+    threads or chunks. A failed run has a status; the others go on. Raises Exhausted if an allowance does not suffice
+    (see `friso.engine.allowance`).
     """
     for first in range(0, runs, options.chunk):
         numbers = np.arange(first, min(first + options.chunk, runs))
@@ -102,8 +102,10 @@ def run_chunks(
 def prepare(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, options: RunOptions, starts: np.ndarray | None = None
 ) -> Batch:
-    """Return the kernel's input for the runs of one chunk,
-    from the states `starts` unless as the motion says."""
+    """Return the kernel's input for the runs of one chunk.
+
+    They begin in the states `starts`, or as the motion says.
+    """
     values = kernel.values({**flat, "motion.size": motion.size(flat)}, runs)
 
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
@@ -125,15 +127,20 @@ def prepare(
 
 
 def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-    """Everything at rest, the masses (and what has been measured of them) displaced as the motion says."""
+    """Return initial states: everything at rest, masses displaced as the motion says.
+
+    What has been measured of the masses is displaced too.
+    """
     displacement = motion.initial_displacement(flat)
     return kernel.settled({**flat, "motion.size": motion.size(flat)}, Steady(0.0, displacement), runs)
 
 
 def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.ndarray, np.ndarray]:
-    """Pieces of the reference with the window's start and the end of the run among them, and the window's place; of
-    those that begin behind that end, nothing is left. Runs that have the same motion share one row. Where
-    the reference stands in the end or moves evenly, the window lies behind its last corner."""
+    """Return pieces of the reference, with the start of the window and the end of the run added.
+
+    Pieces that begin after the end are left out. The second result is the place of the window. Runs with the same
+    motion share one row. If the reference stands or moves evenly in the end, the window lies after its last corner.
+    """
     runs = runs if motion.varies(flat) else 1
     pieces = motion.pieces(flat, runs)
     end = np.broadcast_to(np.asarray(flat["motion.duration"], dtype=float), (runs,))
@@ -162,8 +169,10 @@ def _run_with_room(
     options: RunOptions,
     starts: np.ndarray | None,
 ) -> Iterator[Runs]:
-    """Run the runs with these numbers; those with more turning points than there is room for again, fewer at a time
-    with more room each."""
+    """Run numbered runs; repeat those with too many turning points, with more room for each.
+
+    The repeated ones are run fewer at a time.
+    """
     part = part_of(flat, numbers)
     least = options.least_swing
     part_options = replace(options, least_swing=least[numbers]) if isinstance(least, np.ndarray) else options
@@ -190,9 +199,11 @@ def _run_with_room(
 
 
 def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, results: Results) -> None:
-    """Run a batch; where there is an allowance, in no more steps than it has left for each run. Those for which that
-    does not suffice, a few as a rule, are run again by themselves, and may take what the others have left over. Raises
-    Exhausted where that is hardly more."""
+    """Run a batch within the allowance, if there is one.
+
+    Each run gets an equal share of the steps left. Runs for which that does not suffice, usually a few, are run again
+    alone with what the others have left over. Raises Exhausted if that is hardly more.
+    """
     allowance = current_allowance()
     if allowance is None:
         run_batch(kernel, batch, options_of(options), results, options.threads)
@@ -242,8 +253,10 @@ def options_of(options: RunOptions) -> BatchOptions:
 
 
 def run_batch(kernel: Kernel, batch: Batch, settings: BatchOptions, results: Results, threads: int | None) -> None:
-    """Have threads take the runs of a chunk from a queue; the kernel runs without the interpreter's lock. Raises
-    Overtaken where nobody waits for them any more."""
+    """Have threads take the runs of a chunk from a queue, without the interpreter's lock.
+
+    Raises Overtaken if nobody waits for them any more.
+    """
     go_on()
     workers = min(threads or cores_to_use(), -(-len(batch.starts) // LANES))
     arguments = (new_queue(), batch, settings, results)

@@ -25,8 +25,10 @@ from friso.stage.plug_ins import PlugIn
 
 
 def build(folder: Path, task: bytes) -> str:
-    """Keep the kernel that a pickled task asks for in a folder of the cache, or without a task the driver; the name of
-    its entry."""
+    """Compile the kernel that a pickled task asks for, and keep it in a folder of the cache.
+
+    Without a task it is the driver. Returns the name of the entry.
+    """
     if not task:
         return keep(folder, inspect.getsource(driver), _loops_code)
     plug_ins, pickled = pickle.loads(task)

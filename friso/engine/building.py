@@ -34,10 +34,11 @@ _AT_THE_END = 2.0
 
 
 def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
-    """Return the entries of what is requested; what is missing in the cache is built,
-    and what is said about it logged. Raises RuntimeError with the builder's message if that fails, OSError where no
-    folder can be written, Overtaken where nobody waits for them any more: what is being built is, to its end, for
-    whoever asks next."""
+    """Return the cache entries requested; missing ones are built, and messages are logged.
+
+    Raises RuntimeError with the builder's message if that fails, OSError if no folder can be written, and Overtaken if
+    nobody waits for them any more; what is being built is then finished for whoever asks next.
+    """
     requests, folder = list(requests), cache_folder()
     compiled = {request: request.entry() for request in requests}
     if missing := [request for request, entry in compiled.items() if entry is None]:
@@ -65,8 +66,11 @@ class _Work:
         self._jobs: dict[CodeRequest, _Job] = {}
 
     def finish(self, requests: list[CodeRequest]) -> None:
-        """Meet all requests. What ends this early ends the jobs for which nobody else waits; but where it is overtaken,
-        those that build already go on."""
+        """Meet all requests.
+
+        If this ends early, jobs for which nobody else waits are ended; if it is overtaken, jobs already being built go
+        on.
+        """
         requests = list(dict.fromkeys(requests))
         jobs: list[_Job] = []
         overtaken = False
@@ -89,8 +93,10 @@ class _Work:
         wait([job.met for job in jobs], _AT_THE_END)
 
     def _joined(self, request: CodeRequest, place: str) -> _Job:
-        """Return the job of a request, for which one more waits; begun where there is none,
-        or one that was given up."""
+        """Return the job of a request with one more waiting for it; begin it if there is none.
+
+        A job that was given up is begun again.
+        """
         with self._turn:
             job = self._jobs.get(request)
             if job is None or job.given_up:
@@ -147,8 +153,11 @@ def _wait(jobs: list[_Job]) -> None:
 
 
 class _Job:
-    """A request that is to be met, and at last is; `place`: which of how many; `waiting`: how many wait for it;
-    whether it `builds` already, and whether it was `given_up`."""
+    """A request to build a cache entry, on its way to being met.
+
+    `place` tells which of how many it is, `waiting` how many wait for it, `builds` whether it is being built, and
+    `given_up` whether it was abandoned.
+    """
 
     def __init__(self, request: CodeRequest, place: str, cores: Semaphore) -> None:
         self.request, self.met, self.waiting = request, Future[None](), 0
@@ -206,7 +215,7 @@ class _Job:
             raise RuntimeError("the kernels were not compiled: interrupted")
 
     def _built(self) -> str:
-        """Build what is requested, by a builder that waits where there is one; the name of the entry."""
+        """Build what is requested by an idle builder if there is one; return the name of the entry."""
         surroundings = _Surroundings(os.getpid(), cache_folder(), tuple(sys.path), self.request.plug_ins)
         while True:
             waiting = _taken(surroundings)
@@ -245,8 +254,10 @@ class _Builder(HelperProcess):
         super().__init__("friso.engine.builder", str(surroundings.folder), paths=surroundings.paths)
 
     def build(self, request: CodeRequest) -> str:
-        """Build what is requested; the name of its entry, "" where the process ended instead. Raises OSError where the
-        entry cannot be kept."""
+        """Build what is requested; return the name of its entry, or "" if the process ended.
+
+        Raises OSError if the entry cannot be kept.
+        """
         try:
             answer = self.ask((request.builder, request.task))
         except EOFError:
@@ -261,8 +272,7 @@ _waiting: list[_Builder] = []
 
 
 def _taken(surroundings: _Surroundings) -> _Builder | None:
-    """Return a builder that waits in these surroundings, and no longer does;
-    None if there is none."""
+    """Take an idle builder with these surroundings; None if there is none."""
     with _taking:
         for builder in _waiting:
             if builder.surroundings == surroundings:

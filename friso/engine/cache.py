@@ -55,8 +55,10 @@ DAY = 86_400.0
 
 @cache
 def cache_folder() -> Path:
-    """Return the folder of compiled code, mode 0700; a temporary one, with a warning,
-    where that cannot be had."""
+    """Return the folder of compiled code, mode 0700.
+
+    If that is not possible, it is a temporary one, with a warning.
+    """
     try:
         for error in _UNWRITABLE:
             raise error
@@ -83,8 +85,10 @@ _UNWRITABLE: list[OSError] = []
 
 
 def leave_cache(folder: Path, error: OSError) -> None:
-    """Have kernels compiled into a temporary folder from now on, since nothing can be kept in this one: its disk is
-    full, for example. Raises the error where that is temporary already."""
+    """Compile kernels into a temporary folder from now on, since this one cannot be written.
+
+    Its disk may be full. Raises the error if the folder is temporary already.
+    """
     if is_passing(folder):
         raise error
     with _LEAVING:
@@ -131,22 +135,19 @@ def code_digest(*parts: str) -> str:
 
 @cache
 def machine() -> str:
-    """Name the processor and the compiler, which decide on the last bits of a run besides
-    friso's code."""
+    """Name processor and compiler, on which the last bits of a run depend besides friso's code."""
     return f"{processor().name}, llvmlite {llvmlite.__version__}, numpy {np.__version__}"
 
 
 @cache
 def environment() -> str:
-    """Describe the compilers and the processor,
-    on which machine code depends besides its source."""
+    """Describe compilers and processor, on which machine code depends besides its source."""
     return repr((sys.version, np.__version__, llvmlite.__version__, processor()))
 
 
 @dataclass(frozen=True)
 class Compiled:
-    """Cache entry of one module: its name, its source, its byte code for the interpreter,
-    and its machine code."""
+    """Cache entry of one module: its name, source, byte code and machine code."""
 
     name: str
     source: str
@@ -215,8 +216,10 @@ def _stored(file: Path) -> Compiled | None:
 
 
 def keep(folder: Path, source: str, code_of: Callable[[ModuleType], bytes]) -> str:
-    """Keep a module and the machine code that `code_of` makes of it in the cache `folder`, unless the same is there
-    already; the name of its entry."""
+    """Keep a module and the machine code that `code_of` makes of it in the cache `folder`.
+
+    Nothing is written if the same is there already. Returns the name of the entry.
+    """
     name = _digest(_without_words(source), _compiled_with(), environment())
     file = folder / f"{name}{ENTRY}"
     with entry_lock(file):
@@ -233,8 +236,10 @@ def entry_lock(file: Path) -> FileLock:
 
 
 def _without_words(source: str) -> str:
-    """Return the bytecode of a module, without comments, docstrings and line numbers,
-    so that words do not count."""
+    """Return a module's bytecode without comments, docstrings and line numbers.
+
+    Changes of words thus change nothing.
+    """
     return repr(_plain(compile(source, "", "exec", dont_inherit=True, optimize=2)))
 
 

@@ -21,11 +21,11 @@ CHUNK, FEWEST, MOST = 4e6, 16, 256
 
 @dataclass(frozen=True)
 class Inputs:
-    """Inputs that runs follow, every `sample_time` [s]:
-    the reference [m] and the force on the stage [N], shape (n,).
+    """Inputs of driven runs: reference [m] and force on the stage [N], shape (n,).
 
-    The force acts besides the controller's. The velocity at each sample is the central difference of the reference, and
-    linear between samples. The force is linear too, or constant if `held`, as in a sampled drive.
+    They come every `sample_time` [s]. The force acts besides the controller's. The velocity at each sample is the
+    central difference of the reference, and linear between samples. The force is linear too, or constant if `held`, as
+    in a sampled drive.
     """
 
     reference: np.ndarray
@@ -54,7 +54,10 @@ class Inputs:
 
 @dataclass(frozen=True)
 class DrivenRuns:
-    """States at the samples, shape (runs, n, states), and what is held from each until the next, (runs, n, held)."""
+    """States of driven runs at the samples, shape (runs, n, states).
+
+    Also what is held from each sample to the next, (runs, n, held).
+    """
 
     numbers: np.ndarray
     states: np.ndarray
@@ -65,9 +68,11 @@ class DrivenRuns:
 def run_driven(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, inputs: Inputs, starts: np.ndarray, rtol: float = 1e-5
 ) -> Iterator[DrivenRuns]:
-    """Run stages of one structure, given as flat keys to SI numbers or arrays of shape
-    (runs,), from the states `starts`, shape (runs, kept); they come chunk by chunk. A failed run is NaN from there on,
-    and has its status."""
+    """Run driven stages of one structure from the states `starts`, in chunks.
+
+    The stages are given as flat keys to SI numbers or arrays of shape (runs,); `starts` has the shape (runs, kept). A
+    failed run is NaN from there on, and has its status.
+    """
     count, segments = len(inputs.reference), inputs.segments
     options = RunOptions(
         rtol=rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, budget=BUDGET * count

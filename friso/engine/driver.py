@@ -32,7 +32,7 @@ def between(B, layout, lane, i, theta):
 
 
 def reference_at(B, layout, lane, t, order):
-    """Return the reference [m], or its rate [m/s], a time t after its last corner: polynomial and tones."""
+    """Return the reference [m], or its rate [m/s], at a time t after its last corner."""
     total, k = 0.0, layout.degree
     while k >= order:
         total = total * t / (k - order + 1) + B[(layout.reference + k) * layout.lanes + lane]
@@ -56,13 +56,19 @@ def deviation(B, layout, lane, theta):
 
 
 def deviation_rate(B, layout, lane, theta):
-    """Velocity minus that of the reference [m/s] at the fraction theta of the step last tried."""
+    """Return velocity minus the reference's velocity [m/s], within the step last tried.
+
+    `theta` is the fraction of the step.
+    """
     t = B[ROW.old_time * layout.lanes + lane] + theta * B[ROW.taken * layout.lanes + lane]
     return between(B, layout, lane, layout.velocity, theta) - reference_at(B, layout, lane, t, 1)
 
 
 def find_turn(B, layout, lane, high):
-    """The fraction in (0, high) at which the deviation turns: bisection sped up by the secant (Illinois)."""
+    """Return the fraction in (0, high) of the step at which the deviation turns.
+
+    It is found by bisection, sped up by the secant (Illinois).
+    """
     low, f_low, f_high = 0.0, deviation_rate(B, layout, lane, 0.0), deviation_rate(B, layout, lane, high)
     theta, side = high, 0
     for _ in range(30):
@@ -100,7 +106,10 @@ def moment(B, layout, lane, theta):
 
 
 def note_entry(B, layout, lane, row, fraction, start, end, band):
-    """Refine the moment at which the deviation last left the band (row), where it came back between start and end."""
+    """Refine the moment at which the deviation last entered the band, within a step.
+
+    `row` is where it is kept; it came back between start and end.
+    """
     if abs(start) > band and abs(end) <= band:
         theta = find_entry(B, layout, lane, fraction, band)
         B[row * layout.lanes + lane] = moment(B, layout, lane, theta)
@@ -185,9 +194,10 @@ def reference_of(batch, j):
 
 
 def enter_segment(B, layout, lane, j, segment, batch):
-    """Start the next segment of the reference that lasts, if there is one: what follows the last only ends the run.
+    """Start the next segment of the reference that has a duration.
 
-    A certain segment begins the window over which the extremes of the deviation are taken.
+    If there is none, the last one only ends the run. A certain segment begins the window over which the extremes of
+    the deviation are taken.
     """
     segments = batch.segments[reference_of(batch, j)]
     count = segments.shape[0] - 1
@@ -220,8 +230,7 @@ def enter_segment(B, layout, lane, j, segment, batch):
 
 
 def walk(B, layout, lane, w):
-    """Return the place of a lane along the axis of its tables, in points: by a state,
-    or by time."""
+    """Return a lane's place along the axis of its tables, in points: by a state, or by time."""
     timed = w == layout.place_states.size
     axis = (layout.axis + (AXIS_ROWS if timed else 0)) * layout.lanes + lane
     if timed:
@@ -249,7 +258,10 @@ def look_up(B, layout, lane, j, tables):
 
 
 def looked_up(layout, j, i, point, tables):
-    """A point of table i of run j, over places or over time: all runs may share those of one."""
+    """Return one point of table i for run j: a table over places, or over time.
+
+    All runs may share one set of tables.
+    """
     if i < layout.places:
         return tables.places[min(j, tables.places.shape[0] - 1), i, point]
     return tables.times[min(j, tables.times.shape[0] - 1), i - layout.places, point]
@@ -301,7 +313,7 @@ def load_run(B, layout, lane, j, batch, settings):
 
 
 def start_clock(B, layout, lane, j, batch):
-    """The first sample is taken at the start; what follows from it acts at once, or a little later."""
+    """Take the first sample at the start; its results act at once, or a little later."""
     late, tables = batch.clocks[j, 1], batch.tables
     B[ROW.period * layout.lanes + lane] = batch.clocks[j, 0]
     B[ROW.due * layout.lanes + lane] = late
@@ -346,7 +358,7 @@ def idle(B, layout, lane):
 
 
 def answer(B, layout, lane, batch, settings, results):
-    """Record what happened in the lane's last step; at the end of a segment of the reference, go on to the next."""
+    """Record the lane's last step; at the end of a segment of the reference, go to the next."""
     fraction, j = B[ROW.fraction * layout.lanes + lane], int(B[ROW.run * layout.lanes + lane])
     if fraction == 0.0:
         return
@@ -360,8 +372,11 @@ def answer(B, layout, lane, batch, settings, results):
 
 
 def next_segment(B, layout, lane, j, batch):
-    """Go on to the next segment; where the reference leaves a place at which it stood, note how long the run took to
-    enter the bands there, if that was the longest so far."""
+    """Go to the next segment of the reference.
+
+    If the reference leaves a place at which it stood, note how long the run took to settle there, if that was the
+    longest so far.
+    """
     stood, now = stands(B, layout, lane), B[ROW.start * layout.lanes + lane] + B[ROW.time * layout.lanes + lane]
     enter_segment(B, layout, lane, j, int(B[ROW.segment * layout.lanes + lane]) + 1, batch)
     stands_now, since = stands(B, layout, lane), layout.stands_since * layout.lanes + lane
@@ -434,7 +449,7 @@ def refill(B, layout, lane, queue, batch, settings, results):
 
 
 def run(B, layout, queue, batch, settings, results):
-    """Run the runs of the batch that this thread gets from the queue, each in a lane of its own; write the results."""
+    """Run the runs that this thread gets from the queue, each in a lane, and write results."""
     busy = 0
     for lane in range(layout.lanes):
         if refill(B, layout, lane, queue, batch, settings, results):

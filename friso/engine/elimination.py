@@ -21,7 +21,10 @@ WORK = 0.5
 
 @dataclass(frozen=True)
 class Elimination:
-    """Pivot order, entries of the lower factor in the order of use, rows of the upper one, and the factorising code."""
+    """A symbolic elimination: pivot order, entries of both factors, and the factorising code.
+
+    Entries of the lower factor are in the order of use, those of the upper one by row.
+    """
 
     order: tuple[int, ...]
     lower: tuple[MatrixEntry, ...]
@@ -29,7 +32,10 @@ class Elimination:
     code: tuple[str, ...]
 
     def solve(self, name: str) -> list[str]:
-        """Code that solves in place for the vector whose entries are called `name` followed by the row."""
+        """Return code that solves in place for a vector.
+
+        The vector's entries are called `name` followed by the row.
+        """
         forward = [f"{name}{i} = {name}{i} - L_{i}_{k} * {name}{k}" for i, k in self.lower]
         backward = [
             f"{name}{k} = {name}{k} * D_{k}" + "".join(f" - U_{k}_{j} * {name}{j}" for j in self.upper[k])
@@ -39,10 +45,10 @@ class Elimination:
 
 
 def eliminate(size: int, nonzero: set[MatrixEntry], diagonal: set[int], solves: int) -> Elimination:
-    """Elimination of the matrix whose entries ``A_i_j`` are nonzero at `nonzero` and on the diagonal.
+    """Eliminate a matrix with entries ``A_i_j`` at `nonzero` and on the diagonal, symbolically.
 
-    Rows not in `diagonal` have nothing but ``diagonal`` on the diagonal, whose inverse is ``inverse``. The order is the
-    best of the exchanges of two pivots, tried until none helps, for one factorisation and `solves` solutions.
+    Rows not in `diagonal` have only ``diagonal`` on the diagonal, whose inverse is ``inverse``. The pivot order is
+    improved by exchanging two pivots until no exchange helps, for one factorisation and `solves` solutions.
     """
     pattern = nonzero | {(i, i) for i in range(size)}
     order = _markowitz(size, pattern)
@@ -73,7 +79,10 @@ def _markowitz(size: int, nonzero: set[MatrixEntry]) -> list[int]:
 
 
 def _cost(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int], solves: int) -> float:
-    """Cycles for a factorisation and `solves` solutions: the longest wait, and a share for every operation."""
+    """Return the estimated cycles of a factorisation and `solves` solutions.
+
+    They are the longest wait, and a share for every operation.
+    """
     ready = dict.fromkeys(nonzero, 0)
     inverse, operations = dict.fromkeys(order, 0), 0
     forward, backward = dict.fromkeys(order, 0), dict.fromkeys(order, 0)

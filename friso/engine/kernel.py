@@ -60,8 +60,10 @@ class Kernel:
 
     @cached_property
     def work(self) -> float:
-        """Return the work of a step of a run, by what it computes,
-        so that it is the same on every machine."""
+        """Return the work of a step of a run, counted in operations.
+
+        It is the same on every machine.
+        """
         step = "".join(_STEP.findall(self.source))
         return STEP + OPERATION * len(_OPERATIONS.findall(step)) + CALL * len(_CALLS.findall(step))
 
@@ -70,8 +72,10 @@ class Kernel:
         self.loops(self._buffer(), self.layout, queue, batch, settings, results)
 
     def _buffer(self) -> np.ndarray:
-        """Room for all rows, on a boundary of 64 bytes: a register that straddles two cache lines takes twice as
-        long."""
+        """Return room for all rows, aligned to 64 bytes.
+
+        A register that straddles two cache lines takes twice as long.
+        """
         numbers = self.layout.rows * self.layout.lanes
         room = np.empty(numbers + 8)
         first = -room.__array_interface__["data"][0] % 64 // 8
@@ -94,8 +98,10 @@ class Kernel:
 
     @property
     def cart_position(self) -> int:
-        """Return which state is the position of what the friction acts on;
-        that of the stage where it is rigid."""
+        """Return the index of the state that is the position of the body with friction.
+
+        It is the position of the cart, or of the stage if there is no joint.
+        """
         return self.module.CART_POSITION
 
     @property
@@ -124,8 +130,10 @@ class Kernel:
 
     @property
     def initial_size(self) -> int:
-        """Return how many numbers of `full_state` a run starts from:
-        the modes that remember follow from these if need be."""
+        """Return how many numbers of `full_state` a run starts from.
+
+        The modes with memory follow from these if need be.
+        """
         return len(self.full_state) - len(self.switches)
 
     @property
@@ -143,18 +151,18 @@ class Kernel:
         return self.module.OUTPUTS
 
     def settled(self, flat: dict[str, Any], steady: Steady, runs: int) -> np.ndarray:
-        """Return states and numbers held in a steady motion that has lasted, shape (runs,
-        initial_size); `flat` and the numbers of the motion may be arrays of shape (runs,)."""
+        """Return states and numbers held in a steady motion that has lasted, (runs, initial_size).
+
+        `flat` and the numbers of the motion may be arrays of shape (runs,).
+        """
         return self.settled_at(self.values(flat, runs), steady, runs)
 
     def settled_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
-        """Return states in a steady motion that has lasted,
-        for stages given by the values of their parameters."""
+        """Return states in a steady motion that has lasted, from values of the parameters."""
         return columns(self.module.settled(steady, values), runs)
 
     def unwound_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
-        """Return states in a steady motion with all integrals 0,
-        for stages given by the values of their parameters.
+        """Return states in a steady motion with all integrals 0, from values of the parameters.
 
         The force of the controller follows from the other states.
         """
@@ -167,9 +175,11 @@ class Kernel:
         return resting
 
     def modes(self, full: np.ndarray, time: Any, reference: Any, values: list[Any]) -> np.ndarray:
-        """On which side of each kink runs are, 1 beyond and 0 before it, shape (kinks, ...), from the `full` state
-        (or the states alone, ...): modes that remember are as they are kept, and where they are not, those in which a
-        run begins there."""
+        """Return on which side of each kink runs are, 1 beyond and 0 before, shape (kinks, ...).
+
+        `full` is the full state, or the states alone, (..., ). Modes with memory are taken from it; without them they
+        are those in which a run begins in that state.
+        """
         sides = self.module.surfaces(full[: len(self.states)], time, reference, values)
         modes = np.zeros((len(self.kinks), *full.shape[1:]))
         for k, side in enumerate(sides):
@@ -179,15 +189,17 @@ class Kernel:
         return modes
 
     def with_modes(self, starts: np.ndarray, reference: Any, values: list[Any]) -> np.ndarray:
-        """Starts, shape (runs, initial_size or all), with the modes that remember in which a run begins there."""
+        """Return starts with their modes with memory, as a run would begin in these states.
+
+        `starts` has the shape (runs, initial_size), or is complete already.
+        """
         if starts.shape[1] == len(self.full_state):
             return starts
         modes = self.modes(starts.T, 0.0, reference, values)[list(self.switches)]
         return np.hstack([starts, modes.T])
 
     def values(self, flat: dict[str, Any], runs: int) -> list[np.ndarray]:
-        """Return the parameters of each run [SI], each of shape (runs,),
-        from flat keys to numbers or arrays."""
+        """Return the parameters of each run [SI], each of shape (runs,), from flat keys."""
         rows = np.empty((len(self.parameters), runs))
         for row, name in zip(rows, self.parameters, strict=True):
             row[:] = flat[name]
@@ -300,8 +312,10 @@ def _loops() -> Loops:
 
 
 def columns(rows: Iterable[Any], runs: int) -> np.ndarray:
-    """Stack the rows of a generated function, numbers or arrays of shape (runs,),
-    into an array (runs, rows)."""
+    """Stack the rows of a generated function into an array (runs, rows).
+
+    Rows are numbers or arrays of shape (runs,).
+    """
     rows = list(rows)
     full = np.empty((runs, len(rows)))
     for i, row in enumerate(rows):
@@ -310,7 +324,10 @@ def columns(rows: Iterable[Any], runs: int) -> np.ndarray:
 
 
 def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Results:
-    """Room for the results of so many runs, with turning points, samples, and numbers kept at each of these."""
+    """Return empty arrays for the results of runs, with turning points and samples.
+
+    Outputs are kept at samples and at turning points.
+    """
     return Results(
         statistics=np.zeros((runs, len(STATISTICS))),
         statuses=np.zeros(runs, np.int64),

@@ -45,7 +45,9 @@ class ArrayKind:
 
     def words(self, value: Any) -> list[Any]:
         """Return the address of an array, and its shape.
-        Raises TypeError for arguments of other kinds."""
+
+        Raises TypeError for arguments of other kinds.
+        """
         if not (value.dtype == _DTYPES[self.dtype] and value.ndim == self.dimensions and value.flags.c_contiguous):
             raise TypeError(f"an array of {value.dtype}, strides {value.strides}, where {self} is expected")
         return [value.__array_interface__["data"][0], *value.shape]
@@ -90,7 +92,9 @@ class Packing:
         self._kinds, self._struct = tuple(kinds), struct.Struct("".join(kind.form for kind in kinds))
 
     def packed(self, arguments: Sequence[Any]) -> bytes:
-        """Return the words of the arguments. Arrays must outlive them.
-        Raises TypeError for arguments of other kinds."""
+        """Return the words of the arguments; arrays must outlive them.
+
+        Raises TypeError for arguments of other kinds.
+        """
         words = (word for kind, argument in zip(self._kinds, arguments, strict=True) for word in kind.words(argument))
         return self._struct.pack(*words)

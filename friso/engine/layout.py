@@ -110,11 +110,12 @@ that a module numbers comes one of use to the driver alone: since when the refer
 
 @dataclass(frozen=True)
 class Layout:
-    """The buffer for a model of the given size.
+    """Layout of the buffer in which the driver keeps the runs of a model.
 
-    `walks` are what tables are looked up over: states, and time. Each is in a `cell` between two points of its tables,
-    in which each of these has a `base` and a `slope`. `piece_before` holds length and inputs of the piece of the
-    reference before: a sample may lie in it whose command acts after the corner.
+    `walks` are the quantities over which tables are looked up: states, and time. For each, a `cell` is the interval
+    between two points of its tables, in which every table has a `base` and a `slope`. `piece_before` holds the length
+    and the inputs of the previous piece of the reference, because a sample may lie there whose command acts only after
+    the corner.
     """
 
     states: int

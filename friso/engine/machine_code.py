@@ -35,8 +35,10 @@ def optimised(module: ir.Module, machine: llvm.TargetMachine) -> llvm.ModuleRef:
 
 
 def load_object(code: bytes, functions: Iterable[str]) -> Mapping[str, int]:
-    """Load an object file; the addresses of these functions of it. What is loaded stays to the end of the process.
-    Raises RuntimeError where it cannot be linked."""
+    """Load an object file, and return the addresses of the functions named.
+
+    It stays loaded until the process ends. Raises RuntimeError if it cannot be linked.
+    """
     library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
     for function in functions:
         library.export_symbol(function)

@@ -91,8 +91,10 @@ def _places(model: Model, body: Body) -> tuple[int, int]:
 
 
 def _looked_up(model: Model, writer: StepWriter) -> dict[str, tuple[int, ...]]:
-    """Return which states a drive with a clock measures and looks up over,
-    and over which of these each table is."""
+    """Return which states a sampled drive measures, and which its tables are looked up over.
+
+    Also return, for each table, the index of what it is looked up over.
+    """
     clock, states = model.clock, list(model.symbols)
     seen = tuple(states.index(x) for x in clock.seen.values()) if clock else ()
     over = tuple(dict.fromkeys(states.index(x) for x in clock.places.values())) if clock else ()
@@ -100,8 +102,7 @@ def _looked_up(model: Model, writer: StepWriter) -> dict[str, tuple[int, ...]]:
 
 
 def _numpy_functions(model: Model, writer: StepWriter) -> str:
-    """Write the functions of a model for NumPy arrays: constants, scales, steady states,
-    outputs and others."""
+    """Write the functions of a model for NumPy: constants, scales, steady states, outputs."""
     names: dict[sp.Symbol, str] = {p: f"p[{i}]" for i, p in enumerate(model.parameters)}
     names |= {s: f"x[{i}]" for i, s in enumerate(model.symbols)}
     names |= {r: f"r[{i}]" for i, r in enumerate(model.fixed)} | {TIME: "t"}
@@ -124,8 +125,7 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
 
 
 def _function(head: str, expressions: Iterable[sp.Expr], names: Mapping[sp.Symbol, str]) -> str:
-    """Return a function of what stands in its head; what has cases is worked out once,
-    however often it occurs."""
+    """Return a function with this head; expressions with cases are evaluated once."""
     expressions = [sp.sympify(e) for e in expressions]
     cases = sorted({case for e in expressions for case in e.atoms(sp.Piecewise)}, key=sp.count_ops)
     shared = {case: sp.Symbol(f"w{k}") for k, case in enumerate(cases)}

@@ -28,15 +28,17 @@ ASKER: ContextVar[object] = ContextVar("asker", default=None)
 
 
 def current_flag() -> np.ndarray:
-    """Return the flag, shape (1,), by which runs are cancelled now: that of `ended_by`,
-    or one that nobody sets."""
+    """Return the flag that cancels runs: of `ended_by`, or an unset one."""
     flag = _FLAG.get()
     return np.zeros(1, np.int64) if flag is None else flag
 
 
 @contextmanager
 def ended_by(flag: np.ndarray) -> Iterator[None]:
-    """Let all runs within end once another thread sets ``flag[0] = 1``; `flag` is of int64 and of shape (1,)."""
+    """Let all runs within the block end once another thread sets ``flag[0] = 1``.
+
+    `flag` is of int64 and of shape (1,).
+    """
     token = _FLAG.set(flag)
     try:
         yield
@@ -64,7 +66,10 @@ _turn = Condition()
 
 @contextmanager
 def going_first() -> Iterator[None]:
-    """Let what is computed within go first: all other work of this process waits at its next batch of runs."""
+    """Give priority to runs within the block: other work of this process waits meanwhile.
+
+    It waits at its next batch of runs.
+    """
     token, own = _FIRST.set(True), object()
     with _turn:
         _ahead[own] = time.monotonic() + AHEAD

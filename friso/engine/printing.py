@@ -26,7 +26,7 @@ def reciprocals(expr: Any) -> Any:
 
 
 class _KernelPrinter(PythonCodePrinter):
-    """Scalar code without library calls other than those of `friso.engine.simd_math`."""
+    """Print expressions as scalar code that calls no library but `friso.engine.simd_math`."""
 
     def __init__(self, rename: Rename) -> None:
         super().__init__({"fully_qualified_modules": False})
@@ -128,7 +128,7 @@ class Constants:
         return {symbol: i for i, symbol in enumerate(self._symbols.values())}
 
     def hoist(self, expr: Any) -> Any:
-        """`expr` with every largest subexpression in parameters alone replaced by a constant's symbol."""
+        """Replace every largest subexpression in parameters alone by a constant's symbol."""
         if expr.is_number or not expr.free_symbols & self._parameters:
             return expr
         if expr.free_symbols <= self._parameters:

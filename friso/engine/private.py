@@ -16,11 +16,11 @@ from friso.platform.whole_file import FOR_USER, whole_file
 
 
 def make_private(folder: Path) -> None:
-    """Make a folder for this user alone, with those above it that are missing; one of the user's own is closed to
-    others.
+    """Make a folder for this user alone, with missing ones above it.
 
-    Raises PermissionError where another user could exchange the folder, or one on the way: where it is another user's,
-    others may write to it, or it is a symbolic link. Raises OSError where it cannot be made.
+    One of the user's own is closed to others. Raises PermissionError if another user could exchange the folder, or one
+    on the way: if it is another user's, others may write to it, or it is a symbolic link. Raises OSError if it cannot
+    be made.
     """
     folder = folder.absolute()
     for path in [*reversed(folder.parents), folder]:
@@ -41,8 +41,10 @@ def make_private(folder: Path) -> None:
 
 
 def read_private(path: Path) -> bytes:
-    """Read a private file. Raises PermissionError where another user can have written it,
-    OSError where it cannot be read."""
+    """Read a private file.
+
+    Raises PermissionError if another user can have written it, OSError if it cannot be read.
+    """
     flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     with open(open_file(path, flags), "rb") as file:
         status = os.fstat(file.fileno())

@@ -15,8 +15,10 @@ AVX-512. For `python -m benchmarks.processors`, and for a cache that different m
 
 @dataclass(frozen=True)
 class Processor:
-    """A processor as LLVM knows it: the platform's triple, a name, and the features beyond those that the name implies
-    ("+avx2,-fma")."""
+    """A processor as LLVM describes it: the platform's triple, a name, and features.
+
+    Features are those beyond what the name implies ("+avx2,-fma").
+    """
 
     triple: str
     name: str
@@ -24,8 +26,10 @@ class Processor:
 
     @property
     def lanes(self) -> int:
-        """Return numbers of float64 that a register holds: 8 with AVX-512, 4 with AVX,
-        2 with SSE2 and NEON. More of them side by side are no faster, and take longer to compile (docs/platforms.md).
+        """Return how many float64 a register holds.
+
+        8 with AVX-512, 4 with AVX, 2 with SSE2 and NEON. More of them side by side are no faster, and take longer to
+        compile (docs/platforms.md).
         """
         features = self.features.split(",")
         if "+avx512f" in features or self.name == "x86-64-v4":
@@ -34,7 +38,9 @@ class Processor:
 
     def target_machine(self) -> llvm.TargetMachine:
         """Return LLVM's code generator for the processor.
-        Raises RuntimeError for a triple that LLVM does not know."""
+
+        Raises RuntimeError for a triple that LLVM does not know.
+        """
         target = llvm.Target.from_triple(self.triple)
         return target.create_target_machine(self.name, self.features, opt=3, reloc="pic", codemodel="small")
 
@@ -51,7 +57,9 @@ def processor() -> Processor:
 
 
 def loadable(triple: str) -> str:
-    """Return the triple of a platform whose object files LLVM can load:
-    on Windows those of Linux (ELF), since it fails to place the constants of Windows' own (COFF); Numba does the same.
+    """Return the target triple whose object files LLVM can load on a platform.
+
+    On Windows it is that of Linux files (ELF), because LLVM misplaces the constants of Windows' own format (COFF).
+    Numba does the same.
     """
     return f"{triple}-elf" if "windows" in triple else triple

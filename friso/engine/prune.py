@@ -16,8 +16,7 @@ KEPT_FOR, KEPT_IN_ALL = 60 * DAY, 200_000_000
 
 
 def prune(folder: Path) -> None:
-    """Delete compiled code that has not been used for long,
-    and files that killed processes left behind.
+    """Delete compiled code that has not been used for long, and leftovers of killed processes.
 
     If the folder is still too large, the code unused for longest goes next. Files that another process is writing are
     left alone.

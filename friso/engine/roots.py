@@ -15,8 +15,7 @@ def cubic(p0, p1, p2, p3, theta):
 
 
 def bracket(p0, p1, p2, p3):
-    """Bracket the first zero of a cubic: return an interval that holds it,
-    and the cubic at its ends.
+    """Bracket the first zero of a cubic: return the ends of an interval and the cubic there.
 
     The cubic is evaluated at the thirds, at the end, and at its minimum. The upper end is 2 if it is nowhere below
     zero.
@@ -37,7 +36,7 @@ def bracket(p0, p1, p2, p3):
 
 
 def first_guess(p0, p1, p2, p3):
-    """About where the cubic first falls below zero from p0 > 0, by a secant; 2 where it does not."""
+    """Return about where a cubic first falls below zero from p0 > 0, by a secant; else 2."""
     low, high, above, below = bracket(p0, p1, p2, p3)
     guess = low + (high - low) * above / (above - below)
     return guess if high < 2.0 else 2.0

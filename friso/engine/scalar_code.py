@@ -30,8 +30,10 @@ _ELEMENTS = {"int64": _INT64, "float64": _DOUBLE, "bool": ir.IntType(8)}
 
 
 def _types(kind: CompiledKind) -> Sequence[ir.Type]:
-    """Return LLVM's types of a value: a number, an array's address and shape,
-    or a named tuple's address."""
+    """Return LLVM's types of a value.
+
+    A number has one; an array has an address and a shape, a named tuple an address.
+    """
     if isinstance(kind, NumberKind):
         return [_NUMBERS[kind]]
     if isinstance(kind, RecordKind):
@@ -40,8 +42,11 @@ def _types(kind: CompiledKind) -> Sequence[ir.Type]:
 
 
 def scalar_llvm(function: Callable[..., None], kinds: Sequence[CompiledKind]) -> ir.Module:
-    """Return a function of arguments of these kinds as LLVM has it, called `run`.
-    It takes the address at which the arguments lie one after another (`friso.engine.kinds.Packing`)."""
+    """Translate a function into LLVM code, with a function `run` that calls it.
+
+    `run` takes the address at which the arguments lie one after another (`friso.engine.kinds.Packing`); `kinds` are
+    their types.
+    """
     module = ir.Module()
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [ir.PointerType(_INT64)]), "run")
     builder: Any = ir.IRBuilder(entry.append_basic_block())
@@ -52,14 +57,16 @@ def scalar_llvm(function: Callable[..., None], kinds: Sequence[CompiledKind]) ->
 
 
 def take_next(queue: Any) -> Any:
-    """Return the number at the head of a queue, an array of one number,
-    which no other thread gets too."""
+    """Take the number at the head of a queue, which no other thread gets too."""
     queue[0] += 1
     return queue[0] - 1
 
 
 def call_at(address: Any, buffer: Any, *numbers: Any) -> Any:
-    """Call a function that `friso.engine.vector_code` has written, at its address; the bits of the lanes it returns."""
+    """Call a function written by `friso.engine.vector_code`; return the bits of its lanes.
+
+    `address` is where it lies.
+    """
     raise NotImplementedError
 
 
@@ -134,7 +141,10 @@ class _Writer:
         self._written: dict[tuple[Any, ...], tuple[ir.Function, NumberKind | None]] = {}
 
     def call(self, builder: Any, function: Callable[..., Any], arguments: list[Any]) -> Any:
-        """Call a function; its result, None without one. All return a word, whatever the kind of their result."""
+        """Call a function and return its result, None without one.
+
+        All functions return a word, whatever the kind of their result.
+        """
         kinds = tuple(argument.kind for argument in arguments)
         if (function, kinds) not in self._written:
             self._written[function, kinds] = self._write(function, kinds)
@@ -149,7 +159,7 @@ class _Writer:
     def _write(
         self, function: Callable[..., Any], kinds: tuple[CompiledKind, ...]
     ) -> tuple[ir.Function, NumberKind | None]:
-        """Write a function for arguments of these kinds as LLVM code."""
+        """Write a function as LLVM code, for arguments of the given kinds."""
         tree = syntax(function)
         signature = ir.FunctionType(_INT64, [part for kind in kinds for part in _types(kind)])
         code = ir.Function(self.module, signature, self.module.get_unique_name(function.__name__))
@@ -366,8 +376,7 @@ class _Frame(ast.NodeVisitor):
         return self._outside[node.id] if node.id in self._outside else getattr(builtins, node.id)
 
     def visit_Attribute(self, node: ast.Attribute) -> Any:
-        """Write access to an attribute: a constant of a module, a field of a record,
-        or the shape of an array."""
+        """Write access to an attribute: a module's constant, a record's field, an array's shape."""
         value = self.visit(node.value)
         if isinstance(value, _RecordValue):
             return value.field(self._builder, node.attr)
@@ -553,8 +562,7 @@ class _Frame(ast.NodeVisitor):
         return self._number(first, kind).value, self._number(second, kind).value, kind
 
     def _number(self, value: Any, kind: NumberKind | None = None) -> _Value:
-        """Return a number as one of a kind; a whole number may become a float64 number,
-        and a truth either."""
+        """Return a number as one of a kind; whole numbers and truths may become float64."""
         if not isinstance(value, _Value):
             own_kind = argument_kind(value) if not isinstance(value, bool) else TRUTH
             if not isinstance(own_kind, NumberKind):

@@ -26,8 +26,7 @@ def write_sealed(path: Path, content: bytes) -> None:
 
 
 def read_sealed(path: Path) -> bytes | None:
-    """Read the content that `write_sealed` wrote under this name; None if it is missing,
-    damaged or exchanged."""
+    """Read the content that `write_sealed` wrote; None if it is missing, damaged or exchanged."""
     try:
         sealed = read_private(path)
     except OSError:
@@ -42,8 +41,10 @@ def _authenticator(path: Path, content: bytes) -> bytes:
 
 @cache
 def _secret(folder: Path) -> bytes:
-    """Return the secret of a folder; a new one where there is none,
-    or one that others can have read or written."""
+    """Return the secret of a folder.
+
+    It is a new one if there is none, or if others can have read or written it.
+    """
     file = folder / SECRET
     if (secret := _stored(file)) is None:
         with FileLock(folder / f"{SECRET}.lock", mode=0o600):

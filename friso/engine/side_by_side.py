@@ -23,7 +23,10 @@ _PATIENCE = 0.1
 
 @dataclass(frozen=True)
 class _Beside:
-    """Among how many tasks the present one is, their jobs, and what stood beside the one that began them."""
+    """The tasks among which the present one runs: their number and their jobs.
+
+    It also holds what stood beside the task that began them.
+    """
 
     tasks: int
     jobs: Sequence[Future]
@@ -31,7 +34,7 @@ class _Beside:
 
     @property
     def cores(self) -> int:
-        """Return the share of one of those that have not ended."""
+        """Return the cores that one task may use: all cores divided by the tasks that still run."""
         cores = self.about.cores if self.about else usable_cores()
         return max(1, cores // (self.tasks - sum(job.done() for job in self.jobs)))
 
@@ -40,15 +43,16 @@ _BESIDE: ContextVar[_Beside | None] = ContextVar("beside", default=None)
 
 
 def cores_to_use() -> int:
-    """Return how many cores a batch of runs may take now: all,
-    or its share beside the other tasks that have not ended. Fewer threads keep more of their lanes busy."""
+    """Return how many cores a batch of runs may take now.
+
+    It is all of them, or the batch's share while other tasks run. Fewer threads keep more of their lanes busy.
+    """
     beside = _BESIDE.get()
     return beside.cores if beside else usable_cores()
 
 
 def results_of(jobs: Sequence[Future[_T]]) -> list[_T]:
-    """Wait for jobs and return their results, in their order;
-    an error of one of them is raised at once.
+    """Wait for jobs and return their results in order; an error is raised at once.
 
     Between waits it is checked that someone still waits for all results, and Ctrl-C is noticed, which interrupts no
     wait on Windows.

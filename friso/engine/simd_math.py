@@ -30,7 +30,10 @@ def number_of(bits):
 
 
 def exp(x):
-    """e^x for any x; below -300 as at -300 (1e-130: products with it stay normal numbers), above 700 as at 700."""
+    """Return e^x, with x limited to -300 to 700.
+
+    At -300 it is 1e-130, so that products with it stay normal numbers.
+    """
     x = min(max(x, -300.0), 700.0)
     shifted = x * _LOG2_E + _ROUNDER
     rounded = shifted - _ROUNDER
@@ -80,21 +83,30 @@ def quantised(x, digit):
 
 
 def mixed(z):
-    """The bits of z well mixed: SplitMix64 (Steele, Lea, Flood 2014, doi:10.1145/2660193.2660195)."""
+    """Return the bits of z well mixed: SplitMix64.
+
+    Steele, Lea, Flood 2014, doi:10.1145/2660193.2660195.
+    """
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return z ^ (z >> np.uint64(31))
 
 
 def uniform(bits):
-    """A number evenly spread over the open interval from 0 to 1, from 40 bits at the top, and a half of the last."""
+    """Return a number uniform in the open interval from 0 to 1, from the top 40 bits.
+
+    Half of the last bit is added.
+    """
     number = number_of(np.int64((bits >> np.uint64(12)) | np.uint64(0x3FF0000000000000)))
     return (number - 1.0) + 4.547473508864641e-13
 
 
 def gaussian(seed, tick):
-    """A normal deviate for a seed and a tick, whole numbers below 2^51, by Box and Muller (1958,
-    doi:10.1214/aoms/1177706645): the same on any thread, in any order; up to 7.5 in size."""
+    """Return a normal deviate for a seed and a tick, whole numbers below 2^51.
+
+    It is by Box and Muller (1958, doi:10.1214/aoms/1177706645): the same on any thread, in any order; up to 7.5 in
+    size.
+    """
     key = mixed(np.uint64(bits_of(seed + _TWO52)) * np.uint64(0x9E3779B97F4A7C15))
     bits = mixed(key + np.uint64(bits_of(tick + _TWO52)) * np.uint64(0x9E3779B97F4A7C15))
     radius = sqrt(-2.0 * log(uniform(bits & np.uint64(0xFFFFFFFFFF000000))))
@@ -110,7 +122,10 @@ def quarter_sine(turn):
 
 
 def sine(turn):
-    """sin(2 pi turn) for up to 2^50 turns; absolute error below 1e-11 and the rounding of the turn."""
+    """Return sin(2 pi turn) for up to 2^50 turns, with an absolute error below 1e-11.
+
+    The rounding of the turn comes on top.
+    """
     quarter_later = turn + 0.25
     within = quarter_later - ((quarter_later - 0.5 + _ROUNDER) - _ROUNDER)  # 0 to 1
     return quarter_sine(0.25 - abs(within - 0.5))

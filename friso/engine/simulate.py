@@ -50,7 +50,10 @@ def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None)
 
 
 def checked_interval(interval: float, duration: float) -> float:
-    """Return the interval between samples [s]. Raises InputError where a run would have too many of them, or none."""
+    """Return the interval between samples [s].
+
+    Raises InputError if a run would have too many of them, or none.
+    """
     if not duration / MOST_SAMPLES <= interval <= duration:
         text, expected = f"{interval:g} s", f"from {duration / MOST_SAMPLES:g} s to the duration, {duration:g} s"
         raise InputError("sample_time", text, expected, "1 ms")
@@ -69,8 +72,10 @@ def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, tim
 
 
 def output_variables(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> dict[str, Any]:
-    """Return the model's outputs from its states, shape (states, samples), at the times [s],
-    as variables over "time"."""
+    """Return the model's outputs as variables over "time".
+
+    They follow from states, shape (states, samples), at the times [s].
+    """
     arrays, kind = sampled_outputs(shape, flat, states, time), axis_of(flat)
     return {
         name: ("time", array, {"units": kind.unit(unit), "long_name": label})
@@ -86,8 +91,7 @@ def time_axis(time: np.ndarray) -> dict[str, Any]:
 def _dataset(
     stage: Stage, shape: Kernel, flat: dict[str, Any], runs: Runs, time: np.ndarray, rtol: float
 ) -> xr.Dataset:
-    """Return the signals of a run as a dataset over time, with units,
-    names and the status of the run."""
+    """Return the signals of a run as a dataset over time, with units, names and its status."""
     import xarray as xr
 
     results = runs.results

@@ -121,7 +121,7 @@ class StepWriter:
         self._rows = ROW._asdict() | self.layout.first_rows
 
     def _jumping(self, jumps: Mapping[sp.Symbol, sp.Expr]) -> tuple[Block, list[int]]:
-        """Return by how much states jump at a kink, and the numbers of these."""
+        """Return a block that computes how far states jump at a kink, and the states' indices."""
         named = {f"jump{self._index[x]}_": jump for x, jump in jumps.items()}
         return Block(named, self.constants), [self._index[x] for x in jumps]
 
@@ -158,8 +158,10 @@ class StepWriter:
         return tuple(map(self.model.kinks.index, self.model.switches))
 
     def source(self) -> str:
-        """Return the function `step(B, rtol, inner, outer, budget)` of a lane:
-        whether the lane wants attention."""
+        """Return a lane's function `step(B, rtol, inner, outer, budget)`.
+
+        It tells whether the lane wants attention.
+        """
         body = [
             *self._load(),
             *self._choose_step(),
@@ -183,9 +185,11 @@ class StepWriter:
         return [self._walks.index(x) for x in (*clock.places.values(), *(TICK for _ in clock.times))] if clock else []
 
     def locate_source(self) -> str:
-        """Return the function `locate(B)` of a lane:
-        whether it has `ticked` and a cell of a table has been `left`, or the sample is to be `noted`; none without a
-        clock."""
+        """Return a lane's function `locate(B)`; none without a clock.
+
+        It tells whether the lane has `ticked`, whether a cell of a table has been `left`, and whether a sample is to
+        be `noted`.
+        """
         if not self.model.clock:
             return ""
         lines = [*self._clock.code("", self._in_buffer()), *self._offsets(), f"ticked = {self._row('ticked')} > 0.0"]
@@ -209,9 +213,11 @@ class StepWriter:
         return lines
 
     def update_source(self) -> str:
-        """Return the function `update(B)` of a lane: tables are looked up,
-        and the numbers that are held become what follows from the sample just taken, where the lane has `ticked`; and
-        when it will next. Modes that remember are kept as they are at the beginning of the step."""
+        """Return a lane's function `update(B)`.
+
+        It looks up tables and, where the lane has `ticked`, sets the numbers held from the last sample, and the time
+        of the next tick. Modes with memory are kept as at the beginning of the step.
+        """
         clock, name = self.model.clock, self._in_buffer()
         lines = [f"ticked, tick = {self._row('ticked')}, {self._row('tick')}", "instant = 0.0"]
         if clock:
@@ -234,8 +240,10 @@ class StepWriter:
         return _function("update", "B", [*lines, f"{self._row('ticked')} = 0.0"])
 
     def _piece_of_sample(self) -> list[str]:
-        """Return the piece of the reference in which the sample was taken: the one before,
-        where a corner came in between."""
+        """Return the piece of the reference in which the sample was taken.
+
+        It is the previous one if a corner came in between.
+        """
         length, *before = (self._row("piece_before", i) for i in range(1 + len(self.model.inputs)))
         lines = ["earlier = instant < -1e-6 * period_", f"instant = instant + {length} if earlier else instant"]
         now = (self._row("reference", i) for i in range(len(before)))
@@ -270,8 +278,10 @@ class StepWriter:
         return lines + [f"{'t' if name == 'time' else name} = {self._row(name)}" for name in (*SCALARS, "due")]
 
     def _choose_step(self) -> list[str]:
-        """Return the next step, at most to the corner of the reference,
-        or to what follows from the next sample; the last two before it are made equal."""
+        """Return the next step, at most to the corner of the reference or to the next tick.
+
+        The last two steps before it are made equal.
+        """
         return [
             *self._edge(),
             "rest = edge - t",
@@ -283,8 +293,10 @@ class StepWriter:
         ]
 
     def _edge(self) -> list[str]:
-        """Return where the step ends at the latest;
-        a corner and what follows from a sample fall together within rounding."""
+        """Return where the step ends at the latest.
+
+        A corner and a tick coincide if they are equal within rounding.
+        """
         if not self.model.clock:
             return ["edge = stop"]
         lines = [*self._clock.code("", self._rename("x", "t")), "together = abs(stop - due) < 1e-6 * period_"]
@@ -353,8 +365,10 @@ class StepWriter:
         return f"x{i} + {theta} * (end{i} - x{i} + (1.0 - {theta}) * ({inner}))"
 
     def _crossings(self) -> list[str]:
-        """Return where in the step the first kink is crossed: `fraction`, 1 if none is; `astray`:
-        a kink's mode is wrong."""
+        """Return where in the step the first kink is crossed: `fraction`, 1 if none is.
+
+        `astray` tells that a kink's mode is wrong.
+        """
         lines = []
         for point, theta in enumerate(THIRDS):
             states = [f"p{point}_{i} = {self._between(i, repr(theta))}" for i in self._watched_states]
@@ -432,9 +446,11 @@ class StepWriter:
         return lines
 
     def _jump(self) -> list[str]:
-        """Let the states jump that do so at the kinks just crossed, and the modes change; where there are modes that
-        remember, one after the other, since several may change at one instant: what follows from the first belongs to
-        what is before the second."""
+        """Let states jump at the kinks just crossed, and let the modes change.
+
+        Modes with memory change one after the other, because several may change at one instant: the result of the
+        first is the input of the second.
+        """
         lines: list[str] = []
         flips = [f"mode{k} = 1.0 - mode{k} if flip{k} else mode{k}" for k in range(self.kinks)]
         for k, (block, jumping) in enumerate(self._jumps):
@@ -444,7 +460,10 @@ class StepWriter:
         return lines if self.model.switches else lines + flips
 
     def _step_factor(self) -> list[str]:
-        """SAFETY / error^(1/order), from the mean square error by roots alone: 3/32 of it stands for 1/10."""
+        """Return SAFETY / error^(1/order), from the mean square error, by roots alone.
+
+        The exponent 3/32 stands for 1/10.
+        """
         lines = ["root8 = sqrt(sqrt(sqrt(square + 1e-20)))"]
         if self.tableau.order == 4:
             return [*lines, f"factor = {SAFETY!r} / root8"]
@@ -467,7 +486,10 @@ class StepWriter:
         ]
 
     def _between_samples(self) -> list[str]:
-        """Largest force inside the step, extremes of the deviation, when it last left the two bands, and turned."""
+        """Return what is kept of the inside of a step.
+
+        It is the largest force, the extremes of the deviation, when it last left the two bands, and when it turned.
+        """
         lines = ["now = start + t_n"]
         for where, theta in zip(("p0", "p1", "e"), (*THIRDS, 1.0), strict=True):
             reached = f"good & (fraction >= {theta!r})"
@@ -486,8 +508,7 @@ class StepWriter:
         ]
 
     def _seen(self) -> list[str]:
-        """Write the code for the drive's measurement at the instant of its sample,
-        which may lie inside the step."""
+        """Write the drive's measurement at the instant of its sample, which may lie inside the step."""
         clock = self.model.clock
         if not clock:
             return []

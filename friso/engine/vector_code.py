@@ -154,8 +154,10 @@ class _Writer:
         return _Vector(ir.Constant(self._type(kind), [ir.Constant(kind.element, constant)] * self.lanes), kind)
 
     def together(self, *operands: Any) -> tuple[list[ir.Value], _Kind]:
-        """Return the values of vectors and numbers, which become of the kind of the vectors;
-        and the kind."""
+        """Return vectors and numbers as values of one kind, and that kind.
+
+        Numbers become of the kind of the vectors.
+        """
         kinds = [operand.kind for operand in operands if isinstance(operand, _Vector)]
         truths = all(isinstance(operand, bool) for operand in operands)
         kind = kinds[0] if kinds else (_TRUTH if truths else _FLOAT)
@@ -240,7 +242,7 @@ _LIBRARY: dict[Any, Callable[..., _Vector]] = {
 
 
 class _Frame(ast.NodeVisitor):
-    """Evaluates the statements and expressions of one function: to vectors, or to what is known beforehand."""
+    """Evaluates the statements and expressions of one function, to vectors or to constants."""
 
     def __init__(self, writer: _Writer, scope: dict[str, Any], outside: Mapping[str, Any]) -> None:
         self._writer, self._scope, self._outside = writer, scope, outside

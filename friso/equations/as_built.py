@@ -37,8 +37,11 @@ OF_RATED = 2**50
 
 @dataclass(frozen=True)
 class AsBuilt:
-    """The stage's structure; whole samples of delay; whether the current loop lags; and over how many samples a drive
-    without a filter takes the velocity."""
+    """The structure of a stage as built.
+
+    `delay_samples` is the delay in whole samples, `current_loop` tells whether the current loop lags, and
+    `velocity_samples` is the number of samples over which a drive without a filter takes the velocity.
+    """
 
     structure: Structure
     delay_samples: int
@@ -104,8 +107,10 @@ def as_built(form: AsBuilt) -> Model:
 
 
 def _kink_along_rail(kink: Kink, varied: Mapping[Any, Any]) -> Kink:
-    """Return a kink whose levels vary along the rail;
-    on which side a run begins is told before anything is looked up, by the levels as they are given."""
+    """Return a kink whose levels vary along the rail.
+
+    The side on which a run begins is decided before anything is looked up, by the levels as given.
+    """
     from friso.equations.component import Kink, Switch
 
     there = kink.with_values(varied)
@@ -158,8 +163,10 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
 
 
 def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...]]:
-    """Return the encoder's reading [m], the controller's command [N],
-    and the numbers kept for the next sample."""
+    """Return the encoder's reading [m], the controller's command [N], and the numbers it keeps.
+
+    These are kept for the next sample.
+    """
     from dataclasses import replace
 
     import sympy as sp

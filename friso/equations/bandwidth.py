@@ -11,37 +11,43 @@ from friso.stage.controllers import KIND, controller_of
 
 
 def bandwidth(flat: Mapping[str, Any]) -> Any:
-    """Return the bandwidth [Hz] that the keys of a controller tell;
-    None for one that is given by its gains, for instance, and without a controller."""
+    """Return the bandwidth [Hz] that a controller's keys state.
+
+    None if they state none, as for a controller by gains, or without a controller.
+    """
     key = controller_of(flat).bandwidth_key if KIND in flat else None
     return None if key is None else flat[key]
 
 
 def at_bandwidth(flat: Mapping[str, Any], bandwidth: Any) -> dict[str, Any]:
-    """Return stages with their controllers at bandwidths [Hz], faster or slower as a whole;
-    at factors of it where no key states a bandwidth."""
+    """Return stages with their controllers set to bandwidths [Hz], each scaled as a whole.
+
+    For controllers that state no bandwidth, `bandwidth` is a factor on the present one.
+    """
     key = controller_of(flat).bandwidth_key
     return faster(flat, bandwidth) if key is None else {**faster(flat, bandwidth / flat[key]), key: bandwidth}
 
 
 def faster(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Return stages whose controller is faster by a factor,
-    all its poles and zeros and its bandwidth being scaled."""
+    """Return stages with the whole controller faster by a factor, bandwidth included.
+
+    All its poles and zeros are scaled.
+    """
     return {**flat, **sped_up(flat, factor)}
 
 
 def sped_up(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Return the keys that change in a controller that is faster by a factor,
-    to their new values."""
+    """Return the keys that change in a controller that is faster by a factor, with new values."""
     controller = controller_of(flat)
     powers = {controller.key(name): power for name, power in controller.speeds_up.items()}
     return {key: flat[key] * factor**power for key, power in powers.items() if key in flat}
 
 
 def range_example(flat: Mapping[str, Any]) -> str:
-    """Return a range of a key, as it stands in a message:
-    of the one that says how fast the controller of a stage is, its bandwidth or the first of its gains, or else of a
-    mass."""
+    """Return a range of a typical key, as an example in a message.
+
+    It is a range of the bandwidth, of the first gain, or else of a mass.
+    """
     controller = controller_of(flat) if KIND in flat else None
     gains = [controller.bandwidth_key, *map(controller.key, controller.speeds_up)] if controller else []
     key = next(key for key in [*gains, "masses.stage", "masses.cart"] if key and flat.get(key))

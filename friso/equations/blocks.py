@@ -123,8 +123,7 @@ class Measured:
 
 
 def loop_signals(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
-    """Return the signals of a loop, which are as large as a length [m],
-    and change at a rate [1/s]."""
+    """Return the signals of a loop, scaled by a length [m] and a rate [1/s]."""
     drift = STEADY.reference_velocity - STEADY.velocity
     position = Signal(loop.position, length, STEADY.position, STEADY.velocity, rate=loop.velocity)
     return Measured(
@@ -145,7 +144,10 @@ def loop_signals(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
 
 
 class Blocks(ABC):
-    """The blocks, which keep what they need beside them. `name` distinguishes a block from others of its kind."""
+    """Building blocks of a controller, such as filters and integrals.
+
+    `name` distinguishes a block from others of its kind.
+    """
 
     def __init__(self, form: ControllerForm | None = None) -> None:
         self.form = form
@@ -155,7 +157,10 @@ class Blocks(ABC):
 
     @contextmanager
     def loop(self, name: str) -> Iterator[None]:
-        """Blocks within it are those of a loop, "position" or "velocity", which a drive may carry out more slowly."""
+        """Mark the blocks made within as parts of the "position" or the "velocity" loop.
+
+        A drive may carry out that loop more slowly.
+        """
         yield
 
     def handed_on(self, signal: Signal, name: str) -> Signal:
@@ -177,7 +182,10 @@ class Blocks(ABC):
 
     @abstractmethod
     def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
-        """s/(1 + tau s), tau [s]; the rate of what is measured without a filter, which a drive takes over samples."""
+        """Return s/(1 + tau s) of a signal, tau [s].
+
+        Without `tau` it is the rate of what is measured, which a drive takes over samples.
+        """
 
     @abstractmethod
     def integral(
@@ -189,16 +197,21 @@ class Blocks(ABC):
         limit: sp.Expr | None = None,
         leak: sp.Expr | None = None,
     ) -> Signal:
-        """gain/s, or gain/(s + leak); the gain is positive, and the controller's force rises with the output. Where
-        that force is at its limit, the integrator does what the anti-windup prescribes; where its own output is at a
-        `limit`, it rests. A drive integrates by the `rule`, if its own is not another one."""
+        """Return gain/s, or gain/(s + leak), of a signal.
+
+        The gain is positive, and the controller's force rises with the output. At the force limit the integrator
+        follows the anti-windup; where its own output is at a `limit`, it rests. A drive integrates by the `rule`,
+        unless it has a rule of its own.
+        """
 
     @abstractmethod
     def biquad(
         self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
     ) -> Signal:
-        """Return a transfer function of the second order, whose lower polynomial begins with 1:
-        a notch, for one."""
+        """Return a transfer function of second order, such as a notch.
+
+        Its lower polynomial begins with 1.
+        """
 
     @abstractmethod
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
@@ -210,8 +223,10 @@ class Blocks(ABC):
 
     @abstractmethod
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
-        """Return the force with the gains of standstill, where the error is small;
-        what integrals hold stays."""
+        """Return the force with the gains of standstill where the error is small.
+
+        The force held by integrals stays.
+        """
 
     @abstractmethod
     def push(self, error: Signal, direction: Signal) -> Signal:
@@ -241,8 +256,7 @@ class Blocks(ABC):
     def transfer(
         self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
     ) -> Signal:
-        """Return a transfer function of the first or the second order,
-        whose lower polynomial begins with 1."""
+        """Return a transfer function of first or second order; its lower polynomial begins with 1."""
         if lower[2] != 0:
             return self.biquad(signal, upper, lower, name, rule)
         through = sp.sympify(upper[1]) / lower[1]
@@ -266,8 +280,11 @@ class _Row(dict[str, sp.Symbol]):
 
 @dataclass(frozen=True)
 class Demand:
-    """The shares of a controller's force by name, their sum, and the force demanded with what is added against friction
-    and behind the filters [N]; and the error [m] that is measured."""
+    """The force that a controller demands.
+
+    `shares` are its parts by name, `total` is their sum, `force` [N] adds settings against friction and filters, and
+    `error` [m] is measured.
+    """
 
     shares: Mapping[str, Signal]
     total: Signal
@@ -307,9 +324,11 @@ def unwinding_time() -> sp.Symbol:
 
 
 def wound_up(force: sp.Expr, integrals: list[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
-    """Return the integrals in a steady motion: the innermost, which is made last,
-    such that the controller exerts the force of `STEADY`, the others 0; `force` is its own in that motion, in terms of
-    the integrals."""
+    """Return the integrals in a steady motion, so that the force is that of `STEADY`.
+
+    The innermost integral, which is made last, supplies that force; the others are 0. `force` is the controller's own
+    in that motion, in terms of the integrals.
+    """
     if not integrals:
         return {}
     *outer, innermost = integrals

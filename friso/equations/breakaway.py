@@ -21,22 +21,27 @@ Force = Callable[[Mapping[str, Any]], Any]
 
 
 def breakaway(flat: Mapping[str, Any]) -> Any:
-    """Return the largest friction force at rest [N] of guide and motor together: a number,
-    or an array where keys are. 0 for laws that declare none."""
+    """Return the largest friction force at rest [N] of guide and motor together.
+
+    It is a number, or an array if keys are. Laws that declare none count as 0.
+    """
     return sum(_breakaway(keys) for keys in _tables(flat))
 
 
 def sliding(flat: Mapping[str, Any]) -> Any:
-    """Return the level of sliding friction [N] of guide and motor together:
-    Coulomb friction where a law has that key, else what it declares for the slowest motion."""
+    """Return the level of sliding friction [N] of guide and motor together.
+
+    It is Coulomb friction if the law has that key, otherwise its friction in the slowest motion.
+    """
     named = "friction.coulomb"
     return sum(keys[named] if named in keys else np.maximum(*_slow(keys)) for keys in _tables(flat))
 
 
 def least_breakaway(flat: Mapping[str, Any]) -> Any:
-    """Return the force [N] at which the guide alone breaks away in its weaker direction,
-    less what a bias force on the cart takes of it. Laws declare the break-away force without what differs between the
-    directions, as their mean."""
+    """Return the force [N] at which the guide breaks away in its weaker direction.
+
+    A bias force on the cart is subtracted. Laws declare the mean break-away force of both directions.
+    """
     forward, back = _slow(flat)
     total = forward + back
     weaker = np.divide(2 * np.minimum(forward, back), total, out=np.ones_like(total), where=total > 0)
@@ -61,8 +66,10 @@ def _breakaway(flat: Mapping[str, Any]) -> Any:
 
 
 def _slow(flat: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the forces [N] of one law against the slowest motion forward and back;
-    0 where it cannot say them."""
+    """Return the forces [N] of one law against the slowest motion, forward and back.
+
+    They are 0 if the law cannot say them.
+    """
     force = _steady_of(flat["friction.model"], _variant(flat))
     if force is None:
         return np.zeros(()), np.zeros(())

@@ -36,10 +36,10 @@ STEADY = Steady(*(sp.Symbol(f"steady_{name}", real=True) for name in Steady._fie
 
 @dataclass(frozen=True)
 class State:
-    """A state, its time derivative, unit, the magnitude below which it does not matter, and its role.
+    """A state: its derivative, unit, role, and the magnitude below which it does not matter.
 
     `settled` is its value in a steady motion that has lasted, in terms of `STEADY`. A state that is not `controlled`
-    has no say in the size of the steps.
+    has no influence on the size of the steps.
     """
 
     symbol: sp.Symbol
@@ -71,11 +71,11 @@ TICK = sp.Symbol("tick", real=True)
 
 @dataclass(frozen=True)
 class Clock:
-    """When a drive samples: every `period` [s]. What it computes at a sample acts a time `late` [s] after it, less than
-    a period; then the numbers that are held change.
+    """The instants at which a drive samples: every `period` [s].
 
-    `seen` are the states that are measured at the sample itself, under names of their own. `places` are looked up in
-    tables over the position that a state holds, `times` in tables over the time of the sample; they are held too.
+    What it computes at a sample acts `late` [s] after it, less than a period; then the numbers that are held change.
+    `seen` are the states measured at the sample itself, under names of their own. `places` are looked up in tables
+    over the position that a state holds, `times` in tables over the time of the sample; both are held too.
     """
 
     period: sp.Expr
@@ -91,7 +91,10 @@ class Clock:
 
 
 class gaussian(sp.Function):
-    """A normal deviate for a seed and the number of a sample, the same in every lane and thread (`friso.engine`)."""
+    """A normally distributed number for a seed and the number of a sample.
+
+    It is the same in every lane and thread (`friso.engine`).
+    """
 
     nargs = 2
 
@@ -107,14 +110,16 @@ class sine(sp.Function):
 
 
 class clipped(sp.Function):
-    """A number within plus and minus a limit, which comes second (`friso.engine`); SymPy's own minimum and maximum take
-    minutes to compare long expressions."""
+    """A number limited to plus and minus the second argument (`friso.engine`).
+
+    SymPy's own minimum and maximum take minutes to compare long expressions.
+    """
 
     nargs = 2
 
 
 class quantised(sp.Function):
-    """A number in whole digits, the size of which comes second; as it is where that is 0 (`friso.engine`)."""
+    """A number rounded to multiples of the second argument; unchanged if that is 0."""
 
     nargs = 2
 
@@ -149,8 +154,7 @@ class Kink:
         return self.surface if self.starts is None else self.starts
 
     def beginning(self, sides: Mapping[Any, Any]) -> Kink:
-        """Return the same, its surface beginning with conditions in the place of the sides of other
-        kinks."""
+        """Return the kink with conditions for the sides of other kinks at the start of a run."""
         return Kink(self.name, self.surface, narrow=self.narrow, starts=cast(sp.Expr, self.surface.xreplace(sides)))
 
     def called(self, name: str) -> Self:
@@ -166,12 +170,12 @@ class Kink:
 
 @dataclass(frozen=True)
 class Switch(Kink):
-    """A mode that remembers, such as the slip of an element: which side it is on depends on how the motion came there.
+    """A mode with memory, such as slipping: its side depends on how the motion came there.
 
     It is entered where `enter` rises through 0 and left where `leave` does; `beyond` is 1 in it. `begins` is positive
-    in the states in which a run begins in the mode where nothing else decides; it contains no mode. `entered` and
-    `left` are what states become on entering and on leaving, in terms of what they were; the other states go on as they
-    were."""
+    in the states in which a run begins in the mode if nothing else decides; it contains no mode. `entered` and `left`
+    are new values of states on entering and on leaving, in terms of the old ones; other states are unchanged.
+    """
 
     surface: sp.Expr = field(init=False, compare=False)
     enter: sp.Expr
@@ -207,7 +211,7 @@ class Switch(Kink):
 
 @dataclass(frozen=True)
 class Output:
-    """A quantity to look at: expression in states, time and parameters, its unit and its name in plots."""
+    """A quantity to show: an expression in states, time and parameters, its unit and its name."""
 
     expression: sp.Expr
     unit: str

@@ -44,7 +44,10 @@ def load_follows(flat: Mapping[str, Any]) -> bool:
 
 
 def friction_level(name: str, conditions: bool) -> sp.Expr:
-    """Static or Coulomb friction [N], under `conditions` if there are any, while the reference does not accelerate."""
+    """Return static or Coulomb friction [N], with [conditions] if there are any.
+
+    It holds while the reference does not accelerate.
+    """
     from friso.equations.component import key
 
     measured = key(f"friction.{name}")
@@ -66,8 +69,11 @@ def under_acceleration(acceleration: sp.Expr) -> dict[Any, Any]:
 
 @register_derivation(CONDITIONS)
 def factors(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Flat keys of the factors that follow from [conditions], numbers or arrays, at its place on the rail. Raises
-    InputError for a correlation length that is no more than a speck of the places' range."""
+    """Return flat keys of the factors that follow from [conditions], numbers or arrays.
+
+    They hold at the stage's place on the rail. Raises InputError for a correlation length that is tiny against the
+    range of places.
+    """
     own = {key.removeprefix(f"{CONDITIONS}."): flat[key] for key in flat if key.startswith(f"{CONDITIONS}.")}
     loaded = 1 - own["load_share"] + own["load_share"] * own["load"]
     warm = np.exp(-own["running_time"] / own.get("warm_up_time", np.inf))
@@ -80,8 +86,10 @@ def factors(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def anywhere(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the flat keys for a machine that moves along its rail:
-    the factors are not those of one place."""
+    """Return the flat keys for a machine that moves along its rail.
+
+    Its friction then has no factor of a single place.
+    """
     if not has_conditions(flat):
         return dict(flat)
     free = {key: value for key, value in flat.items() if key != f"{CONDITIONS}.place"}

@@ -35,8 +35,7 @@ switching for ever; over this narrow band the stop is continuous and the slide i
 
 
 def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
-    """Return the controller of the given form;
-    `length` [m] and `rate` [1/s] are the scales of its states."""
+    """Return a controller in continuous time; `length` [m] and `rate` [1/s] scale its states."""
     blocks = Continuous(rate, form)
     demand = demanded(form, loop_signals(loop, length, rate), blocks)
     bound = ForceLimit.of(demand.force, form.anti_windup) if form.anti_windup else None
@@ -58,11 +57,9 @@ FAR = 1e9
 
 
 def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the gains of a controller for an error that hardly changes,
-    beyond all windows and deadbands.
+    """Return proportional [N/m] and integral gain [N/(m s)] for an error that hardly changes.
 
-    They are the proportional gain [N/m] and the integral gain [N/(m s)], of a stage given as flat keys, with its
-    reference at rest.
+    The error lies beyond all windows and deadbands, and the stage's reference rests.
     """
     form = controller_form(flat)
     loop = Loop(STEADY.error, STEADY.position, sp.S.Zero, sp.S.Zero)
@@ -84,8 +81,7 @@ def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def _per_error(value: sp.Expr) -> sp.Expr:
-    """Return by how much a value changes with the error of a stage that is displaced the other
-    way."""
+    """Return the derivative of a value by the error, the stage being displaced the other way."""
     return sp.diff(value, STEADY.error) - sp.diff(value, STEADY.position)
 
 
@@ -113,8 +109,10 @@ class ForceLimit:
 
 @dataclass(frozen=True)
 class _Integral:
-    """An integrator's state, what it integrates (also in a steady motion), its magnitude, its output, the limit of
-    that, and the rate at which it leaks."""
+    """An integrator: its state, its input (also in a steady motion), its magnitude and output.
+
+    It may have a limit of its output, and a rate at which it leaks.
+    """
 
     symbol: sp.Symbol
     integrand: sp.Expr
@@ -126,7 +124,10 @@ class _Integral:
 
 
 class Continuous(Blocks):
-    """Blocks whose memories are states; `rate` [1/s] is that of the motion."""
+    """Blocks of a controller in continuous time, whose memories are states.
+
+    `rate` [1/s] is the natural frequency of the motion, by which states are scaled.
+    """
 
     def __init__(self, rate: sp.Expr, form: ControllerForm | None = None) -> None:
         super().__init__(form)
@@ -291,7 +292,7 @@ class Continuous(Blocks):
         return tuple(states), (*far, *winding, *pauses, *self._begun_anew(error))
 
     def _limits(self, integral: _Integral, demand: Demand) -> list[tuple[sp.Expr, sp.Expr, str]]:
-        """Return the limited outputs of an integral, with their limits and the names of these."""
+        """Return the limited outputs of an integral, each with its limit and the limit's name."""
         limits = [] if integral.limit is None else [(integral.output, integral.limit, str(integral.symbol))]
         if self.settings.limit:
             force = sp.diff(demand.total.value, integral.symbol) * integral.symbol
@@ -314,8 +315,10 @@ def _far(limits: tuple[Kink, ...], limit: sp.Expr, name: str) -> tuple[Kink, ...
 
 
 def _resting(limits: tuple[Kink, ...], far: tuple[Kink, ...], winding: Kink, limit: sp.Expr) -> sp.Expr:
-    """Return the share by which an integrator rests:
-    while the value is beyond its limit and would be driven further."""
+    """Return the share by which an integrator rests because of a limit, 0 to 1.
+
+    It rests while the value is beyond its limit and would be driven further.
+    """
     band, rest = UNWINDING_BAND * limit, sp.S.Zero
     for kink, end, inwards in zip(limits, far, (winding.beyond, 1 - winding.beyond), strict=True):
         rest += inwards * (kink.beyond * (1 - end.beyond) * kink.surface / band + end.beyond)

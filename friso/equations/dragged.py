@@ -21,8 +21,7 @@ IMPULSE = "impulse"
 
 @dataclass(frozen=True)
 class Dragged(Imposed):
-    """Friction law of a body that follows a reference,
-    and the rest on which its equations depend (see `Structure`)."""
+    """The friction law of a body that follows a reference, and what its equations depend on."""
 
 
 def dragged(form: Dragged) -> Model:

@@ -18,17 +18,22 @@ HELD_FORCE = "held_force"
 
 @dataclass(frozen=True)
 class Driven:
-    """The stage's structure, and over how many samples the drive takes the velocity; 0: a controller in continuous
-    time."""
+    """The structure of a stage that follows a log.
+
+    `velocity_samples` is the number of samples over which the drive takes the velocity; 0 means a controller in
+    continuous time.
+    """
 
     structure: Structure
     velocity_samples: int = 0
 
 
 def driven(form: Driven) -> Model:
-    """Return the equations of the stage with what it is given at every sample: position [m],
-    velocity [m/s] and acceleration [m/s^2] of the reference, and the force [N] besides the controller's with its rate
-    [N/s]."""
+    """Return the equations of a stage whose reference and force are given at every sample.
+
+    Given are position [m], velocity [m/s] and acceleration [m/s^2] of the reference, and the force [N] beside the
+    controller's with its rate [N/s].
+    """
     from dataclasses import replace
 
     from friso.equations.component import TIME, key
@@ -42,8 +47,7 @@ def driven(form: Driven) -> Model:
 
 
 def _sampled(form: Driven) -> Control:
-    """Return the controller as a drive carries it out,
-    whose samples are the corners of the reference."""
+    """Return the controller as a drive carries it out, sampling at the reference's corners."""
     from dataclasses import replace
 
     from friso.equations.blocks import Controller, Loop

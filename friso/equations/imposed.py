@@ -81,8 +81,10 @@ def imposed(form: Imposed) -> Model:
 
 
 def _per_period(inner: State, period: sp.Expr) -> State:
-    """Return a state of the law, its rate counted per period;
-    one that is a length matters as the motion does."""
+    """Return a state of the law with its rate per period.
+
+    A state that is a length is scaled by the motion.
+    """
     import sympy as sp
 
     from friso.equations.model import MOTION_SIZE

@@ -14,11 +14,11 @@ from friso.equations.structure import JointForm
 
 
 def joint_force(form: JointForm, deflection: sp.Expr, rate: sp.Expr, limiter_pulls: bool) -> tuple[sp.Expr, Component]:
-    """Force of the joint on the cart [N] for a deflection [m] of the stage against it, and its kinks.
+    """Return the force of the joint on the cart [N], and its kinks, for a deflection [m].
 
-    "locked": cart and stage meet through the limiter alone. "touching": the stroke is zero, so that the limiter
-    always touches. "free": the limiter touches where abs(deflection) exceeds the stroke. A limiter that does
-    not pull lets go where its damping would outweigh its stiffness.
+    "locked": cart and stage meet through the limiter alone. "touching": the stroke is zero, so that the limiter always
+    touches. "free": the limiter touches where abs(deflection) exceeds the stroke. A limiter that does not pull lets go
+    where its damping would outweigh its stiffness.
     """
     contact = key("joint.limiter_stiffness") * deflection + key("joint.limiter_damping") * rate
     leaves = key("joint.stiffness") * deflection + key("joint.damping") * rate

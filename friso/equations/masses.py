@@ -31,9 +31,10 @@ class Body:
 
 
 def parasitic_force(parasitic: Body, stage: Body) -> sp.Expr:
-    """Force of the stage on the parasitic mass [N]: spring and damper of the first internal mode.
+    """Return the force of the stage on the parasitic mass [N], by a spring and a damper.
 
-    `parasitic.frequency` is that of the two halves of the stage against each other (design.md, section 1).
+    They are those of the first internal mode. `parasitic.frequency` is that of the two halves of the stage against
+    each other (design.md, section 1).
     """
     reduced = parasitic.mass * stage.mass / (parasitic.mass + stage.mass)
     omega = 2 * sp.pi * key("parasitic.frequency")
@@ -52,13 +53,17 @@ def position_outputs(prefix: str, name: str, body: Body) -> Component:
 
 
 def stops(deflection: sp.Expr, reach: sp.Expr, name: str) -> tuple[Kink, Kink]:
-    """Return where two bodies touch, ahead and behind,
-    that may move against each other by a reach [m] to either side."""
+    """Return the kinks at which two bodies touch, ahead and behind.
+
+    They may move against each other by a reach [m] to either side.
+    """
     return Kink(f"{name}_ahead", deflection - reach), Kink(f"{name}_behind", -deflection - reach)
 
 
 def beyond_stops(stops: tuple[Kink, Kink], contact: sp.Expr, reached: sp.Expr) -> sp.Expr:
-    """Force [N] between them: what the `contact` would exert [N] if it always touched, less what it has `reached` at
-    the stops [N]; nothing between these."""
+    """Return the force [N] between two bodies at stops; zero between the stops.
+
+    It is what `contact` would exert [N] if it always touched, less what it has `reached` at the stops [N].
+    """
     ahead, behind = stops
     return (ahead.beyond + behind.beyond) * contact + (behind.beyond - ahead.beyond) * reached

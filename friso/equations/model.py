@@ -37,8 +37,7 @@ SMALLEST_LENGTH = sp.Rational(1, 10**4)
 
 @dataclass(frozen=True)
 class Model:
-    """Equations of a stage with the bodies `stage`, which is measured, and `cart`,
-    which feels friction.
+    """Equations of a stage with the bodies `stage`, which is measured, and `cart`, with friction.
 
     A rigid stage has one body that is both. The right-hand side is smooth while the kinks' `beyond` symbols are held.
     `TIME` counts from the last corner of the reference.
@@ -98,14 +97,12 @@ class Model:
 
     @property
     def fixed(self) -> tuple[sp.Symbol, ...]:
-        """Return the symbols that are constant during a step: inputs, discrete states,
-        and tabled values."""
+        """Return the symbols that are constant during a step: inputs, discrete states, table values."""
         return (*self.inputs, *self.discrete, *(self.clock.tabled if self.clock else ()))
 
     @property
     def parameters(self) -> tuple[sp.Symbol, ...]:
-        """Return the stage-file keys (and the length of the motion) that the equations contain,
-        sorted by name."""
+        """Return the stage-file keys, and the motion's length, that the equations contain, sorted."""
         expressions = [*self.rhs, *(k.surface for k in self.kinks), *(o.expression for o in self.outputs.values())]
         expressions += [*(part.scale for part in self.states), *(part.update for part in self.held), *self.settled]
         expressions += [*(k.at_start for k in self.kinks), *(e for jump in self.jumps.values() for e in jump.values())]
@@ -132,10 +129,10 @@ External = Callable[[Body], sp.Expr]
 
 
 def assemble(structure: Structure, external: External | None = None, control: Control | None = None) -> Model:
-    """Return the equations of every stage with this structure,
-    on which an `external` force acts besides the actuator's.
+    """Return the equations of every stage with this structure.
 
-    Instead of the structure's controller in continuous time there may be another one.
+    An `external` force may act besides the actuator's, and another controller may replace the structure's in
+    continuous time.
     """
     chain, course = _bodies(structure), declared(structure.reference)
     friction = friction_law(structure.friction).declare(chain.cart.velocity, structure.friction_variant)
@@ -229,8 +226,10 @@ class Pushes:
 
 
 def _bodies(structure: Structure) -> Bodies:
-    """Return the bodies of a stage with their masses: cart, stage,
-    and a parasitic mass or a motor if there is one."""
+    """Return the bodies of a stage with their masses.
+
+    They are cart and stage, and a parasitic mass or a motor if there is one.
+    """
     motor = Body.named("motor_", key(MOTOR_MASS)) if structure.transmission else None
     if structure.joint == "rigid":
         rigid = Body.named("", sum((key(f"masses.{name}") for name in structure.masses), start=sp.S.Zero))
@@ -243,7 +242,10 @@ def _bodies(structure: Structure) -> Bodies:
 
 
 def _positions(structure: Structure, chain: Bodies) -> list[Component]:
-    """Position and velocity of the stage; behind a transmission, of the side that is measured, and of the other."""
+    """Return position and velocity of the stage as outputs.
+
+    With a transmission the measured side comes first, then the other.
+    """
     if not (structure.transmission and chain.motor):
         return [position_outputs("", "stage", chain.stage)]
     sides = {"load": chain.stage, "motor": chain.motor}
@@ -263,14 +265,19 @@ def _motor_friction(structure: Structure, chain: Bodies) -> Friction | None:
 
 
 def _breakaway(structure: Structure, *frictions: Friction | None) -> sp.Expr:
-    """Return the largest force [N] with which the controller may pull while nothing moves that
-    it measures: the friction forces at rest, and what it exerts half a backlash off its reference."""
+    """Return the largest force [N] with which the controller may pull while nothing moves.
+
+    It is the sum of friction forces at rest and the controller's force half a backlash off its reference.
+    """
     force = sum((friction.breakaway for friction in frictions if friction), start=sp.S.Zero)
     return force + (loop_stiffness(structure.controller) * BACKLASH / 2 if structure.plays else 0)
 
 
 def _steady(chain: Bodies, friction: Friction | None, motor_friction: Friction | None) -> sp.Expr | None:
-    """Friction [N] at the guide and at the motor while all move as the cart does; None where a law cannot say it."""
+    """Return friction [N] at guide and motor while all masses move as the cart does.
+
+    None if a law cannot say it.
+    """
     total: sp.Expr | None = friction.steady(chain.cart.velocity) if friction else sp.S.Zero
     if motor_friction and chain.motor and total is not None:
         part = motor_friction.steady(chain.motor.velocity)
@@ -303,8 +310,10 @@ def _mechanics(
     forces: Pushes,
     scales: tuple[sp.Expr, sp.Expr],
 ) -> tuple[list[State], list[Component]]:
-    """Newton's law for every body, and the components that bring the forces between them; `frictions` on the cart and
-    at the motor."""
+    """Return Newton's law for every body, and the components that supply the forces.
+
+    `frictions` act on the cart and at the motor.
+    """
     cart, stage, parasitic, motor = chain.cart, chain.stage, chain.parasitic, chain.motor
     friction, motor_friction = frictions
     bias = {name: key(f"bias.{name}") for name in structure.biased}

@@ -23,8 +23,10 @@ def varies(flat: Mapping[str, Any]) -> bool:
 
 
 def pieces(flat: Mapping[str, Any], runs: int) -> np.ndarray:
-    """Return the pieces of the reference of each run, shape (runs, pieces, 1 + inputs): see
-    `friso.equations.reference`."""
+    """Return the pieces of the reference of each run, shape (runs, pieces, 1 + inputs).
+
+    See `friso.equations.reference`.
+    """
     kind = motion_of(flat)
     form, rows, tones = kind.form(flat), kind.pieces(flat), kind.tones(flat)
     full = np.zeros((runs, len(rows), 1 + form.inputs))
@@ -35,7 +37,7 @@ def pieces(flat: Mapping[str, Any], runs: int) -> np.ndarray:
 
 
 def _with_tones(form: ReferenceForm, rows: np.ndarray, tones: Sequence[Tone], duration: Any) -> np.ndarray:
-    """Return pieces to which tones are added, with further corners where the reference turns round."""
+    """Return pieces with sinusoids added, and further corners where the reference reverses."""
     ends = np.broadcast_to(np.asarray(duration, dtype=float), (len(rows),))
     for number, tone in enumerate(tones):
         for i, part in enumerate(tone):
@@ -46,7 +48,10 @@ def _with_tones(form: ReferenceForm, rows: np.ndarray, tones: Sequence[Tone], du
 
 
 def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
-    """Return the pieces of one run with tones as they are at time 0, cut where the reference turns round."""
+    """Return the pieces of one run with sinusoids, cut where the reference reverses.
+
+    Sinusoids are given as at time 0.
+    """
     starts, first, per_period = rows[:, 0], form.degree + 3, MotionSettings.current().samples_per_period
     tones = rows[0, first:].reshape(-1, 4)
     fastest = np.max(np.maximum(np.abs(tones[:, 2]), np.abs(tones[:, 2] + tones[:, 3] * end)))
@@ -95,19 +100,21 @@ def initial_displacement(flat: Mapping[str, Any]) -> Any:
 
 
 def stands(flat: Mapping[str, Any]) -> Sequence[Stand]:
-    """Return the places where the reference comes to stand, one after the other; of one that never stands, from its
-    last corner on."""
+    """Return the places where the reference comes to stand, in turn.
+
+    For a reference that never stands it is from its last corner on.
+    """
     return motion_of(flat).stands(flat)
 
 
 def rests(flat: Mapping[str, Any]) -> bool:
-    """Tell whether the reference of some stages stands in the end, so that they may hunt about a place."""
+    """Tell whether the reference stands in the end, so that a stage may hunt about a place."""
     form, rows = form_of(flat), pieces(flat, int(np.max([np.size(value) for value in flat.values()])))
     return motion_of(flat).rests or bool(np.all(at_rest(form, rows[:, -1])))
 
 
 def ends_evenly(flat: Mapping[str, Any]) -> bool:
-    """Tell whether the reference of some stages stands in the end, or moves on at an even velocity."""
+    """Tell whether the reference stands in the end, or moves on at constant velocity."""
     rows = pieces(flat, int(np.max([np.size(value) for value in flat.values()])))
     return bool(np.all(at_rest(form_of(flat), rows[:, -1], 2)))
 
@@ -133,15 +140,15 @@ def last_part(share: float, ended: np.ndarray, corner: np.ndarray | float) -> np
 
 
 def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the flat keys without those of the motion."""
+    """Return the flat keys without the keys of the motion."""
     return {key: value for key, value in flat.items() if not key.startswith("motion.")}
 
 
 def standing(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the flat keys of a stage whose reference stands from the start.
+    """Return the flat keys of a stage whose reference stands still from the start.
 
-    It stands where the reference of its own motion stands after the last corner. Magnitudes remain those of its own
-    motion, or of a step to where it ends.
+    It stands where the reference of the stage's own motion ends. Magnitudes remain those of that motion, or of a step
+    to its end.
     """
     rows = motion_of(flat).pieces(flat)
     if len(rows) == 1:

@@ -27,14 +27,13 @@ BLOCK = 4
 
 
 def friction_factors(flat: Mapping[str, Any], places: np.ndarray, seed: int | None = None) -> np.ndarray:
-    """Return factors of static and of Coulomb friction at places [m], shape (n,), of one run:
-    shape (2, n).
+    """Return factors of static and Coulomb friction at places [m] on a rail, shape (2, n).
 
-    (1 + offset) (1 + sum of A_n cos(2 pi n x / pitch + phase_n)) exp(s g - s^2 / 2), with s^2 = log(1 + deviation^2):
-    lognormal of mean 1 and of the standard deviation given, hence positive, from one Gaussian field g for both, since
-    both follow the same preload. Flat keys "rail.*" describe it, all 1 without them; `seed` replaces that of the rail.
-    What stands at a place does not depend on the other places. Raises InputError for a correlation length that is no
-    more than a speck of the places' range.
+    `places` has the shape (n,). The factors are (1 + offset) (1 + sum of A_n cos(2 pi n x / pitch + phase_n)) exp(s g
+    - s^2 / 2), with s^2 = log(1 + deviation^2): lognormal with mean 1 and the standard deviation given, hence
+    positive. One Gaussian field g serves both, since both follow the same preload. Flat keys "rail.*" describe the
+    rail; without them all factors are 1. `seed` replaces that of the rail. The factors at a place do not depend on the
+    other places. Raises InputError for a correlation length that is tiny against the range of places.
     """
     rail = {key.removeprefix("rail."): value for key, value in flat.items() if key.startswith("rail.")}
     if not rail:
@@ -49,12 +48,11 @@ def friction_factors(flat: Mapping[str, Any], places: np.ndarray, seed: int | No
 
 
 def gaussian_field(places: np.ndarray, length: float, seed: int) -> np.ndarray:
-    """Return a Gaussian field at places [m], shape (n,), of mean 0 and variance 1,
-    correlated by exp(-(d / length)^2 / 2).
+    """Return a Gaussian field at places [m], shape (n,), with mean 0 and variance 1.
 
-    White noise in cells that are counted from place 0, smoothed by exp(-(d / length)^2). A random Fourier series needs
-    many more terms than the 21 here until it is Gaussian, and its few longest waves repeat along a rail. Raises
-    InputError.
+    Its correlation is exp(-(d / length)^2 / 2): white noise in cells counted from place 0, smoothed by exp(-(d /
+    length)^2). A random Fourier series needs many more terms than the 21 here until it is Gaussian, and its few
+    longest waves repeat along a rail. Raises InputError.
     """
     at = places * (CELLS / length)
     cell = np.rint(at)
@@ -71,7 +69,10 @@ def gaussian_field(places: np.ndarray, length: float, seed: int) -> np.ndarray:
 
 
 def _white(first: int, count: int, seed: int, length: float) -> np.ndarray:
-    """Independent standard normal numbers of cells from number `first`, each a function of its number alone."""
+    """Return independent standard normal numbers of cells, from number `first`.
+
+    Each is a function of the cell's number alone.
+    """
     if count > MOST_CELLS:
         least = length * count / MOST_CELLS
         actual, expected = f"{length:.3g} m", f"at least {least:.3g} m for places that far apart"

@@ -28,10 +28,10 @@ TONE = ("amplitude", "turns", "frequency", "sweep")
 
 @dataclass(frozen=True)
 class Reference:
-    """A reference in symbols: the inputs that each piece brings, and the derivatives in terms of these and `TIME`.
+    """A reference as symbols: inputs of each piece, and derivatives made of them and `TIME`.
 
-    `direction` is 1 ahead, -1 back and 0 at rest, and stays through a piece. `acceleration_size` is the absolute value
-    of the acceleration.
+    `direction` is 1 ahead, -1 back and 0 at rest, throughout a piece. `acceleration_size` is the absolute value of the
+    acceleration.
     """
 
     inputs: tuple[sp.Symbol, ...]
@@ -69,7 +69,10 @@ def declared(form: ReferenceForm = QUADRATIC) -> Reference:
 
 
 def value(form: ReferenceForm, rows: np.ndarray, elapsed: Any, order: int = 0) -> np.ndarray:
-    """Return a derivative, up to the second, a time [s] after the starts of the pieces, shape of these."""
+    """Return the reference, or its first or second derivative, at a time [s] within each piece.
+
+    `elapsed` counts from the start of the piece; the result has the shape of the pieces.
+    """
     total = rows[..., 1 + order] + 0.0 * elapsed
     for power in range(1, form.degree - order + 1):
         total = total + rows[..., 1 + order + power] * elapsed**power / factorial(power)
@@ -96,7 +99,10 @@ def moved_on(form: ReferenceForm, rows: np.ndarray, elapsed: Any) -> np.ndarray:
 
 
 def at_rest(form: ReferenceForm, rows: np.ndarray, derivative: int = 1) -> np.ndarray:
-    """Tell which pieces stand still, or have no second `derivative` and so an even velocity, shape of the rows."""
+    """Tell which pieces stand still, in the shape of the rows.
+
+    With the second `derivative`, tell which ones have a constant velocity.
+    """
     rests = np.all(rows[..., 1 + derivative : form.degree + 2] == 0, axis=-1)
     for amplitude, *_ in _tones(form, rows):
         rests &= amplitude == 0

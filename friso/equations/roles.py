@@ -29,8 +29,10 @@ class Role(StrEnum):
 
 
 class Steady(NamedTuple):
-    """A steady motion: error [m], position [m] and velocity [m/s] of all masses, velocity of the reference [m/s] and
-    force of the controller [N]; numbers, arrays or symbols."""
+    """A steady motion of all masses: error [m], position [m] and velocity [m/s].
+
+    Also the velocity of the reference [m/s] and the controller's force [N]; numbers, arrays or symbols.
+    """
 
     error: Any
     position: Any

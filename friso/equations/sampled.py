@@ -42,7 +42,10 @@ def counter(loop: str) -> sp.Symbol:
 
 @dataclass(frozen=True)
 class Rest:
-    """When the integrators rest for a sample, and when they begin anew, besides at the limit of the force."""
+    """Conditions under which integrators rest for a sample, or restart.
+
+    The limit of the force is not among them.
+    """
 
     rests: Any = sp.false
     restarts: Any = sp.false
@@ -51,12 +54,11 @@ class Rest:
 def sampled_controller(
     form: ControllerForm, loop: Loop, velocity_samples: int, extra: sp.Expr = sp.S.Zero, rest: Rest = Rest()
 ) -> tuple[sp.Expr, tuple[Held, ...]]:
-    """Return the force [N] commanded at a sample, an `extra` one added before it is limited,
-    and what is kept for the next.
+    """Return the force [N] that a drive commands at a sample, and what it keeps for the next.
 
-    `loop` holds what is known at the sample. A derivative without a filter is a difference over `velocity_samples`. An
-    integrator does at the limit of the force what its anti-windup prescribes: clamped, it rests for the sample in which
-    it would drive the force further beyond.
+    An `extra` force is added before the limit. `loop` holds what is known at the sample. A derivative without a filter
+    is a difference over `velocity_samples`. At the force limit an integrator follows its anti-windup: clamped, it
+    rests for the sample in which it would drive the force further beyond.
     """
     blocks = Sampled(velocity_samples, form)
     demand = demanded(form, loop_signals(loop, sp.S.One, sp.S.One), blocks)
@@ -69,8 +71,11 @@ def sampled_controller(
 
 @dataclass(frozen=True)
 class _Integral:
-    """An integrator's number, its next one, what a sample adds to it, its gain, the limit of its output, its leak, the
-    period of its loop, and when that is due (None: at every sample)."""
+    """An integrator of a drive: its number, the next one, and what a sample adds to it.
+
+    It has a gain, a limit of its output, a leak, the period of its loop, and the condition for that loop to be due
+    (None: at every sample).
+    """
 
     symbol: sp.Symbol
     next: sp.Symbol
@@ -95,8 +100,10 @@ class DiscreteRate:
 
     @classmethod
     def by(cls, rule: FilterRule, period: sp.Expr, exact_at: sp.Expr) -> DiscreteRate:
-        """Make the substitute of a rule with a period [s],
-        prewarped to be exact at an angular frequency [rad/s]."""
+        """Return what stands for s by a rule with a period [s].
+
+        Prewarped, it is exact at an angular frequency [rad/s].
+        """
         if rule == "backward_euler":
             return cls(2 * period, sp.S.Zero)
         if rule == "prewarped":
@@ -106,8 +113,7 @@ class DiscreteRate:
         return cls(period, sp.S.One)
 
     def scale(self, period: sp.Expr) -> sp.Expr:
-        """Return by how much it is larger than s where all changes slowly: 1,
-        if it is not prewarped."""
+        """Return the ratio of the substitute to s for slow changes; 1 unless it is prewarped."""
         return 2 * period / (self.step * (1 + self.weight))
 
     def polynomial(self, polynomial: Polynomial) -> Polynomial:
@@ -197,8 +203,10 @@ class Sampled(Blocks):
         limit: sp.Expr | None = None,
         leak: sp.Expr | None = None,
     ) -> Signal:
-        """Return a number that a sample adds to; `gain` in N per unit of it.
-        Raises ValueError for an unknown rule."""
+        """Return an integral as a number that every sample adds to; `gain` [N per unit].
+
+        Raises ValueError for an unknown rule.
+        """
         if rule not in get_args(IntegralRule):
             raise ValueError(f"rule: {rule!r}; expected one of {', '.join(get_args(IntegralRule))}")
         symbol, following = state(name), state(f"next_{name}")
@@ -294,8 +302,7 @@ class Sampled(Blocks):
         return Rest(rests, restarts)
 
     def finished(self, demand: Demand, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
-        """Return the force before it is limited, and all numbers held,
-        with the integrators' behaviour at limits.
+        """Return the force before its limit, and all numbers held, with integrators at limits.
 
         Integrators follow the anti-windup where the force would exceed its limit. They rest where their output would
         exceed a limit of its own.

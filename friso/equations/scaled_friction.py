@@ -15,27 +15,29 @@ TABLES = ("friction", MOTOR_FRICTION)
 
 
 def static_frictions(flat: Mapping[str, Any]) -> dict[str, str]:
-    """Return the keys of static friction, each with that of the Coulomb friction below it;
-    none of laws without both."""
+    """Return the keys of static friction, each with its key of Coulomb friction.
+
+    Empty for laws that do not have both.
+    """
     pairs = {f"{table}.static": f"{table}.coulomb" for table in TABLES}
     return {static: coulomb for static, coulomb in pairs.items() if static in flat and coulomb in flat}
 
 
 def least_static_factor(flat: Mapping[str, Any]) -> float:
-    """Return by how much the static friction of a stage may be multiplied at least:
-    it is as large as Coulomb friction then, that of one law of those there are."""
+    """Return the least factor on static friction at which it still reaches Coulomb friction."""
     return max(float(np.max(flat[coulomb] / flat[static])) for static, coulomb in static_frictions(flat).items())
 
 
 def with_static_friction(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Return stages with a multiple of their static friction,
-    Coulomb friction and all else held."""
+    """Return stages with a multiple of their static friction, Coulomb friction unchanged."""
     return {**flat, **{key: flat[key] * factor for key in static_frictions(flat)}}
 
 
 def with_friction(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Return stages with a multiple of their friction: every force is,
-    and every stiffness and damping in a law, so that deflections and speeds stay as they are."""
+    """Return stages with a multiple of their friction.
+
+    Every force, stiffness and damping of a law is multiplied, so that deflections and speeds stay.
+    """
     forces = [key for key, kind in numeric_keys(flat).items() if key.partition(".")[0] in TABLES and _is_force(kind)]
     return {**flat, **{key: flat[key] * factor for key in forces if key in flat}}
 

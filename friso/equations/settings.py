@@ -59,16 +59,20 @@ class Setting:
         return {ControllerSection.key(name): value for name, value in self.sizes(flat, within).items()}
 
     def ranges(self, flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
-        """Return the setting's keys in a stage file,
-        and the ends [SI] between which they are tuned; none if it is not tuned."""
+        """Return the setting's keys, and the ranges [SI] in which they are tuned.
+
+        Empty if it is not tuned.
+        """
         if self.tuned_in is None:
             return {}
         return {ControllerSection.key(name): ends for name, ends in self.tuned_in(flat, within).items()}
 
 
 def gain_states(flat: FlatMachine) -> list[FlatMachine]:
-    """Return the flat keys of a stage with the gains that its loop may have: its own,
-    and where there is a window of standstill those within it."""
+    """Return the stage's flat keys for each set of gains that its loop may have.
+
+    They are its own, and those within a window of standstill.
+    """
     factor, controller = flat.get(ControllerSection.key("standstill_factor")), controller_of(flat)
     if factor is None:
         return [flat]
@@ -108,8 +112,10 @@ def _dithers(flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]
 
 
 def _own_frequency(flat: FlatMachine) -> float:
-    """Return the frequency [Hz] of the moving mass on the proportional stiffness of the loop;
-    0 without one."""
+    """Return the frequency [Hz] of the moving mass on the loop's proportional stiffness.
+
+    It is 0 without that stiffness.
+    """
     proportional, _ = slow_gains(flat)
     return sqrt(max(proportional, 0.0) / moving_mass(flat)) / (2 * pi)
 
@@ -165,8 +171,10 @@ bandwidth, or with twenty samples a period."""
 
 
 def settings_named(names: tuple[str, ...], others: tuple[str, ...] = ()) -> tuple[Setting, ...]:
-    """Settings by their names, "all" for all of them, those of `others` being none. Raises InputError for an unknown
-    one."""
+    """Return the settings against friction with these names; "all" stands for all of them.
+
+    `others` are further names that are allowed and select none. Raises InputError for an unknown name.
+    """
     names_of_all = (*SETTINGS, *others)
     for name in names:
         if name not in (*names_of_all, "all"):

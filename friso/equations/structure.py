@@ -34,12 +34,11 @@ JointForm = Literal["rigid", "locked", "free", "touching"]
 
 @dataclass(frozen=True)
 class ControllerForm:
-    """Structure of a controller: its kind, the class of its form,
-    and the choices on which its equations depend.
+    """The structure of a controller: its kind, the class of its form, and further choices.
 
-    These are whether it has integral action, and its anti-windup at the force limit (None: no limit). Further ones are
-    its filters, its settings against friction, and the loops with their own sample times. A drive may also choose how
-    integrals (None: as the controller says) and low-pass filters are computed.
+    Its equations depend on integral action, its anti-windup at the force limit (None: no limit), its filters, its
+    settings against friction, and the loops with their own sample times. A drive may also choose how integrals (None:
+    as the controller says) and low-pass filters are computed.
     """
 
     kind: str
@@ -162,8 +161,7 @@ def shared_structure(flat: Mapping[str, Any]) -> Structure:
 
 
 def decisive_keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the numeric keys on which the structure depends, by being zero or a whole number,
-    for instance."""
+    """Return the numeric keys on which the structure depends, as by being zero."""
     law, control = friction_law(flat["friction.model"]), controller_of(flat)
     of_stage = ("joint.stroke", "bias.cart", "bias.stage", BACKLASH, *DECISIVE)
     at_motor: tuple[str, ...] = ()

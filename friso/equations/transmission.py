@@ -20,8 +20,11 @@ BACKLASH = key("transmission.backlash")
 
 
 def transmission(backlash: bool, motor: Body, load: Body) -> tuple[sp.Expr, Component]:
-    """Force of the transmission on the load [N], and its kinks. Within the backlash, where there is one, there is no
-    force; on a flank the spring carries what exceeds half of it, and the damper acts beside it."""
+    """Return the force of the transmission on the load [N], and its kinks.
+
+    There is no force within a backlash. On a flank the spring carries what exceeds half of it, and the damper acts
+    beside it.
+    """
     deflection, rate = motor.position - load.position, motor.velocity - load.velocity
     stiffness = key("transmission.stiffness")
     contact = stiffness * deflection + key("transmission.damping") * rate
@@ -37,14 +40,18 @@ def transmission(backlash: bool, motor: Body, load: Body) -> tuple[sp.Expr, Comp
 
 
 def flanks(deflection: sp.Expr) -> tuple[Kink, Kink]:
-    """Return where the transmission begins to pull, ahead and behind,
-    for a deflection [m] of the motor against the load."""
+    """Return the kinks at which the transmission begins to pull, ahead and behind.
+
+    `deflection` [m] is the motor's against the load.
+    """
     return stops(deflection, BACKLASH / 2, "flank")
 
 
 def at_motor(friction: Friction, velocity: sp.Symbol, motor_velocity: sp.Symbol) -> Friction:
-    """Return a law that was declared for a body with a `velocity`, on the motor,
-    with names and keys of its own."""
+    """Return a friction law moved to the motor, with names and keys of its own.
+
+    It was declared for a body with a `velocity`.
+    """
     component = friction.component
     names = {x: _renamed(str(x)) for x in (part.symbol for part in component.states)}
     names |= {kink.beyond: _renamed(kink.name, "beyond_") for kink in component.kinks}

@@ -28,11 +28,10 @@ def along(name: str) -> str:
 
 
 def variational(model: Model, keys: Sequence[str] = ()) -> Model:
-    """Return the model with a deviation beside each state, the states first;
-    it takes no part in the control of the step.
+    """Return the model extended by a small deviation of each state, the states first.
 
-    The motion beside may be that of a stage some of whose `keys` differ, each by its parameter `along` (times the unit
-    of the deviation): then the deviations are the sensitivities to these keys.
+    The deviations take no part in the control of the step. With `keys`, they are sensitivities to these keys: each key
+    differs in the neighbouring motion by its parameter `along`, times the unit of the deviation.
     """
     beside = {part.symbol: state(f"{PREFIX}{part.symbol}") for part in model.states}
     small = beside | {key(name): key(along(name)) for name in keys}
@@ -63,8 +62,10 @@ def _directional_derivative(expression: sp.Expr, small: Small) -> sp.Expr:
 
 
 def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Expr]:
-    """Return by how much the deviations jump at a kink:
-    (f+ - f-) times their share across it over the speed of crossing."""
+    """Return the jump of deviations at a kink.
+
+    It is (f+ - f-) times their share across the kink over the speed of crossing.
+    """
     speed = sp.diff(kink.surface, TIME)
     speed += sum((sp.diff(kink.surface, part.symbol) * part.derivative for part in model.states), start=sp.S.Zero)
     share = _directional_derivative(kink.surface, small) / speed
@@ -79,8 +80,10 @@ def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Exp
 
 
 def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
-    """Return the jump of deviations at a kink where states become R(x):
-    DR small + (f+ - DR f-) share, f+ taken at R(x)."""
+    """Return the jump of deviations at a kink where states become R(x).
+
+    It is DR small + (f+ - DR f-) share, with f+ taken at R(x).
+    """
     becomes = switch.becomes
     behind = {**becomes, switch.beyond: 1 - switch.beyond}
     before = {part.symbol: part.derivative for part in model.states}
@@ -96,8 +99,10 @@ def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.
 
 
 def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
-    """Tell whether a difference is zero all over the surface of a kink, tried at points of it;
-    not, where the surface is linear in no symbol: it bounds a window then, at which something is switched."""
+    """Tell whether a difference is zero all over the surface of a kink, tried at points of it.
+
+    It is not if the surface is linear in no symbol: such a surface bounds a window in which something is switched.
+    """
     if gap == 0:
         return True
     linear = (s for s in sorted(kink.surface.free_symbols, key=str) if sp.diff(kink.surface, s, 2) == 0)

@@ -21,9 +21,11 @@ of the stage."""
 
 
 def loop_bandwidth(stage: Stage) -> float:
-    """Return the bandwidth [Hz] of a stage: the last frequency at which the gain of its open
-    loop is 1 (0 dB) while the stage slides (NaN: there is none): stuck, its bearing holds it, and the loop hardly moves
-    it. With other gains at standstill it is the larger one of both."""
+    """Return the bandwidth [Hz] of a stage: the last frequency at which its loop has gain 1.
+
+    The stage slides; while it is stuck its bearing holds it, and the loop hardly moves it. NaN if the gain never
+    reaches 1. With other gains at standstill the larger bandwidth counts.
+    """
     return float(np.fmax.reduce([_last_crossing(flat) for flat in gain_states(stage.flat())]))
 
 
@@ -42,15 +44,13 @@ def _last_crossing(flat: Mapping[str, Any]) -> float:
 
 
 def bandwidths_at(stage: Stage, factors: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Return the bandwidths [Hz] of a stage whose controller is faster as a whole by factors,
-    as of `loop_bandwidths`."""
+    """Return the bandwidths [Hz] of a stage whose controller is faster by factors."""
     return loop_bandwidths(stage, sped_up(stage.flat(), np.array(factors)), len(factors))
 
 
 @np.errstate(all="ignore")
 def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.ndarray:
-    """Return the bandwidths [Hz] of a stage with changes, arrays of shape (count,),
-    in continuous time.
+    """Return the bandwidths [Hz] of a stage with changes, arrays (count,), in continuous time.
 
     They are exact to a share of 1e-3: the loop is computed on a grid of frequencies, and its gain is a power of
     frequency in between. If the gains at standstill differ, the larger bandwidth counts.
@@ -62,8 +62,10 @@ def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.
 
 
 def _last_falls(flat: Mapping[str, Any], machines: Members, omega: np.ndarray) -> np.ndarray:
-    """Return where the gains of open loops fall through 1 for the last time on a grid of angular
-    frequencies [rad/s]: at these frequencies [Hz], shape (members,) (NaN: nowhere)."""
+    """Return the last frequencies [Hz] at which open loops fall through gain 1, (members,).
+
+    They are sought on a grid of angular frequencies [rad/s]; NaN if there is none.
+    """
     loops = poles(flat, machines, DriveTiming(0.0, 0.0)).loop(omega)
     gain, frequency = np.log(np.abs(loops)), np.log(omega / (2 * np.pi))
     falls = (gain[:, :-1] >= 0) & (gain[:, 1:] < 0)

@@ -32,8 +32,10 @@ PRESCRIBED = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 
 @dataclass(frozen=True)
 class BodeCase:
-    """A limit case: the state, its plant, stage position over force [m/N], and its loop L over `Bode.omega`, complex,
-    both of shape (k,), and its margins."""
+    """A limit case: its state, plant, loop and margins.
+
+    The plant is stage position over force [m/N]. It and the loop L are complex, over `Bode.omega`, shape (k,).
+    """
 
     members: Members
     plant: np.ndarray
@@ -43,8 +45,10 @@ class BodeCase:
 
 @dataclass(frozen=True)
 class Unstable:
-    """Speeds [m/s] from `low` to `high` at which a sliding stage is not stable; `falling`, whether its friction is
-    smaller at the upper end."""
+    """Speeds [m/s] from `low` to `high` at which a sliding stage is not stable.
+
+    `falling` tells whether its friction is smaller at the upper end.
+    """
 
     low: float
     high: float
@@ -55,7 +59,10 @@ class Unstable:
 
 @dataclass(frozen=True)
 class Prescribed:
-    """A cart that slides at a `speed` [m/s], stuck at 0: its loop L over `Bode.omega`, and whether it is stable."""
+    """A cart sliding at a `speed` [m/s], or stuck at 0: its loop L and whether it is stable.
+
+    The loop is given over `Bode.omega`.
+    """
 
     speed: float
     loop: np.ndarray
@@ -104,8 +111,10 @@ class Bode:
 
     @cached_property
     def settled(self) -> tuple[Members, Margins]:
-        """Return the worst of the settled members (limit cases, and stuck under any bias),
-        with its margins."""
+        """Return the worst of the settled states, with its margins.
+
+        They are the limit cases, and the states stuck under any bias.
+        """
         return self._with_margins(self.scan.worst(self.scan.members.settled))
 
     @cached_property
@@ -115,8 +124,10 @@ class Bode:
 
     @cached_property
     def limits(self) -> Mapping[str, Limits]:
-        """Return how fast the controller may be, by joint: "locked" and "free",
-        or "given" without one."""
+        """Return how fast the controller may be, for the joint "locked" and "free".
+
+        Without a joint the only entry is "given".
+        """
         stages = _by_joint(self.stage)
         return dict(zip(stages, side_by_side([partial(limits, flat) for flat in stages.values()]), strict=True))
 
@@ -126,10 +137,12 @@ class Bode:
 
 
 def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
-    """Return the linear analysis of a stage, its curves over frequencies `band` [Hz] (default:
-    those that matter); with `series`, the thesis's formula for a touched limiter is added. Raises InputError for
-    frequencies that are not usable, a controller that exerts no force, and a delay that is too long (see
-    `DriveTiming`)."""
+    """Return the linear analysis of a stage.
+
+    Its curves cover frequencies `band` [Hz] (default: those that matter). With `series`, the thesis's formula for a
+    touched limiter is added. Raises InputError for frequencies that are not usable, a controller that exerts no force,
+    and a delay that is too long (see `DriveTiming`).
+    """
     settings = FrequencySettings.current()
     if band is not None and not 0 < band[0] < band[1] < np.inf:
         raise InputError("band", repr(band), "two rising frequencies [Hz]", "friso.bode(stage, (0.1, 1000.0))")
@@ -170,8 +183,10 @@ def _plant(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> Compl
 
 
 def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Members]]:
-    """Return the cases with a touched limiter by the formula of Table 1:
-    as stages whose limiter is not touched."""
+    """Return the cases with a touched limiter, modelled as in Table 1 of the thesis.
+
+    There the limiter is in series with the joint, so that the stage is one with another joint and no touched limiter.
+    """
     touched = {name: member for name, member in limit_cases(flat).items() if member.touched[0]}
     return {f"{name}-series": (limiter_in_series(flat), member.with_limiter(False)) for name, member in touched.items()}
 
@@ -204,8 +219,10 @@ def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed,
 
 
 def _unstable(flat: Mapping[str, Any], members: Members) -> tuple[Unstable, ...]:
-    """Return the ranges of speed at which the stage is not stable,
-    for each state of the limiter and direction."""
+    """Return the ranges of speed at which the stage is not stable.
+
+    They are given for each state of the limiter and each direction.
+    """
     sliding = members[~members.stuck]
     ranges = []
     for touched, backward in sorted({*zip(sliding.touched.tolist(), (~sliding.forward).tolist(), strict=True)}):

@@ -32,8 +32,11 @@ CascadeLoop = Literal["velocity", "position"]
 
 @dataclass(frozen=True)
 class CascadeLoops:
-    """A cascade in one state, all over `Bode.omega`, complex: the `plant` from the commanded force to the velocity
-    [m/(N s)], with hold, delay and current loop; and its loops by name, each with its margins."""
+    """The loops of a cascade in one state, complex, over `Bode.omega`.
+
+    `plant` leads from the commanded force to the velocity [m/(N s)], with hold, delay and current loop. Loops stand by
+    name, each with its margins.
+    """
 
     plant: np.ndarray
     loops: Mapping[CascadeLoop, np.ndarray]
@@ -41,8 +44,7 @@ class CascadeLoops:
 
 
 def is_cascade(flat: Mapping[str, Any]) -> bool:
-    """Tell whether the controller of a stage given as flat keys closes a velocity loop within
-    its position loop."""
+    """Tell whether a stage's controller closes a velocity loop within its position loop."""
     return controller_of(flat).feeds_back == "velocity"
 
 
@@ -74,8 +76,7 @@ def _seen(rates: Complex) -> np.ndarray:
 
 
 def _position_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming) -> Callable[[np.ndarray], Complex]:
-    """Return the position loop over angular frequencies [rad/s],
-    the velocity loop within it closed."""
+    """Return the position loop over angular frequencies [rad/s], the velocity loop closed."""
     if not drive.sample_time:
         outer, inner = (response(flat, member, drive, cut=channel) for channel in (VELOCITY, STAGE))
         return lambda omega: outer(omega) / (1 + inner(omega))

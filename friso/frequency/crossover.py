@@ -31,14 +31,16 @@ WANTED = 0.5
 
 @dataclass(frozen=True)
 class Limits:
-    """The crossovers [Hz], from `searched_crossovers`, at which a stage is `stable` and those with a `comfortable`
-    modulus margin, as ranges, in all limit cases: stuck under any bias force or sliding fast, limiter free or touched.
+    """The crossovers [Hz] at which a stage is stable, and those with a `comfortable` margin.
 
-    Of both kinds, one range holds the stage's own crossover, or is the next one below it (or the lowest). The `highest`
-    stable and comfortable ones end it, possibly with the search (None if there is none). `first_lost` is the state that
-    is not stable just above, `closest` the one that comes closest to -1 there (None at the end of the search); where
-    there is no such range, those of the stage's own crossover. For a controller given by its gains all are factors of
-    its bandwidth instead.
+    They are ranges from `searched_crossovers`, valid in all limit cases: stuck under any bias force or sliding fast,
+    limiter free or touched.
+
+    Of both kinds, one range holds the stage's own crossover, or is the next one below it (or the lowest).
+    `highest_stable` and `highest_comfortable` are the upper ends of these ranges, None if there is no such range.
+    `first_lost` is the state that becomes unstable just above the first, `closest` the state that comes closest to -1
+    just above the second (None at the end of the search); if there is no such range, they are taken at the stage's own
+    crossover. For a controller given by gains all values are factors of its bandwidth.
     """
 
     searched: Range
@@ -82,15 +84,19 @@ def stable_crossovers(flat: Mapping[str, Any], members: Members) -> tuple[Range,
 
 
 def range_end(ranges: Sequence[Range], crossover: float) -> float | None:
-    """Upper end [Hz] of the range that contains a crossover [Hz], or of the next one below it, or else of the lowest;
-    None without ranges."""
+    """Return the upper end [Hz] of the range that contains a crossover [Hz].
+
+    If none does, it is the end of the next range below, or else of the lowest. None without ranges.
+    """
     below = [high for low, high in ranges if low <= crossover] or [high for _, high in ranges[:1]]
     return below[-1] if below else None
 
 
 def searched_crossovers(flat: Mapping[str, Any]) -> Range:
-    """Return the crossovers that are searched;
-    those of a sampled drive end below half the sampling frequency."""
+    """Return the range of crossovers that is searched.
+
+    With a sampled drive it ends below half the sampling frequency.
+    """
     settings = FrequencySettings.current()
     drive = DriveTiming.of(flat)
     if bandwidth(flat) is None:
@@ -99,23 +105,26 @@ def searched_crossovers(flat: Mapping[str, Any]) -> Range:
 
 
 def settled_margin(flat: Mapping[str, Any]) -> float:
-    """Return the least modulus margin of the settled states of a stage;
-    0 if one of them is not stable."""
+    """Return the least modulus margin of the settled states; 0 if one is not stable."""
     loops = scan_stability(flat, settled_members(flat))
     return float(loops.distance.min()) if loops.stable.all() else 0.0
 
 
 def settled_members(flat: Mapping[str, Any]) -> Members:
-    """Limit cases, and those that are stuck under a bias force: what a stage is in unless it creeps or just broke away,
-    when its friction falls with the speed."""
+    """Return the limit cases, and the states stuck under a bias force.
+
+    A stage is in one of them unless it creeps or just broke away, while its friction falls with speed.
+    """
     settings = FrequencySettings.current()
     members = family(flat, settings.search_biases, 2)
     return concatenate_families([*limit_cases(flat).values(), members[members.stuck]])
 
 
 def unstable_as_built(flat: Mapping[str, Any]) -> tuple[bool, bool]:
-    """Tell whether the samples and delays of a drive make the loop unstable, which is stable without them,
-    while the stage sticks and while it slides."""
+    """Tell whether samples and delays of a drive alone make the loop unstable.
+
+    The first answer is for a stage that sticks, the second for one that slides.
+    """
     members = settled_members(flat)
     smooth = {key: value for key, value in flat.items() if not key.startswith("drive.")}
     if len(smooth) == len(flat):
@@ -136,8 +145,10 @@ def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Search:
-    """The members of a stage whose controller is made faster and slower; crossovers are of shape (crossovers,). What
-    does not depend on them is computed once."""
+    """A search over crossovers of a stage's controller, in all its settled states.
+
+    Arrays have the shape (crossovers,). What does not depend on the crossover is computed once.
+    """
 
     flat: Mapping[str, Any]
     members: Members
@@ -169,8 +180,11 @@ class _Search:
 
     @cached_property
     def _loops(self) -> tuple[np.ndarray, Callable[[Mapping[str, Any]], Complex]]:
-        """Frequencies [rad/s] that show the loop at all crossovers searched, always the same, so that the distance is a
-        smooth function; and the loops there for the keys of any controller."""
+        """Return frequencies [rad/s] that resolve the loop at all crossovers, and loops there.
+
+        Frequencies are always the same, so that the distance is a smooth function. The loops are for the keys of any
+        controller.
+        """
         settings = FrequencySettings.current()
         grids = [frequency_grid(_at(self.flat, np.array(end)), settings.search_density) for end in self.ends]
         omega = np.unique(np.concatenate(grids))

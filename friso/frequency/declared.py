@@ -15,8 +15,10 @@ from friso.frequency.system import System
 
 @dataclass(frozen=True)
 class Declared:
-    """Equations to be linearised: symbols of the states with their rates, of the inputs and of the outputs with their
-    expressions, by name."""
+    """Equations to be linearised, by symbols.
+
+    They have states with their rates, inputs, and outputs with their expressions, by name.
+    """
 
     states: tuple[sp.Symbol, ...]
     rates: tuple[sp.Expr, ...]
@@ -25,8 +27,10 @@ class Declared:
 
     @cached_property
     def _entries(self) -> tuple[list[tuple[int, int]], Any, list[str]]:
-        """Places of the entries of [[a, b], [c, d]] that are not zero, the function that computes them, and the names
-        of what it takes."""
+        """Return the places of the non-zero entries of [[a, b], [c, d]], and a function for them.
+
+        Also returns the names of the function's arguments.
+        """
         rows = sp.Matrix([*self.rates, *self.outputs.values()])
         matrix = rows.jacobian([*self.states, *self.inputs.values()])
         entries = {place: entry for place, entry in matrix.todok().items() if entry != 0}
@@ -35,8 +39,10 @@ class Declared:
         return list(entries), function, [str(symbol) for symbol in symbols]
 
     def at(self, values: Mapping[str, Any], members: int) -> System:
-        """Return the linear systems where the symbols have these values,
-        numbers or arrays of shape (members,), by name."""
+        """Return the linear systems for values of the symbols, by name.
+
+        Values are numbers or arrays of shape (members,).
+        """
         places, function, names = self._entries
         n, m, p = len(self.states), len(self.inputs), len(self.outputs)
         matrices = np.zeros((members, n + p, n + m))

@@ -40,8 +40,10 @@ class DriveTiming:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> DriveTiming:
-        """Return the drive of a stage. Raises InputError for a delay of more samples than are
-        followed, and for a loop that is due as rarely."""
+        """Return the drive of a stage.
+
+        Raises InputError for a delay of more samples than are followed, and for a loop that is due as rarely.
+        """
         settings = FrequencySettings.current()
         sample_time = flat.get("drive.sample_time", 0.0)
         slow = {key: flat[key] for key in SLOW_LOOPS if key in flat}
@@ -61,7 +63,7 @@ class DriveTiming:
 
     @property
     def highest(self) -> float:
-        """Angular frequency [rad/s] up to which the drive knows frequencies: half that of sampling."""
+        """Return half the sampling frequency [rad/s], the highest that the drive can represent."""
         return np.pi / self.sample_time if self.sample_time else np.inf
 
     @property
@@ -71,14 +73,16 @@ class DriveTiming:
         return samples, max(0.0, self.delay - samples * self.sample_time)
 
     def transfer(self, omega: np.ndarray) -> np.ndarray:
-        """Return the transfer of hold, delay and current loop at angular frequencies [rad/s],
-        without aliases."""
+        """Return the transfer of hold, delay and current loop at [rad/s], without aliases."""
         half = omega * self.sample_time / 2
         return np.sinc(half / np.pi) * np.exp(-1j * (half + omega * self.delay)) / (1 + 1j * omega * self.lag)
 
     def to_s(self, poles: Complex) -> Complex:
-        """Poles of the loop as s [rad/s]: of a sampled one, those whose exponential over its period they are, as slow
-        as can be; 0 is at minus infinity."""
+        """Return the poles of the loop as s [rad/s].
+
+        For a sampled loop they are the slowest s whose exponential over the period is the pole; 0 becomes minus
+        infinity.
+        """
         if not self.sample_time:
             return poles
         time = self.sample_time * self.period
@@ -101,8 +105,10 @@ def behind_current_loop(machine: System, lag: float) -> System:
 
 
 def zero_order_hold(machine: System, sample_time: float, late: float) -> System:
-    """Return a plant with one input in discrete time behind a hold and a delay `late` [s] of
-    less than a sample: exact, the force that still acts being a further state."""
+    """Return a plant with one input in discrete time, behind a hold and a delay.
+
+    The delay `late` [s] is less than a sample. The result is exact; the force that still acts is a further state.
+    """
     members, n, waiting = len(machine.a), len(machine.states), int(late > 0)
     rest, before = _transition(machine, late)
     ahead, after = _transition(machine, sample_time - late)
@@ -157,8 +163,7 @@ def fastest(poles: Complex) -> float:
 
 
 def _behind(machine: System, first: tuple[np.ndarray, ...], name: str) -> System:
-    """Return a plant with one input behind another system with one input and output,
-    given by its four matrices."""
+    """Return a plant with one input behind another system, given by its four matrices."""
     la, lb, lc, ld = first
     members, n, k = len(machine.a), len(machine.states), len(la)
     a = np.zeros((members, n + k, n + k))
@@ -179,8 +184,11 @@ def _transition(machine: System, time: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def exponentials(matrices: np.ndarray) -> np.ndarray:
-    """Matrix exponentials, shape (members, n, n): Pade's of order 6 with scaling and squaring (Higham 2005,
-    doi:10.1137/04061101X), for all members at once, which `scipy.linalg.expm` takes one by one."""
+    """Return matrix exponentials, shape (members, n, n), of all members at once.
+
+    The method is Pade's of order 6 with scaling and squaring (Higham 2005, doi:10.1137/04061101X); `scipy.linalg.expm`
+    takes them one by one.
+    """
     norm = np.abs(matrices).sum(axis=-2).max()
     squarings = max(0, int(np.ceil(np.log2(norm / SCALED)))) if norm > 0 else 0
     scaled, identity = matrices / 2.0**squarings, np.eye(matrices.shape[-1])

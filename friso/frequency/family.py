@@ -37,8 +37,10 @@ NEAR = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 
 @dataclass(frozen=True)
 class Scan:
-    """The `members` of a stage, with the keys `flat`: whether they are stable, and their modulus margins, which are
-    computed once they are asked for; arrays of shape (members,)."""
+    """The stability of the `members` of a stage with keys `flat`, arrays of shape (members,).
+
+    Modulus margins are computed when they are first asked for.
+    """
 
     flat: Mapping[str, Any]
     members: Members
@@ -56,8 +58,11 @@ class Scan:
 
     @cached_property
     def distance(self) -> np.ndarray:
-        """Least distance of the loop from -1: on frequencies that all share and about a member's own closed-loop
-        resonances, and exactly for those that come closest to -1 there."""
+        """Return the least distance of each member's loop from -1.
+
+        It is computed on frequencies that all share and about each member's closed-loop resonances, and exactly for
+        the members that come closest to -1.
+        """
         settings = FrequencySettings.current()
         omega = frequency_grid(self.flat, settings.family_density)
 
@@ -73,8 +78,10 @@ class Scan:
         return distance
 
     def worst(self, among: np.ndarray | None = None) -> int:
-        """Return the number of the worst (of those that `among` marks):
-        the least stable if any is unstable, else the one whose loop comes closest to -1."""
+        """Return the index of the worst state: the least stable, else the one closest to -1.
+
+        `among` marks the states to look at; all of them if it is None.
+        """
         among = np.ones(len(self.members), bool) if among is None else among
         if not self.stable[among].all():
             return int(np.where(among, self.abscissa, -np.inf).argmax())
@@ -87,15 +94,21 @@ def scan_stability(flat: Mapping[str, Any], members: Members) -> Scan:
 
 
 class PoleStability(NamedTuple):
-    """Real part of the rightmost closed-loop pole [1/s], 0 on the edge of stability, and the least abs(1 + L) about
-    closed-loop resonances, both of shape (members,)."""
+    """Stability of members by their closed-loop poles, both of shape (members,).
+
+    `abscissa` is the real part of the rightmost pole [1/s], 0 on the edge of stability; `resonant` is the least abs(1
+    + L) about closed-loop resonances.
+    """
 
     abscissa: np.ndarray
     resonant: np.ndarray
 
 
 def stability_by_poles(flat: Mapping[str, Any], members: Members) -> PoleStability:
-    """Every member by its own poles; `flat` may hold arrays of shape (members,), except in the drive's keys."""
+    """Return the stability of every member by its poles.
+
+    `flat` may hold arrays of shape (members,), except in the drive's keys.
+    """
     by_poles = PoleStability(np.empty(len(members)), np.empty(len(members)))
 
     def look(part: Poles) -> PoleStability:
@@ -110,8 +123,10 @@ def stability_by_poles(flat: Mapping[str, Any], members: Members) -> PoleStabili
 def for_poles(
     flat: Mapping[str, Any], members: Members, function: Callable[[Poles], _T]
 ) -> list[tuple[np.ndarray, _T]]:
-    """Return a function of the poles of every member, a few at a time, side by side:
-    their numbers, and what it returns; `flat` may hold arrays of shape (members,), except in the drive's keys."""
+    """Apply a function to the poles of all members, a few at a time, side by side.
+
+    Yields their numbers and the results. `flat` may hold arrays of shape (members,), except in the drive's keys.
+    """
     drive = DriveTiming.of(flat)
 
     def of_part(which: np.ndarray) -> tuple[np.ndarray, _T]:
@@ -123,13 +138,18 @@ def for_poles(
 
 
 def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
-    """Real part [1/s] of the rightmost closed-loop pole, shape (members,), 0 on the edge of stability."""
+    """Return the real part [1/s] of the rightmost closed-loop pole, shape (members,).
+
+    It is 0 on the edge of stability.
+    """
     return stability_by_poles(flat, members).abscissa
 
 
 def about_resonances(system: Poles) -> np.ndarray:
-    """Angular frequencies [rad/s] about the lightly damped closed-loop poles of each member, shape (members, k), NaN
-    where there are fewer."""
+    """Return angular frequencies [rad/s] about each member's lightly damped closed-loop poles.
+
+    Shape (members, k), NaN where there are fewer.
+    """
     settings = FrequencySettings.current()
     if system.drive.period > 1:  # its poles do not tell which alias resonates
         return np.full((len(system.closed), 1), np.nan)
@@ -148,8 +168,10 @@ def distance_to_lines(loop: Complex) -> np.ndarray:
 
 
 def frequency_grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
-    """Angular frequencies [rad/s] that show the loops in all limit cases: so many per decade, and more about the
-    resonances of plant and closed loop."""
+    """Return angular frequencies [rad/s] that resolve the loops in all limit cases.
+
+    There are `density` per decade, and more about the resonances of plant and closed loop.
+    """
     cases = concatenate_families([*limit_cases(flat).values()])
     return frequencies(
         flat, cases, DriveTiming.of(flat), density, [plant_poles(flat, cases), closed_loop_poles(flat, cases)]
@@ -169,7 +191,10 @@ def plant_poles(flat: Mapping[str, Any], members: Members) -> Complex:
 
 
 def plants(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
-    """Stage position over actuator force [m/N], complex, shape (members, k), at angular frequencies (k,) [rad/s]."""
+    """Return stage position over actuator force [m/N], complex, shape (members, k).
+
+    The angular frequencies (k,) are in [rad/s].
+    """
     s = 1j * omega
     sides = np.unique(members.touched)
     side = np.searchsorted(sides, members.touched)
@@ -180,8 +205,10 @@ def plants(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Comp
 
 
 def _cart_held(flat: Mapping[str, Any], masses: System, s: np.ndarray) -> Complex:
-    """Stage position over force [m/N] while the cart is held, shape (members, k), at the complex frequencies s (k,)
-    [rad/s]; 0 where cart and stage are one."""
+    """Return stage position over force [m/N] while the cart is held, shape (members, k).
+
+    The complex frequencies s (k,) are in [rad/s]. It is 0 if cart and stage are one.
+    """
     if shared_structure(flat).joint == "rigid":
         return np.zeros((len(masses.a), len(s)), complex)
     cart = cart_states(flat)
@@ -192,13 +219,18 @@ def _cart_held(flat: Mapping[str, Any], masses: System, s: np.ndarray) -> Comple
 
 
 def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
-    """L at angular frequencies [rad/s], shape (members, k); of a sampled loop without the aliases of the plant."""
+    """Return the loops L at angular frequencies [rad/s], shape (members, k).
+
+    A sampled loop is taken without the aliases of the plant.
+    """
     return bare_loops(flat, members, omega)(flat) * DriveTiming.of(flat).transfer(omega)
 
 
 def bare_loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Callable[[Mapping[str, Any]], Complex]:
-    """L without hold, delay and current loop at angular frequencies (k,) [rad/s], for the keys of any controller: shape
-    (members, k); what it moves is computed once."""
+    """Return a function from controller keys to L without hold, delay and current loop.
+
+    L has the shape (members, k) over angular frequencies (k,) [rad/s]. What the controller moves is computed once.
+    """
     if shared_structure(flat).transmission is None:
         bare = plants(flat, members, omega)
         return lambda keys: bare * controller_response(keys, omega)
@@ -207,8 +239,11 @@ def bare_loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> 
 
 
 def _measured_compliance(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
-    """Position measured over the force [m/N], and velocity [m/(N s)] or, sampled, the position that it is of, shape
-    (members, k, 2): by the whole plant, whose encoders may be on different sides of a transmission."""
+    """Return what is measured over the force, shape (members, k, 2), from the whole plant.
+
+    They are position [m/N] and velocity [m/(N s)] or, sampled, the position that is differentiated. Encoders may be on
+    different sides of a transmission.
+    """
     settings = FrequencySettings.current()
     second = RATED if DriveTiming.of(flat).sample_time else VELOCITY
     answers = np.empty((len(members), len(omega), 2), complex)
@@ -221,14 +256,17 @@ def _measured_compliance(flat: Mapping[str, Any], members: Members, omega: np.nd
 
 
 def controller_response(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
-    """Force over a deviation of the stage from its reference [N/m], its sign reversed, shape (k,)."""
+    """Return the controller's force over a deviation of the stage [N/m], sign reversed, (k,)."""
     position, second = _channels(flat, omega).T
     return position + (second if DriveTiming.of(flat).sample_time else 1j * omega * second)
 
 
 def _channels(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
-    """Force over position [N/m] and velocity measured [N s/m], or, sampled, over the two positions, its sign reversed,
-    shape (k, 2); with loops at several rates, the part of it that has the frequency of what is measured."""
+    """Return the controller's force over each measured channel, sign reversed, shape (k, 2).
+
+    Channels are position [N/m] and velocity [N s/m] or, sampled, two positions. With loops at several rates, the part
+    at the frequency of the input counts.
+    """
     drive = DriveTiming.of(flat)
     if drive.sample_time:
         controls, turn = samples_controller(flat, 1, drive.period), omega * drive.sample_time
@@ -240,7 +278,10 @@ def _channels(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
 
 
 def impedance(flat: Mapping[str, Any], members: Members, s: np.ndarray) -> Complex:
-    """Friction force over velocity of the cart [N s/m], shape (members, k), at the complex frequencies s (k,)."""
+    """Return the friction force over the cart's velocity [N s/m], shape (members, k).
+
+    The complex frequencies s have the shape (k,).
+    """
     law = law_of(flat)
     if law is None:
         return np.zeros((len(members), len(s)), complex)

@@ -56,8 +56,7 @@ def law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
 
 
 def motor_law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
-    """Return the law of the friction at the motor,
-    its states under the names that they have there; None without any."""
+    """Return the law of the motor's friction, with its states named as there; None without any."""
     form = shared_structure(flat).transmission
     law = _law(form.friction, form.friction_variant) if form else None
     if law is None:
@@ -91,8 +90,10 @@ def _law(name: str, variant: Hashable) -> LinearFriction | None:
 
 
 def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
-    """Return the internal states that bear the bias at rest: all pulled as far as the cart,
-    from where they bear nothing."""
+    """Return the internal states of the friction law that bear the bias at rest.
+
+    All are pulled as far as the cart, from where they bear nothing.
+    """
     pulled = sp.Symbol("pulled", real=True)
     relaxed: dict[Any, Any] = {VELOCITY: 0, **dict.fromkeys(states, 0)}
     ways: dict[Any, Any] = {
@@ -105,8 +106,10 @@ def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr
 
 
 def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[Any]]:
-    """Return the expressions as a function of the values of their symbols by name;
-    what no float holds is infinite or NaN."""
+    """Return a function that evaluates expressions from values of their symbols, by name.
+
+    Numbers that no float holds become infinite or NaN.
+    """
     symbols = sorted(set[Any]().union(*(expression.free_symbols for expression in expressions)), key=str)
     function = sp.lambdify(symbols, expressions, [{"sine": sine}, "numpy"])
 
@@ -118,13 +121,16 @@ def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[
 
 
 def level(flat: Mapping[str, Any], forward: bool) -> float:
-    """Friction force [N] from which on a stuck cart breaks away; 0 for a law that creeps instead of sticking."""
+    """Return the friction force [N] at which a stuck cart breaks away; 0 if it creeps instead."""
     law = law_of(leading_friction(flat))
     return float(steady_force(flat, np.zeros(1), forward)[0]) if law is not None and law.states else 0.0
 
 
 def steady_force(flat: Mapping[str, Any], speeds: np.ndarray, forward: bool) -> np.ndarray:
-    """Friction force [N] against a steady motion at speeds [m/s], both of shape (count,), in one direction."""
+    """Return the friction force [N] against steady motion at speeds [m/s], both (count,).
+
+    `forward` gives the direction.
+    """
     flat = leading_friction(flat)
     law, sign = law_of(flat), 1.0 if forward else -1.0
     (force,) = law.force({**flat, "velocity": sign * speeds, FORWARD: float(forward)}) if law else (np.zeros(1),)

@@ -43,7 +43,7 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
     """Return the closed loop in continuous time, with all its inputs and outputs.
 
     Inputs are a force on the stage, the reference, a disturbance on the cart, noise of the sensor, and feedforward of
-    the reference. Outputs are those of the plant, and the actuator force.
+    the reference. Outputs are the outputs of the plant, and the actuator force.
     """
     machine, control = plant(flat, members), compensator(flat, len(members))
     ahead = reference_derivatives(control)
@@ -76,8 +76,11 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
 
 @dataclass(frozen=True)
 class Poles:
-    """Poles of the `closed` and of the `cut` loop of a drive, complex, both of shape (members, n): in the plane of s
-    [rad/s], or of z if it is sampled; and those of the closed loop in `continuous` time without delay."""
+    """Poles of the `closed` and of the `cut` loop with its drive, both of shape (members, n).
+
+    They lie in the plane of s [rad/s], or of z if the drive samples. `continuous` are the poles of the closed loop in
+    continuous time without delay.
+    """
 
     closed: Complex
     cut: Complex
@@ -91,8 +94,11 @@ class Poles:
 
     @property
     def abscissa(self) -> np.ndarray:
-        """Real part [1/s] of the rightmost closed-loop pole, shape (members,): 0 where it is on the imaginary axis as
-        far as rounding can tell. Slow poles are those in continuous time without delay, which rounding spares."""
+        """Return the real part [1/s] of the rightmost closed-loop pole, shape (members,).
+
+        It is 0 for a pole on the imaginary axis, up to rounding. Slow poles are taken in continuous time without
+        delay, where rounding does less harm.
+        """
         settings = FrequencySettings.current()
         step = self.drive.sample_time or self.drive.delay
         if not step:
@@ -103,8 +109,10 @@ class Poles:
         return np.maximum(fast.max(axis=1), slow.max(axis=1))
 
     def distance(self, omega: np.ndarray) -> np.ndarray:
-        """abs(1 + L) at angular frequencies [rad/s], shape (members, k): the distances from all closed-loop poles over
-        those from all poles of the cut loop."""
+        """Return abs(1 + L) at angular frequencies [rad/s], shape (members, k).
+
+        It is the product of distances from all closed-loop poles over that from all poles of the cut loop.
+        """
         at = self._at(omega)
         squared = np.ones(omega.shape)
         for closed, cut in zip(self.closed.T[..., None], self.cut.T[..., None], strict=True):
@@ -112,7 +120,10 @@ class Poles:
         return np.sqrt(squared)
 
     def loop(self, omega: np.ndarray) -> Complex:
-        """L at angular frequencies (k,) [rad/s], shape (members, k), to a share of its size and of 1."""
+        """Return L at angular frequencies (k,) [rad/s], shape (members, k).
+
+        Its error is a share of its size and of 1.
+        """
         at = self._at(omega)
         ratio = np.ones((len(self.closed), len(omega)), complex)
         for closed, cut in zip(self.closed.T[..., None], self.cut.T[..., None], strict=True):
@@ -126,9 +137,12 @@ class Poles:
 
 
 def poles(flat: Mapping[str, Any], members: Members, drive: DriveTiming, cut: str = "") -> Poles:
-    """Poles of the loop, of members all of which are stuck or none; those of a delay in continuous time are of rational
-    functions that stand for it. The way of what is measured on one `cut` channel, STAGE or VELOCITY, is left open.
-    Raises InputError for a delay that is too long for these."""
+    """Return the poles of the loop in each state.
+
+    All members are stuck, or none is. A delay in continuous time is replaced by a rational function. `cut` names the
+    measured channel, STAGE or VELOCITY, whose feedback is left open. Raises InputError for a delay that is too long
+    for that function.
+    """
     machine = _driven(flat, members, drive)
     bare = _cut(machine, _continuous(flat, len(members), cut))
     if drive.sample_time:
@@ -147,8 +161,11 @@ def poles(flat: Mapping[str, Any], members: Members, drive: DriveTiming, cut: st
 def response(
     flat: Mapping[str, Any], member: Members, drive: DriveTiming, cut: str = ""
 ) -> Callable[[np.ndarray], Complex]:
-    """L over angular frequencies [rad/s], exactly, of a stage in one state; with loops at several rates its
-    characteristic locus (see `friso.frequency.rates`). One channel of what is measured may be `cut`."""
+    """Return the exact L of a stage in one state, as a function of frequencies [rad/s].
+
+    With loops at several rates it is the characteristic locus (see `friso.frequency.rates`). One measured channel may
+    be `cut`.
+    """
     if drive.sample_time:
         lifted = lifted_loop(flat, member, drive, cut)
         return lambda omega: lifted.locus(omega * drive.sample_time)[0]
@@ -198,7 +215,7 @@ def _cut(machine: System, control: System) -> System:
 
 
 def _squared(at: Complex, pole: Complex) -> np.ndarray:
-    """Squares of distances from a pole of each member, (members, 1): much sooner than with `np.abs`."""
+    """Return squared distances from a pole of each member, (members, 1), without `np.abs`."""
     return np.asarray((at.real - pole.real) ** 2 + (at.imag - pole.imag) ** 2)
 
 
@@ -208,7 +225,7 @@ def _shut(loop: System) -> Complex:
 
 
 def _real_parts(poles: Complex) -> np.ndarray:
-    """Real parts of poles, shape (members, n), 0 for those on the imaginary axis within rounding."""
+    """Return real parts of poles, (members, n); 0 for poles on the imaginary axis, up to rounding."""
     settings = FrequencySettings.current()
     size = np.abs(poles)
     fastest = np.where(np.isfinite(size), size, 0.0).max(axis=1, keepdims=True)

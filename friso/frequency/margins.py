@@ -54,8 +54,7 @@ class Margins:
 
     @property
     def on_the_edge(self) -> bool:
-        """Tell whether a deviation neither dies out nor grows: a position that is not controlled,
-        an undamped swing."""
+        """Tell whether a deviation neither dies out nor grows, as an undamped swing."""
         return self.abscissa == 0
 
     @property
@@ -66,7 +65,9 @@ class Margins:
 
 def margins(flat: Mapping[str, Any], member: Members) -> Margins:
     """Return the margins of a stage in one of its states.
-    Raises InputError for too long a delay (see `DriveTiming`)."""
+
+    Raises InputError for too long a delay (see `DriveTiming`).
+    """
     drive = DriveTiming.of(flat)
     return margins_of(response(flat, member, drive), flat, member, poles(flat, member, drive))
 
@@ -90,8 +91,11 @@ def margins_of(at: LoopResponse, flat: Mapping[str, Any], member: Members, loop_
 def frequencies(
     flat: Mapping[str, Any], members: Members, drive: DriveTiming, density: float, resonant: Sequence[Complex]
 ) -> np.ndarray:
-    """Angular frequencies [rad/s] that show all that loops of these states do, up to the highest the drive knows: so
-    many per decade, and more about the resonances among the poles `resonant`."""
+    """Return angular frequencies [rad/s] that resolve the loops of all these states.
+
+    There are `density` per decade, up to the highest that the drive can represent, and more about the resonances among
+    the poles `resonant`.
+    """
     settings = FrequencySettings.current()
     size = np.concatenate([np.abs(poles(flat, kind, DriveTiming(0.0, 0.0)).closed).ravel() for kind in members.kinds])
     size = size[size > settings.negligible_pole * size.max(initial=0.0)] if size.any() else np.ones(1)
@@ -100,7 +104,7 @@ def frequencies(
 
 
 def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray:
-    """Ascending angular frequencies [rad/s] with those about the resonances of these poles among them."""
+    """Return ascending angular frequencies [rad/s], with more of them about resonances."""
     light = resonances(np.concatenate([roots.ravel() for roots in resonant]))
     near = (np.abs(light.imag)[:, None] + np.abs(light.real)[:, None] * AROUND).ravel()
     return np.unique(np.concatenate([even, near[(near > even[0]) & (near < even[-1])]]))
@@ -119,8 +123,9 @@ def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
 def of_loop(response: LoopResponse, poles: Complex, abscissa: float, omega: np.ndarray, ends: Complex) -> Margins:
     """Return the margins of a loop from its response.
 
-    `poles` are those of the closed loop, `abscissa` the real part of the rightmost, and `omega` frequencies [rad/s]
-    that show the loop. `ends` are its values where it is real at any gain: at rest, and at half the sampling frequency.
+    `poles` are those of the closed loop, `abscissa` the real part of the rightmost one, and `omega` frequencies
+    [rad/s] that resolve the loop. `ends` are its values where it is real at any gain: at rest, and at half the
+    sampling frequency.
     """
     seen = response(omega)
     crossovers = _roots(lambda w: _decades(response(np.array([w])))[0], omega, _decades(seen))
@@ -152,8 +157,10 @@ def _decades(loop: Complex) -> np.ndarray:
 
 
 def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return where a function of the frequency, known at some, passes zero; not where it jumps,
-    as a locus does that goes over to an alias."""
+    """Return where a function of frequency, known at some frequencies, passes zero.
+
+    Jumps, as where a locus goes over to an alias, do not count.
+    """
     settings = FrequencySettings.current()
     with np.errstate(invalid="ignore"):
         passes = np.flatnonzero(values[:-1] * values[1:] < 0)

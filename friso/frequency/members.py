@@ -48,8 +48,10 @@ class Members:
 
     @property
     def kinds(self) -> list[Members]:
-        """Return the stuck members and the others, as far as there are any:
-        they have different states."""
+        """Return the stuck members and the others, since they have different states.
+
+        Empty groups are left out.
+        """
         return [self[mask] for mask in (self.stuck, ~self.stuck) if mask.any()]
 
     @property
@@ -73,8 +75,10 @@ class Members:
 
 @check_arguments
 def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward: bool = True) -> Members:
-    """A single state: sliding at a speed [m/s], `forward` or back, or, at 0, stuck under a bias force [N]; with its
-    limiter `touched` or not. Raises InputError for a speed that is negative and for a bias of a cart that slides.
+    """Return one state of a stage: sliding at a speed [m/s], or stuck under a bias force [N].
+
+    It slides `forward` or back; a speed of 0 means stuck. The limiter may be `touched`. Raises InputError for a
+    negative speed and for a bias of a cart that slides.
 
     Examples
     --------
@@ -95,8 +99,10 @@ def concatenate_families(parts: list[Members]) -> Members:
 
 
 def limit_cases(flat: Mapping[str, Any]) -> dict[str, Members]:
-    """Return the limit cases by name: "stuck" and "sliding" (fast),
-    and both with "-touched" behind where the limiter is touched (Table 1); "given" for a stage that has just one."""
+    """Return the limit cases by name: "stuck" and "sliding" (fast).
+
+    Both have "-touched" appended where the limiter is touched (Table 1). A stage with just one case calls it "given".
+    """
     flat = leading_friction(flat)
     moves = ["sliding"] if flat["friction.model"] == "none" else ["stuck", "sliding"]
     limits = limiter_states(flat)

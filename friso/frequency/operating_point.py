@@ -33,8 +33,10 @@ def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]
 
 
 def operating_point_of_motor(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
-    """Return operating points of the friction law at the motor,
-    which moves with the load and bears no bias."""
+    """Return operating points of the motor's friction law.
+
+    The motor moves with the load and bears no bias.
+    """
     unbiased = replace(members, bias=np.zeros(len(members)))
     point = operating_point(of_motor(flat), unbiased)
     beyond = "beyond_"

@@ -70,8 +70,10 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
 
 
 def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
-    """Return the masses without friction: from the forces on stage and cart to their positions,
-    shape of `touched`. Raises InputError for a transmission with another nonlinearity than the friction of the guide.
+    """Return the masses without friction, from forces on stage and cart to their positions.
+
+    There is one system for each entry of `touched`. Raises InputError for a transmission with another nonlinearity
+    than the friction of the guide.
     """
     drive = shared_structure(flat).transmission
     if drive is not None and (drive.backlash or drive.friction != "none"):
@@ -94,9 +96,11 @@ def _on_flank() -> dict[str, Any]:
 
 
 def compensator(flat: Mapping[str, Any], members: int) -> System:
-    """Return the controller: from reference, position [m] and velocity [m/s] of the stage,
-    velocity [m/s], acceleration [m/s^2] and jerk [m/s^3] of the reference to the force [N]. Raises InputError for one
-    that exerts none."""
+    """Return the controller, from reference and measurements to the force [N].
+
+    Inputs are the reference, position [m] and velocity [m/s] of the stage, and velocity [m/s], acceleration [m/s^2]
+    and jerk [m/s^3] of the reference. Raises InputError for a controller that exerts no force.
+    """
     form = shared_structure(flat).controller
     assert form is not None  # a stage file has a controller
     system = _compensator(replace(form, anti_windup=None)).at(flat, members)
@@ -112,8 +116,11 @@ def reference_derivatives(control: System) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class _Plant:
-    """The model's own equations, the controller replaced by a force; names of all velocities, and of position and
-    velocity of the cart and of the motor (none without a transmission)."""
+    """The model's own equations with a force in place of the controller.
+
+    It has the names of all velocities, and of position and velocity of the cart and of the motor (none without a
+    transmission).
+    """
 
     declared: Declared
     velocities: tuple[str, ...]
@@ -146,8 +153,7 @@ def _plant(form: Structure) -> _Plant:
 
 
 def cart_states(flat: Mapping[str, Any]) -> tuple[str, str]:
-    """Return names of position and velocity of what the friction acts on,
-    in the plant's systems."""
+    """Return the names of position and velocity of the body with friction."""
     return _plant(shared_structure(flat).standing).cart
 
 
@@ -164,12 +170,10 @@ def _compensator(form: ControllerForm) -> Declared:
 
 
 def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...]) -> System:
-    """Return the system with the internal states of the friction law following the cart,
-    which is stuck.
+    """Return the system with the friction law's internal states tied to the stuck cart.
 
-    At rest their rate is proportional to the velocity of the cart alone, so that they differ from a multiple of its
-    position by a constant: where on the rail it got stuck. Nothing controls that, nor does it matter; it would be a
-    pole at 0.
+    At rest their rate is proportional to the velocity of the cart alone. They differ from a multiple of its position
+    by a constant: where on the rail it got stuck. Nothing controls that, nor does it matter; it would be a pole at 0.
     """
     position, velocity = map(system.states.index, cart)
     a, c = system.a.copy(), system.c.copy()
@@ -185,8 +189,10 @@ def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...])
 
 
 def _without_constants(system: System, internal: tuple[str, ...]) -> System:
-    """Return the system without those internal states of the friction law that stay as they are,
-    such as the force of an element that slips: each would be a pole at 0."""
+    """Return the system without internal states of the friction law that stay constant.
+
+    An example is the force of an element that slips. Each would be a pole at 0.
+    """
     unmoved = [z for z in map(system.states.index, internal) if not (system.a[:, z].any() or system.b[:, z].any())]
     moving = [i for i in range(len(system.states)) if i not in unmoved]
     states = tuple(system.states[i] for i in moving)

@@ -15,8 +15,7 @@ Range = tuple[float, float]
 
 
 def ranges_below(at: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> tuple[Range, ...]:
-    """Return the ranges of positive ascending places (n,) in which a function of them is below
-    0."""
+    """Return the ranges of ascending positive places (n,) in which a function is below 0."""
     values = excess(at)
     below = values < 0
     changes = np.flatnonzero(below[1:] != below[:-1])

@@ -33,8 +33,10 @@ from friso.stage.standstill import FrictionSettings
 
 @dataclass(frozen=True)
 class Lifted:
-    """A periodic system at the ends of its periods: x' = a x + b u, y = c x + d u, u and y holding a period's N
-    samples; a (members, n, n), b (members, n, N), c (members, N, n), d (members, N, N)."""
+    """A periodic system at the ends of its periods: x' = a x + b u, y = c x + d u.
+
+    u and y hold the N samples of a period; a (members, n, n), b (members, n, N), c (members, N, n), d (members, N, N).
+    """
 
     a: np.ndarray
     b: np.ndarray
@@ -52,8 +54,7 @@ class Lifted:
         return self.at(np.exp(1j * turn * self.d.shape[-1]))
 
     def fundamental(self, turn: np.ndarray) -> Complex:
-        """Return the part of the response to a harmonic signal that has its frequency,
-        shape (members, k).
+        """Return the response to a harmonic signal at its own frequency, shape (members, k).
 
         The signal turns by an angle (k,) [rad] in each sample.
         """
@@ -65,16 +66,17 @@ class Lifted:
 
 
 def _fundamental(matrices: Complex, turn: np.ndarray) -> Complex:
-    """Return the response of lifted matrices (members, k, N, N) to a harmonic signal,
-    at its own frequency."""
+    """Return the response of lifted matrices (members, k, N, N) at a signal's own frequency."""
     turns = np.exp(1j * turn[:, None] * np.arange(matrices.shape[-1]))  # (k, N)
     answers = (matrices @ turns[..., None])[..., 0]
     return np.asarray((answers * turns.conj()).mean(axis=-1), dtype=complex)
 
 
 def locus_of(matrices: Complex, turn: np.ndarray) -> Complex:
-    """Return the eigenvalue of lifted matrices (members, k, N,
-    N) that is closest to the fundamental, shape (members, k)."""
+    """Return the eigenvalue closest to the fundamental, shape (members, k).
+
+    The lifted matrices have the shape (members, k, N, N).
+    """
     if matrices.shape[-1] == 1:
         return matrices[..., 0, 0]
     eigenvalues = np.linalg.eigvals(matrices)
@@ -83,9 +85,12 @@ def locus_of(matrices: Complex, turn: np.ndarray) -> Complex:
 
 
 def samples_controller(flat: Mapping[str, Any], members: int, period: int) -> tuple[System, ...]:
-    """Return the controller at each sample of a period: from the position measured,
-    and that of which the velocity is the rate [m], to the force [N], and what is held for the next sample. A controller
-    that feeds back a position alone, of one encoder, does not see the second."""
+    """Return the controller at each sample of a period.
+
+    Its inputs are the measured position and the position whose rate is the measured velocity [m], its outputs the
+    force [N] and what is held for the next sample. A controller that feeds back one encoder's position does not use
+    the second input.
+    """
     form = shared_structure(flat)
     assert form.controller is not None
     both = form.controller.section.feeds_back == "velocity"
@@ -111,8 +116,10 @@ def _samples(flat: Mapping[str, Any], name: str) -> int:
 
 @cache
 def _declared(form: ControllerForm, due: tuple[bool, ...], both: bool, velocity_samples: int) -> Declared:
-    """Return the controller at a sample at which some loops are due,
-    of small motions away from the reference; with `both` positions told apart."""
+    """Return the controller at a sample at which some loops are due, for small motions.
+
+    With `both`, the two measured positions are told apart.
+    """
     bare = replace(form, anti_windup=None, settings=FrictionSettings(leak=form.settings.leak))
     y, rated = sp.symbols("measured_position measured_rated", real=True)
     seen = Loop(-y, y, sp.S.Zero, sp.S.Zero, rated=rated if both else None)
@@ -125,8 +132,7 @@ def _declared(form: ControllerForm, due: tuple[bool, ...], both: bool, velocity_
 
 
 def closed_over_period(machine: System, controls: tuple[System, ...]) -> np.ndarray:
-    """Return how a period takes the states of plant and controller along, shape (members, n,
-    n), the loop being closed."""
+    """Return how a period carries the states of the closed loop along, (members, n, n)."""
     whole = _identity(machine, controls[0])
     for control in controls:
         whole = _step(machine, control, 1.0) @ whole
@@ -134,8 +140,10 @@ def closed_over_period(machine: System, controls: tuple[System, ...]) -> np.ndar
 
 
 def cut_over_period(machine: System, controls: tuple[System, ...]) -> Lifted:
-    """Return the loop cut at the actuator: from the forces of a period to those that answer,
-    their sign reversed."""
+    """Return the loop cut at the actuator, over a period.
+
+    It leads from the forces of a period to the controller's answer, with the sign reversed.
+    """
     steps = [_step(machine, control, 0.0) for control in controls]
     held = np.zeros((len(machine.a), controls[0].a.shape[-1], 1))
     push = np.concatenate([machine.b, held], axis=1)
@@ -144,8 +152,10 @@ def cut_over_period(machine: System, controls: tuple[System, ...]) -> Lifted:
 
 
 def controller_over_period(controls: tuple[System, ...], measured: str) -> Lifted:
-    """Return the controller alone: from what is measured, STAGE or RATED,
-    over a period to the forces."""
+    """Return the controller alone over a period, from one measured channel to the forces.
+
+    The channel is STAGE or RATED.
+    """
     seen = [control.take((measured,), (FORCE,)) for control in controls]
     lifted = _lifted([control.a for control in seen], [control.b for control in seen], [control.c for control in seen])
     direct = np.zeros_like(lifted.d)
@@ -176,8 +186,10 @@ def _lifted(steps: list[np.ndarray], pushes: list[np.ndarray], answers: list[np.
 
 
 def _step(machine: System, control: System, shut: float) -> np.ndarray:
-    """Return how a sample takes the states of plant and controller along;
-    `shut` is 1 where the controller's force acts."""
+    """Return how a sample carries the states of plant and controller along.
+
+    `shut` is 1 where the controller's force acts.
+    """
     n, k = machine.a.shape[-1], control.a.shape[-1]
     step = np.zeros((len(machine.a), n + k, n + k))
     step[:, :n, :n] = machine.a + shut * (machine.b @ control.d @ machine.c)

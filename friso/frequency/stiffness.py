@@ -13,8 +13,10 @@ def in_series(first: Any, second: Any) -> Any:
 
 
 def limiter_in_series(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the stage with joint and limiter in series,
-    as Table 1 of the thesis prints it for a touched limiter; to be used as one whose limiter is not touched."""
+    """Return the stage with limiter and joint in series, as one whose limiter is not touched.
+
+    Table 1 of the thesis prints a touched limiter so.
+    """
     pairs = {"stiffness": "limiter_stiffness", "damping": "limiter_damping"}
     free = {"joint.stroke": 1.0}  # however long: it is not touched
     return {**flat, **free, **{f"joint.{a}": _printed(flat, a, b) for a, b in pairs.items() if f"joint.{a}" in flat}}

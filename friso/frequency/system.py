@@ -13,8 +13,11 @@ Complex = npt.NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class System:
-    """x' = a x + b u, y = c x + d u for every member: a (members, n, n), b (members, n, m), c (members, p, n),
-    d (members, p, m), with the names of states, inputs and outputs; of a sampled one, x' is the next x."""
+    """Linear systems x' = a x + b u, y = c x + d u, one for every member.
+
+    a (members, n, n), b (members, n, m), c (members, p, n), d (members, p, m), with the names of states, inputs and
+    outputs. For a sampled system x' is the next x.
+    """
 
     a: np.ndarray
     b: np.ndarray
@@ -37,7 +40,7 @@ class System:
         return bool(self.b[..., column].any() or self.d[..., column].any())
 
     def at(self, points: np.ndarray) -> Complex:
-        """Transfer matrices c (s - a)^-1 b + d at the points s (k,), complex, shape (members, k, p, m)."""
+        """Return transfer matrices c (s - a)^-1 b + d at points s (k,), (members, k, p, m)."""
         n = len(self.states)
         shifted = points[:, None, None] * np.eye(n) - self.a[:, None]
         answers = np.linalg.solve(shifted, self.b[:, None])

@@ -14,8 +14,9 @@ from friso.stage.stage import numeric_keys
 
 @dataclass(frozen=True)
 class Tuning:
-    """Gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s] of Eq. 8, and the margins of the loop on the bare
-    mass.
+    """Gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s] of Eq. 8, with margins.
+
+    The margins are those of the loop on the bare mass.
 
     Examples
     --------
@@ -33,8 +34,10 @@ class Tuning:
 
     @property
     def parallel(self) -> dict[str, float]:
-        """Return the tuning as gains of Eq. 6, on the error behind the low-pass: kp [N/m],
-        ki [N/(m s)], kd [N s/m], tau [s]."""
+        """Return the tuning as gains of Eq. 6: kp [N/m], ki [N/(m s)], kd [N s/m], tau [s].
+
+        They act on the error behind the low-pass.
+        """
         return as_gains(self.k_p, self.tau_z, self.tau_i, self.tau_p)
 
     @property
@@ -49,8 +52,10 @@ EXAMPLE, MOST = "friso.tuning(8.0, 0.1, 2.0, 1.7)", 1e30
 
 @check_arguments
 def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
-    """The controller for a mass [kg] at a crossover [Hz], by van Dijk's rules with `alpha` and `beta`, and how it does
-    on that mass. Raises InputError for numbers that no stage file may have.
+    """Return the controller for a mass [kg] at a crossover [Hz] by van Dijk's rules.
+
+    `alpha` and `beta` are the rules' other numbers. The result includes the margins on that mass. Raises InputError
+    for numbers that no stage file may have.
 
     Examples
     --------

@@ -52,10 +52,10 @@ class Kick:
 
 @dataclass(frozen=True)
 class MoveShare:
-    """Share of moves that end in the cycle, drawn evenly over two keys of the motion.
+    """The share of moves that end in the cycle.
 
-    `count` moves were drawn and run to their end, `hunting` of them hunt. `ranges` [SI] of these keys are those that
-    they were drawn from.
+    `count` moves were drawn evenly over two keys of the motion and run to their end; `hunting` of them hunt. `ranges`
+    [SI] are the ranges of the two keys.
     """
 
     count: int

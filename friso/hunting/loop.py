@@ -97,11 +97,9 @@ def unstable(stage: Stage) -> tuple[LoopState, ...]:
 
 
 def leaves_for_good(stage: Stage) -> bool:
-    """Tell whether a motion that has gone farther from its reference than runs are followed
-    diverges.
+    """Tell whether a motion beyond the range that runs are followed to grows without bound.
 
-    It does if the loop is unstable and there is no force limit with anti-windup, behind which it may reach a larger
-    swing.
+    It does if the loop is unstable and no force limit with anti-windup can hold it in a larger swing.
     """
     stages = Ensemble.held(stage.flat(), 1)
     controller = stages.structure.controller

@@ -49,11 +49,10 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
 
 
 def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return the keys of groups of estimates and their correlations once combined, shape (keys,
-    keys).
+    """Return the keys of groups of estimates, and their correlations once combined, (keys, keys).
 
-    `estimates` are those of all experiments. A combined value is a mean of single ones with weights a_i, and the
-    experiments are independent: its covariance is the sum of A_i C_i A_i, with C_i the covariance within one.
+    `estimates` come from all experiments. A combined value is a mean of single ones with weights a_i, and experiments
+    are independent: its covariance is the sum of A_i C_i A_i, with C_i the covariance within one experiment.
     """
     keys = tuple(dict.fromkeys(estimate.name for group, _ in groups for estimate in group))
     precision = {
@@ -82,13 +81,12 @@ def _weight(estimate: Estimate) -> float:
 
 
 def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
-    """Return the weighted mean of estimates of one key, and whether a chi-square test allows
-    that all are of one value.
+    """Return the weighted mean of estimates of one key, and whether they agree (chi-square test).
 
-    Its interval is wider by the Birge ratio (Birge 1932, doi:10.1103/PhysRev.40.207), by Student's t of three and more,
-    where they scatter more than their own intervals say; what is systematic in these does not average out. Where the
-    test does not allow it, as for friction at several places, each counts with a scatter from place to place besides
-    its own (`_between`); of two, which hardly show a scatter, the interval spans both.
+    If they scatter more than their own intervals say, the interval is wider by the Birge ratio (Birge 1932,
+    doi:10.1103/PhysRev.40.207), and for three or more by Student's t. Systematic parts do not average out. If the
+    estimates do not agree, as friction at several places, each gets an additional scatter from place to place
+    (`_between`); for two, which hardly show a scatter, the interval spans both.
     """
     values, weights = (
         np.array(column)
@@ -114,9 +112,9 @@ def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
 def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
     """Return the mean of values, shape (n,), that scatter by more than their variances.
 
-    A variance from one to the next is added with which they scatter as they do (Paule, Mandel 1982,
-    doi:10.6028/jres.087.022). The degrees of freedom are those of as many values as count equally: one that is hardly
-    known says little about the scatter.
+    A variance between the values is added, just large enough to explain their scatter (Paule, Mandel 1982,
+    doi:10.6028/jres.087.022). The degrees of freedom are those of the number of values that count equally: a value
+    that is hardly known says little about the scatter.
     """
 
     def excess(added: float) -> float:
@@ -129,10 +127,9 @@ def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
 
 
 def _intersection(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
-    """Return the range that estimates without a value leave in common, and whether they have
-    one.
+    """Return the range that estimates without a value have in common, and whether there is one.
 
-    Where they have none, their hull is left.
+    If they have none in common, return the range that spans all of them.
     """
     bounding = [
         estimate for estimate in estimates if np.isfinite(estimate.low) or np.isfinite(estimate.high)
@@ -147,7 +144,7 @@ def _intersection(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bo
 
 
 def _reasons(reasons: Sequence[str]) -> str:
-    """Join reasons; of those that differ in numbers alone the first one stands for all."""
+    """Join reasons; where some differ in numbers alone, name the first and count the others."""
     alike: dict[str, list[str]] = {}
     for reason in dict.fromkeys(reasons):
         alike.setdefault(re.sub(r"\d[\d.e+-]*", "#", reason), []).append(reason)

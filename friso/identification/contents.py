@@ -57,9 +57,7 @@ class ChannelContent:
         return 1 / usual_step(steps) if steps.size else None
 
     def course(self) -> np.ndarray:
-        """Return means over parts of the channel in turn, for a small plot; NaN where there is no
-        number.
-        """
+        """Return means over successive parts of the channel, for a small plot; NaN without numbers."""
         settings = IdentificationSettings.current()
         parts = np.array_split(self.values, min(settings.bins_of_a_small_plot, max(self.values.size, 1)))
         finite = [part[np.isfinite(part)] for part in parts]
@@ -146,9 +144,7 @@ def _content(channel: Channel, proposal: Proposal, reading: Reading) -> ChannelC
 
 
 def _time(channel: Channel, proposal: Proposal, reading: Reading) -> np.ndarray | None:
-    """Return the instants of a channel [s]; None where neither the file nor the mapping tells
-    them.
-    """
+    """Return the sampling instants of a channel [s]; None if neither file nor mapping has them."""
     clock = proposal.chosen.get("time")
     try:
         return instants(AssignedRole("", channel, "", False), clock, reading, Notes())

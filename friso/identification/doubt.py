@@ -46,7 +46,10 @@ Moment = Literal["record", "fault", "cause", "otherwise", "value", "fit", "curve
 
 @dataclass(frozen=True)
 class RecordCase:
-    """A log of moves with its inverse model; `cart_share` is the share of the mass that moves with a measured cart."""
+    """A log of moves with its inverse model.
+
+    `cart_share` is the share of the mass that moves with a measured cart.
+    """
 
     log: Log
     inverse: InverseModel
@@ -60,7 +63,10 @@ class RecordCase:
 
 @dataclass(frozen=True)
 class ValueCase(RecordCase):
-    """A log of moves of which it is decided whether the model `lacks` something and whether the record is `poor`."""
+    """A log of moves, with judgements of its inverse model.
+
+    The model `lacks` something, or the record is `poor`.
+    """
 
     lacks: bool = False
     poor: bool = False
@@ -82,8 +88,10 @@ class TriedForces:
 
 @dataclass(frozen=True, kw_only=True)
 class FittedCase(RecordCase):
-    """A log of moves with the fit of the whole model. `flat` is the stage as it was given, and `velocity` [m/s], shape
-    (n,), the smooth one of the part of the log that is fitted."""
+    """A log of moves with the fit of the whole model.
+
+    `flat` is the stage as given; `velocity` [m/s], shape (n,), is smoothed over the part of the log that is fitted.
+    """
 
     flat: Mapping[str, Any]
     fit: OutputErrorFit
@@ -92,8 +100,10 @@ class FittedCase(RecordCase):
 
 @dataclass(frozen=True, kw_only=True)
 class FitCase(FittedCase):
-    """A log of moves with its fit, and how good that is. `leading` is the effect that explains most of what the fit
-    leaves, of all doubts that try forces."""
+    """A log of moves with its fit, and the quality of the fit.
+
+    `leading` is the effect that explains most of what the fit leaves, among all doubts that try forces.
+    """
 
     quality: Quality
     refused: Mapping[str, str] = field(default_factory=dict)
@@ -107,11 +117,14 @@ class FitCase(FittedCase):
         return explaining or self.quality.spoilt or bool(self.quality.without)
 
     def may_name(self, doubt: str) -> bool:
-        """Tell whether a doubt may name its cause: it leads, or no other cause is named and no other doubt leads."""
+        """Tell whether a doubt may name its cause.
+
+        It may if it leads, or if no doubt leads and no other cause has been named.
+        """
         return not self.has_cause if self.leading is None else self.leading.doubt == doubt
 
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
-        """The case after a finding: its consequences for the fit, and the finding among those of the quality."""
+        """Return the case with a finding added, and with the finding's consequences for the fit."""
         quality = replace(
             self.quality, findings=(*self.quality.findings, finding), spoilt=self.quality.spoilt or finding.spoils
         )
@@ -130,7 +143,7 @@ class LeadingEffect:
 
 @dataclass(frozen=True, kw_only=True)
 class KeyCase(FitCase):
-    """A log of moves with estimates by key of the stage file and the `correlation` of those that are determined."""
+    """A log of moves with its estimates by key of the stage file, and their `correlation`."""
 
     estimates: tuple[Estimate, ...]
     correlation: np.ndarray
@@ -143,8 +156,7 @@ class KeyCase(FitCase):
         return {estimate.name: estimate for estimate in self.estimates if estimate.determined}
 
     def with_answers(self, finding: RaisedDoubt) -> KeyCase:
-        """The case with the estimates that a finding puts in the place of others, and those left out that it
-        refuses."""
+        """Return the case with estimates replaced by a finding's answers, or withheld if it refuses them."""
         answers = {**finding.answers, **refused(self.estimates, finding.refuses)}
         estimates = tuple(answers.get(estimate.name, estimate) for estimate in self.estimates)
         pairs = zip(self.estimates, estimates, strict=True)
@@ -154,12 +166,12 @@ class KeyCase(FitCase):
 
 @dataclass(frozen=True)
 class RaisedDoubt:
-    """A doubt that was raised: the cause in `words` ("" where estimates say it), and its `size` in a `unit`.
+    """A doubt that was raised: its cause in `words` ("" if estimates say it), and its `size`.
 
-    Consequences: intervals reach to what the inverse model `without` the effect says, and to `reaches`, ends by
-    quantity of the inverse model; the `fit` and the `inverse` model with intervals that allow for the effect;
-    `answers`, estimates in place of others of the same key; keys that it `refuses`, with the reason; and whether it
-    `spoils` the record, so that it passes for friction at low speed. One that `explains` what a fit leaves keeps others
+    `size` has a `unit`. Consequences: intervals reach to the values of the inverse model `without` the effect, and to
+    the ends `reaches` by quantity of the inverse model; `fit` and `inverse` have intervals that allow for the effect;
+    `answers` replace estimates of the same key; `refuses` names keys that are withheld, with the reason; and a doubt
+    that `spoils` the record can pass for friction at low speed. One that `explains` what a fit leaves keeps others
     that would explain it too from being named. `doubt` is the name of the file that raised it.
     """
 
@@ -179,12 +191,12 @@ class RaisedDoubt:
 
 @dataclass(frozen=True)
 class Doubt:
-    """An effect that may be in a log and is not in the model. Its name is that of its module; see `DOUBTS`.
+    """An effect that may be in a log and is not in the model, named by its module (`DOUBTS`).
 
-    `find` yields findings for what it is given at its `moment`; it `looks_at` something, has a `consequence` in words,
-    and is `decided_by` a measurement: these stand in the reference. `after` names doubts that are asked before.
-    `forces` are those of an effect that may be in what a fit leaves: of all such doubts the one that explains most of
-    it leads, and the others do not name a cause.
+    `find` yields findings from the case at its `moment`. The reference shows what it `looks_at`, its `consequence`,
+    and by which measurement it is `decided_by`. `after` names doubts that are asked before. `forces` returns forces
+    that the effect would add, to be fitted to what is left: the doubt that explains most of it leads, and the others
+    do not name a cause.
     """
 
     moment: Moment
@@ -212,10 +224,11 @@ def words_of(moment: Moment, case: Any) -> tuple[str, ...]:
 
 
 def causes(case: RecordCase) -> list[RaisedDoubt]:
-    """List what may be wrong with a log that a mass with friction does not describe; [] where nothing explains it.
+    """List what may be wrong with a log that a mass with friction does not describe.
 
-    Faults of the log come first. Of effects whose inverse model explains much more than the plain one, the best come
-    next, none that leaves much more than the best; what counts only without such an effect comes last.
+    Faults of the log come first. Next come effects with which the inverse model fits much better, the best first,
+    without those that fit much worse than the best. Causes that count only without such effects come last. Returns []
+    if nothing explains the log.
     """
     settings = DoubtSettings.current()
     every = list(raised("cause", case))
@@ -231,13 +244,16 @@ def causes(case: RecordCase) -> list[RaisedDoubt]:
 
 
 def way_of(case: FittedCase) -> np.ndarray:
-    """Return the direction of the motion from -1 to 1, shape (n,), which turns gradually where it creeps."""
+    """Return the direction of the motion from -1 to 1, shape (n,), gradual where it creeps."""
     top = DoubtSettings.current().speed_share_of_creeping * np.abs(case.velocity).max()
     return np.clip(case.velocity / top, -1.0, 1.0)
 
 
 def leading_effect(case: FittedCase) -> LeadingEffect | None:
-    """Try the forces of all doubts on what a fit leaves; None where none explains enough of it to be named."""
+    """Return the effect whose forces explain most of what a fit leaves.
+
+    The forces of all doubts are tried. None if none of them explains enough.
+    """
     best: LeadingEffect | None = None
     for name in _at("fit"):
         tries = DOUBTS[name].forces

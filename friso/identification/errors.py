@@ -50,9 +50,7 @@ class Residual:
 
 
 def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> SimulationErrors:
-    """Compare a simulated record with some samples of a log; `bandwidth` [Hz] is that of the
-    motion.
-    """
+    """Compare a simulated record with some samples of a log; `bandwidth` [Hz] is the motion's."""
     settings = IdentificationSettings.current()
     measured = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * bandwidth)
     modelled = motion(simulated.position, log.sample_time, settings.smoothing_bandwidths * bandwidth)
@@ -66,17 +64,13 @@ def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> 
 
 
 def unexplained(log: Log, part: slice, held: Simulated) -> SimulationErrors:
-    """Return the error of a stage that was held to the log's position: the force that holding it
-    took.
-    """
+    """Return the error of a stage held to the log's position: the force that held it there."""
     share = float(np.linalg.norm(held.force) / np.linalg.norm(log["force"][part]))
     return SimulationErrors(np.nan, np.nan, np.nan, share)
 
 
 def residual_of(residual: np.ndarray, moved: FilteredMotion, sample_time: float) -> Residual:
-    """Describe what is left of the force [N], shape (n,), over a motion sampled every
-    `sample_time` [s].
-    """
+    """Describe the residual force [N], (n,), over a motion sampled every `sample_time` [s]."""
     alike = correlation_length(residual)
     return Residual(
         float(np.sqrt(np.mean(residual**2))),

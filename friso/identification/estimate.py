@@ -14,14 +14,12 @@ NO_INTERVAL = "how far off it may be is not known"
 
 @dataclass(frozen=True)
 class Estimate:
-    """A quantity found from data, with its 95 % interval, or with the reason why there is no
-    value.
+    """A quantity found from data, with its 95 % interval or the reason why it has no value.
 
-    `name` is a key of the stage file ("friction.coulomb") where it is one, else what it is ("resonance 1 frequency");
-    all numbers are in the SI `unit`. `low` to `high`, finite and apart, is the interval of the `value`. Where the data
-    cannot show the quantity, `value` is NaN, `reason` says why, and `low`, `high` are what is left possible (infinite
-    where nothing is known). `systematic` is the part of the interval's half-width that repeating the experiment does
-    not make smaller.
+    `name` is a key of the stage file ("friction.coulomb") or a description ("resonance 1 frequency"); all numbers are
+    in the SI `unit`. `low` to `high`, finite and apart, is the interval of the `value`. If the data cannot show the
+    quantity, `value` is NaN, `reason` says why, and `low` and `high` are what remains possible (infinite if nothing is
+    known). `systematic` is the part of the interval's half-width that does not shrink when the experiment is repeated.
     """
 
     name: str
@@ -50,9 +48,7 @@ class Estimate:
     def unknown(
         cls, name: str, unit: str, method: str, reason: str, low: float = -np.inf, high: float = np.inf
     ) -> Estimate:
-        """Make an estimate that the data do not determine, with the reason and the bounds that are
-        left.
-        """
+        """Make an estimate that the data do not determine, with the reason and remaining bounds."""
         return cls(name, unit, np.nan, float(low), float(high), method, reason)
 
     @property

@@ -65,9 +65,7 @@ class InverseModel:
 
 @dataclass(frozen=True)
 class FilteredMotion:
-    """Position [m], velocity [m/s] and acceleration [m/s^2] without noise beyond a cut-off
-    frequency, shape (n,).
-    """
+    """Position [m], velocity [m/s] and acceleration [m/s^2] below a cut-off frequency, (n,)."""
 
     position: np.ndarray
     velocity: np.ndarray
@@ -75,10 +73,9 @@ class FilteredMotion:
 
 
 def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredMotion:
-    """Smooth a measured position [m], shape (n,), forward and back at a cut-off frequency [Hz],
-    and differentiate it.
+    """Smooth a position [m], (n,), forward and back below `cutoff` [Hz], and differentiate it.
 
-    Where the cut-off is near the sampling frequency derivatives are those of a spline: differences would lose a part of
+    If the cut-off is near the sampling frequency, derivatives are those of a spline: differences would lose a part of
     the acceleration.
     """
     settings = IdentificationSettings.current()
@@ -120,8 +117,9 @@ def bandwidth_of(log: Log) -> float:
 
 
 def directions(position: np.ndarray) -> tuple[bool, bool]:
-    """Tell whether a motion [m], shape (n,), goes forward, and whether it goes back; its noise
-    does neither.
+    """Tell whether a motion [m], shape (n,), goes forward, and whether it goes back.
+
+    Noise counts as neither.
     """
     settings = IdentificationSettings.current()
     steps = np.diff(
@@ -213,8 +211,7 @@ def _other_sign(log: Log) -> str:
 
 
 def unit_of(unit: str, log: Log) -> str:
-    """Return the unit of a quantity of mechanics where the force of a log stands in the newton's
-    place.
+    """Return a unit with the newton replaced by the unit of the log's force.
 
     With a force in volts a mass is in V*s^2/m instead of kg.
     """
@@ -224,9 +221,7 @@ def unit_of(unit: str, log: Log) -> str:
 
 
 def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
-    """Make an estimate from a coefficient and its variance, which is infinite where directions
-    are missing.
-    """
+    """Make an estimate from a coefficient and its variance (infinite if a direction is missing)."""
     if np.isfinite(variance):
         return Estimate.normal(name, unit, value, float(np.sqrt(variance)), METHOD)
     return Estimate.unknown(
@@ -259,8 +254,9 @@ _NAMES = {
 def _rows(
     log: Log, part: slice, band: float, by_direction: bool, cart_share: float, averaged: int, extra: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return times, columns with the extra ones, forces and positions of a segment, filtered and
-    decimated.
+    """Return times, columns, forces and positions of a segment, filtered and decimated.
+
+    The columns include the extra ones.
     """
     settings = IdentificationSettings.current()
     if part.stop - part.start < 2 * settings.samples_of_an_edge:
@@ -289,9 +285,7 @@ def _rows(
 
 
 def _decimated(columns: np.ndarray, step: int) -> np.ndarray:
-    """Keep every `step`th row, after a filter forward and back that keeps out what is too fast
-    for that.
-    """
+    """Keep every `step`th row, after a low-pass forward and back against aliasing."""
     settings = IdentificationSettings.current()
     if step == 1:
         return columns

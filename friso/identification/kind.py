@@ -51,9 +51,9 @@ NOTHING_CHOSEN = AnalysisSettings()
 class Prior:
     """What is known of the machine before an experiment is analysed.
 
-    `stage` is None where there is none; `from_user` says whether it is the user's, so that its controller is the
-    machine's. `estimates` are those of experiments analysed before, by key, and `made_up` the keys of that stage that
-    were made up around a log, since its file lacks their tables.
+    `stage` is None if there is none. `from_user` says whether the user gave it, so that its controller is the
+    machine's. `estimates` are results of experiments analysed before, by key. `made_up` are the keys of the stage that
+    were made up around a log, because the file lacks their tables.
     """
 
     stage: Stage | None = None
@@ -131,24 +131,24 @@ class Predictor(Generic[Result]):
 
 @dataclass(frozen=True)
 class ExperimentKind(Generic[Result]):
-    """A kind of experiment. Its name, the word of the command line, is that of its module; see
-    `kinds`.
+    """A kind of experiment, named by its module, which is also its word on the command line.
 
-    `analyse` gives the result of a group of logs, whose class is the kind's own affair; `estimates` what this says
-    about keys of the stage file, and `correlated` how these hang together. `after` names the kinds whose results it
-    uses.
+    `analyse` returns the result of a group of logs, of a class of the kind's own; `estimates` says what the result
+    means for keys of the stage file, and `correlated` how these are correlated. `after` names the kinds whose results
+    it uses.
 
     `roles` are the channels that a log needs; of several separated by | the first one that is mapped, or the last.
-    `si`: they have to be in SI units, but for the `foreign` ones (a force in volts); where the kind is `per_unit`, its
-    analysis is the same whatever the unit of the force, and then one per volt. `partial`: whether a log shows too
-    little for a result of its own, such as one event; logs like that count as one log with gaps. `together`: all its
-    logs are realisations of one experiment; `responses`: it takes frequency responses as somebody measured them, too.
+    `si`: they have to be in SI units, except the `foreign` ones (a force in volts). `per_unit`: the analysis is the
+    same whatever the unit of the force, and results are then per volt. `partial`: tells whether a log shows too little
+    for a result of its own, such as one event; such logs count as one log with gaps. `together`: all logs are
+    realisations of one experiment; `responses`: it also takes frequency responses that another instrument has
+    computed.
 
-    `claims` says why a log without a stated kind may be of this one, or None, `claims_together` does so for several
-    logs, whatever each seems to be alone; `around` makes up a stage around a log where none is given. `notes` are what
-    the engineer should know of all its results, the stage being given or not; `doubts` what speaks against believing a
-    result, in sentences, and `failed` whether its analysis failed, whatever of it still holds. Functions raise
-    InputError for logs that cannot be used.
+    `claims` says why a log without a stated kind may be of this one, or None; `claims_together` does so for several
+    logs, whatever each seems to be alone. `around` makes up a stage around a log if none is given. `notes` tell the
+    engineer what to know about results, with or without a stage; `doubts` are sentences against believing a result,
+    and `failed` tells whether its analysis failed, even if some of it still holds. Functions raise InputError for logs
+    that cannot be used.
     """
 
     analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]

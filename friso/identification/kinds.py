@@ -15,9 +15,9 @@ KINDS: Registry[ExperimentKind[Any]] = Registry("friso.identification.experiment
 
 
 def in_order(registry: Registry[Any] = KINDS) -> list[str]:
-    """Return the names of a registry, those first after which others come; by name where neither needs the other.
+    """Return the names of a registry so that each comes after those it depends on.
 
-    What the registry holds names in `after` what has to come before it.
+    An entry names in `after` what has to come before it. Otherwise names are in alphabetical order.
     """
     sorter = TopologicalSorter(
         {name: [other for other in registry[name].after if other in registry] for name in registry}

@@ -26,9 +26,7 @@ from friso.stage.correlations import Correlations
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment of a kind with its logs, its result, and its estimates of keys of the stage
-    file.
-    """
+    """An experiment of a kind: its logs, its result, and its estimates of stage-file keys."""
 
     kind: str
     logs: tuple[Source, ...]
@@ -61,9 +59,7 @@ class Identification:
 
 @dataclass(frozen=True)
 class Prediction:
-    """Another log as an experiment of this kind predicts it; the `result` is the kind's own
-    affair.
-    """
+    """The prediction of another log by an experiment; the kind defines what `result` is."""
 
     log: Log
     kind: str
@@ -161,10 +157,9 @@ def axis_of_all(sources: Sequence[Source], base: Stage | None) -> AxisKind:
 
 
 def check_predictions(logs: Sequence[tuple[Source, str]], others: Sequence[Log], base: Stage | None) -> None:
-    """Check before any fit that the logs, each with its kind, will be able to predict the
-    others.
+    """Check before any fit that the logs, each with its kind, can predict the others.
 
-    Raises InputError for a log that none of them will.
+    Raises InputError for a log that none of them can predict.
     """
     prior = Prior(base, base is not None)
     predictors = {kind: predictor for _, kind in logs if (predictor := KINDS[kind].predictor) is not None}
@@ -184,12 +179,11 @@ def check_predictions(logs: Sequence[tuple[Source, str]], others: Sequence[Log],
 def predict(
     identification: Identification, log: Log, settings: AnalysisSettings, base: Stage | None = None
 ) -> Prediction:
-    """Predict another log of the machine by the first experiment that can, kinds that rest on
-    others first.
+    """Predict another log of the machine by the first experiment that can.
 
-    The prediction is by the stage as that experiment alone shows it, not as combined, so that the errors are those of
-    one record on another. The controller is that of `base`, or of the log's own set-up. Raises InputError where none
-    can.
+    Kinds that use the results of others come first. The stage is that of the one experiment, not of all combined, so
+    that the errors are those of one record on another. The controller is taken from `base`, or from the log's own
+    set-up. Raises InputError if none can.
     """
     prior = Prior(base, base is not None)
     predictors = {name: predictor for name in reversed(in_order()) if (predictor := KINDS[name].predictor)}
@@ -209,7 +203,7 @@ def _unpredictable(log: Log) -> InputError:
 
 
 def _doubts(experiments: Sequence[Experiment]) -> tuple[str, ...]:
-    """Return the doubts about the results: one by one of a single experiment, else a line for each with its logs."""
+    """Return the doubts about the results: one by one for a single experiment, else by logs."""
     doubts_by_log = [KINDS[experiment.kind].doubts(experiment.result) for experiment in experiments]
     if len(experiments) == 1:
         return tuple(doubts_by_log[0])
@@ -261,9 +255,7 @@ def _notes(experiments: Sequence[Experiment], base: Stage | None) -> list[str]:
 def _correlations(
     experiments: Sequence[Experiment], estimates: Sequence[Estimate], fits: Fitting, stage: Stage
 ) -> Correlations:
-    """Return the correlations of keys that the stage file has as they were estimated, and of
-    those that move along.
-    """
+    """Return correlations of the stage file's keys, and of keys that follow from others."""
     keys, matrix = correlations(
         _every_estimate(experiments),
         [KINDS[experiment.kind].correlated(experiment.result, experiment.estimates) for experiment in experiments],

@@ -26,12 +26,11 @@ CONTRADICTED = "the whole model contradicts the record"
 
 
 def allowed_for(case: KeyCase) -> KeyCase:
-    """Return the case with intervals that allow for what the model lacks, and for every cause that was found.
+    """Return the case with intervals that allow for what the model lacks and for causes found.
 
-    Nothing is taken from a fit that describes nothing, and the inverse model's estimates from one that contradicts the
-    record. What the model lacks passes for bristles: of a load behind a coupling of 40 Hz, and of a force 2 ms early,
-    their stiffness came out at half of the truth, with an interval that did not hold it when it was twice as wide as
-    its noise allowed.
+    Nothing is taken from a fit that describes nothing; a fit that contradicts the record is replaced by the inverse
+    model. What the model lacks can pass for bristles: with a load behind a coupling of 40 Hz, and with a force 2 ms
+    early, their stiffness came out at half of the truth, outside an interval twice as wide as the noise allowed.
     """
     quality = case.quality
     if quality.failed:
@@ -67,7 +66,10 @@ def inverse_sources(flat: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
 def of_inverse_model(
     inverse: InverseModel, flat: Mapping[str, Any], estimates: Sequence[Estimate]
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    """Return what the inverse model shows of the keys of some estimates, with its correlation; the rest is refused."""
+    """Return estimates and correlation from the inverse model, for the keys that it shows.
+
+    All other keys are withheld.
+    """
     sources, answers = inverse_sources(flat), []
     for estimate in estimates:
         name, scale = sources.get(estimate.name, ("", 1.0))
@@ -121,7 +123,10 @@ def _with_model_error(case: KeyCase) -> dict[str, Estimate]:
 
 
 def _with_causes(case: KeyCase) -> dict[str, Estimate]:
-    """Estimates with intervals that reach as far as what a spoilt log says once it is rid of what may be wrong."""
+    """Return estimates that allow for causes, if the log is spoilt.
+
+    Their intervals reach to the values of the log corrected for each cause.
+    """
     if not case.quality.spoilt:
         return {}
     answers = {}
@@ -159,14 +164,16 @@ def _wider(estimate: Estimate, much: bool) -> Estimate:
 
 
 def _rid_of(model: InverseModel, inverse: InverseModel, name: str) -> tuple[Estimate, float]:
-    """A quantity by the inverse model of a log rid of a cause, and by how much it would move on if what is still left
-    had that cause too, at most as far again."""
+    """Return a quantity of the inverse model with a cause removed, and how far it may still move.
+
+    What is left unexplained may have that cause too, at most by as much again.
+    """
     share = min(model.error / max(inverse.error - model.error, 1e-12), 1.0)
     return model.estimate(name), share * (model.value(name) - inverse.value(name))
 
 
 def spanning(estimate: Estimate, other: Estimate, further: float, scale: float) -> Estimate:
-    """Return an estimate whose interval reaches as far as that of another one, and `further`, times `scale`.
+    """Return an estimate whose interval also covers another one, and `further`, times `scale`.
 
     The two differ by a cause that nobody has settled.
     """

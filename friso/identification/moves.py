@@ -88,13 +88,12 @@ def identify_moves(
     progress: Progress = silent,
     tell: FirstEstimates = lambda name, estimates: None,
 ) -> IdentifiedMoves:
-    """Identify mass, friction and what else the moves of a log show of a stage given as flat
-    keys.
+    """Identify mass, friction and whatever else the moves of a log show of a stage.
 
-    With `own_loop` the stage's controller is the machine's, and the closed loop is simulated on the log's reference;
-    else the model follows the log's position. `bandwidth` [Hz] is the motion's, read off the force by default. Where
-    the force is not in newtons, which no loop of a machine allows, estimates are per unit of it. The inverse model's
-    estimates are told as soon as they are known. Raises InputError for a log without position or force.
+    With `own_loop` the stage's controller is the machine's, and the closed loop is simulated on the logged reference;
+    otherwise the model follows the logged position. `bandwidth` [Hz] is the motion's, read from the force by default.
+    If the force is not in newtons, which no machine's loop allows, estimates are per unit of force. The inverse
+    model's estimates are reported as soon as they are known. Raises InputError for a log without position or force.
     """
     settings = IdentificationSettings.current()
     check_roles(log, ("position", "force", *(("reference",) if own_loop else ())), () if own_loop else ("force",))
@@ -132,7 +131,10 @@ def identify_moves(
 
 
 def _with_estimates(doubted: FitCase, answer: IdentifiableFit, covered: Coverage, acceleration: np.ndarray) -> KeyCase:
-    """The case with estimates by key, and what doubts make of them; `acceleration` [m/s^2], shape (n,), is smooth."""
+    """Return the case with estimates by key, as changed by doubts.
+
+    `acceleration` [m/s^2], shape (n,), is smooth.
+    """
     fit, inverse, quality = doubted.fit, doubted.inverse, doubted.quality
     if quality.rejected:
         acceleration, left = inverse.columns[:, 0], float(np.std(inverse.measured - inverse.fitted))
@@ -183,8 +185,9 @@ def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | 
 
 
 def _same_kind(problem: Problem, log: Log, part: slice, set_up: Mapping[str, Any] | None, changed: set[str]) -> Problem:
-    """Set up the stage and its parameters on another log, with the controller and the `changed`
-    keys of its set-up.
+    """Set up the stage and its parameters on another log, with that log's own set-up.
+
+    `set_up` holds its controller and the `changed` keys.
     """
     check_roles(log, ("position", "force", "reference"))
     flat = dict(problem.flat)
@@ -211,8 +214,9 @@ def check_roles(log: Log, roles: Sequence[str], foreign: Sequence[str] = ()) -> 
 def _problems(
     log: Log, part: slice, flat: Mapping[str, Any], inverse: InverseModel, own_loop: bool
 ) -> tuple[Problem, Problem | None]:
-    """Set up the stage following the log's position, and in its own loop, with all the
-    parameters of its equations.
+    """Set up two problems: the stage that follows the log, and the stage in its own loop.
+
+    Both have all parameters of their equations.
     """
     settings = IdentificationSettings.current()
     speed = float(
@@ -230,8 +234,9 @@ def _problems(
 
 
 def _cart_share(log: Log, flat: Mapping[str, Any]) -> float:
-    """Return the share of the mass that moves with the cart, where that is measured apart from a
-    stage on a free joint.
+    """Return the cart's share of the mass, if the cart is measured and the joint is free.
+
+    Otherwise return 0.
     """
     if not is_free(flat) or not ("cart_position" in log or "relative_position" in log):
         return 0.0
@@ -239,11 +244,10 @@ def _cart_share(log: Log, flat: Mapping[str, Any]) -> float:
 
 
 def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[str, float]:
-    """Return where the fit starts: at the inverse model's values, as far as it shows them and is
-    one of this stage.
+    """Return the values at which the fit starts, from the inverse model as far as it shows them.
 
-    The inverse model knows one body. What it does not tell from 0 starts within its interval; all of a stage on a free
-    joint whose cart is not measured starts at the stage given.
+    The inverse model knows one body. Values that it cannot distinguish from 0 start within their interval. A stage on
+    a free joint whose cart is not measured starts at the values given.
     """
     if is_free(flat) and not _cart_share(log, flat):
         mass = flat["masses.cart"] + flat["masses.stage"]

@@ -28,8 +28,10 @@ RecordedSamples = tuple[np.ndarray, np.ndarray]
 
 @register_motion
 class Recorded(Motion):
-    """The reference is a channel of a file (CSV, MAT, TwinCAT, or any other log) from its first value on, which
-    counts as 0; its last value is held to the end."""
+    """A reference from a channel of a file: CSV, MAT, TwinCAT, or any other log.
+
+    Its first value counts as 0; its last value is held to the end.
+    """
 
     kind: Literal["recorded"]
     file: str

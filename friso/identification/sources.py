@@ -24,10 +24,10 @@ MOVED = ("position", "force")
 
 @dataclass(frozen=True)
 class LogFile:
-    """A file with what it holds, its kind of experiment and why it counts as one.
+    """A log file: its content, its kind of experiment, and the reason for that kind.
 
-    `mapping` says how it was read, `mapping_file` where that is kept (None: not yet, or nothing had to be said about
-    it), `earlier` what of it was kept from an earlier time, and `replaced` what was kept and is now said otherwise.
+    `mapping` says how it was read, and `mapping_file` is the file where that is kept (None: it is not kept). `earlier`
+    is the part of the mapping that was taken from that file, `replaced` the part of the file that the user overrode.
     """
 
     path: Path
@@ -53,10 +53,9 @@ class OpenQuestions(GapsError):
 
 
 def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogFile]:
-    """Read the files, mapped as the options say, or as kept from an earlier time beside them or
-    in `folder`.
+    """Read the files, mapped by the options or by what was kept beside them or in `folder`.
 
-    Raises OpenQuestions for all that they do not tell, InputError for what cannot be read.
+    Raises OpenQuestions for all that is missing, InputError for what cannot be read.
     """
     files, wrong = read_usable(paths, options, folder)
     if wrong:
@@ -67,11 +66,11 @@ def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogF
 def read_usable(
     paths: Sequence[Path], options: Mapping, folder: Path, others: Sequence[Path] = ()
 ) -> tuple[list[LogFile], list[InputError]]:
-    """Read the files as `read_all` does, and leave out those that cannot be used, as long as one can.
+    """Read the files, and leave out unusable ones as long as one can be used.
 
     Returns the files and the errors of those left out. Of several files, and of `others` that are read beside them,
-    each takes what the options say about channels that it has. Raises OpenQuestions for all that they do not tell, and
-    InputError where no file can be used.
+    each takes what the options say about its own channels. Raises OpenQuestions for everything that is missing, and
+    InputError if no file can be used.
     """
     if options.experiment is not None:
         KINDS.checked(options.experiment, "--as", "--as {}")
@@ -97,7 +96,10 @@ def read_usable(
 
 
 def _recognised_together(files: list[LogFile]) -> list[LogFile]:
-    """Give files without a stated kind the kind that claims all of these together, if one does."""
+    """Give files without a stated kind the kind that recognises them as one experiment.
+
+    They stay as they are if no kind does.
+    """
     kindless = [number for number, file in enumerate(files) if file.mapping.experiment is None]
     courses = [Course(source) for number in kindless if isinstance(source := files[number].source, Log)]
     for name in KINDS if len(courses) > 1 else ():
@@ -205,10 +207,9 @@ def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
 
 
 def _without_clock(path: Path, mapping: Mapping) -> Log | None:
-    """Return a log whose instants are not told, sample by sample, by which its course can be
-    seen.
+    """Return a log without known instants, sample by sample, so that its course can be seen.
 
-    None where it cannot.
+    None if that is not possible.
     """
     try:
         return read_log(path, replace(mapping, sample_time=1.0), strict=False, needed=MOVED)
@@ -217,9 +218,7 @@ def _without_clock(path: Path, mapping: Mapping) -> Log | None:
 
 
 def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
-    """Return where the mapping of a log is kept for the next time: beside it, or in `folder`;
-    None for nothing to keep.
-    """
+    """Return where a log's mapping is kept, beside it or in `folder`; None if there is none."""
     return None if mapping == Mapping() else place_for(path, folder)
 
 

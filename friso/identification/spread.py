@@ -15,8 +15,7 @@ CONFIDENCE = 0.975
 
 
 def correlation_length(residual: np.ndarray) -> int:
-    """Count the rows after which residuals, shape (n,), are no longer correlated; 1 of white
-    noise.
+    """Count the rows after which residuals, (n,), are no longer correlated; 1 for white noise.
 
     It is the integrated autocorrelation up to its first zero, to both sides.
     """
@@ -54,16 +53,14 @@ def _binned(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def spread_of(jacobian: np.ndarray, residual: np.ndarray, groups: Sequence[np.ndarray] = ()) -> np.ndarray:
-    """Return the covariance of the parameters of a fit, shape (p, p), from its Jacobian and
-    residual.
+    """Return the covariance of fitted parameters, (p, p), from Jacobian (n, p) and residual (n,).
 
-    The Jacobian has the shape (n, p), and the residual (n,). Neither equal nor independent errors are assumed: Newey,
-    West 1987, doi:10.2307/1913610, with the window as long as the residuals, or their products with a column, stay
-    correlated.
+    Errors need be neither equal nor independent: Newey, West 1987, doi:10.2307/1913610, with a window as long as the
+    residuals, or their products with a column, stay correlated.
 
-    Errors may besides be alike within each of some `groups` (Cameron, Miller 2015, doi:10.3368/jhr.50.2.317), numbers
-    of shape (n,): a parameter has the largest of the deviations that these give, as large as Student's t of so many
-    groups asks for. Directions in which the fit does not depend on the parameters have an infinite variance.
+    Errors may also be alike within each of some `groups` (Cameron, Miller 2015, doi:10.3368/jhr.50.2.317), numbers of
+    shape (n,): each parameter has the largest of the resulting deviations, widened by Student's t for the number of
+    groups. Directions in which the fit does not depend on the parameters have an infinite variance.
     """
     count, size = jacobian.shape
     scale = np.linalg.norm(jacobian, axis=0)
@@ -85,9 +82,7 @@ def spread_of(jacobian: np.ndarray, residual: np.ndarray, groups: Sequence[np.nd
 
 
 def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Return the covariance of the sum of scores, shape (n, p), of which neighbouring ones are
-    alike.
-    """
+    """Return the covariance of the sum of scores, (n, p), whose neighbours are correlated."""
     count = len(scores)
     window = max(correlation_length(series) for series in (residual, *scores.T))
     window = min(max(window, 1), max(2, int(IdentificationSettings.current().row_share_of_likeness * count)))
@@ -99,11 +94,10 @@ def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
 
 
 def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
-    """Return the covariance of the sum of scores, shape (n, p), of which those of a group are
-    alike.
+    """Return the covariance of the sum of scores, shape (n, p), which are alike within a group.
 
-    It is one for normal intervals of `COVERAGE` deviations; the degrees of freedom are those of as many groups as are
-    equally large.
+    It is scaled for normal intervals of `COVERAGE` deviations. The degrees of freedom are those of the number of
+    groups that count equally.
     """
     names, members = np.unique(group, return_inverse=True)
     sums = np.stack([np.bincount(members, column, len(names)) for column in scores.T], axis=1)
@@ -115,8 +109,9 @@ def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
 
 
 def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Invert columns of length 1 times themselves, and tell which of these cannot be
-    distinguished from others.
+    """Invert X' X for columns X of length 1, and tell which columns others can replace.
+
+    Directions that the columns do not resolve are left out.
     """
     settings = IdentificationSettings.current()
     sizes, directions = np.linalg.eigh(square)

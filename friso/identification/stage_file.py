@@ -68,11 +68,10 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
 
 
 def identified_stage(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str]) -> Stage:
-    """Return the stage with the estimates of its keys, as values with 95 % intervals or as
-    ranges.
+    """Return the stage with its identified keys as values with intervals, or as ranges.
 
-    Their units are those of the stage's kind of axis. A stiffness that follows from a [flexure] stays as it follows.
-    Raises InputError where they do not fit together, which those of `fitting` do.
+    Units follow the stage's kind of axis. A stiffness that follows from a [flexure] is left to it. Raises InputError
+    if the values contradict each other; values from `fitting` do not.
     """
     changes: dict[str, object] = {}
     for estimate in estimates:
@@ -89,9 +88,7 @@ TOLD_BY_LOGS = ("masses", "friction", "motion")
 
 
 def completed(tables: Mapping[str, Any], around: Stage) -> dict[str, Any]:
-    """Return the tables of a stage file, completed by those that a stage made up around a log
-    can stand in for.
-    """
+    """Return the tables of a stage file, with missing ones taken from a made-up stage."""
     made = around.as_written()
     return {**{name: made[name] for name in TOLD_BY_LOGS}, **tables}
 
@@ -115,9 +112,7 @@ def origins(
 
 
 def with_origins(text: str, origins: Mapping[str, str]) -> str:
-    """Return the text of a stage file with a comment behind each key that says where it comes
-    from.
-    """
+    """Return the text of a stage file with a comment on the origin of each key."""
     lines, table = [], ""
     for line in text.splitlines():
         key = f"{table}.{line.partition(' = ')[0]}"
@@ -128,8 +123,9 @@ def with_origins(text: str, origins: Mapping[str, str]) -> str:
 
 
 def estimate_text(estimate: Estimate) -> str:
-    """Write an estimate as in a stage file: "20.4 N +/- 0.1 N", or "1 N .. 2.5 N" for what is
-    not shown.
+    """Write an estimate as in a stage file: "20.4 N +/- 0.1 N", or a range "1 N .. 2.5 N".
+
+    The range stands for a quantity that is not shown.
     """
     unit = f" {estimate.unit}" if estimate.unit else ""
     if not estimate.determined:
@@ -140,9 +136,7 @@ def estimate_text(estimate: Estimate) -> str:
 
 
 def round_uncertainty(half: float) -> tuple[str, int]:
-    """Round an uncertainty up to two digits, as text, and return the decimal places of its
-    value.
-    """
+    """Round an uncertainty up to two digits, as text, and return its decimal places."""
     digits = IdentificationSettings.current().digits_of_an_uncertainty - 1 - math.floor(math.log10(half))
     up = math.ceil(round(half * 10**digits, 6)) / 10**digits
     return (f"{up:.{digits}f}" if digits > 0 else f"{up:.0f}"), digits

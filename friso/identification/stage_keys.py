@@ -37,9 +37,7 @@ class Fitting:
 
 
 def fitting(stage: Stage, estimates: Sequence[Estimate]) -> Fitting:
-    """Choose what of the estimates, one per key, the stage file can take, in the units of its
-    kind of axis.
-    """
+    """Choose the estimates that the stage file can take, one per key, in its units."""
     flat, notes = stage.flat(), []
     estimates = [replace(estimate, unit=stage.axis_kind.unit(estimate.unit)) for estimate in estimates]
     fields = numeric_keys({**flat, "bias.cart": 0.0})
@@ -72,8 +70,7 @@ def shared_masses(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
 
 
 def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) -> Estimate:
-    """Complete an estimate of which one bound is known by the other one from what was known
-    beforehand.
+    """Complete an estimate that has one bound by the other bound from earlier knowledge.
 
     Static friction known as "at least" reaches up to the highest ratio to Coulomb friction that is believed of a
     bearing, unless the stage knows.
@@ -92,9 +89,7 @@ def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) ->
 
 
 def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | None, str]:
-    """Return the estimate as far as the key allows it, or None; and why it is not as it was, if
-    it is not.
-    """
+    """Return the estimate within the limits of its key, or None, and why it was changed."""
     if not np.isfinite([estimate.low, estimate.high]).all():
         ends = [f"{word} {end:.4g} {estimate.unit}".rstrip() for word, end in _ends(estimate)]
         knowledge = f"known only to be {' and '.join(ends)}" if ends else "unknown"
@@ -131,10 +126,9 @@ def _allowed(estimate: Estimate, field: Quantity | Number) -> bool:
 def _static_above(
     stage: Stage, fields: Mapping[str, Quantity | Number], estimates: dict[str, Estimate], notes: list[str]
 ) -> dict[str, str]:
-    """Keep static friction no smaller than Coulomb friction: the less certain of both gives way,
-    in `estimates`.
+    """Keep static friction at least as large as Coulomb friction, in `estimates`.
 
-    It moves along with the other, in the ratio that the stage had.
+    The less certain of both gives way: it follows the other in the ratio that the stage had.
     """
     flat = stage.flat()
     if STATIC not in flat or not estimates.keys() & {STATIC, COULOMB}:

@@ -19,8 +19,11 @@ NAMES = ("a", "b", "c", "d")
 
 @register_controller
 class StateSpace(RationalController):
-    """Force over error by matrices: x' = a x + b e, F = c x + d e, or of samples with a sample_time; in SI, as MATLAB
-    writes them ("0 1; 0 -400"), or by their names in a file."""
+    """A controller by matrices, from error to force: x' = a x + b e, F = c x + d e.
+
+    With a `sample_time` the equations are for samples. Matrices are in SI, as MATLAB writes them ("0 1; 0 -400"), or
+    named in a file.
+    """
 
     kind: Literal["state_space"]
     a: str

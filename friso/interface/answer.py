@@ -116,7 +116,7 @@ class Answer:
     def __init__(self, result: Any, **parts: Any) -> None:
         """Keep the result, and other `parts` as attributes.
 
-        The axis is that of the stage, unless it is one of the parts.
+        The kind of axis is taken from the stage, unless it is one of the parts.
         """
         stage = parts.get("stage") or getattr(result, "stage", None)
         self.result, self.axis_kind = result, LINEAR if stage is None else stage.axis_kind

@@ -59,7 +59,7 @@ def _label(record: Mapping[str, Any], number: int) -> str:
 
 
 def _leaves(record: Mapping[str, Any], before: str = "") -> Any:
-    """Yield the numbers and texts of a table and of those below it, with their keys."""
+    """Yield the numbers and texts of a table and of the tables within it, with their keys."""
     for key, value in record.items():
         if isinstance(value, dict):
             yield from _leaves(value, f"{before}{key}_")

@@ -111,7 +111,7 @@ class Question:
 
     @property
     def name(self) -> str:
-        """Return the name of the command: that of the package, with dashes."""
+        """Return the name of the command: the name of the package, with dashes."""
         return self.package.rpartition(".")[2].replace("_", "-")
 
     @property

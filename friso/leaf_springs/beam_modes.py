@@ -45,7 +45,7 @@ class Reduced:
     def of(cls, mechanism: Mechanism, stiffness: np.ndarray, mass: np.ndarray) -> Reduced:
         """Reduce the stiffness [N/m, N, N m] and mass [kg, kg m, kg m^2] of the nodes of a leaf.
 
-        Torsion is replaced by that of a plate.
+        The torsion of the beam is replaced by the torsion of a plate.
         """
         size = len(stiffness)
         stiffness, mass = stiffness.copy(), mass.copy()

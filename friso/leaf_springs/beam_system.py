@@ -88,10 +88,9 @@ class LeafBeams:
 
 @dataclass(frozen=True)
 class Configuration:
-    """A configuration in the plane of motion.
+    """Displacements of leaves and stage in the plane of motion.
 
-    `inner` holds the displacements of the nodes between the ends (leaves, nodes between the ends, 3). `stage` holds
-    those of the stage (x, z, about y).
+    `inner` holds those of the nodes between the ends (leaves, nodes, 3), `stage` those of the stage (x, z, about y).
     """
 
     inner: np.ndarray
@@ -180,9 +179,9 @@ def _add_leaf(system: Any, mechanism: Mechanism, elements: int) -> None:
 
 
 def _section(mechanism: Mechanism, h: float, curl: float, twist: float) -> Any:
-    """Return the section of an element of length h [m].
+    """Return the cross-section of an element of length h [m].
 
-    Its compliance in bending and torsion over that of a plain beam is given.
+    `curl` and `twist` are its compliance in bending and torsion over that of a plain beam.
     """
     weak, strong = mechanism.young * mechanism.bending / curl, mechanism.young * mechanism.edgewise
     shears = (edgewise_shear(mechanism), strong), (SHEAR * mechanism.shear * mechanism.area, weak)

@@ -137,9 +137,9 @@ def leaf_bending(mechanism: Mechanism) -> Any:
 
 
 def _mode_stiffening(mechanism: Mechanism) -> Any:
-    """Return the stiffening for moments that change sign along the leaf, as in a mode.
+    """Return the plate's stiffening for moments that change sign along the leaf, as in a mode.
 
-    It is that of parallel motion. The even share of the moments lies far from the clamps and has little influence.
+    It is taken from parallel motion. The even share of the moments lies far from the clamps and has little influence.
     """
     return plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
 

@@ -29,7 +29,10 @@ def stage_stiffness_at(mechanism: Mechanism, deflection: float) -> np.ndarray:
 
 
 def leaf_stiffness(mechanism: Mechanism, deflection: float) -> np.ndarray:
-    """Return the stiffness of one leaf at its end, deflected [m] to 3 s^2 - 2 s^3, (6, 6)."""
+    """Return the stiffness matrix (6, 6) at the end of one deflected leaf.
+
+    The leaf is bent by `deflection` [m] into the shape 3 s^2 - 2 s^3, s being the share of its length.
+    """
     settings = LeafSpringSettings.current()
     nodes, weights = np.polynomial.legendre.leggauss(settings.gauss_points)
     x, weight = (nodes + 1) / 2 * mechanism.length, weights / 2 * mechanism.length

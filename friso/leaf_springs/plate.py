@@ -193,9 +193,9 @@ def stretching(length: Any, width: Any, poisson: Any) -> Any:
 
 
 def edgewise_shear_factor(length: Any, width: Any, poisson: Any) -> Any:
-    """Return by what factor a leaf is stiffer against shear in its plane than a beam.
+    """Return the factor by which a leaf is stiffer against shear in its plane than a beam.
 
-    Its bending in that plane is taken as that of a beam. The factor is fitted to shells, as in `stretching`.
+    Its bending in that plane is taken as for a beam. The factor is fitted to shells, as in `stretching`.
     """
     ratio = length / width
     beam = 2.4 * (1 + poisson) * ratio

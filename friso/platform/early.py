@@ -10,8 +10,7 @@ import sys
 
 
 def _module() -> str:
-    """Return the module that Python was started with by -m, however it was written;
-    empty without."""
+    """Return the module that Python was started with by -m, however written; "" without."""
     if sys.argv[:1] != ["-m"]:  # as it is until the module itself runs
         return ""
     for word, following in zip(sys.orig_argv[1:], [*sys.orig_argv[2:], ""], strict=True):
@@ -45,7 +44,10 @@ def _note(number: int, frame: FrameType | None) -> None:
 
 
 def _ignore() -> None:
-    """Ignore the signals from now on: when Python takes its handlers away they would end a command that is done."""
+    """Ignore signals from now on.
+
+    When Python removes its handlers they would end a command that is done.
+    """
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 

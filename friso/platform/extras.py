@@ -30,8 +30,10 @@ def missing(extra: str) -> list[str]:
 
 
 def need(extra: str, subject: str) -> None:
-    """Refuse a subject, a command or an option, before anything is computed, where its extra is not installed. Raises
-    InputError, which says how to install it."""
+    """Refuse what needs an extra that is not installed, before anything is computed.
+
+    Raises InputError, which names the `subject`, a command or an option, and says how to install the extra.
+    """
     if packages := missing(extra):
         actual = f"an installation of friso without {' and '.join(packages)}"
         raise InputError(subject, actual, f"the extra {extra}", install(extra))

@@ -32,7 +32,9 @@ class HelperProcess:
 
     def ask(self, question: object) -> Any:
         """Ask the process a question, and return its answer.
-        Raises EOFError where it has ended instead."""
+
+        Raises EOFError if it has ended.
+        """
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         with suppress(OSError):  # nobody reads it any more: the process ended, and says why
@@ -80,7 +82,10 @@ def answer_questions(answer: Callable[[Any], Any], orphaned: bool = True) -> Non
 
 
 def _end_with(parent: int) -> None:
-    """End this process once it is no child of that one any more, which Windows does not tell."""
+    """End this process as soon as its parent has ended; look twice a second.
+
+    Windows does not report a new parent, so that it has no effect there.
+    """
     while os.getppid() == parent:
         time.sleep(0.5)
     os._exit(1)

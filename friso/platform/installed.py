@@ -26,8 +26,10 @@ RENAMED = {"friso.commands": "friso.questions", "friso.functions": "friso.questi
 
 @cache
 def installed_modules(group: str, taken: frozenset[str] = frozenset()) -> Mapping[str, str]:
-    """Return the modules that packages name in the entry points of a group, by name.
-    Names that friso has `taken`, or that several packages give, are told and left out."""
+    """Return the modules that packages name in a group of entry points, by name.
+
+    Names that friso has `taken`, or that several packages give, are reported and left out.
+    """
     modules: dict[str, list[str]] = {}
     for name, module in _entry_points().get(group, ()):
         modules.setdefault(name, []).append(module)
@@ -54,7 +56,10 @@ def _entry_points() -> Mapping[str, list[tuple[str, str]]]:
 
 
 def load_module(group: str, name: str, module: str) -> ModuleType:
-    """Import the module that a package names in a group. Raises InputError where it cannot be imported."""
+    """Import the module that a package names in a group.
+
+    Raises InputError if it cannot be imported.
+    """
     try:
         with redirect_stdout(sys.stderr):  # what a plug-in prints is no answer
             return import_module(module)
@@ -66,8 +71,10 @@ def load_module(group: str, name: str, module: str) -> ModuleType:
 
 
 def load_declared(group: str, name: str, module: str, attribute: str, kind: Any = object) -> Any:
-    """Return what the module that a package names declares as an `attribute`.
-    Raises InputError where the module cannot be imported, or declares nothing of this `kind`."""
+    """Return what a package's module declares as an `attribute`.
+
+    Raises InputError if the module cannot be imported, or declares nothing of this `kind`.
+    """
     declared = getattr(load_module(group, name, module), attribute, None)
     if declared is None or not isinstance(declared, kind):
         actual = f"{module}, whose {attribute} is {'missing' if declared is None else type(declared).__name__}"

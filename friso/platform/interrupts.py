@@ -54,15 +54,17 @@ def last_word(number: int) -> str:
 
 
 def answers_interrupts() -> None:
-    """Let this command take as long as it needs to end: it answers Ctrl-C with what it has so far."""
+    """Let this command end in its own time: it answers Ctrl-C with what it has so far."""
     global _bounded
     _bounded = False
 
 
 @contextmanager
 def raising() -> Iterator[None]:
-    """Return signals raise KeyboardInterrupt within, one that came before at once.
-    In another thread than the main one they are as they were."""
+    """Raise KeyboardInterrupt on signals within the block, at once for an earlier one.
+
+    Outside the main thread nothing changes.
+    """
     global _raising, _waits
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -98,8 +100,10 @@ def raise_what_waits() -> None:
 
 @contextmanager
 def hold_interrupts() -> Iterator[None]:
-    """Ctrl-C and a termination wait for the end of the block. In another thread than the main one, which they do not
-    reach, nothing is done."""
+    """Make Ctrl-C and a termination wait for the end of the block.
+
+    Outside the main thread, which signals do not reach, nothing is done.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -119,7 +123,7 @@ def hold_interrupts() -> Iterator[None]:
 
 
 def _take(handler: Callable[[int, FrameType | None], object]) -> dict[int, Any]:
-    """Handle the signals so, but those that are ignored (nohup); what Python did with them before."""
+    """Handle the signals by `handler`, except ignored ones (nohup); return former handlers."""
     before = {number: signal.getsignal(number) for number in SIGNALS}
     taken = {number: earlier for number, earlier in before.items() if earlier is not signal.SIG_IGN}
     for number in taken:
@@ -141,10 +145,12 @@ def _arrived(number: int, frame: FrameType | None) -> None:
 
 
 def _end_in_time(pipe: int) -> None:
-    """End the process some time after a signal, whatever its main thread is at: an import that does not return, a
-    library that leaves the interpreter for minutes or swallows the exception. What must be whole, becomes so before.
+    """End the process some time after a signal, whatever its main thread is doing.
 
-    `pipe`: the descriptor from which signals can be read, a byte each, also while the main thread hears none."""
+    It may be in an import that does not return, or in a library that keeps the interpreter for minutes or swallows the
+    exception. Files that are being put in place are completed first. `pipe` is the descriptor from which signals can
+    be read, a byte each, even while the main thread hears none.
+    """
     number = came()
     while number not in SIGNALS:
         number = os.read(pipe, 1)[0]
@@ -161,8 +167,10 @@ def _end_in_time(pipe: int) -> None:
 
 
 def _lost(otherwise: Callable[[Any], object], what: Any) -> None:
-    """Python ignores what is raised while an object goes (a finalizer, the callback of a weak reference), and prints a
-    traceback: a KeyboardInterrupt is raised again instead, and of what was cut short by one nothing is said."""
+    """Raise a KeyboardInterrupt again that Python would lose in a finalizer or a callback.
+
+    Python ignores what is raised there and prints a traceback. What an interrupt cut short is not reported.
+    """
     if _raising and isinstance(what.exc_value, KeyboardInterrupt):
         signal_later(_AGAIN, _arrived)
     elif not came():

@@ -21,8 +21,10 @@ _TRIES = 3
 
 @contextmanager
 def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
-    """Return a new folder that only this user may open, locked and thus no leftover within,
-    and removed in the end. Raises OSError. What killed processes left of such folders is removed first."""
+    """Return a new, locked folder that only this user may open; it is removed in the end.
+
+    While it is locked it is no leftover. Leftovers of killed processes are removed first. Raises OSError.
+    """
     remove_leftovers(root, prefix, lock)
     folder, held = _made_and_locked(root, prefix, lock, _TRIES)
     try:
@@ -38,8 +40,11 @@ def temporary_folder(prefix: str) -> AbstractContextManager[Path]:
 
 
 def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Path, FileLock]:
-    """Return the folder and its lock. Before that is held another process may remove the folder,
-    and filelock makes it again, for others to read: then it is another folder that is tried."""
+    """Return a new folder and its lock.
+
+    Before the lock is held another process may remove the folder, and filelock makes it again, readable for others:
+    then another folder is tried.
+    """
     folder = root / f"{prefix}{uuid.uuid4().hex[:12]}"
     folder.mkdir(mode=DRAFT_MODE)  # mkdtemp tries for ever where Windows lets no folder be made (python/cpython#66305)
     held = FileLock(folder / lock)
@@ -76,8 +81,10 @@ def remove_leftover(folder: Path, lock: str) -> None:
 
 
 def remove_leftovers(root: Path, prefix: str, lock: str) -> None:
-    """Remove the leftovers of this user among the folders below `root` whose names begin with a prefix; one that others
-    may write to stays, in which they may have put a link for a lock."""
+    """Remove this user's leftover folders below `root` whose names begin with a prefix.
+
+    A folder that others may write to stays, because they may have put a link there as a lock.
+    """
     for folder in root.glob(f"{prefix}*"):
         with suppress(OSError):  # another process was quicker
             if not foreign_writers(folder.lstat()):
@@ -86,8 +93,10 @@ def remove_leftovers(root: Path, prefix: str, lock: str) -> None:
 
 @contextmanager
 def _unless_locked(folder: Path, lock: str) -> Iterator[bool]:
-    """Tell whether nobody else held the lock of a folder, which is held within;
-    never that of another user's folder, or of a link to one."""
+    """Hold the lock of a folder within the block, and tell whether it was free.
+
+    A folder of another user, or a link, counts as locked.
+    """
     try:
         status = folder.lstat()
         if not (stat.S_ISDIR(status.st_mode) and is_users_own(status)):

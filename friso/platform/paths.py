@@ -38,8 +38,10 @@ def flaw_of(path: str | os.PathLike[str], longest_name: int = LONGEST_NAME) -> s
 
 
 def unwritable(path: Path) -> tuple[str, str] | None:
-    """Return why nothing can be written to a path, whatever is there, and what can, in words;
-    None where it may be: it has no name, one that is too long, or one that Windows does not take."""
+    """Return why nothing can be written to a path, and what can; None if it may be.
+
+    Paths may have no name, one that is too long, or one that Windows does not take.
+    """
     if flaw := flaw_of(path, LONGEST_WRITTEN):
         return flaw, f"names of at most {LONGEST_WRITTEN} bytes"
     if why := name_refused(path):

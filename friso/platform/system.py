@@ -30,8 +30,7 @@ def _quoted(word: str) -> str:
 
 
 def path_of(error: OSError) -> str:
-    """Return the path at which an error arose, of two the one to be written;
-    "" where there is none."""
+    """Return the path at which an error arose; of two, the one to be written; "" for none."""
     return next(iter(_paths_of(error)), "")
 
 
@@ -266,10 +265,9 @@ else:
 
 
 def once_free(use: Callable[[], _T]) -> _T:
-    """Call `use` and return its result; retry for up to `PATIENCE` while another program holds
-    the file open.
+    """Call `use` and return its result, waiting while another program holds the file.
 
-    Raises the error of `use`.
+    It waits for up to `PATIENCE`. Raises the error of `use`.
     """
     end = time.monotonic() + PATIENCE
     while True:
@@ -282,8 +280,10 @@ def once_free(use: Callable[[], _T]) -> _T:
 
 
 def open_file(path: Path, flags: int) -> int:
-    """Return the descriptor of a file that is opened, once no other program holds it.
-    Raises OSError, for a folder too."""
+    """Return the descriptor of a file, opened once no other program holds it.
+
+    Raises OSError, for a folder too.
+    """
     if path.is_dir():  # which Windows calls one that may not be read
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     return once_free(partial(os.open, path, flags))
@@ -300,7 +300,7 @@ def delete_file(path: Path) -> None:
 
 
 def remove_folder(folder: Path) -> None:
-    """Remove a folder with all that is in it, as far as this user may, once no other program holds anything of it."""
+    """Remove a folder with its content, as far as this user may, once no program holds it."""
     with suppress(OSError):
         once_free(partial(shutil.rmtree, folder))
     shutil.rmtree(folder, ignore_errors=True)

@@ -22,10 +22,12 @@ FOR_ALL, FOR_USER = 0o666, 0o600
 
 @contextmanager
 def whole_file(path: Path, mode: int = FOR_ALL, new: bool = False, kept: bool = False) -> Iterator[BinaryIO]:
-    """Return a stream whose content takes the place of a file when the block ends;
-    of a block that fails nothing is left. A new file is for whom the user lets read files, or with `FOR_USER` for this
-    user alone; the permissions of one that is replaced may be `kept`. Raises OSError, FileExistsError where it has to
-    be `new` and something is there by then."""
+    """Return a stream whose content replaces a file when the block ends.
+
+    If the block fails nothing is left. A new file is readable for whom the user lets read files, or with `FOR_USER`
+    for this user alone; the permissions of a replaced file may be `kept`. Raises OSError, and FileExistsError if it
+    has to be `new` and something is there by then.
+    """
     draft = path.with_name(f"{path.name}.{uuid.uuid4().hex}{PARTIAL}")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
     try:

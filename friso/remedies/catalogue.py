@@ -116,7 +116,7 @@ def _gains(name: str, stage: Stage, first: tuple[Variable, ...] = (), buys_joint
 
 
 def _notch(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """Return a notch filter at the parasitic mode, if margins without it do not allow the bandwidth of the goal."""
+    """Return a notch at the parasitic mode, if margins need it to reach the goal's bandwidth."""
     flat = stage.flat()
     if "parasitic.frequency" not in flat or _reaches(stage, goal):
         return
@@ -138,7 +138,7 @@ def _notch(stage: Stage, goal: Goal) -> Iterator[Remedy]:
 
 
 def _reaches(stage: Stage, goal: Goal) -> bool:
-    """Tell whether the controller made faster reaches the limit of the bandwidth with the margin wanted."""
+    """Tell whether a faster controller reaches the bandwidth limit with the margin wanted."""
     if goal.bandwidth_limit is None or goal.margin > WANTED:
         return False
     flat = stage.flat()

@@ -42,7 +42,7 @@ class Goal:
     moves: MoveRange | None = None
 
     def moves_of(self, stage: Stage) -> MoveRange:
-        """Return the moves that machines like a stage make: those of the goal, or else of the stage."""
+        """Return the moves that machines must make: those of the goal, or else of the stage."""
         return self.moves or MoveRange.of_stage(stage, self.within)
 
     def surely(self, machines: int) -> float:

@@ -113,7 +113,7 @@ class Fleet:
         return replace(self, ratios=ratios, shifts=shifts, sizes=self.sizes[numbers], accelerations=faster)
 
     def with_moves_from(self, smallest: float) -> Fleet:
-        """Return the machines with moves from `smallest` [m] to the largest, in the order of those that they make."""
+        """Return the machines with moves rescaled to begin at `smallest` [m], in the same order."""
         low, high = np.log([self.moves.smallest, self.moves.largest])
         share = (np.log(self.sizes) - low) / (high - low) if high > low else np.ones(self.count)
         sizes = smallest * (self.moves.largest / smallest) ** share

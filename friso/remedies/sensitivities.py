@@ -193,7 +193,7 @@ def edge_sensitivities(stage: Stage, edge: Margin | None) -> Sensitivities:
 
 
 def _keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the keys that the equations contain, except those of the motion and those that are 0."""
+    """Return the keys that the equations contain, without the motion's keys and keys that are 0."""
     contained = Ensemble.held(flat, 1).kernel.parameters
     return tuple(name for name in contained if name.startswith(TABLES) and flat[name])
 

@@ -87,8 +87,8 @@ def modulus_margins(
 ) -> np.ndarray:
     """Return the least modulus margin of the limit cases, shape (points, machines).
 
-    An unstable case counts as 0. Sampling and delay are those of the stage `drive`, and the bandwidth is lower by the
-    factor `slower`. Controllers with other gains at standstill get the smaller margin of both sets.
+    An unstable case counts as 0. Sampling and delay are taken from the stage `drive`, and the bandwidth is lowered by
+    the factor `slower`. Controllers with other gains at standstill get the smaller margin of both sets.
     """
     flat = {**machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), **timing(drive)}
     flat = faster(flat, 1 / slower)
@@ -143,10 +143,11 @@ def attraction(
 ) -> Attraction:
     """Survey what attracts the machines at points.
 
-    The bandwidth is that of the point, and lower ones down to the goal's distance: the lowest first, where most is
-    attracted, or all `at_once`, which saves time where nearly all machines are clear. A machine of which something is
-    not clear at one bandwidth is not surveyed at the next, nor are the machines of a point at which fewer than `enough`
-    of them (a share) are clear. Simulations start from many states; closed orbits have to confirm the final answer.
+    Each machine is surveyed at the point's bandwidth and at lower ones, down to the goal's distance: the lowest first,
+    where most machines are attracted, or all `at_once`, which saves time where nearly all are clear. A machine for
+    which a bandwidth stays undecided is not surveyed further, nor are the machines of a point at which fewer than
+    `enough` of them (a share) are clear. Simulations start from many states; closed orbits have to confirm the final
+    answer.
     """
     flat = machines.laid_over(remedy.stage, remedy.changes(shares), len(shares))
     shape = len(shares), machines.count

@@ -168,11 +168,10 @@ class Performance:
 
 
 def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
-    """Return the first and last place of the run of places that gains most.
+    """Return the first and last place of the run of places that best meets the goal.
 
-    A place that meets the goal gains as much as makes up for those that do not at the `share` wanted, so that of each
-    part next to an end of the run at least that share meets it. Returns None if none gains as much as the fewest places
-    that can show such a share.
+    In every part of it that touches one of its ends, at least the `share` wanted meets the goal. Returns None if no
+    run is long enough to show such a share.
     """
     if meets.all():
         return 0, len(meets) - 1

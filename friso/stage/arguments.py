@@ -205,7 +205,10 @@ _PATH_KINDS = {"os.PathLike[str]", "Path", "Stage", "StageLike", "LogFiles", "It
 
 
 def alternatives(annotation: str) -> list[str]:
-    """Split an annotation at its outer bars: "int | None" has two parts, "Iterable[str | None]" one."""
+    """Split an annotation at its outer bars: "int | None" has two parts.
+
+    "Iterable[str | None]" has one.
+    """
     parts, depth = [""], 0
     for sign in annotation:
         depth += (sign == "[") - (sign == "]")
@@ -267,8 +270,10 @@ def _read_stage(source: Any) -> Stage:
 
 
 def _check(name: str, value: Any, kinds: Mapping[str, ArgumentKind], sets: bool) -> None:
-    """Raises InputError for an argument that is of none of the kinds, and for a path that is none; `sets`: keys can be
-    set, for which a dictionary in another place was meant."""
+    """Raise InputError for an argument of none of the kinds, or for a path that is none.
+
+    `sets`: keys can be set, for which a dictionary in another place was meant.
+    """
     if kinds and not any(kind.holds(value) for kind in kinds.values()):
         words = " or ".join(dict.fromkeys(kind.words for kind in kinds.values() if kind.words))
         key = "set" if sets and isinstance(value, Mapping) else name

@@ -15,8 +15,10 @@ from_0_to_1 = Bound("from 0 to 1", lambda value: (value >= 0) & (value <= 1))
 
 
 def _falls(flat: Mapping[str, Any]) -> Any:
-    """Tell whether static friction is no smaller than Coulomb friction,
-    under a law that has both, there and then."""
+    """Tell whether static friction is at least Coulomb friction, under the conditions.
+
+    It is true for laws that do not have both.
+    """
     if not {"friction.static", "friction.coulomb"} <= {*flat}:
         return True
     static, coulomb = (flat[f"friction.{x}"] * flat.get(f"{CONDITIONS}.{x}_factor", 1.0) for x in ("static", "coulomb"))

@@ -107,8 +107,7 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def with_defaults(cls, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return keys that follow other keys of the stage where its file leaves them out,
-        to their values."""
+        """Return values for keys that follow other keys of the stage if its file lacks them."""
         return {}
 
     @classmethod
@@ -118,14 +117,15 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
-        """Tell whether there is integral action, which winds up while a stage sticks off its
-        reference."""
+        """Tell whether there is integral action, which winds up while a stage sticks."""
         raise NotImplementedError
 
     @classmethod
     def takes_velocity(cls, flat: Mapping[str, Any]) -> bool:
-        """Tell whether the controller acts on a measured velocity,
-        which may come from another encoder than the position."""
+        """Tell whether the controller acts on a measured velocity.
+
+        That may come from another encoder than the position.
+        """
         return cls.feeds_back == "velocity"
 
     @classmethod
@@ -135,21 +135,24 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def declare(cls, measured: Any, blocks: Any, variant: Any) -> Mapping[str, Any]:
-        """Return the shares of the force [N], each a signal made by the `blocks`
-        (`friso.equations.blocks`) from what is `measured`."""
+        """Return the parts of the force [N], each a signal made by `blocks` from what is `measured`.
+
+        See `friso.equations.blocks`.
+        """
         raise NotImplementedError
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """Other structures of the controller of a stage, for `friso tune` to try: what each is, to the keys of the
-        stage file that change for it: numbers [SI] as floats, texts, None for keys that go. None, if a controller does
-        not say."""
+        """Return other structures of the controller for `friso tune` to try, by their names.
+
+        Each holds the keys of the stage file that change: numbers [SI] as floats, texts, None for keys that go. It is
+        empty if a controller declares none.
+        """
         return {}
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Return the numbers for a drive: its keys that are not 0,
-        then those that every controller has."""
+        """Return the numbers for a drive: keys that are not 0, then those of every controller."""
         fields = numeric_fields(cls)
         names = sorted(fields, key=lambda name: name in ControllerSection.model_fields)
         return tuple(
@@ -165,8 +168,10 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """Draw the way from the error to the demanded force in characters (`friso.drives.diagram.Canvas`): a box, if a
-        controller does not say more."""
+        """Draw the way from the error to the demanded force in characters.
+
+        Without more it is a box (`friso.drives.diagram.Canvas`).
+        """
         canvas.box(flat[KIND])
 
     @classmethod
@@ -194,7 +199,10 @@ class Controllers(Variants):
         return self._forms
 
     def register(self, cls: SectionClass) -> SectionClass:
-        """Class decorator: add a form of a controller. Raises InputError for a kind that another class declares."""
+        """Add a form of a controller (a class decorator).
+
+        Raises InputError for a kind that another class declares.
+        """
         form = cast(type[ControllerSection], cls)
         owner = next(base for base in form.__mro__ if self.tag in get_annotations(base))
         super().register(owner)
@@ -202,8 +210,10 @@ class Controllers(Variants):
         return cls
 
     def pick(self, table: dict[str, Any]) -> type[Section]:
-        """Return the class for a [controller] table. Raises InputError for an unknown kind,
-        StageError for an unclear form."""
+        """Return the class for a [controller] table.
+
+        Raises InputError for an unknown kind, StageError for an unclear form.
+        """
         owner = cast(type[ControllerSection], super().pick(table))
         return owner.pick(self.forms[table[self.tag]], table)
 
@@ -239,8 +249,10 @@ def controller_of(flat: Mapping[str, Any]) -> type[ControllerSection]:
 
 
 def as_tuned(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keys of a controller that follow other keys of the stage,
-    with their present values: it is tuned once, for the machine of the stage file."""
+    """Return a controller's keys that follow other keys of the stage, at their present values.
+
+    The controller is tuned once, for the machine of the stage file.
+    """
     controller = controller_of(flat)
     of_file = {*map(controller.key, numeric_fields(controller))}
     return {key: flat[key] for key in controller.with_defaults(flat) if key in of_file}

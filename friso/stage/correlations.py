@@ -36,10 +36,9 @@ MOST = 100
 
 @dataclass(frozen=True)
 class Correlations:
-    """Keys of a stage file and the correlation matrix of what they are drawn from, shape (keys, keys); without any, all
-    keys are independent.
+    """Keys of a stage file and their correlation matrix, shape (keys, keys).
 
-    Raises StageError where the matrix is none of correlations.
+    Without any, all keys are independent. Raises StageError if the matrix is not one of correlations.
     """
 
     keys: tuple[str, ...] = ()
@@ -58,8 +57,10 @@ class Correlations:
         return Correlations(tuple(self.keys[k] for k in places), self.matrix[np.ix_(places, places)])
 
     def over(self, keys: list[str]) -> np.ndarray:
-        """Return the matrix of all `keys`, shape (keys, keys);
-        those that this does not name are independent."""
+        """Return the correlation matrix of all `keys`, shape (keys, keys).
+
+        Keys that are not named here are independent.
+        """
         matrix = np.eye(len(keys))
         places = [keys.index(key) for key in self.keys]
         matrix[np.ix_(places, places)] = self.matrix
@@ -82,14 +83,15 @@ def _problem(matrix: np.ndarray, size: int) -> str:
 
 
 def correlations_file(path: str | os.PathLike[str]) -> Path:
-    """Return where the correlations of a stage file stand:
-    stage.toml has stage.correlations.toml."""
+    """Return the path of a stage file's correlations: stage.correlations.toml for stage.toml."""
     return Path(path).with_suffix(".correlations.toml")
 
 
 def read_correlations(path: str | os.PathLike[str], stage: Stage) -> Correlations:
-    """Return the correlations of a file, which are to be of uncertain keys of the stage.
-    Raises StageError."""
+    """Return the correlations of a file, which must be of uncertain keys of the stage.
+
+    Raises StageError.
+    """
     try:
         correlations = _from(parsed(text_of(Path(path), _EXPECTED, _EXAMPLE), _EXPECTED, _EXAMPLE))
         _belongs(correlations, stage)
@@ -99,8 +101,10 @@ def read_correlations(path: str | os.PathLike[str], stage: Stage) -> Correlation
 
 
 def correlations_text(correlations: Correlations, stage: Stage) -> str:
-    """Return the file of the correlations of uncertain keys of the stage.
-    Raises StageError where they are not of it."""
+    """Return the text of a file of correlations of uncertain keys of the stage.
+
+    Raises StageError if they are of other keys.
+    """
     _belongs(correlations, stage)
     rows = [f"  [{', '.join(repr(float(value)) for value in row)}]," for row in correlations.matrix]
     names = [f"  {as_toml(key)}," for key in correlations.keys]
@@ -140,8 +144,11 @@ def _belongs(correlations: Correlations, stage: Stage) -> None:
 
 @dataclass(frozen=True)
 class Sample:
-    """Stages drawn: dotted keys to SI arrays, shape (count,). Draws in which a key was `beyond` its bound, or that
-    broke a rule between keys (`broken`: what was expected, to how many), were left out and others drawn instead."""
+    """Stages drawn at random: dotted keys to SI arrays, shape (count,).
+
+    Draws in which a key was `beyond` its bound, or that broke a rule between keys (`broken`: what was expected, to how
+    many), were replaced by others.
+    """
 
     keys: Mapping[str, np.ndarray]
     count: int
@@ -155,8 +162,11 @@ class Sample:
 
 
 def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sample:
-    """Draw stages from what is uncertain of one: a scrambled Sobol sequence (Owen 1998), in which the same seed gives
-    the same stages. Raises StageError where no key is uncertain, or hardly any draw is allowed."""
+    """Draw stages from a stage with uncertain keys; the same seed gives the same stages.
+
+    They follow a scrambled Sobol sequence (Owen 1998). Raises StageError if no key is uncertain, or hardly any draw is
+    allowed.
+    """
     from scipy.stats import qmc
 
     intervals = stage.uncertain()
@@ -185,8 +195,10 @@ def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sam
 
 
 def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the uncertain keys at shares, shape (count, keys),
-    of independent uniform distributions."""
+    """Return the uncertain keys at shares of independent uniform distributions.
+
+    Shares have the shape (count, keys).
+    """
     from scipy.special import ndtr, ndtri
 
     sizes, directions = np.linalg.eigh(matrix)
@@ -203,8 +215,10 @@ def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, n
 
 
 def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return which draws a stage may have, and which rule between keys ("" none) the others
-    break, both of shape (count,)."""
+    """Return which draws a stage may have, and which rule between keys others break.
+
+    Both have the shape (count,); the rule is "" for none.
+    """
     fields = stage.numeric_keys()
     within = np.all([fields[key].bound.holds(values) for key, values in keys.items()], axis=0)
     why = np.full(count, "", dtype=object)
@@ -216,7 +230,9 @@ def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[
 
 
 def laid_over(stage: Stage, keys: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """Return the flat keys of drawn stages. The controller stays as tuned:
-    it does not know the mass that was drawn."""
+    """Return the flat keys of drawn stages.
+
+    The controller stays as tuned: it does not know the mass that was drawn.
+    """
     flat = stage.flat()
     return stage.flat(as_tuned(flat) | dict(keys))

@@ -58,8 +58,10 @@ def load_tables(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _hinted(path: str | os.PathLike[str], read: Callable[[str], Read]) -> Read:
-    """Read a stage file; an error says which command reads a file of another kind.
-    Raises StageError."""
+    """Read a stage file; for a file of another kind, the error names the command for it.
+
+    Raises StageError.
+    """
     try:
         return read(text_of(Path(path), _EXPECTED))
     except InputError as error:
@@ -72,8 +74,10 @@ def _hinted(path: str | os.PathLike[str], read: Callable[[str], Read]) -> Read:
 
 
 def load_changed(path: Path, changes: Mapping[str, Any]) -> Stage:
-    """Return the stage of a file with dotted keys set, which the file may lack.
-    Raises StageError."""
+    """Return the stage of a file with dotted keys set, also if the file lacks them.
+
+    Raises StageError.
+    """
     try:
         return changed(_with_whole_paths(parsed(text_of(path, _EXPECTED), _EXPECTED), path.parent), changes)
     except InputError as error:
@@ -95,7 +99,10 @@ def loads(text: str, origin: str = "stage file") -> Stage:
 
 
 def _stage_of(text: str, origin: str, folder: Path | None = None) -> Stage:
-    """Return the stage of a TOML text, whose files stand beside it in a folder. Raises StageError."""
+    """Return the stage of a TOML text; its files stand beside it in a folder.
+
+    Raises StageError.
+    """
     try:
         tables = parsed(text, _EXPECTED)
         if "masses" not in tables or "controller" not in tables:
@@ -106,7 +113,7 @@ def _stage_of(text: str, origin: str, folder: Path | None = None) -> Stage:
 
 
 def _with_whole_paths(tables: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
-    """Return tables in which a `file`, which is beside the stage file in a folder, stands by its whole path."""
+    """Return tables in which a `file` beside the stage file has its whole path."""
     whole: dict[str, Any] = dict(tables)
     for name, table in tables.items():
         if folder is not None and isinstance(table, dict) and isinstance(table.get("file"), str):
@@ -149,7 +156,10 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
 
 
 def parse_set(text: str) -> tuple[str, Any]:
-    """Key and value of a command line's KEY=VALUE; a value that is no TOML is a text. Raises InputError."""
+    """Split KEY=VALUE of a command line; a value that is no TOML is a text.
+
+    Raises InputError.
+    """
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise InputError("", quoted(text), "KEY=VALUE", 'masses.stage="0.6 kg"', origin="--set")
@@ -163,8 +173,10 @@ def parse_set(text: str) -> tuple[str, Any]:
 
 
 def _value(text: str) -> Any:
-    """Return a TOML value, or the text itself;
-    an inline table holds neither comments nor a second line."""
+    """Return a TOML value, or the text itself if it is none.
+
+    An inline table holds neither comments nor a second line.
+    """
     if _MANY_PARTS.search(text):
         return text
     try:
@@ -176,10 +188,10 @@ def _value(text: str) -> Any:
 
 
 def text_of(path: Path, expected: str, example: str = _EXAMPLE, latin: bool = False) -> str:
-    """Read a text file that should be `expected`; it may be Latin-1 if `latin`,
-    as older programs write it.
+    """Read a text file that should be `expected`.
 
-    Raises InputError, also for a device, for a pipe and for more than MOST_BYTES.
+    With `latin` it may be Latin-1, as older programs write it. Raises InputError, also for a device, for a pipe and
+    for more than MOST_BYTES.
     """
     try:
         content = content_of(path, MOST_BYTES)

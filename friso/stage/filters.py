@@ -45,8 +45,10 @@ class FilterSection(UncertainSection):
 
     @classmethod
     def variant(cls, row: Mapping[str, Any]) -> Hashable:
-        """Return the further choices on which the equations depend, such as an order;
-        `row` are the filter's keys."""
+        """Return further choices on which the equations of a filter depend, such as its order.
+
+        `row` holds the filter's keys.
+        """
         return None
 
     @classmethod
@@ -205,7 +207,7 @@ def _second_order(omega: Any, damping: Any) -> Polynomial:
 
 
 class FilterForm(NamedTuple):
-    """A filter by its kind, where it acts, what else its equations depend on, and how a drive takes it."""
+    """A filter by its kind, where it acts, what its equations depend on, and its discretisation."""
 
     kind: str
     path: str
@@ -219,7 +221,10 @@ class FilterForm(NamedTuple):
 
 
 def filter_forms(flat: Mapping[str, Any], key: str) -> tuple[FilterForm, ...]:
-    """Return the filters of a stage given as flat keys, the array having a `key`."""
+    """Return the form of each filter in an array of filters, given the stage's flat keys.
+
+    `key` names the array: "controller.filters".
+    """
     forms = []
     for place in row_keys(flat, key):
         row = keys_below(flat, place)

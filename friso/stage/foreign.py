@@ -7,7 +7,7 @@ from friso.stage.tables import FRICTION
 
 
 def foreign() -> list[str]:
-    """Controllers and friction laws from outside friso that are loaded, each with the module it comes from."""
+    """Return the loaded controllers and friction laws from outside friso, with their modules."""
     kinds = {
         "controller": [(name, form) for name, forms in CONTROLLERS.forms.items() for form in forms],
         "friction law": FRICTION.classes.items(),
@@ -21,7 +21,7 @@ def foreign() -> list[str]:
 
 
 def installed() -> list[str]:
-    """Controllers and friction laws from outside friso that are loaded or that installed packages name."""
+    """Return controllers and friction laws from outside friso, loaded or installed."""
     for registry in (CONTROLLERS, FRICTION):
         load_installed(registry.group)
     return foreign()

@@ -70,8 +70,10 @@ class Several:
         return f"[{', '.join(f'{quote}{example}{quote}' for example in self.examples)}]"
 
     def read(self, raw: Any, read_one: Callable[[Any], Any] | None = None) -> Values:
-        """Return the values of an array, each read by `read_one` or as the key's kind is.
-        Raises InputError, under the number of the element that is wrong."""
+        """Return the values of an array, each read by `read_one` or by the key's own kind.
+
+        Raises InputError, under the number of the wrong element.
+        """
         if self.alone and not isinstance(raw, list | tuple):
             raw = [raw]
         size = len(raw) if isinstance(raw, list | tuple) else None
@@ -132,13 +134,14 @@ class Coefficients:
 
 
 def element_keys(flat: Mapping[str, Any], key: str) -> list[str]:
-    """Return the flat keys of the elements of an array, in order;
-    none where the stage does not have it."""
+    """Return the flat keys of an array's elements, in order; none if the stage lacks it."""
     return [*takewhile(flat.__contains__, (f"{key}.{number}" for number in count(1)))]
 
 
 def row_keys(flat: Mapping[str, Any], key: str) -> list[str]:
-    """Return the beginnings of the flat keys of an array's tables, in order;
-    none where the stage does not have it."""
+    """Return the prefixes of the flat keys of an array's tables, in order.
+
+    There are none if the stage does not have the array.
+    """
     places = (f"{key}.{number}" for number in count(1))
     return [*takewhile(lambda place: any(name.startswith(f"{place}.") for name in flat), places)]

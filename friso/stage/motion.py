@@ -13,14 +13,20 @@ KIND, DURATION = "motion.kind", "motion.duration"
 
 
 class ReferenceForm(NamedTuple):
-    """Form of a reference: within a piece, a polynomial of some `degree`, 2 to 4, and a number of `tones`."""
+    """The form of a reference: pieces of polynomials of a `degree`, 2 to 4, and sinusoids.
+
+    `tones` is the number of sinusoids.
+    """
 
     degree: int = 2
     tones: int = 0
 
     @property
     def inputs(self) -> int:
-        """Return how many numbers describe a piece: derivatives, then the direction and four numbers of each tone."""
+        """Return how many numbers describe a piece.
+
+        They are derivatives, the direction, and four for each sinusoid.
+        """
         return 1 + self.degree + (1 + 4 * self.tones if self.tones else 0)
 
 
@@ -29,7 +35,7 @@ QUADRATIC = ReferenceForm()
 
 
 class Tone(NamedTuple):
-    """A sinusoid: amplitude [m], phase at the start [turns], frequency there [Hz], and how fast that rises [Hz/s]."""
+    """A sinusoid: amplitude [m], initial phase [turns] and frequency [Hz], and its rise [Hz/s]."""
 
     amplitude: Any
     turns: Any
@@ -38,14 +44,20 @@ class Tone(NamedTuple):
 
 
 class Stand(NamedTuple):
-    """A place where the reference comes to stand: from its `corner` [s] on, `until` [s] it leaves or the run ends."""
+    """A place where the reference stands, from its `corner` [s] `until` [s] it leaves.
+
+    It may also stand to the end of the run.
+    """
 
     corner: Any
     until: Any
 
 
 class Lowered(NamedTuple):
-    """A peak that a move is too short to reach: its distance [m], name and unit of its limit, limit and peak [SI]."""
+    """A peak that a move is too short to reach.
+
+    It has the move's distance [m], the limit's name, unit and value, and the peak [SI].
+    """
 
     distance: float
     name: str
@@ -59,9 +71,10 @@ Piece = tuple[Any, ...]
 
 
 class Motion(UncertainSection):
-    """Base of the motions: a kind declares its keys, and its reference as pieces of polynomials, tones, or both.
+    """Base of the motions: a kind declares its keys, and its reference.
 
-    The functions take the stage as flat keys to SI numbers, or arrays with one entry per run.
+    A reference is made of pieces of polynomials, sinusoids, or both. The functions take the stage as flat keys to SI
+    numbers, or arrays with one entry per run.
     """
 
     kind: Any
@@ -97,7 +110,10 @@ class Motion(UncertainSection):
 
     @classmethod
     def stands(cls, flat: Mapping[str, Any]) -> Sequence[Stand]:
-        """Return the places where the reference comes to stand; of one that never stands, from its last corner on."""
+        """Return the places where the reference comes to stand.
+
+        For a reference that never stands it is from its last corner on.
+        """
         return [Stand(cls.pieces(flat)[-1][0], flat[DURATION])]
 
     @staticmethod
@@ -117,12 +133,15 @@ class Motion(UncertainSection):
 
     @staticmethod
     def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
-        """Return the keys that change in a move that is longer by a factor; none if the motion is no move."""
+        """Return the keys that change in a move longer by a factor; none if it is no move."""
         return {}
 
     @staticmethod
     def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:
-        """Return ranges of two keys for moves around this one, from and to shares of each; none if it is no move."""
+        """Return ranges of two keys for moves around this one; none if it is no move.
+
+        `shares` gives both ends, as factors.
+        """
         return {}
 
 

@@ -28,8 +28,7 @@ PRESLIDING = (1e-10, 1e-2)
 
 @dataclass(frozen=True)
 class _Usual:
-    """Range of values [SI] that is usual for positioning stages,
-    with the unit in which it is shown."""
+    """A range of values [SI] that is usual for positioning stages, with the unit to show."""
 
     low: float
     high: float
@@ -83,8 +82,7 @@ _ROTARY: Mapping[str, _Usual] = {
 
 
 def idle_encoder(stage: Stage) -> Iterator[str]:
-    """Yield a sentence where the velocity is to come from another encoder than the position,
-    and no velocity is taken."""
+    """Yield a sentence if a separate velocity encoder is stated that the controller ignores."""
     sides, controller = stage.encoder, stage.controller
     if sides and controller and sides.velocity != sides.position and not controller.takes_velocity(stage.flat()):
         yield (
@@ -94,11 +92,10 @@ def idle_encoder(stage: Stage) -> Iterator[str]:
 
 
 def implausible_values(stage: Stage) -> Iterator[str]:
-    """Yield a sentence on each implausible value: key, value,
-    and the unit that probably was meant.
+    """Yield a sentence on each implausible value, with the unit that was probably meant.
 
-    Friction and gains are judged by the mass: where a mass in another unit would make several of them usual, the mass
-    is named instead.
+    Friction and gains are judged by the mass: if a mass in another unit would make several of them usual, the mass is
+    named instead.
     """
     flat = stage.flat()
     complaints = _complaints(stage, flat)
@@ -156,8 +153,7 @@ _OF_FILTER = re.compile(r"controller\.filters\.\d+\.(frequency|width)")
 
 
 def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
-    """Return what is usual: friction follows the weight,
-    and what gives way before it slides follows friction."""
+    """Return usual ranges by key: friction follows the weight, presliding follows friction."""
     carried, moving = sum(flat.get(f"masses.{body}", 0.0) for body in ("cart", "stage")), moving_mass(flat)
     usual = dict(_USUAL)
     for table, mass in {"friction": carried, MOTOR_FRICTION: moving}.items():
@@ -175,8 +171,7 @@ def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
 
 
 def _presliding(force: float) -> _Usual:
-    """Return what is usual for the stiffness with which a contact takes a force before it
-    slides."""
+    """Return the usual range of a contact's stiffness before sliding, for a force."""
     low, high = (force / way for way in reversed(PRESLIDING))
     return _Usual(low, high or inf, "N/m", _STIFFNESSES)
 

@@ -38,7 +38,10 @@ class PlugIn:
         return hashlib.sha256(Path(self.file).read_bytes() if self.file else b"").hexdigest()
 
     def load(self) -> None:
-        """Import the module by its name where that gives this file, else from the file. Raises ImportError."""
+        """Import the module by its name if that gives this file, else from the file.
+
+        Raises ImportError.
+        """
         if self.module in sys.modules and self.module != SCRIPT:
             return
         if (
@@ -89,8 +92,10 @@ def load_own(group: str) -> None:
 
 @cache
 def load_installed(group: str) -> None:
-    """Import what installed packages name in the entry points of a group: each registers its sections. One that cannot
-    be imported, or registers a name that is taken, is told and left out."""
+    """Import what installed packages name in a group of entry points, to register sections.
+
+    A package that cannot be imported, or registers a name that is taken, is reported and left out.
+    """
     for name, module in installed_modules(group).items():
         try:
             load_module(group, name, module)

@@ -38,7 +38,7 @@ CONVERSIONS = frozenset({"machine_unit", "force_per_output", "velocity_per_outpu
 
 
 def is_as_built(stage: Any) -> bool:
-    """Tell whether a stage says how its drive is carried out, at which samples for one, or what surrounds it."""
+    """Tell whether a stage describes its drive as built, such as its samples, or surroundings."""
     if any(getattr(stage, table) for table in AS_BUILT[1:]) or getattr(stage.controller, "sample_time", None):
         return True
     return stage.drive is not None and bool({*stage.drive.as_written()} - CONVERSIONS)
@@ -77,8 +77,7 @@ def _one_travel(flat: Mapping[str, Any]) -> Any:
 
 
 def _below_half_the_rate(flat: Mapping[str, Any]) -> Any:
-    """Tell whether the filters that are exact at a frequency,
-    which sampling allows below half its own, keep to that."""
+    """Tell whether prewarped filters are exact below half the sampling frequency."""
     fine: Any = True
     for place in row_keys(flat, FILTERS_KEY) if "drive.sample_time" in flat else ():
         law: Any = FILTERS.classes[flat[f"{place}.kind"]]

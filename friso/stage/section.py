@@ -65,8 +65,7 @@ class Section(BaseModel):
 
     @classmethod
     def on(cls, kind: AxisKind, data: Mapping[str, Any]) -> Self:
-        """Return the section of a stage with that kind of axis,
-        which decides on the units of its keys."""
+        """Return the section of a stage with this kind of axis, which decides the units of keys."""
         section = cls.__new__(cls)
         section._take(data, kind)
         return section
@@ -112,8 +111,11 @@ class UncertainSection(Section):
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """Return the values by key; those of an array by key and number, from 1,
-        and those of tables in it by theirs."""
+        """Return the values by key.
+
+        Values of an array stand under key and number, counted from 1, and values of tables in it under their own keys
+        below that.
+        """
         values: dict[str, Any] = {}
         for key, value in self:
             if isinstance(value, Values):
@@ -171,8 +173,10 @@ class Variants:
 
     @property
     def classes(self) -> dict[str, type[Section]]:
-        """Return the variants by name; of those of modules of their own first friso's,
-        alphabetically, whichever was imported first."""
+        """Return the variants by name.
+
+        friso's own come first, alphabetically, whichever module was imported first.
+        """
         load_own(self.group)
         return self._classes
 
@@ -235,8 +239,10 @@ class TableArray:
     most: int
 
     def read(self, entries: Any, info: ValidationInfo) -> Rows:
-        """Return the sections for an array of tables. Raises InputError,
-        under the number of the one that is wrong."""
+        """Return the sections for an array of tables.
+
+        Raises InputError, under the number of the wrong one.
+        """
         size = len(entries) if isinstance(entries, list | tuple) else None
         if size is None or size > self.most:
             text = quoted(entries) if size is None else f"{size} tables"
@@ -291,8 +297,10 @@ def unknown_key(key: str, names: Iterable[str], example: str = "") -> InputError
 
 
 def _problems(cls: type[Section], error: ValidationError, kind: AxisKind) -> InputError:
-    """One InputError from pydantic's list: an unknown key first, since it often explains a missing one, and what else
-    is wrong below it."""
+    """Return one InputError from pydantic's list of problems.
+
+    An unknown key comes first, since it often explains a missing one; other problems follow below it.
+    """
     order = sorted(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
     nearest_keys = {
         nearest_name(problem["loc"][-1], cls.model_fields) for problem in order if problem["type"] == "extra_forbidden"
@@ -328,8 +336,10 @@ def _own_first(cls: type[Section]) -> list[str]:
 
 
 def _complete(error: InputError, key: str) -> InputError:
-    """Return the error seen from the table: below `key`,
-    which also goes before an example that is a mere value."""
+    """Return the error as seen from the table, below `key`.
+
+    `key` also goes before an example that is a mere value.
+    """
     is_value = not error.key and error.example and "=" not in error.example
     example = f"{key} = {error.example}" if is_value else error.example
     return InputError(error.key, error.actual, error.expected, example, also=error.also).under(key)

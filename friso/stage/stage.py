@@ -185,7 +185,10 @@ class Stage(Section):
         return self
 
     def _has_a_whole_transmission(self) -> None:
-        """Encoders and friction at the motor belong to a transmission, which has encoders on one side or both."""
+        """Check that encoders and motor friction come with a transmission.
+
+        A transmission has encoders on one side or both.
+        """
         if self.transmission is None:
             for table, words in (("encoder", "a choice of encoders"), ("motor_friction", "friction at the motor")):
                 if getattr(self, table):
@@ -232,17 +235,18 @@ class Stage(Section):
         return ", ".join(f"{name} = {_written(getattr(value, 'text', value))}" for name, value in values)
 
     def as_written(self) -> dict[str, Any]:
-        """Return the stage file as nested tables: the keys that the user gave,
-        with the values as written."""
+        """Return the stage file as nested tables, with keys and values as the user wrote them."""
         texts = super().as_written()
         return {key: item.as_written() if isinstance(item, Section) else item for key, item in texts.items()}
 
     def flat(self, swept: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        """Dotted keys to SI floats, texts and booleans; defaults filled in, absent optional keys absent, and so are
-        the arrays of [floor]. The elements of any other array are numbered from 1: friction.element_stiffness.2.
+        """Return dotted keys to SI floats, texts and booleans, with defaults filled in.
 
-        `swept`, dotted keys to SI numbers or arrays, is laid over the stage before the defaults that follow
-        other keys are filled in: tuned_mass follows a swept mass. Raises StageError for an unknown key.
+        Absent optional keys are absent, and so are the arrays of [floor]. Elements of any other array are numbered
+        from 1: friction.element_stiffness.2.
+
+        `swept`, dotted keys to SI numbers or arrays, is laid over the stage before the defaults that follow other keys
+        are filled in: tuned_mass follows a swept mass. Raises StageError for an unknown key.
         """
         if not swept:
             return dict(self._complete)
@@ -275,8 +279,7 @@ class Stage(Section):
 
     @cached_property
     def _sweepable(self) -> Mapping[str, Quantity | Number]:
-        """Return the numeric keys that may be laid over the stage:
-        not those that follow from the leaf springs."""
+        """Return the numeric keys that may be swept: not those that follow from leaf springs."""
         keys = numeric_keys(self._declared)
         if not self.flexure:
             return keys
@@ -291,16 +294,20 @@ class Stage(Section):
         return {f"{name}.{key}": interval for name, table in tables.items() for key, interval in table.items()}
 
     def replace(self, changes: Mapping[str, Any]) -> "Stage":
-        """Return the stage with dotted keys set, or removed by None; checked like a file.
-        Raises StageError."""
+        """Return the stage with dotted keys set, or removed by None, checked like a file.
+
+        Raises StageError.
+        """
         if not (isinstance(changes, Mapping) and all(isinstance(key, str) for key in changes)):
             expected = "a dictionary of keys to new values"
             raise StageError("", quoted(changes), expected, 'stage.replace({"masses.stage": "0.6 kg"})')
         return changed(self.as_written(), changes)
 
     def in_own_units(self, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Changes as a person types them next to the stage file: a number alone has the unit in which the file has the
-        key, and a unit that is only wrong in its capitals is put right."""
+        """Return changes typed next to the stage file, completed by its units.
+
+        A number alone gets the unit that the file has for that key; wrong capitals in a unit are corrected.
+        """
         tables, keys = self.as_written(), numeric_keys(self.flat())
         units = {key for key in changes if getattr(keys.get(key), "unit", "")}
         return {
@@ -308,15 +315,19 @@ class Stage(Section):
         }
 
     def with_numbers(self, numbers: Mapping[str, float], without: Iterable[str] = ()) -> "Stage":
-        """Return the stage with SI numbers for dotted keys,
-        written such that they are read again as the same ones, and without some tables. Raises StageError."""
+        """Return the stage with SI numbers for dotted keys, and without some tables.
+
+        Numbers are written so that they read back as the same. Raises StageError.
+        """
         keys = numeric_keys({**self.flat(), **numbers})
         texts = {key: exactly(value, keys[key].unit) if keys[key].unit else value for key, value in numbers.items()}
         return self.replace(texts | dict.fromkeys(without))
 
     def variants(self) -> "Mapping[str, Stage]":
-        """Return the stage as "given" and, if it has a joint,
-        with that "locked" and (if the file tells all of it) "free"."""
+        """Return the stage as "given" and, if it has a joint, with it "locked" and "free".
+
+        "free" needs all keys of the joint in the file.
+        """
         variants: dict[str, Stage | Self] = {"given": self}
         if self.joint:
             variants["locked"] = self.replace({"joint.locked": True})
@@ -335,10 +346,10 @@ class Stage(Section):
 
 
 def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
-    """Return the stage of tables in which dotted keys are set, or removed by None; they themselves stay as they are.
+    """Return a new stage from tables in which dotted keys are set, or removed by None.
 
-    A controller that is set in another form, by its gains where the tables have a crossover, replaces that of the
-    tables. Raises StageError.
+    A controller that is set in another form, by its gains where the tables have a crossover, replaces the controller
+    of the tables. The tables passed in stay as they are. Raises StageError.
     """
     own, tables = {*tables}, deepcopy(dict(tables))
     for key, value in changes.items():
@@ -368,8 +379,10 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
 
 
 def axis_written(tables: Mapping[str, Any]) -> AxisKind:
-    """Return the axis that tables of a stage file are of, with what an ampere exerts there;
-    what is wrong with the tables [axis] and [actuator] is found later."""
+    """Return the axis of a stage file's tables, with what an ampere exerts there.
+
+    Errors in [axis] and [actuator] are found later.
+    """
     name = _of_table(tables, "axis", "kind")
     kind = KINDS.get(name, LINEAR) if isinstance(name, str) else LINEAR
     if tables.get("actuator") is None:
@@ -382,8 +395,7 @@ def axis_written(tables: Mapping[str, Any]) -> AxisKind:
 
 
 def _of_table(tables: Mapping[str, Any], name: str, key: str) -> Any:
-    """Return the value of a key of a table, which may be a section or anything else;
-    None if there is none."""
+    """Return the value of a key of a table, or of a section; None if there is none."""
     table = tables.get(name)
     return table.get(key) if isinstance(table, dict) else getattr(table, key, None)
 
@@ -392,12 +404,15 @@ _MOTOR_LAW = f"{MOTOR_FRICTION}.model"
 
 
 def numeric_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
-    """Unit, bound and example of every numeric key that a stage with these tables can have, on its kind of axis."""
+    """Return unit, bound and example of every numeric key of a stage with these tables.
+
+    They are in the units of its axis.
+    """
     return {key: field.on(axis_of(flat)) for key, field in declared_keys(flat).items()}
 
 
 def declared_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
-    """Return the keys of a flat stage in their declared units, those of a linear axis."""
+    """Return the keys of a flat stage in their declared units, which are those of a linear axis."""
     keys: dict[str, Quantity | Number] = {}
     for name, cls in _tables(flat).items():
         keys |= _numeric_keys_of(flat, name, cls)
@@ -415,15 +430,16 @@ def _numeric_keys_of(flat: Mapping[str, Any], name: str, cls: type[Section]) -> 
 
 
 def _rows(flat: Mapping[str, Any], name: str, cls: type[Section]) -> Iterator[tuple[str, type[Section]]]:
-    """Yield the tables in the arrays of a table: their places in the stage file,
-    and their classes."""
+    """Yield the tables in a table's arrays: their places in the stage file, and classes."""
     for key, array in table_arrays(cls).items():
         yield from array.rows(flat, f"{name}.{key}").items()
 
 
 def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
-    """Return the violated bounds and rules of a flat SI mapping, arrays allowed:
-    where (a boolean or an array), and why."""
+    """Return the violated bounds and rules of flat SI values: where, and why.
+
+    `flat` may hold arrays; where is a boolean or an array.
+    """
     bounds = [
         (np.logical_not(field.bound.holds(flat[key])), f"{key} must be {field.bound.text}")
         for key, field in numeric_keys(flat).items()
@@ -529,7 +545,10 @@ def _under(tables: Mapping[str, Any], key: str) -> Any:
 
 
 def _put(tables: dict[str, Any], key: str, value: Any) -> None:
-    """Set or (None) remove a dotted key of nested tables, or set an element of an array. Raises StageError."""
+    """Set or (None) remove a dotted key of nested tables, or set an element of an array.
+
+    Raises StageError.
+    """
     *path, last = key.split(".")
     place: Any = tables
     for depth, name in enumerate(path):
@@ -549,8 +568,10 @@ def _put(tables: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _number(values: list[Any], key: str, depth: int) -> int:
-    """Return which element of an array the part of a dotted key at a depth means.
-    Raises StageError."""
+    """Return which element of an array a part of a dotted key means.
+
+    `depth` is the place of the part in the key. Raises StageError.
+    """
     parts = key.split(".")
     number, array = parts[depth], ".".join(parts[:depth])
     if not (number.isascii() and number.isdigit() and 1 <= int(number) <= len(values)):

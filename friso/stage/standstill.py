@@ -97,13 +97,11 @@ def settings_of(flat: Mapping[str, Any]) -> FrictionSettings:
 
 
 def dead_band(flat: Mapping[str, Any]) -> Any:
-    """Return the error [m] up to which the controller does nothing,
-    of stages given as flat keys; 0 without a dead zone."""
+    """Return the error [m] up to which the controller does nothing; 0 without a dead zone."""
     return flat.get("controller.error_deadband", 0.0)
 
 
 def integral_leak(flat: Mapping[str, Any]) -> Any:
-    """Return the frequency of the leak of integrals [Hz], of stages given as flat keys;
-    0 without one."""
+    """Return the frequency [Hz] below which integrals leak; 0 without a leak."""
     own = flat.get("controller.parts.leak", 0.0) * flat.get("controller.speed", 1.0) / (2 * np.pi)
     return flat.get("controller.integral_leak", 0.0) + own

@@ -79,25 +79,27 @@ class FrictionSection(UncertainSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Hashable:
-        """Return the further choices on which the equations depend besides the law's name,
-        such as a whole exponent."""
+        """Return further choices on which a law's equations depend, such as a whole exponent."""
         return None
 
     @staticmethod
     def declare(velocity: Any, variant: Any) -> Any:
-        """Return the equations of the law for a body moving at `velocity`,
-        or None if there is no force."""
+        """Return the equations of the law for a body moving at `velocity`; None for no force."""
         return None
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> Any:
-        """Return what measurements show of the law
-        (`friso.equations.friction.measured.MeasuredFriction`)."""
+        """Return what measurements show of the law.
+
+        See `friso.equations.friction.measured.MeasuredFriction`.
+        """
 
     @staticmethod
     def keeping(measured: Any, elements: int) -> dict[str, Any]:
-        """Return keys of the law, as flat SI values, with which it shows what was measured,
-        as nearly as it can; `elements` side by side, of a law that has several."""
+        """Return keys with which the law shows what was measured, as nearly as it can [SI].
+
+        Laws with several elements have `elements` side by side.
+        """
         return {}
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {}
@@ -106,9 +108,10 @@ class FrictionSection(UncertainSection):
 
     @staticmethod
     def shaped(measured: Any, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return keys of the law, as flat SI values, with the steady friction,
-        stiffness and damping measured and numbers of its `shape`; a law that declares it can be fitted
-        (`friso.identification.laws`)."""
+        """Return keys with the measured steady friction, stiffness and damping, and a `shape` [SI].
+
+        A law that declares it can be fitted (`friso.identification.laws`).
+        """
         return {}
 
     @staticmethod
@@ -118,8 +121,10 @@ class FrictionSection(UncertainSection):
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Return why the law may give energy back, which no friction does:
-        the condition for passivity that the stage does not meet; "" where it is passive or does not say."""
+        """Return the condition for passivity that the stage does not meet.
+
+        Without passivity the law gives energy back, which no friction does. "" if it is passive or does not say.
+        """
         return ""
 
 
@@ -133,8 +138,10 @@ def friction_law(name: str) -> type[FrictionSection]:
 
 
 def passive_where(flat: Mapping[str, Any]) -> str:
-    """Return the condition of passivity that the friction law of a stage,
-    given as flat SI values, does not meet; "" where it is passive, or does not say; in the units of its axis."""
+    """Return the condition of passivity that a stage's friction law does not meet.
+
+    It is in the units of its axis; "" if the law is passive, or does not say.
+    """
     return axis_of(flat).text(friction_law(flat["friction.model"]).active(flat))
 
 

@@ -67,15 +67,13 @@ class Encoder(UncertainSection):
 
 
 def motor_mass(flat: Mapping[str, Any]) -> Any:
-    """Return the mass of the motor at the load [kg] that follows from its inertia;
-    None where none does."""
+    """Return the mass of the motor at the load [kg] from its inertia; None without one."""
     lead = flat[LEAD] if LEAD in flat else 2 * pi / flat[RATIO] if RATIO in flat else None
     return None if INERTIA not in flat or lead is None else flat[INERTIA] * (2 * pi / lead) ** 2
 
 
 def leading_friction(flat: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the keys with the friction at the motor in the place of that of the guide,
-    where it alone is there."""
+    """Return the flat keys with the motor's friction under [friction], if no other is there."""
     alone = flat["friction.model"] == "none" and f"{MOTOR_FRICTION}.model" in flat
     return of_motor(flat) if alone else flat
 
@@ -86,8 +84,10 @@ def moving_mass(flat: Mapping[str, Any]) -> Any:
 
 
 def of_motor(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keys with the friction at the motor in the place of that of the guide,
-    whose conditions are not its."""
+    """Return the flat keys with the motor's friction under [friction], and without [conditions].
+
+    The conditions hold for the guide, whose friction is left out.
+    """
     kept = {key: value for key, value in flat.items() if not key.startswith(("friction.", f"{CONDITIONS}."))}
     return {**kept, "friction.model": "none", **as_friction(flat)}
 

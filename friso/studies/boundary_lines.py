@@ -75,8 +75,10 @@ def lines(result: Diagram | Plane) -> tuple[Line, ...]:
 
 
 def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
-    """Return the points of a branch with those of its special points that are inside the range,
-    in order, but for those within the error of one: there it is not known whether they attract."""
+    """Return the points of a branch and its special points inside the range, in order.
+
+    Points within the error of a special point are left out, because it is not known whether they attract.
+    """
     path = np.array([point.vector for point in branch.points])
     ordinary = [
         (k, point) for k, point in enumerate(branch.points) if not any(spot.in_doubt(point) for spot in special)

@@ -43,10 +43,11 @@ def of_runs_alone(names: Sequence[str]) -> bool:
 def built_runs(
     stage: Stage, flat: Mapping[str, Any], count: int, threads: int | None, cancel: np.ndarray | None
 ) -> Iterator[tuple[Runs, Measures]]:
-    """Run cells of one structure, given as flat keys to SI numbers or arrays (count,), and measure them.
+    """Run cells of one structure as built, and measure them.
 
-    All have the same noise. The runs tell statistics and statuses; turning points are those of samples, in the
-    measures. Once `cancel` is set, no further chunk of them begins.
+    `flat` holds flat keys to SI numbers or arrays (count,). All cells have the same noise. The runs hold statistics
+    and statuses; turning points are those of the samples, in the measures. Once `cancel` is set, no further chunk
+    begins.
     """
     timing = [np.broadcast_to(flat[key], (count,)) for key in TIMING if key in flat]
     kinds, which = np.unique(np.stack([np.zeros(count), *timing]), axis=1, return_inverse=True)

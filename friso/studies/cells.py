@@ -235,7 +235,7 @@ class _Table:
         return Motions(self.columns["outcome"][cells] != FAILED, away, peaks, swing, self.settled[cells])
 
     def write_runs(self, cells: np.ndarray, evidence: RunEvidence) -> None:
-        """Write the status and the metrics of those of the cells that were run before the work was cancelled."""
+        """Write the status and the metrics of the cells that were run before work was cancelled."""
         measures, ran = evidence.measures, evidence.runs.results.statuses != Status.NOT_RUN
         columns = {name: metric.compute(evidence) for name, metric in self.of("run").items()}
         for name, column in (columns | {STATUS: _STATUS[measures.status]}).items():

@@ -45,8 +45,11 @@ def where_links_lead(path: Path) -> Path:
 
 
 def make(path: Path, fill: Callable[[Path], object]) -> None:
-    """Have `fill` write what is new into a folder aside, which is then moved to `path`, if nothing is there by then.
-    Raises OSError, with nothing left."""
+    """Create the folder `path`, complete or not at all.
+
+    `fill` writes the content into a temporary folder beside it, which is then renamed to `path`, unless another process
+    has created that meanwhile. Raises OSError, and then leaves nothing behind.
+    """
     remove_leftovers(path)
     with _made_aside(path, fill) as new:
         try:

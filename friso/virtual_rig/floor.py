@@ -15,12 +15,11 @@ FLOOR = int.from_bytes(b"floor")
 
 
 def floor_acceleration(floor: Floor, duration: float, interval: float, seed: int) -> np.ndarray:
-    """Return a Gaussian realisation of the floor's acceleration [m/s^2] at 0, `interval`, ...
-    up to `duration` [s].
+    """Return a random acceleration of the floor [m/s^2] every `interval` up to `duration` [s].
 
-    Shape (n,). One wave per frequency of the Fourier transform, with the variance that the spectrum has in the band
-    around it; so the variance is that of the spectrum however short the record is. Raises InputError for a spectrum
-    that reaches beyond half the sampling frequency.
+    Its shape is (n,), from time 0 on. There is one wave per frequency of the Fourier transform, with the variance that
+    the spectrum has in the band around it; so the variance is that of the spectrum however short the record is. Raises
+    InputError for a spectrum that reaches beyond half the sampling frequency.
     """
     highest = floor.frequency[-1]
     if highest * interval > 0.5:
@@ -41,7 +40,7 @@ def floor_acceleration(floor: Floor, duration: float, interval: float, seed: int
 
 
 def variance_below(floor: Floor, frequencies: np.ndarray) -> np.ndarray:
-    """Variance [m^2/s^4] that the floor's acceleration has below frequencies [Hz]: the spectrum's integral."""
+    """Return the variance [m^2/s^4] of the floor's acceleration below frequencies [Hz]."""
     total = np.zeros(len(frequencies))
     for (low, high), (first, last) in zip(pairwise(floor.frequency), pairwise(floor.acceleration), strict=True):
         slope = 2 * np.log(last / first) / np.log(high / low) + 1

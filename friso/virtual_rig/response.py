@@ -68,7 +68,7 @@ def measured_response(stage: Stage, response: xr.Dataset) -> Measures:
 
 
 def _dataset(stage: Stage, flat: dict[str, Any], recorded: RecordedRuns, rtol: float) -> xr.Dataset:
-    """Return the signals of a recorded run as a dataset over time, with units, names and the status of the run."""
+    """Return the signals of a recorded run as a dataset, with units, names and status."""
     import xarray as xr
 
     from friso.engine.kernel import kernel

@@ -55,8 +55,10 @@ class RecordedRuns:
 
 
 def as_built_keys(stage: Stage, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the flat keys of a stage with a complete drive: what it does not tell is ideal.
-    `changes` are SI numbers, or arrays with one for each run."""
+    """Return the flat keys of a stage with a complete drive; what is not stated is ideal.
+
+    `changes` are SI numbers, or arrays with one for each run.
+    """
     return with_complete_drive(stage.flat(changes))
 
 
@@ -78,12 +80,12 @@ def run(
     changes: Mapping[str, Any] | None = None,
     threads: int | None = None,
 ) -> Iterator[RecordedRuns]:
-    """Run a stage several times, each with noise of its own seed, logged every `interval` [s],
-    a whole number of samples.
+    """Run a stage as built several times, each with its own noise, logged every `interval` [s].
 
-    `changes` are flat keys to SI numbers, or arrays of one for each run: of a sweep, or of machines drawn at random.
-    The runs come chunk by chunk; they are the same for any number of threads. Raises InputError for an interval that
-    does not fit the samples, and for a [rail] along which this law does not vary.
+    The interval is a whole number of samples. `changes` are flat keys to SI numbers, or arrays of one for each run: of
+    a sweep, or of machines drawn at random. The runs come chunk by chunk; they are the same for any number of threads.
+    Raises InputError for an interval that does not fit the samples, and for a [rail] along which this law does not
+    vary.
     """
     yield from run_flat(as_built_keys(stage, changes), stage.floor, task, seeds, interval, threads)
 
@@ -97,9 +99,10 @@ def run_flat(
     threads: int | None = None,
     outputs: bool = False,
 ) -> Iterator[RecordedRuns]:
-    """Run stages given as flat keys with a complete drive, as `run` does, on a floor that may shake.
+    """Run stages with a complete drive as `run` does, on a floor that may shake.
 
-    With `outputs`, everything that the equations tell is recorded, not what the drive and a sensor see alone.
+    They are given as flat keys. With `outputs`, all signals of the equations are recorded, not only those that the
+    drive and a sensor see.
     """
     settings = RigSettings.current()
     _check(flat, interval)
@@ -187,7 +190,7 @@ def _recorded(
 def _outputs(
     shape: Kernel, samples: np.ndarray, values: list[np.ndarray], batch: Batch, interval: float, number: int
 ) -> dict[str, np.ndarray]:
-    """Return what the equations tell of a run, from its samples, by name, each of shape (samples,)."""
+    """Return all signals of a run from its samples, by name, each of shape (samples,)."""
     time, states = np.arange(len(samples)) * interval, samples.T
     rows = batch.segments[min(number, len(batch.segments) - 1)]
     active = rows[np.searchsorted(rows[:, 0], time * (1 + 1e-12), side="right") - 1]
@@ -241,7 +244,7 @@ def _signals(
 
 
 def reference(task: MoveTask, time: np.ndarray) -> np.ndarray:
-    """Return the reference [m] at times [s], shape (n,); of runs with moves of their own, (runs, n)."""
+    """Return the reference [m] at times [s], shape (n,), or (runs, n) for different moves."""
     if task.pieces.ndim > 2:
         return np.array([reference(replace(task, pieces=pieces), time) for pieces in task.pieces])
     rows = task.pieces[np.searchsorted(task.pieces[:, 0], time * (1 + 1e-12), side="right") - 1]

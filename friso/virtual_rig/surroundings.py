@@ -17,10 +17,10 @@ from friso.virtual_rig.task import MoveTask
 
 
 def tables(flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> Tables:
-    """Return the tables of the runs whose noise has these seeds,
-    from flat keys to SI numbers or arrays of shape (runs,).
+    """Return the tables of runs, over place and over time.
 
-    The rails are the machines': their seeds are "rail.seed". All runs share one table where they do not differ.
+    Stages are given as flat keys to SI numbers or arrays of shape (runs,); `seeds` are those of the runs' noise, while
+    rails have the machines' "rail.seed". All runs share one table if they do not differ.
     """
     places, grid = _places(flat, task)
     varied = [key for key, value in flat.items() if key.startswith(("rail.", "drive.ripple")) and np.ndim(value)]
@@ -34,8 +34,10 @@ def _of_run(flat: Mapping[str, Any], run: int) -> dict[str, Any]:
 
 
 def _places(flat: Mapping[str, Any], task: MoveTask) -> tuple[np.ndarray, np.ndarray]:
-    """Return the places [m] of the tables, evenly spaced, and their grid, shape (1, 2):
-    first place, points per metre."""
+    """Return evenly spaced places [m] of tables, and their grid, shape (1, 2).
+
+    The grid holds the first place and the points per metre.
+    """
     settings = RigSettings.current()
     low, high = task.span
     margin = max(settings.table_margin, settings.table_share * (high - low))
@@ -60,7 +62,10 @@ def _over_places(flat: Mapping[str, Any], places: np.ndarray) -> np.ndarray:
 
 
 def _over_time(floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> tuple[np.ndarray, float]:
-    """Injected force and floor's acceleration, shape (runs or 1, 2, points), and their points per second."""
+    """Return injected force and floor acceleration over time, and their points per second.
+
+    Their shape is (runs or 1, 2, points).
+    """
     settings = RigSettings.current()
     injected = len(task.injected) > 0
     if floor is None and not injected:

@@ -21,12 +21,12 @@ SAMPLE_TIME = 50e-6
 
 @dataclass(frozen=True)
 class MoveTask:
-    """Pieces of the reference (see `friso.equations.reference`), shape (pieces, 1 + inputs), of a `form`; of runs with
-    moves of their own, shape (runs, pieces, 1 + inputs).
+    """The motion of runs as built: pieces of the reference and what happens meanwhile.
 
-    Further fields are its duration [s], and the injected force [N] every `injected_each` [s], shape (n,), empty for
-    none; the drive logs it unless it is `unknown` to it. The stage starts at rest where the reference does, but
-    displaced from it by `displacement` [m].
+    Pieces (see `friso.equations.reference`) have the shape (pieces, 1 + inputs) and a `form`; for runs with different
+    moves (runs, pieces, 1 + inputs). There are the duration [s], and the injected force [N] every `injected_each` [s],
+    shape (n,), empty for none; the drive logs it unless it is `unknown` to it. The stage starts at rest where the
+    reference does, or displaced from it by `displacement` [m].
     """
 
     pieces: np.ndarray
@@ -56,13 +56,18 @@ class MoveTask:
 
 
 def own_motion(stage: Stage) -> MoveTask:
-    """Return the motion of the stage file, at whose start the stage stands at 0 (or displaced
-    from there): the reference of a step has been there too, and leaves it after one sample of the drive."""
+    """Return the motion of the stage file, which starts at 0 or displaced from there.
+
+    The reference of a step starts there too, and leaves after one sample of the drive.
+    """
     return motion_task(stage.flat(), 1)
 
 
 def motion_task(flat: Mapping[str, Any], runs: int) -> MoveTask:
-    """Return the motions of stages given as flat keys, for the longest of their durations (see `own_motion`)."""
+    """Return the motions of stages given as flat keys (see `own_motion`).
+
+    They have the longest of their durations.
+    """
     several = motion.varies(flat)
     pieces = motion.pieces(flat, runs if several else 1)
     if pieces[:, 0, 1].any():
@@ -79,15 +84,17 @@ def standing(place: float, duration: float) -> MoveTask:
 
 
 def staircase(steps: Sequence[float], stands: float) -> MoveTask:
-    """Steps of the reference [m] from 0 on, one after the other, before and after each of which it stands for a time
-    [s]."""
+    """Return a reference of steps [m] from 0 on, standing for a time [s] around each."""
     places = np.cumsum([0.0, *steps])
     rows = [[number * stands, place, 0.0, 0.0] for number, place in enumerate(places)]
     return MoveTask(np.array(rows), stands * len(places))
 
 
 def legs(start: float, parts: Sequence[tuple[float, float]]) -> MoveTask:
-    """Constant velocities [m/s], each for a time [s], one after the other from a place [m]; 0 is a standstill."""
+    """Return a reference of constant velocities [m/s] in turn, each for a time [s].
+
+    It begins at a place [m]; a velocity of 0 is a standstill.
+    """
     times = np.cumsum([0.0, *(time for _, time in parts)])
     places = start + np.cumsum([0.0, *(velocity * time for velocity, time in parts)])
     rows = [[t, p, v, 0.0] for t, p, (v, _) in zip(times[:-1], places[:-1], parts, strict=True)]
@@ -95,8 +102,10 @@ def legs(start: float, parts: Sequence[tuple[float, float]]) -> MoveTask:
 
 
 def point_to_point(places: Sequence[float], acceleration: float, top_speed: float, stands: float) -> MoveTask:
-    """Moves from place to place [m] with bounded acceleration [m/s^2] and speed [m/s], after each of which the
-    reference stands for a time [s]."""
+    """Return a reference of moves from place to place [m], standing for a time [s] after each.
+
+    Acceleration [m/s^2] and speed [m/s] are bounded.
+    """
     rows, now = [[0.0, places[0], 0.0, 0.0]], stands
     for start, end in pairwise(places):
         travel, sign = abs(end - start), np.sign(end - start)

@@ -178,7 +178,7 @@ def test_simulation_agrees_where_hunting_ends() -> None:
 
 
 def sample(*values: float) -> dict[str, np.ndarray]:
-    """A sample of the locked sweep, as in docs/guideline_edges.csv."""
+    """A sample of the locked sweep, as in docs/evidence/guideline_edges.csv."""
     return {name: np.array([value]) for name, value in zip(sweeps.LOCKED_BOX, values, strict=True)}
 
 

@@ -13,7 +13,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Tableau:
-    """One method: rows of `a` and `c` for the stages after the first, nodes, time weights and dense output."""
+    """A Rosenbrock method: rows of `a` and `c`, nodes, time weights and dense output.
+
+    Rows are for the stages after the first.
+    """
 
     name: str
     order: int

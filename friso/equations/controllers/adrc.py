@@ -35,8 +35,10 @@ BANDWIDTH, OBSERVER_RATIO = "controller.bandwidth", "controller.observer_ratio"
 
 
 class _Parts(NamedTuple):
-    """An integral gain [N/(m s)], and a filter (lead s + proportional)/(d0 + d1 s + s^2): of the error [m] to a force
-    [N]."""
+    """The two parts of the controller, from the error [m] to a force [N].
+
+    They are an integral gain [N/(m s)] and a filter (lead s + proportional)/(d0 + d1 s + s^2).
+    """
 
     integral: Any
     lead: Any
@@ -46,8 +48,7 @@ class _Parts(NamedTuple):
 
 
 def _parts(blocks: Any) -> _Parts:
-    """Return the parts of the observer-based controller as blocks:
-    the integral and the filter beside it."""
+    """Return the integral gain and the filter of the controller, in terms of its keys."""
     from sympy import pi
 
     bandwidth, ratio, mass = map(blocks.key, ("bandwidth", "observer_ratio", "tuned_mass"))
@@ -141,8 +142,7 @@ class DisturbanceRejection(ControllerSection):
 
 
 def crossing_ratio(observer_ratio: float) -> float:
-    """Return the 0 dB crossover of the loop over the controller's bandwidth,
-    for a free mass that is known.
+    """Return the 0 dB crossover of the loop over `bandwidth`, for a free mass that is known.
 
     It depends only on the ratio of observer to feedback.
 

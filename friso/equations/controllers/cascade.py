@@ -128,8 +128,10 @@ class Cascade(ControllerSection):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """Return the integral in the other loop, pseudo-derivative feedback or none, feedforward,
-        and no integral."""
+        """Return other structures to try: integral in the other loop, feedforward, no integral.
+
+        Pseudo-derivative feedback, or none, is another.
+        """
         listed: dict[str, Mapping[str, Any]] = {}
         outer, inner = flat.get(POSITION_TIME), flat.get(VELOCITY_TIME)
         if inner and not outer:
@@ -193,8 +195,7 @@ class Cascade(ControllerSection):
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: CascadeTerms) -> Mapping[str, Signal]:
-        """Return the shares [N] of the position loop's command, of the velocity that opposes it,
-        of the velocity loop's integral, and of the feedforward."""
+        """Return the parts of the force [N]: position loop, velocity, integral, feedforward."""
         ahead = {name: blocks.key(name) for name in variant.feedforward}
         kv, kp = blocks.key("kv"), blocks.key("kp")
         with blocks.loop("position"):

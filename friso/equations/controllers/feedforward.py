@@ -32,8 +32,7 @@ def fed_forward(flat: Mapping[str, Any]) -> str:
 
 
 def feedforward_of_moves(flat: Mapping[str, Any], *names: str) -> dict[str, float]:
-    """Return keys and values [SI] of the feedforward that the moving mass and its viscous
-    friction need.
+    """Return the feedforward that moving mass and viscous friction need, by key [SI].
 
     Only those `names` are included that the controller lacks.
     """

@@ -120,8 +120,7 @@ class PidGains(Pid):
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Return the controller's keys and times and, if it is one,
-        the gains of a P over a PI controller."""
+        """Return the controller's gains and times and, if it is one, those of a P over PI loop."""
         kp, ki, kd = flat[KP], flat[KI], flat[KD]
         listed = [*super().gains(flat)]
         if ki and kp:
@@ -157,7 +156,7 @@ class PidGains(Pid):
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: Terms) -> Mapping[str, Signal]:
-        """Return the three shares [N] of Eq. 6, and that of the feedforward where there is any."""
+        """Return the three parts of the force [N] in Eq. 6, and the feedforward if there is any."""
         kp, ki, kd, tau = map(blocks.key, ("kp", "ki", "kd", "tau"))
         lag = tau if variant.filtered else None
         derivative = {

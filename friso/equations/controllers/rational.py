@@ -42,8 +42,11 @@ class TransferRoots(NamedTuple):
 
 
 class RationalTerms(NamedTuple):
-    """Terms that are present: the integral, the poles beside it, whether coefficients are for samples, and whether the
-    integral leaks."""
+    """Terms of the transfer function that are present.
+
+    They are the integral, the number of poles beside it, whether coefficients are for samples, and whether the
+    integral leaks.
+    """
 
     integral: bool
     order: int
@@ -52,7 +55,7 @@ class RationalTerms(NamedTuple):
 
 
 def _divides(flat: Mapping[str, Any]) -> Any:
-    """Tell whether the drive's samples divide those of the controller."""
+    """Tell whether the controller's sample time is a whole multiple of the drive's."""
     if SAMPLE_TIME not in flat or DRIVE_TIME not in flat:
         return True
     ratio = flat[SAMPLE_TIME] / flat[DRIVE_TIME]
@@ -94,7 +97,10 @@ class RationalController(ControllerSection):
 
     @classmethod
     def with_defaults(cls, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the coefficients of integral and sections, and the samples of a drive that tells none."""
+        """Return the flat keys with coefficients of integral and sections, and a drive's samples.
+
+        The sample time is added if the file has none for the drive.
+        """
         roots, times = cls.roots(flat), flat.get(SAMPLE_TIME)
         if times is None or not np.ndim(times):
             return {**_coefficients(roots, times), **_timing(flat)}
@@ -112,7 +118,7 @@ class RationalController(ControllerSection):
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
-        """Tell whether the transfer function has a pole at s = 0 (z = 1), or a lag that winds up as one does."""
+        """Tell whether the transfer function has a pole at s = 0 (z = 1), or a slow one like it."""
         return cls.key(f"{PARTS}.integral") in flat
 
     @classmethod
@@ -160,8 +166,11 @@ class RationalController(ControllerSection):
 
 
 def _timing(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the samples of the drive, where the controller alone tells them, and those of a controller that is
-    carried out less often than the drive's."""
+    """Return the keys of timing that follow from the controller's own sample time.
+
+    They are the drive's sample time if the file has none, or the period of a controller that runs less often than the
+    drive.
+    """
     if SAMPLE_TIME not in flat:
         return {}
     if DRIVE_TIME not in flat:
@@ -207,8 +216,11 @@ def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, 
 
 
 def _beside(leak: float, zeros: np.ndarray, poles: np.ndarray) -> tuple[float, float, np.ndarray]:
-    """Return k0, R(0) and the times of the zeros of R, where prod(1 + t s) of zeros over (s + leak) prod(1 + t s) of
-    poles is k0/(s + leak) + R(s)."""
+    """Split a transfer function with one slow pole into that pole's part and the rest.
+
+    Where prod(1 + t s) of zeros over (s + leak) prod(1 + t s) of poles is k0/(s + leak) + R(s), returns k0, R(0) and
+    the times t of the zeros of R.
+    """
     upper, lower = _expanded(zeros), _expanded(poles)
     at_the_pole = [np.polyval(part[::-1], -leak) for part in (upper, lower)]
     share = float(at_the_pole[0] / at_the_pole[1])
@@ -218,9 +230,10 @@ def _beside(leak: float, zeros: np.ndarray, poles: np.ndarray) -> tuple[float, f
 
 
 def _times(roots: TransferRoots, sample_time: float | None) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return zeros and poles as times t of factors 1 + t s, infinite for a pole at s = 0, and the gain before them.
+    """Return zeros and poles as times t of factors 1 + t s, and the gain before them.
 
-    A root r in z becomes, with z = (1 + s T/2)/(1 - s T/2), the factor (1 - r) + (1 + r) s T/2.
+    A pole at s = 0 has an infinite time. A root r in z becomes, with z = (1 + s T/2)/(1 - s T/2), the factor (1 - r) +
+    (1 + r) s T/2.
     """
     zeros, poles = np.asarray(roots.zeros, complex), np.asarray(roots.poles, complex)
     if sample_time is None:
@@ -258,7 +271,7 @@ def _expanded(times: np.ndarray) -> np.ndarray:
 
 
 def _sections(times: np.ndarray) -> list[tuple[float, float | None]]:
-    """Return coefficients of s and s^2 of factors of the second order; of an odd number the last has none of s^2."""
+    """Return coefficients of s and s^2 of second-order factors; an odd one out has no s^2."""
     pairs = sorted((t for t in times if t.imag > 1e-12 * abs(t)), key=abs, reverse=True)
     real = sorted((t.real for t in times if abs(t.imag) <= 1e-12 * abs(t)), key=abs, reverse=True)
     factors: list[tuple[float, float | None]] = [(2 * t.real, abs(t) ** 2) for t in pairs]
@@ -282,7 +295,10 @@ def _unstable(poles: np.ndarray, sample_time: float | None) -> InputError:
 
 
 def polynomial_roots(numerator: Sequence[float], denominator: Sequence[float]) -> TransferRoots:
-    """Return the roots of a quotient of polynomials, their highest powers first. Raises InputError."""
+    """Return the roots of a quotient of polynomials given by highest powers first.
+
+    Raises InputError.
+    """
     upper, lower = (np.trim_zeros(np.asarray(part, float), "f") for part in (numerator, denominator))
     if not upper.size or not lower.size:
         raise _wrong("coefficients that are all 0", "a transfer function")

@@ -70,16 +70,14 @@ class VanDijk(Pid):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """Return a PID by its gains, as large as those of the rules,
-        its derivative that of the measurement."""
+        """Return the other structure to try: the same gains, with the derivative of the measurement."""
         gone = dict.fromkeys((CROSSOVER, ALPHA, BETA, TUNED_MASS))
         written = {cls.key(name): value for name, value in as_gains(**numbers(flat)).items()}
         return {"derivative of the measurement": {**gone, **written, cls.key("derivative_on"): "measurement"}}
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Return the gains of Eq. 7 that follow from the controller's keys,
-        and the keys that every controller has."""
+        """Return the gains of Eq. 7 that follow from the keys, and the keys of every controller."""
         values = numbers(flat)
         times = {"tau_z": "lead", "tau_i": "integral", "tau_p": "low-pass, before all terms"}
         return (
@@ -126,8 +124,7 @@ class VanDijk(Pid):
 
 
 def controller_table(crossover: str) -> dict[str, Any]:
-    """Return the table [controller] of a stage file for a crossover such as "8 Hz";
-    alpha and beta as in the examples."""
+    """Return a [controller] table for a crossover such as "8 Hz", alpha and beta as in examples."""
     return {"kind": "pid", "crossover": crossover, "alpha": 0.1, "beta": 2}
 
 
@@ -149,8 +146,10 @@ def numbers(flat: Mapping[str, Any]) -> dict[str, float]:
 
 
 def as_gains(k_p: float, tau_z: float, tau_i: float, tau_p: float) -> dict[str, float]:
-    """Return the gains of Eq. 6 that are as large as those of the rules: kp [N/m],
-    ki [N/(m s)], kd [N s/m]; and tau [s]."""
+    """Convert van Dijk's gain and time constants to kp [N/m], ki [N/(m s)], kd [N s/m], tau [s].
+
+    These are the gains of Eq. 6 of the thesis.
+    """
     return {"kp": k_p * (1 + tau_z / tau_i), "ki": k_p / tau_i, "kd": k_p * tau_z, "tau": tau_p}
 
 

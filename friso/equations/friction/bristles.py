@@ -22,8 +22,11 @@ def bristle_friction(
     kinks: Sequence[Kink],
     sliding: Mapping[sp.Symbol, sp.Expr] | None = None,
 ) -> Friction:
-    """Friction of a bristle that deflects at `rate` [m/s]: F = sigma_0 z + sigma_1 z' + sigma_2 v. The first of the
-    `kinks` is that of the direction; `sliding` are states and modes of steady sliding, where they do not follow."""
+    """Return friction of a bristle that deflects at `rate` [m/s]: F = s0 z + s1 z' + s2 v.
+
+    s0, s1, s2 are stiffness, damping and viscous friction. The first of the `kinks` is the reversal of the velocity.
+    `sliding` holds states and modes in steady sliding, if they do not follow from the equations.
+    """
     from friso.equations.component import Component, Output, Role, State, key, state
 
     deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
@@ -39,8 +42,10 @@ def bristle_friction(
 
 
 def keeping_bristle(measured: MeasuredFriction, **shape: float) -> dict[str, Any]:
-    """Return keys of a law whose bristle is as stiff and damped as measured,
-    with those of the `shape` of its virgin curve."""
+    """Return keys of a law whose bristle is as stiff and damped as measured.
+
+    `shape` are keys of the shape of its virgin curve, which are added.
+    """
     return {
         **measured.levels.keys,
         "friction.bristle_stiffness": measured.stiffness,
@@ -50,9 +55,10 @@ def keeping_bristle(measured: MeasuredFriction, **shape: float) -> dict[str, Any
 
 
 def bristles_active(flat: Mapping[str, Any], softer: float = 1.0, power: str = "") -> str:
-    """Return the condition under which damped bristles on a Stribeck curve are passive,
-    where it is not met. Those bent most give way `softer` times as fast as LuGre's; `power` writes that in the
-    condition."""
+    """Return the condition of passivity that damped bristles do not meet; "" if they do.
+
+    The most bent bristles give way `softer` times as fast as in LuGre; `power` writes that in the condition.
+    """
     levels, damping = levels_under_conditions(flat), flat["friction.bristle_damping"]
     least = damping * (levels.static / levels.coulomb - 1) * softer
     viscous = levels.viscous * (1 - abs(levels.viscous_asymmetry))  # in the direction in which it damps less

@@ -36,12 +36,12 @@ LEVEL_WORDS = {"static": "Static friction", "coulomb": "Coulomb friction", "visc
 
 
 class Friction:
-    """A declared friction law: force [N] that opposes the velocity, its component and its scales.
+    """A declared friction law: the force [N] against the velocity, its component and scales.
 
     `breakaway` [N] is the largest force at rest, from which the solver takes its length scale. `sliding` gives the
-    law's own states, its modes that remember, and the sides of its other kinks than the direction, in a steady motion
-    at the velocity; without it they are those at which the states do not change. At rest all modes that remember have
-    been left.
+    law's own states, its modes with memory, and the sides of its kinks other than the direction, in a steady motion at
+    the velocity; without it they are those at which the states do not change. At rest all modes with memory have been
+    left.
     """
 
     def __init__(
@@ -54,8 +54,7 @@ class Friction:
         self.force, self.breakaway, self.component, self.sliding = force, breakaway, component, sliding
 
     def with_values(self, values: Mapping[Any, Any]) -> Friction:
-        """Return the law with expressions in the place of others,
-        but for its scales and its steady motion."""
+        """Return the law with some expressions replaced, except in its scales and steady motion."""
         part, force = self.component, cast(Any, self.force.xreplace(values))
         states = tuple(replace(x, derivative=x.derivative.xreplace(values)) for x in part.states)
         outputs = {name: replace(x, expression=x.expression.xreplace(values)) for name, x in part.outputs.items()}
@@ -65,9 +64,11 @@ class Friction:
         return Friction(force, self.breakaway, component, self.sliding)
 
     def slid(self) -> dict[sp.Symbol, sp.Expr]:
-        """Return the law's own states, and the sides of its kinks but the direction,
-        in a steady motion at the velocity. Raises ValueError where the law does not declare them and its rates are not
-        linear in its states."""
+        """Return the law's states, and the sides of its kinks, in steady motion at the velocity.
+
+        The side of the direction is left out. Raises ValueError if the law does not declare them and its rates are not
+        linear in its states.
+        """
         import sympy as sp
 
         from friso.equations.component import Switch
@@ -97,8 +98,10 @@ class Friction:
         return self.force.subs(slid).subs(side)
 
     def sides(self, states: Mapping[sp.Symbol, sp.Expr]) -> dict[Any, Any]:
-        """On which side of its kinks the law is in `states`: conditions, by the kinks' symbols; without the direction
-        of the motion and modes that remember."""
+        """Return on which side of its kinks the law is, as conditions on its `states`.
+
+        The direction of the motion and modes with memory are left out.
+        """
         from friso.equations.cases import Piecewise
         from friso.equations.component import Switch
 
@@ -115,9 +118,10 @@ def solve_linear(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) ->
 
 
 def direction(velocity: sp.Symbol, narrow: sp.Expr | None = None) -> Kink:
-    """Return the kink of every law that depends on the direction of the motion,
-    beyond which the velocity [m/s] is positive; shared with modules that prescribe a direction. About it friction may
-    have a peak that is `narrow` [m/s]."""
+    """Return the kink at which the velocity [m/s] changes its direction, which all laws share.
+
+    Beyond it the velocity is positive. Friction may have a peak about it that is `narrow` [m/s].
+    """
     from friso.equations.component import Kink
 
     return Kink(DIRECTION, velocity) if narrow is None else Kink(DIRECTION, velocity, narrow=narrow)
@@ -128,7 +132,7 @@ DIRECTION = "forward"
 
 
 def _is_direction(kink: Kink) -> bool:
-    """Tell whether a kink is that of the direction, at the guide or at the motor."""
+    """Tell whether a kink is the reversal of the velocity, at the guide or at the motor."""
     return kink.name.removeprefix(STATE_PREFIX) == DIRECTION
 
 
@@ -167,8 +171,10 @@ class StribeckSection(FrictionSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Any:
-        """Return what of the curve decides on its code:
-        the exponent where it is a small whole number, and asymmetries."""
+        """Return which form the code of the Stribeck curve takes.
+
+        It depends on the exponent, if that is a small whole number, and on asymmetries.
+        """
         exponent = float(flat["friction.stribeck_exponent"])
         return StribeckCurve(
             int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None,
@@ -179,7 +185,10 @@ class StribeckSection(FrictionSection):
 
 
 def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp.Expr:
-    """g(v) of Eq. 4 [N]: F_c + (F_s - F_c) exp(-abs(v/v_s)^j), smooth in v while the sign is held."""
+    """Return g(v) of Eq. 4 [N]: F_c + (F_s - F_c) exp(-abs(v/v_s)^j).
+
+    It is smooth in v while the sign is held.
+    """
     from sympy import exp
 
     from friso.equations.component import key

@@ -51,8 +51,10 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """One level of friction at all speeds, which no Stribeck velocity follows from, and no damping at rest but the
-        viscous."""
+        """Return measured quantities of Dahl's law: one level at all speeds.
+
+        It has no Stribeck velocity, and no damping at rest but the viscous.
+        """
         coulomb, stiffness = flat["friction.coulomb"], flat["friction.bristle_stiffness"]
         levels = Levels(coulomb, coulomb, NO_SPEED, 2.0, flat["friction.viscous"])
         displacement = virgin_displacements(coulomb, stiffness)

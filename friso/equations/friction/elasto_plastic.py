@@ -93,7 +93,7 @@ class ElastoPlastic(StribeckSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Bristles as stiff and damped as measured; the break-away deflection fits the virgin curve best."""
+        """Return bristles as measured, with the break-away deflection that fits best."""
         return keeping_bristle(measured, breakaway_deflection=best(*_break_away_candidates(measured)))
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {"elastic_share": (0.02, 0.5, 0.98)}
@@ -106,7 +106,7 @@ class ElastoPlastic(StribeckSection):
 
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
-        """Break-away deflections with which the virgin curve is hardly another."""
+        """Return the range of break-away deflections that the measured virgin curve allows."""
         return {"friction.breakaway_deflection": as_good(*_break_away_candidates(measured))}
 
     @staticmethod
@@ -116,8 +116,10 @@ class ElastoPlastic(StribeckSection):
 
 
 def _most(measured: MeasuredFriction) -> float:
-    """Return the break-away deflection [m] at which bristles hold Coulomb friction in the weaker
-    direction."""
+    """Return the break-away deflection [m] at which bristles hold Coulomb friction.
+
+    The weaker direction counts.
+    """
     levels = measured.levels
     return levels.coulomb * (1 - abs(levels.asymmetry)) / measured.stiffness
 
@@ -131,8 +133,10 @@ def _break_away_candidates(measured: MeasuredFriction) -> tuple[np.ndarray, np.n
 
 
 def virgin_force(static: float, stiffness: float, begins: float, displacement: np.ndarray) -> np.ndarray:
-    """Force [N] over displacement [m] from rest, both of shape (n,): dz/dx = 1 - alpha(z) z/z_max, z_max being
-    F_s/sigma_0, by quadrature of dx/dz."""
+    """Return the virgin curve, force [N] over displacement [m] from rest, both of shape (n,).
+
+    It solves dz/dx = 1 - alpha(z) z/z_max, with z_max = F_s/sigma_0, by quadrature of dx/dz.
+    """
     from scipy.integrate import cumulative_simpson
 
     most = static / stiffness

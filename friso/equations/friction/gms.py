@@ -52,8 +52,7 @@ FITTED, EVEN = 4, 1.5
 
 
 class Elements(NamedTuple):
-    """Choices on which the equations depend: the Stribeck curve, the number of elements,
-    and whether they are damped."""
+    """What the equations depend on: Stribeck curve, number of elements, and damping."""
 
     curve: StribeckCurve
     number: int
@@ -61,8 +60,10 @@ class Elements(NamedTuple):
 
 
 def _as_many(key: str, what: str, two: str) -> Rule:
-    """Return the rule that a list is as long as that of the stiffnesses;
-    `two` are values of two elements."""
+    """Return the rule that a list has one value for each element stiffness.
+
+    `two` is an example with two elements.
+    """
     example = f'element_stiffness = ["70 N/mm", "30 N/mm"], {key.removeprefix("friction.")} = {two}'
     return Rule(
         (STIFFNESS, key),
@@ -106,8 +107,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Any:
-        """Return what decides on the code: the curve, the number of elements,
-        and whether these are damped."""
+        """Return what the code depends on: the curve, the number of elements, and their damping."""
         return Elements(
             StribeckSection.variant(flat), len(element_keys(flat, STIFFNESS)), bool(element_keys(flat, DAMPING))
         )
@@ -165,9 +165,11 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Return the virgin curve as a polygon of its tangents:
-        the first stiffness and break-away are kept exactly. The attraction lets friction lag as LuGre's does at the
-        Stribeck velocity, s/C = g/(sigma_0 v_s)."""
+        """Return elements whose polygon approximates the virgin curve by tangents.
+
+        First stiffness and break-away are kept exactly. The attraction lets friction lag as in LuGre at the Stribeck
+        velocity, s/C = g/(sigma_0 v_s).
+        """
         return _elements_with(measured, *polygon(measured, elements)) | {
             "friction.attraction": measured.stiffness * measured.levels.stribeck_velocity
         }
@@ -180,8 +182,11 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """`FITTED` elements on the virgin curve of rolling friction, at even slopes, all but the first so many times
-        stiffer beside it; friction that lags so many times as long as LuGre's does at the Stribeck velocity."""
+        """Return `FITTED` elements on the virgin curve of rolling friction, at even slopes.
+
+        All but the first are stiffer by a factor in `shape`, and friction lags a further factor longer than in LuGre
+        at the Stribeck velocity.
+        """
         levels, stiffness = measured.levels, measured.stiffness
         way = virgin_displacements(levels.static, stiffness)
         curve = power_law(levels.static, stiffness, shape["rolling_exponent"], way)
@@ -202,8 +207,11 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Passive where static and Coulomb friction are the same: else a slip that slows down loads the elements
-        without a displacement, and they give that back as they are unloaded."""
+        """Return the condition of passivity that is not met: static equal to Coulomb friction.
+
+        Otherwise a slip that slows down loads the elements without a displacement, and they give that energy back when
+        they are unloaded.
+        """
         levels, stiffness, share = levels_under_conditions(flat), _elements(flat, STIFFNESS), _elements(flat, SHARE)
         gained = float((share**2 * (levels.static**2 - levels.coulomb**2) / (2 * stiffness)).sum())
         return (
@@ -212,8 +220,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
 
 def _elements_with(measured: MeasuredFriction, stiffness: np.ndarray, slips: np.ndarray) -> dict[str, Any]:
-    """Return the keys of elements by stiffness [N/m] and the deflection at which they slip [m],
-    of shape (elements,)."""
+    """Return the keys of elements by stiffness [N/m] and slip deflection [m], both (elements,)."""
     strength = stiffness * slips
     damped = {f"{DAMPING}.{n}": measured.damping * k / measured.stiffness for n, k in enumerate(stiffness, 1)}
     return {
@@ -237,9 +244,11 @@ POWERS = np.linspace(0.6, 4.0, 69)
 
 
 def polygon(measured: MeasuredFriction, elements: int) -> tuple[np.ndarray, np.ndarray]:
-    """Stiffness [N/m] and deflection at which it slips [m] of elements that together have the virgin curve, both of
-    shape (at most `elements`,): the curve itself if it is straight between so many points, else the polygon of tangents
-    at slopes spaced so that it is off the least."""
+    """Return stiffness [N/m] and slip deflection [m] of elements with the virgin curve.
+
+    Both have the shape (at most `elements`,). They give the curve itself if it is straight between so many points,
+    otherwise the polygon of tangents with the least error.
+    """
     slopes = np.append(np.diff(measured.force) / np.diff(measured.displacement), 0.0)
     corners = np.flatnonzero(-np.diff(slopes) > SAME * measured.stiffness)
     if len(corners) <= elements:
@@ -250,8 +259,10 @@ def polygon(measured: MeasuredFriction, elements: int) -> tuple[np.ndarray, np.n
 
 
 def _tangents(measured: MeasuredFriction, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the elements of the polygon of tangents with the slopes `levels`,
-    in units of the first stiffness, from 1 to 0."""
+    """Return the elements of the polygon of tangents whose slopes are `levels`.
+
+    They are in units of the first stiffness, from 1 to 0.
+    """
     slope = measured.stiffness * levels
     touched = np.interp(-slope, -measured.slope, measured.displacement)
     force = np.interp(touched, measured.displacement, measured.force)

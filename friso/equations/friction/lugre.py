@@ -62,5 +62,8 @@ class LuGre(StribeckSection):
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Passive where sigma_2 >= sigma_1 (F_s - F_c)/F_c (Barabanov, Ortega 2000, doi:10.1109/9.839944)."""
+        """Return the condition of passivity, sigma_2 >= sigma_1 (F_s - F_c)/F_c, if it is not met.
+
+        Barabanov, Ortega 2000, doi:10.1109/9.839944.
+        """
         return bristles_active(flat)

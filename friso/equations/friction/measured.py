@@ -40,9 +40,12 @@ class Levels:
 
 @dataclass(frozen=True)
 class MeasuredFriction:
-    """Friction as measurements show it: `levels` over speed; `stiffness` [N/m] and `damping` [N s/m] of small motions
-    at rest; and `force` [N] over `displacement` [m] from rest without load, slowly, both of shape (n,), from 0 on. No
-    stiffness, 0, is that of a law that does not stick."""
+    """Friction as measurements show it.
+
+    `levels` is steady friction over speed; `stiffness` [N/m] and `damping` [N s/m] are of small motions at rest;
+    `force` [N] over `displacement` [m], both of shape (n,), is the virgin curve, from rest without load. A stiffness
+    of 0 means that the law does not stick.
+    """
 
     levels: Levels
     stiffness: float
@@ -58,14 +61,19 @@ class MeasuredFriction:
         return np.minimum.accumulate(np.clip(slopes, 0.0, self.stiffness))
 
     def misfit(self, force: np.ndarray) -> float:
-        """Return how far another virgin curve [N], over the same displacements, is off at most,
-        as a share of static friction."""
+        """Return the largest deviation of another virgin curve [N], as a share of static friction.
+
+        Both have the same displacements.
+        """
         return float(np.max(np.abs(force - self.force)) / self.levels.static)
 
 
 def virgin_displacements(static: float, stiffness: float, corners: Sequence[float] | np.ndarray = ()) -> np.ndarray:
-    """Displacements [m] at which virgin curves are compared, shape (n,), the `corners` of one among them: to the last
-    of these, if that is far away."""
+    """Return displacements [m] at which to compare virgin curves, shape (n,).
+
+    They reach beyond break-away, or to the last of `corners` if that lies farther, and include all `corners`, the
+    displacements at which a curve made of straight pieces bends.
+    """
     usual, corners = static / stiffness * REACH, np.unique(np.append(0.0, corners))
     places = usual * np.linspace(0.0, 1.0, POINTS) ** 2
     if corners[-1] > usual:
@@ -76,8 +84,7 @@ def virgin_displacements(static: float, stiffness: float, corners: Sequence[floa
 
 
 def levels_of(flat: Mapping[str, Any]) -> Levels:
-    """Return the Stribeck curve of a law that has one, as it was measured:
-    without what [conditions] make of it."""
+    """Return the Stribeck curve of a law as it was measured, without [conditions]."""
     values = {field.name: flat.get(f"friction.{field.name}", field.default) for field in fields(Levels)}
     return Levels(**{name: float(value) for name, value in values.items()})
 
@@ -88,7 +95,7 @@ def levels_under_conditions(flat: Mapping[str, Any]) -> Levels:
 
 
 def on_bristles(flat: Mapping[str, Any], displacement: np.ndarray, force: np.ndarray) -> MeasuredFriction:
-    """Return measured quantities of a law with a Stribeck curve and bristles.
+    """Return what measurements would show of a law with a Stribeck curve and bristles.
 
     The bristles are as stiff and damped as those of LuGre, and give the virgin curve `force` [N] over `displacement`
     [m].
@@ -98,9 +105,11 @@ def on_bristles(flat: Mapping[str, Any], displacement: np.ndarray, force: np.nda
 
 
 def power_law(static: float, stiffness: float, exponent: float, displacement: np.ndarray) -> np.ndarray:
-    """Return a virgin curve whose slope falls by a power of the force that is lacking,
-    Dahl's exponent: force [N] over displacement [m] from rest, both of shape (n,). Below 1 it ends at static friction,
-    at 0 straight."""
+    """Return a virgin curve whose slope falls by a power of the missing force (Dahl's exponent).
+
+    It is force [N] over displacement [m] from rest, both of shape (n,). Below an exponent of 1 it ends at static
+    friction, at 0 it is straight.
+    """
     way, more = stiffness * displacement / static, exponent - 1
     lacking = np.exp(-way) if more == 0 else np.maximum(1 + more * way, 0.0) ** (-1 / more)
     return static * (1 - lacking)

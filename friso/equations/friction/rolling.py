@@ -97,7 +97,10 @@ class Rolling(StribeckSection):
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Passive where sigma_2 >= sigma_1 ((F_s - F_c)/F_c)^i: z' v >= -v^2 ((F_s - F_c)/F_c)^i; the power rounded."""
+        """Return the condition of passivity, sigma_2 >= sigma_1 ((F_s - F_c)/F_c)^i, if not met.
+
+        It follows from z' v >= -v^2 ((F_s - F_c)/F_c)^i, with the power rounded.
+        """
         levels, exponent = levels_under_conditions(flat), flat["friction.rolling_exponent"]
         softer = softening(levels.static / levels.coulomb - 1, exponent)
         return bristles_active(flat, softer, "" if exponent == 1 else f"^{exponent:g}")

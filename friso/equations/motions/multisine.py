@@ -66,7 +66,7 @@ class Multisine(Motion):
 
     @staticmethod
     def period(flat: Mapping[str, Any]) -> float | None:
-        """Return the time after which all tones repeat themselves [s]; None if that exceeds the duration."""
+        """Return the time [s] after which all sinusoids repeat; None if it exceeds the duration."""
         first, *others = (float(frequency) for frequency in _numbers(flat, FREQUENCY))
         most = max(1, int(first * flat[DURATION]))
         ratios = [Fraction(other / first).limit_denominator(most) for other in others]

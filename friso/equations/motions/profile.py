@@ -37,7 +37,10 @@ not_zero = Bound("not 0", lambda value: value != 0)
 
 
 class Plan(NamedTuple):
-    """A move of a distance [m]: widths of its averages [s], shape (order, ...), and the highest derivative [SI]."""
+    """A planned move of a distance [m].
+
+    `widths` are the widths of its averages [s], shape (order, ...), and `top` is its highest derivative [SI].
+    """
 
     distance: Any
     widths: np.ndarray
@@ -55,7 +58,10 @@ class Plan(NamedTuple):
 
 
 def plan(distance: Any, limits: Sequence[Any]) -> Plan:
-    """Plan a move of a distance [m] within limits of velocity, acceleration and so on [SI], numbers or arrays."""
+    """Plan a move of a distance [m] within limits of velocity, acceleration and so on [SI].
+
+    Limits may be numbers or arrays.
+    """
     peaks = np.broadcast_arrays(np.abs(distance), *limits)
     order = len(limits)
     widths: list[Any] = []
@@ -84,10 +90,10 @@ def _widest(product_of_widths: Any, further: int, inner: Any) -> Any:
 
 
 def corners(move: Plan, start: Any, position: Any) -> list[Piece]:
-    """Return the pieces of a move that begins at a time [s] and a position [m]; some may last no time at all.
+    """Return the pieces of a move that begins at a time [s] and a position [m].
 
-    The highest derivative changes where a subset of the widths has passed. The second half mirrors the first, so that
-    the move ends exactly where it should, at rest.
+    Some pieces may have no duration. The highest derivative changes where a subset of the widths has passed. The
+    second half mirrors the first, so that the move ends exactly at its target, at rest.
     """
     order = len(move.widths)
     choices = np.array(list(product((0, 1), repeat=order)))

@@ -55,7 +55,7 @@ class ThereAndBack(Motion):
 
     @staticmethod
     def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
-        """Return the pieces of the motion there and back: time, position, velocity and acceleration at each corner."""
+        """Return the pieces of a move there and back: time, position, velocity, acceleration."""
         a, ramp, back = (flat[key] for key in (ACCELERATION, TIME, RETURN))
         size, top, cruise = ThereAndBack.motion_size(flat), a * ramp, flat.get(CRUISE)
         if cruise is not None:
@@ -92,7 +92,7 @@ class ThereAndBack(Motion):
 
     @staticmethod
     def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:
-        """Return ranges of acceleration and acceleration time; the move there ends before the stage returns."""
+        """Return ranges of acceleration and its time in which the move ends before it returns."""
         least, most = shares
         acceleration, time = flat[ACCELERATION], flat[TIME]
         if not acceleration * time:

@@ -66,10 +66,12 @@ def single_harmonic(
     frequencies: Sequence[float] | np.ndarray = FREQUENCIES,
     rtol: float = RTOL,
 ) -> Balance:
-    """Solve the balance of a stage with friction, within a grid of amplitudes [m] of the cart and frequencies [Hz],
-    each in ascending order; more frequencies are put between those from one to the next of which the loop turns by a
-    right angle or more. Two solutions in one cell escape it. Raises InputError for a stage without friction and for a
-    grid that is not usable."""
+    """Solve the single-harmonic balance of a stage with friction on a grid.
+
+    The grid has amplitudes [m] of the cart and frequencies [Hz], each ascending. More frequencies are added where the
+    loop turns by a right angle or more from one to the next. Two solutions in one cell are missed. Raises InputError
+    for a stage without friction and for a grid that is not usable.
+    """
     settings = FrequencySettings.current()
     loop = _Loop(stage, checked_rtol(rtol))
     sizes = checked_positive("amplitudes", amplitudes, "1e-5 m, 1e-4 m")
@@ -90,9 +92,11 @@ def single_harmonic(
 
 
 def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how often a complex function on a grid turns round zero along the edges of each
-    cell: its zeros inside, those at which it is mirrored counted as -1; and whether that is unknown (and given as 0),
-    for a corner that is NaN."""
+    """Return how often a complex function turns round zero along the edges of each cell.
+
+    This counts the zeros inside, with -1 for those at which it is mirrored. The second result marks cells for which it
+    is unknown, because a corner is NaN; the first is 0 there.
+    """
     along = np.angle(left[1:] * np.conj(left[:-1]))
     across = np.angle(left[:, 1:] * np.conj(left[:, :-1]))
     turns = (along[:, :-1] + across[1:] - along[:, 1:] - across[:-1]) / (2 * np.pi)
@@ -101,8 +105,7 @@ def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _near(axes: tuple[np.ndarray, np.ndarray], cells: np.ndarray, solutions: np.ndarray) -> np.ndarray:
-    """Tell whether places (2, count) are inside their cells (count, 2),
-    or inside one next to them."""
+    """Tell whether places (2, count) lie in their cells (count, 2), or in one next to them."""
     near = np.ones(len(cells), bool)
     for axis, cell, place in zip(axes, cells.T, solutions, strict=True):
         low, high = axis[np.maximum(cell - 1, 0)], axis[np.minimum(cell + 2, len(axis) - 1)]
@@ -126,7 +129,7 @@ class _Loop:
         return stiffness - loop, np.abs(stiffness - loop) / (np.abs(stiffness) + np.abs(loop))
 
     def refined(self, frequencies: np.ndarray) -> np.ndarray:
-        """Frequencies [Hz] with more between them, from one to the next of which the loop turns by less than TURN."""
+        """Return frequencies [Hz] with more inserted where the loop turns by TURN or more."""
         settings = FrequencySettings.current()
         for _ in range(settings.grid_halvings):
             logs, share = np.log(frequencies), np.linspace(0, 1, WITHIN + 1)

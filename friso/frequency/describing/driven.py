@@ -26,8 +26,11 @@ LIMITS = (1e-18, 1e18)
 
 @dataclass(frozen=True)
 class DrivenPlant:
-    """A plant at some frequencies [Hz] (frequencies,), with its compliances without friction [m/N], complex, shape
-    (frequencies, 2, 2): positions of stage and cart for forces on stage and cart."""
+    """A plant at some frequencies [Hz], shape (frequencies,), without its friction.
+
+    `compliances` [m/N], complex, shape (frequencies, 2, 2), are positions of stage and cart for forces on stage and
+    cart.
+    """
 
     flat: Mapping[str, Any]
     frequencies: np.ndarray
@@ -41,8 +44,7 @@ class DrivenPlant:
         return cls(flat, frequencies, compliances, rtol)
 
     def answer(self, amplitudes: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the forces [N] that move the cart by amplitudes [m] at the frequencies with these
-        numbers.
+        """Return the forces [N] that move the cart by amplitudes [m] at numbered frequencies.
 
         Also returns the positions of stage and cart over the forces [m/N], complex, and the dynamic stiffness of
         friction [N/m], each of shape (count,).
@@ -67,8 +69,11 @@ class DrivenPlant:
         )
 
     def ends(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes [m] that need less than each of `forces` at each frequency, and more, shape (forces, frequencies):
-        well beyond those of a stuck and of a free cart, whatever the other forces are."""
+        """Return amplitudes [m] that need less and more than each force at each frequency.
+
+        Both have the shape (forces, frequencies). They lie well beyond the amplitudes of a stuck and of a free cart,
+        and do not depend on which other forces are asked for.
+        """
         settings = FrequencySettings.current()
         rows, shape = np.arange(len(self.frequencies)), (len(forces), len(self.frequencies))
         with np.errstate(over="ignore"):
@@ -86,7 +91,10 @@ class DrivenPlant:
         return self._extended(low, forces, -1), self._extended(high, forces, 1)
 
     def _extended(self, amplitudes: np.ndarray, forces: np.ndarray, side: int) -> np.ndarray:
-        """Amplitudes moved down (side -1) or up (1) until their forces lie on that side of the ones asked for."""
+        """Return amplitudes moved until their forces lie below or above those asked for.
+
+        Side -1 moves them down, side 1 up.
+        """
         settings = FrequencySettings.current()
         amplitudes = np.clip(amplitudes, *LIMITS)
         force, frequency = (indices.ravel() for indices in np.indices(amplitudes.shape))
@@ -100,11 +108,10 @@ class DrivenPlant:
         return amplitudes
 
     def grid(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return amplitudes [m] with their forces [N] on a grid, both of shape (frequencies,
-        points).
+        """Return amplitudes [m] with their forces [N] on a grid, both (frequencies, points).
 
-        The third result, shape (forces, frequencies, points - 1), marks the cells in which a root for a force is looked
-        for.
+        The third result, shape (forces, frequencies, points - 1), marks the cells in which a root for a force is
+        sought.
         """
         settings = FrequencySettings.current()
         low, high = self.ends(forces)
@@ -122,9 +129,12 @@ class DrivenPlant:
 
 @dataclass(frozen=True)
 class Roots:
-    """Amplitudes [m] of the cart, each with the numbers of its force and frequency; whether the force rises with the
-    amplitude there, and the relative error of the force that is left; all of shape (count,). `unknown`, of shape
-    (forces, frequencies), is whether friction was not found at some amplitude at which a root may be."""
+    """Amplitudes [m] of the cart at which a force and a frequency are balanced, shape (count,).
+
+    `force` and `frequency` are their indices. Also whether the force rises with the amplitude, and the relative error
+    left. `unknown`, of shape (forces, frequencies), tells whether friction was not found at some amplitude at which a
+    root may be.
+    """
 
     force: np.ndarray
     frequency: np.ndarray
@@ -152,8 +162,11 @@ def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
 
 
 def _illinois(function: Any, ends: tuple[np.ndarray, ...], values: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-    """Zeros of many functions between ends at which they have these values of opposite sign, and what is left there:
-    the secant of the bracket, with the value of an end that stays halved (Illinois)."""
+    """Return zeros of many functions between ends with values of opposite sign.
+
+    Also returns what is left there. The method takes the secant of the bracket and halves the value of an end that
+    stays (Illinois).
+    """
     settings = FrequencySettings.current()
     (low, high), (f_low, f_high) = (end.copy() for end in ends), (value.copy() for value in values)
     best, left = low.copy(), np.full(len(low), np.inf)

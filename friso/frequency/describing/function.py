@@ -38,8 +38,11 @@ NOT_RUN = "a run was not completed: loosen rtol"
 def dynamic_stiffness(
     flat: Mapping[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float = RTOL
 ) -> np.ndarray:
-    """N = F_1/A [N/m], complex, of friction at amplitudes [m] and frequencies [Hz], all of shape (count,); NaN where no
-    steady state was found. The friction keys of `flat` may be arrays of that shape, too."""
+    """Return the dynamic stiffness N = F_1/A [N/m], complex, of friction, shape (count,).
+
+    Amplitudes [m] and frequencies [Hz] have the same shape; friction keys of `flat` may, too. NaN if no steady state
+    was found.
+    """
     if not len(amplitudes):
         return np.empty(0, complex)
     friction = Imposition.of(flat, amplitudes, frequencies, rtol)
@@ -135,10 +138,10 @@ def checked_positive(name: str, values: Sequence[float] | np.ndarray, example: s
 
 
 def _harmonics(friction: Imposition, inner: np.ndarray, count: int, samples: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return harmonics 0 to `count` of the force [N], shape (runs, count + 1),
-    from periodic states of the law.
+    """Return harmonics 0 to `count` of the force [N], shape (runs, count + 1).
 
-    The second result, shape (runs,), is the error of the first harmonic if it is sampled.
+    They follow from periodic states of the law. The second result, shape (runs,), is the error of the first harmonic
+    if it is sampled.
     """
     share, _ = share_of_period(friction)
     force = np.full((friction.count, count + 1), 0.0 if share < 1 else np.nan, complex)

@@ -21,10 +21,10 @@ TOUCHES = "the joint deflects beyond its stroke: the limiter, which this answer 
 
 
 def receptance(flat: Mapping[str, Any], frequencies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions of cart and stage per friction force on the cart [m/N], complex,
-    shape (frequencies,).
+    """Return positions of cart and stage per friction force on the cart [m/N], complex.
 
-    The frequencies are in [Hz]. The reference rests, the limiter is not touched and the force is not limited.
+    Frequencies [Hz] and results have the shape (frequencies,). The reference rests, the limiter is not touched and the
+    force is not limited.
     """
     loop = _loop(shared_structure(flat).standing).at(flat, 1)
     (answer,) = loop.take((FORCE,), (CART, STAGE)).at(2j * np.pi * frequencies)
@@ -44,7 +44,6 @@ def _loop(form: Structure) -> Declared:
 
 
 def beyond_stroke(flat: Mapping[str, Any], deflections: np.ndarray) -> np.ndarray:
-    """Tell whether the limiter would be touched at largest deflections [m] of the joint,
-    of their shape."""
+    """Tell whether the limiter would be touched at largest joint deflections [m]."""
     free = "joint.stroke" in flat and not flat["joint.locked"]
     return deflections > flat["joint.stroke"] if free else np.zeros(np.shape(deflections), bool)

@@ -23,9 +23,12 @@ DONE, REST, OPEN = "done", "only the rest at the reference was found", "no serie
 
 @dataclass(frozen=True)
 class HarmonicSeries:
-    """A periodic motion: harmonics of cart and stage [m], complex, at `orders` of the angular frequency [rad/s], of
-    position = Re(sum of harmonic exp(i order omega t)); the `step` that Newton's method took last, as a share of the
-    known amplitude, and the `status`: what is in it is a motion only if that is "done"."""
+    """A periodic motion by its harmonics, as found by Newton's method.
+
+    `cart` and `stage` [m], complex, are harmonics at `orders` of the angular frequency [rad/s]: position = Re(sum of
+    harmonic exp(i order omega t)). `step` is the last step of the method, as a share of the known amplitude. It is a
+    motion only if `status` is "done".
+    """
 
     orders: np.ndarray
     cart: np.ndarray
@@ -134,8 +137,11 @@ def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> s
 
 @dataclass(frozen=True)
 class _Problem:
-    """The equations X_k = R(k omega) F_k(X, omega) in real numbers: real and imaginary parts of the harmonics over the
-    length, and the logarithm of omega over the known one; the phase is held against a shift of the known motion."""
+    """The equations X_k = R(k omega) F_k(X, omega) of harmonic balance, in real numbers.
+
+    Unknowns are real and imaginary parts of the harmonics over the length, and the logarithm of omega over the known
+    one; the phase is held against a shift of the known motion.
+    """
 
     flat: Mapping[str, Any]
     law: OneStateLaw
@@ -158,7 +164,7 @@ class _Problem:
         return receptance(self.flat, self.basis.orders * speed / (2 * np.pi))[0]
 
     def residual(self, state: np.ndarray) -> np.ndarray:
-        """Return the residuals of the equations; the last is that of the phase."""
+        """Return the residuals of the equations; the last one is the condition on the phase."""
         cart, speed = self.split(state)
         force = self.basis.harmonics(self.answer(state).force[:, None])[:, 0]
         left = (cart - self.receptances(speed) * force) / self.length

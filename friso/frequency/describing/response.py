@@ -98,8 +98,10 @@ def _words(unit: str, text: str) -> dict[str, str]:
 
 
 def _branches(branch_points: Roots, shape: tuple[int, int]) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-    """Return the place of every root: force, frequency and number among those there,
-    by rising amplitude; and how many."""
+    """Return the indices of every root, and the number of roots in each cell.
+
+    Indices are force, frequency, and rank by rising amplitude.
+    """
     cell = branch_points.force * shape[1] + branch_points.frequency
     count = np.bincount(cell, minlength=shape[0] * shape[1])
     order = np.lexsort((branch_points.amplitude, cell))
@@ -116,17 +118,21 @@ def _spread(values: np.ndarray, place: tuple[np.ndarray, ...], shape: tuple[int,
 
 
 def _on_branch(branches: dict[str, np.ndarray], order: int) -> np.ndarray:
-    """Return the response [m/N] that shows, shape (forces, frequencies),
-    NaN where no branch lasts."""
+    """Return the response [m/N] that an analyser shows, shape (forces, frequencies).
+
+    NaN if no branch is stable.
+    """
     chosen = _followed(branches["amplitude"], branches["lasting"], order)[:, :, None]
     answer, lasting = (np.take_along_axis(branches[name], chosen, axis=2)[:, :, 0] for name in ("response", "lasting"))
     return np.where(lasting == 1, answer, np.nan)
 
 
 def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.ndarray:
-    """Return the number of the branch that shows at every frequency,
-    stepping up (order 1) or down (-1), shape (forces, frequencies): the lasting one that is nearest in amplitude to the
-    one before, the least at the start."""
+    """Return the branch that an analyser shows at every frequency, (forces, frequencies).
+
+    It steps up (order 1) or down (-1). It shows the stable branch nearest in amplitude to the one before; at the
+    start, the smallest.
+    """
     sizes = np.where(lasting == 1, np.log(amplitudes), np.inf)
     chosen = np.zeros(sizes.shape[:2], np.int64)
     before = np.full(len(sizes), -np.inf)

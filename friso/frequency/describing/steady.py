@@ -28,8 +28,11 @@ RTOL = 1e-9
 
 @dataclass(frozen=True)
 class Imposition:
-    """Friction laws of one form, each under a motion of its own: flat keys to SI numbers or arrays of shape (count,),
-    with the amplitude under "motion.displacement" [m] and the frequency under "imposed.frequency" [Hz]."""
+    """Friction laws of one form, each under its own sinusoidal motion.
+
+    `flat` holds SI numbers or arrays of shape (count,), with the amplitude under "motion.displacement" [m] and the
+    frequency under "imposed.frequency" [Hz].
+    """
 
     flat: Mapping[str, Any]
     count: int
@@ -37,8 +40,7 @@ class Imposition:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float) -> Imposition:
-        """Return the friction of stages at amplitudes [m] and frequencies [Hz],
-        both of shape (count,)."""
+        """Return the friction of stages at amplitudes [m] and frequencies [Hz], both (count,)."""
         friction = {key: value for key, value in flat.items() if key.startswith("friction.")}
         motion = {"motion.kind": "release", "motion.displacement": amplitudes, "motion.duration": 1.0}
         return cls({**friction, **motion, FREQUENCY: frequencies}, len(amplitudes), rtol)
@@ -65,8 +67,7 @@ class Imposition:
 
     @cached_property
     def symmetric(self) -> bool:
-        """Tell whether the force is odd: the mirror image of every motion has the mirrored force;
-        tried at random states."""
+        """Tell whether mirrored motions have mirrored forces, tried at random states."""
         states = np.random.default_rng(0).normal(size=(8, *self.scales.shape)) * self.scales
         pairs = ((self._reaction(states_of.T), self._reaction(-states_of.T)) for states_of in states)
         return all(bool(np.all(np.abs(a + b) <= 1e-9 * np.abs(a))) for a, b in pairs)
@@ -91,7 +92,10 @@ class Imposition:
         return Imposition(flat, len(numbers), self.rtol)
 
     def run(self, inner: np.ndarray, share: float, samples: int = 0) -> Iterator[tuple[np.ndarray, Results]]:
-        """Follow a share of a period from the law's own states (count, inner), with so many samples per period."""
+        """Follow a share of a period from the law's own states (count, inner).
+
+        There are `samples` per period.
+        """
         settings = FrequencySettings.current()
         starts = np.zeros((self.count, len(self.kernel.states)))
         starts[:, self.kernel.position] = self.flat["motion.displacement"]
@@ -147,8 +151,7 @@ def steady(friction: Imposition) -> PeriodicStates:
 
 
 def share_of_period(friction: Imposition) -> tuple[float, float]:
-    """Return how much of a period has to be followed,
-    and the sign with which the law's states come back."""
+    """Return which part of a period must be followed, and the sign of the states after it."""
     return (0.5, -1.0) if friction.symmetric else (1.0, 1.0)
 
 

@@ -28,8 +28,7 @@ from friso.stage.tables import friction_law
 
 @dataclass(frozen=True)
 class OneStateLaw:
-    """A friction law with at most one state of its own, z, as functions of parameters,
-    velocity and z.
+    """A friction law with at most one state z, as functions of parameters, velocity and z.
 
     They give the rate of z and the force, each with its derivatives by z and velocity.
     """
@@ -41,15 +40,19 @@ class OneStateLaw:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> OneStateLaw:
-        """Return the law of a stage. Raises InputError for a stage without friction,
-        or a law with more states or with modes that remember."""
+        """Return the law of a stage.
+
+        Raises InputError for a stage without friction, or a law with more states or with modes that remember.
+        """
         form = imposed_form(flat)
         function, names, remembers = _compiled(form)
         return cls({name: flat[name] for name in names}, function, names, remembers)
 
     def at(self, velocity: np.ndarray, z: np.ndarray) -> list[np.ndarray]:
-        """Rate, its derivatives by z and by velocity, force [N], its derivatives by the same, at velocities [m/s] and
-        states."""
+        """Return rate and force [N] at velocities [m/s] and states, each with its derivatives.
+
+        Derivatives are by z and by velocity.
+        """
         values = self.function(velocity, z, (velocity > 0).astype(float), *self.values.values())
         return [np.broadcast_to(np.asarray(value, dtype=float), velocity.shape) for value in values]
 
@@ -78,8 +81,10 @@ def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...],
 
 @dataclass(frozen=True)
 class FrictionAnswer:
-    """Friction force [N] at the middles of the intervals (M,), and what its derivative by the velocities there is made
-    of: see `along`."""
+    """Friction force [N] at the middles of intervals (M,), and the parts of its derivative.
+
+    The derivative is by the velocities there: see `along`.
+    """
 
     force: np.ndarray
     by_velocity: np.ndarray
@@ -120,8 +125,7 @@ def _middles(z: np.ndarray) -> np.ndarray:
 
 
 def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> FrictionAnswer:
-    """Return the friction on a motion with velocities [m/s] at the middles (M,) of intervals
-    [s].
+    """Return the friction on a motion with velocities [m/s] (M,) in the middle of intervals [s].
 
     After the intervals the motion comes back (sign 1) or comes to its mirror image (-1).
     """

@@ -267,8 +267,7 @@ class Survey:
         return np.flatnonzero(swinging & ~self._known_to_attract(owners, ends))
 
     def _within_budget(self, swinging: np.ndarray, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return the runs, of those numbered `swinging`,
-        whose stages have steps left after this round."""
+        """Return the swinging runs whose stages have steps left after this round."""
         np.subtract.at(self.left, owners, ends.steps)
         spent = self.left[owners[swinging]] <= 0
         self.unknown[owners[swinging[spent]]] = True

@@ -110,7 +110,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress
 def each_once(
     special: Sequence[Sequence[LocatedPoint]], hundredth: Callable[[float], float]
 ) -> tuple[tuple[LocatedPoint, ...], ...]:
-    """Merge special points that are one: keep the first of those within each other's errors.
+    """Merge special points that are the same within their errors, and keep the first of each.
 
     Points of several branches also merge if they are close in terms of `hundredth`, the length over which the key
     changes by a hundredth. Where a limiter chatters, multipliers scatter, and cycles are followed over short,

@@ -25,9 +25,9 @@ ALONG = np.array([1.0, 0.0, 0.0])
 class LocatedPoint:
     """A point at which a branch loses or gains stability.
 
-    `direction` is that of the branch there. `error` is the error of the place: the rest left by the search, and the
-    change at a hundredth of the tolerance. With a limiter that chatters it is the reserve of `smoothed` or `turned`.
-    `slope` is the change of the multiplier along the direction.
+    `direction` is the direction of the branch there. `error` is the error of the place: the residual of the search,
+    and the change when the tolerance is a hundredth. With a limiter that chatters it is the reserve of `smoothed` or
+    `turned`. `slope` is the change of the multiplier along the direction.
     """
 
     kind: Bifurcation

@@ -103,10 +103,10 @@ def close(
 
 @dataclass(frozen=True)
 class Border:
-    """A plane for each orbit in the space of its place and the logarithms of its distance [m]
-    and time [s].
+    """A plane for each branch, on which its next orbit is sought to follow it around folds.
 
-    The orbit lies on it if normal @ (place, log distance, log time) = level; shapes (count, 3) and (count,).
+    Its space is that of the place along the branch, log distance [m] and log time [s]. An orbit lies on it if normal @
+    (place, log distance, log time) = level; shapes (count, 3) and (count,).
     """
 
     normal: np.ndarray
@@ -336,8 +336,10 @@ class _Following(_Shooting):
         self.jacobians[which, -1, -1] = along
 
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
-        """Return Jacobians by states, time and place; where a limiter chatters,
-        the column of the place is kept while gaps shrink."""
+        """Return Jacobians by states, time and place along the branch.
+
+        Where a limiter chatters, the column of the place is kept as long as the closing gap shrinks.
+        """
         settings = OrbitSettings.current()
         self.jacobians[which, :-1, :-1] = super()._jacobians(which, stages, shot)
         gaps = np.max(np.abs(shot.ends - self.states[which]) / stages.scales, axis=1)

@@ -185,8 +185,10 @@ def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: in
 
 
 def gaps(landing_map: LandingMap) -> np.ndarray:
-    """Return signed distances in the middle of gaps between points that are too wide,
-    the worst first."""
+    """Return the distances at which the map needs a further point, the widest gap first.
+
+    They lie in the middle of gaps that are too wide, and have the sign of their side.
+    """
     settings = ReturnMapSettings.current()
     places, excess = [], []
     for side in landing_map.sides:
@@ -228,8 +230,10 @@ def unclosed(landing_map: LandingMap) -> list[int]:
 
 
 def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[float]:
-    """Return starts half-way from some runs to their neighbours; `starts` ascend,
-    `numbers` are those of their runs."""
+    """Return starts half-way between some runs and their neighbours.
+
+    `starts` ascend, and `numbers` are the runs that they belong to.
+    """
     between = []
     for run in runs:
         for k in np.flatnonzero(numbers == run):

@@ -20,10 +20,11 @@ MEDIAN = 1.25
 
 
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
-    """Read the friction at which motions begin off the log, and compare it with the fitted static friction.
+    """Compare the friction at which motions begin with the fitted static friction.
 
-    A stage that follows a log shows friction while it moves, and the Stribeck curve leads from there to standstill: of
-    a body that sticks by another law, or by a curve with another exponent, it leads to a static friction too low.
+    A stage that follows a log shows friction while it moves, and the Stribeck curve leads from there to standstill.
+    For a body that sticks by another law, or by a curve with another exponent, the curve leads to a static friction
+    that is too low.
     """
     if is_free(case.flat) or (case.fit.problem.closed and case.fit.explains(case.quality.noise)):
         return
@@ -38,7 +39,7 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
 
 
 def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramps: Ramps) -> float | None:
-    """Return the friction [N] with which motions begin, where it is beyond the interval of static friction."""
+    """Return the friction [N] at which motions begin, if it exceeds the interval of static friction."""
     static = determined.get("friction.static")
     sides = [side for _, side in by_direction(ramps.directions)]
     if static is None or len(ramps.forces) < ReadingSettings.current().fewest_ramps:
@@ -56,7 +57,7 @@ def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramp
 
 
 def _rises(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
-    """Return by how much [N] friction at speeds up to these [m/s], shape (n,), exceeds static friction at most."""
+    """Return how far friction may exceed static friction [N] at up to these speeds [m/s], (n,)."""
     static, coulomb = flat["friction.static"], flat["friction.coulomb"]
     up_to = np.linspace(0, 1, DoubtSettings.current().speeds_of_a_start)[:, None] * speeds
     exponent = flat.get("friction.stribeck_exponent", 2.0)

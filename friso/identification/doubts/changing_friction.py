@@ -21,10 +21,10 @@ from friso.identification.settings import DoubtSettings
 
 @dataclass(frozen=True)
 class RecordDrift:
-    """How far fitted numbers would move, shape (free,), if constant force and friction could change along the record.
+    """How far fitted numbers move, (free,), if friction and a constant force may change.
 
-    `friction` and `constant` [N] are the changes over the record; their reaches [N] are how far they come from their
-    means.
+    `friction` and `constant` [N] are the changes over the record; their reaches [N] are how far they deviate from
+    their means.
     """
 
     moved: np.ndarray
@@ -59,9 +59,9 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | None:
-    """Return what changes during a record, of the smooth `velocity` [m/s], shape (n,); None where nothing clearly does.
+    """Return what changes during a record, from its smooth `velocity` [m/s], shape (n,).
 
-    The changes are fitted together with the parameters, about the fit.
+    The changes are fitted together with the parameters, starting from the fit. None if nothing clearly changes.
     """
     if "friction.coulomb" not in [parameter.name for parameter in fit.problem.parameters]:
         return None
@@ -72,10 +72,10 @@ def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | 
 def changing_forces(
     fit: OutputErrorFit, velocity: np.ndarray
 ) -> tuple[list[np.ndarray], list[float], list[np.ndarray]]:
-    """Return forces of friction and of a constant force that change along a record of a velocity [m/s], shape (n,).
+    """Return forces of friction and of a constant force that change along a record, (n,) each.
 
-    Either may follow a line over each half of the record. Also returns the sizes [N] at which they are tried, and the
-    bends of these lines.
+    `velocity` [m/s] is that of the record. Each force may follow a straight line over either half of the record. Also
+    returns the sizes [N] at which they are tried, and the shapes of these lines.
     """
     settings = DoubtSettings.current()
     way = np.clip(velocity / (settings.speed_share_of_creeping * np.abs(velocity).max()), -1.0, 1.0)
@@ -86,7 +86,7 @@ def changing_forces(
 
 
 def changes_beside(inverse: InverseModel) -> RecordDrift | None:
-    """Return what changes during the record of an inverse model, of one friction for both directions."""
+    """Return what changes during the record of an inverse model with one friction for both directions."""
     share = (inverse.time - inverse.time[0]) / np.ptp(inverse.time)
     counted = np.ones(len(share))
     bends = _bends(share, counted)
@@ -95,8 +95,10 @@ def changes_beside(inverse: InverseModel) -> RecordDrift | None:
 
 
 def _bends(share: np.ndarray, counted: np.ndarray) -> list[np.ndarray]:
-    """Return lines with a bend, less their means, at shares of a record's time, shape (n,): up to 1 in its middle and
-    down again, and up to 1 from its middle to its end."""
+    """Return two shapes of change along a record, less their means, at shares of its time, (n,).
+
+    One rises to 1 in the middle and falls again; the other rises to 1 from the middle to the end.
+    """
     shapes = 1 - np.abs(2 * share - 1), np.maximum(2 * share - 1, 0.0)
     return [shape - np.average(shape, weights=counted) for shape in shapes]
 
@@ -111,7 +113,10 @@ def _drift(explained: ExplainedResidual | None, bends: Sequence[np.ndarray]) -> 
 
 
 def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
-    """Return the fit with deviations that reach as far as what changes would move it, and over the change itself."""
+    """Return the fit with deviations widened for changes of friction and of the constant force.
+
+    They reach as far as the changes would move the fit, and over the change itself.
+    """
     further = np.abs(changes.moved)
     for i, number in enumerate(fit.free):
         name = fit.problem.parameters[number].name
@@ -123,7 +128,10 @@ def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
 
 
 def inverse_reaching(inverse: InverseModel, changes: RecordDrift) -> InverseModel:
-    """Return the inverse model with intervals that reach as far as what changes would move it, and over the change."""
+    """Return the inverse model with intervals widened for changes during the record.
+
+    They reach as far as the changes would move it, and over the change itself.
+    """
     over = {"coulomb": changes.friction_reach, "offset": changes.constant_reach}
     answers = []
     for estimate, moved in zip(inverse.estimates, np.abs(changes.moved), strict=True):

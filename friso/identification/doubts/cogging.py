@@ -14,7 +14,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name the force that differs along the way, and its pitch, where it explains most of what the fit leaves."""
+    """Name a force that differs along the way, and its pitch, if it explains most of what is left."""
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "cogging" or case.quality.failed or case.quality.rejected:
         return
@@ -31,7 +31,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield a force at each of some places along the way, and one that repeats with the pitch that fits best."""
+    """Yield a force at each of some places along the way, then one with the best-fitting pitch."""
     settings, problem = DoubtSettings.current(), case.fit.problem
     position, counted = case.log["position"][case.log.longest], problem.counted > 0
     travel = float(np.ptp(position))
@@ -47,8 +47,9 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
 
 
 def places_along(position: np.ndarray) -> list[np.ndarray]:
-    """Return columns that tell places along the way [m] apart, each of shape (n,), less their means and without that
-    of the first place.
+    """Return columns that distinguish places along the way [m], each (n,), less their means.
+
+    The first place has no column.
     """
     nodes = np.linspace(position.min(), position.max(), DoubtSettings.current().places_of_a_force_along)
     near = np.maximum(1 - np.abs(position - nodes[:, None]) / (nodes[1] - nodes[0]), 0.0)
@@ -62,7 +63,10 @@ def _waves(position: np.ndarray, pitch: float) -> list[np.ndarray]:
 
 
 def _explained_by(position: np.ndarray, pitch: float, rest: np.ndarray) -> float:
-    """Return the power [N^2] of a rest, shape (n,), that a force of a pitch [m] explains, less its constant part."""
+    """Return the power [N^2] of a residual force, (n,), that a force of a pitch [m] explains.
+
+    The constant part does not count.
+    """
     columns = np.stack([*_waves(position, pitch), np.ones(len(rest))], axis=1)
     solution = np.linalg.lstsq(columns, rest, rcond=None)[0]
     return float(np.var(columns @ solution))

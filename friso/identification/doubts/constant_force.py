@@ -11,10 +11,9 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Compare the constant force of the inverse model with its Coulomb friction, and with the
-    force at all.
+    """Name a constant force larger than Coulomb friction and not small against the whole force.
 
-    Gravity on an axis that is not level does so, and an offset of the force's channel.
+    Gravity on an axis that is not level causes it, or an offset of the force's channel.
     """
     inverse = case.inverse
     offset, coulomb = (abs(inverse.value(name)) for name in ("offset", "coulomb"))

@@ -18,12 +18,12 @@ IMITATED = "what the model lacks would pass for it"
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Fit a force that goes with the second derivative of the acceleration, beside a rigid mass.
+    """Look for a load on a coupling: a force like the second derivative of the acceleration.
 
     A load m behind the measured position, on a coupling of natural frequency w, seems to weigh m / (1 + s^2 / w^2) in
-    motion that goes as exp(s t): well below w, its force lacks m / w^2 times the second derivative of the acceleration.
-    Where the position is that of the load, the force that moves a mass M before the coupling is greater by M / w^2
-    times that derivative.
+    motion that goes as exp(s t): well below w, its force lacks m / w^2 times the second derivative of the
+    acceleration. Where the position of the load is measured, the force that moves a mass M before the coupling is
+    greater by M / w^2 times that derivative.
     """
     fit, settings, force = case.fit, DoubtSettings.current(), coupling_force(case)
     if force is None or case.quality.failed or case.quality.rejected or is_free(case.flat):
@@ -43,9 +43,9 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def coupling_force(case: FittedCase) -> np.ndarray | None:
-    """Return the force of a coupling [N], shape (n,), with the standard deviation of the inertia.
+    """Return the force of a coupling [N], (n,), scaled to the standard deviation of the inertia.
 
-    None where no mass is fitted, or the stage does not move.
+    None if no mass is fitted, or the stage does not move.
     """
     fit, step = case.fit, case.log.sample_time
     if MASS not in [fit.problem.parameters[number].name for number in fit.free]:

@@ -13,10 +13,11 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Fit a force that goes with the derivative of the log's force, where the stage was held to the log.
+    """Look for a delay of the force: a force like the derivative of the logged force.
 
-    A force that acts later by a short time differs from the log's by that time times its derivative. Bristles pass it
-    on as damping, by their stiffness times the delay, and inertia as viscous friction.
+    A force that acts later by a short time differs from the logged force by that time times its derivative. Bristles
+    pass it on as damping, by their stiffness times the delay, and inertia as viscous friction. It is tried if the
+    stage was held to the log.
     """
     fit, settings, step = case.fit, DoubtSettings.current(), case.log.sample_time
     force = delay_force(case)
@@ -44,7 +45,10 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
 
 
 def delay_force(case: FittedCase) -> np.ndarray:
-    """Return the derivative of the log's force [N/s], shape (n,), which a delay multiplies, without its noise."""
+    """Return the derivative of the logged force [N/s], shape (n,), without noise.
+
+    A delay multiplies it.
+    """
     cutoff = DoubtSettings.current().bandwidths_of_a_delayed_force * case.inverse.bandwidth
     force = low_pass(case.log["force"][case.log.longest], case.log.sample_time, cutoff)
     return np.gradient(force, case.log.sample_time)

@@ -19,7 +19,10 @@ WORDS = {"mass": "the mass", "viscous": "viscous friction", "coulomb": "Coulomb 
 
 @dataclass(frozen=True)
 class Half:
-    """A quantity of the inverse model, by name, with its values in both halves and the interval that holds either's."""
+    """A quantity of the inverse model with its values in both halves of a record.
+
+    The interval holds both.
+    """
 
     name: str
     first: float
@@ -29,7 +32,7 @@ class Half:
 
 
 def find(case: ValueCase) -> Iterator[RaisedDoubt]:
-    """Fit either half of the record with the inverse model, where the whole model lacks something."""
+    """Compare the inverse models of both halves of the record, if the whole model lacks something."""
     for one in halves(case.inverse) if case.lacks else ():
         unit = case.inverse.estimate(one.name).unit
         values = f"{one.first:.4g} and {one.second:.4g} {unit}"
@@ -39,7 +42,10 @@ def find(case: ValueCase) -> Iterator[RaisedDoubt]:
 
 
 def halves(inverse: InverseModel) -> list[Half]:
-    """List mass, viscous and Coulomb friction where the halves of a record differ by more than their spreads."""
+    """List mass, viscous and Coulomb friction that differ between the halves of a record.
+
+    The differences exceed the spreads of both halves.
+    """
     fits = []
     for part in np.array_split(np.arange(len(inverse.measured)), 2):
         columns, force = inverse.columns[part], inverse.measured[part]

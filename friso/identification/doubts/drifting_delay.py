@@ -15,7 +15,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name the delays at the beginning and the end, where a delay that changes explains more than one that stays."""
+    """Name the delays at beginning and end, if a changing delay explains more than a constant one."""
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "drifting-delay" or case.quality.failed or case.quality.rejected:
         return
@@ -29,7 +29,10 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield the derivative of the force, and that times a line over the record, where this clearly explains more."""
+    """Yield the derivative of the force, and its product with a line over the record.
+
+    They are yielded where a changing delay clearly explains more.
+    """
     force = delay_force(case)
     if case.fit.problem.closed or not force.any():
         return

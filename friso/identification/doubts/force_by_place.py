@@ -25,7 +25,10 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
 
 def _places(position: np.ndarray, rows: int) -> dict[str, np.ndarray]:
-    """Return columns that tell places along the way apart, each of shape (n,), without that of the first place."""
+    """Return columns for a least-squares fit of a force that depends on the place, each (n,).
+
+    Each column belongs to one place along the way; the first place has none.
+    """
     settings = DoubtSettings.current()
     count = min(settings.places_of_a_force, rows // settings.rows_for_each_place)
     if count < 3:

@@ -12,7 +12,10 @@ from friso.quantities import percent
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Compare the step of which all steps of the force are whole numbers with Coulomb friction, where most are none."""
+    """Compare the resolution of the force with Coulomb friction.
+
+    It is the step of which all steps of the force are multiples, in a log where most steps are zero.
+    """
     settings = DoubtSettings.current()
     steps = np.abs(np.diff(case.log["force"][case.log.longest]))
     digit = float(steps[steps > settings.rounding_of_a_digit * steps.max(initial=0.0)].min(initial=np.inf))

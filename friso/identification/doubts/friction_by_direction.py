@@ -18,11 +18,11 @@ EITHER = ("friction.viscous_asymmetry", "bias.cart", "bias.stage")
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Fit the forward and the backward motion of a record alone, where the fit to both does not explain it.
+    """Fit forward and backward motion separately, if the fit to both does not explain the record.
 
-    The model has one static friction, one Stribeck velocity and one set of bristles for both; where these differ, what
-    a fit to both makes of them need not be between them. Deviations reach there, beyond chance. Where the model lacks
-    something the search begins everywhere, since the fit to both may be an optimum that neither direction has.
+    The model has one static friction, one Stribeck velocity and one set of bristles for both. If these differ, the fit
+    to both need not lie between them. Deviations are widened to reach both results, beyond chance. If the model lacks
+    something, the search starts everywhere, since the fit to both may be an optimum that neither direction has.
     """
     both, settings = case.fit, DoubtSettings.current()
     if both.explains(case.quality.noise):

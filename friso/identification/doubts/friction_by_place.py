@@ -15,7 +15,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name by how much friction differs along the way, where that explains most of what the fit leaves."""
+    """Name how much friction differs along the way, if that explains most of what the fit leaves."""
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "friction-by-place" or case.quality.failed or case.quality.rejected:
         return

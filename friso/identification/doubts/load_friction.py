@@ -13,12 +13,12 @@ from friso.quantities import percent
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Fit a force against the motion in proportion to the motor's force, beside the friction of the model.
+    """Look for friction in proportion to the motor's force, beside the friction of the model.
 
     Such friction makes a mass seem heavier while the motor drives it than while the motor brakes it. The model has one
-    mass and one Coulomb friction for both: of 3 kg and 5 N with a tenth of the force they came out at 3.13 to 3.36 kg
-    and 5.44 to 5.60 N, without a doubt. It is named where it explains much of what the fit leaves, and more than a
-    coupling, a delay, or friction that changes with time would.
+    mass and one Coulomb friction for both: a machine of 3 kg and 5 N, with a tenth of the force as friction, came out
+    at 3.13 to 3.36 kg and 5.44 to 5.60 N, without a doubt. It is named if it explains much of what the fit leaves, and
+    more than a coupling, a delay, or friction that changes with time would.
     """
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "load-friction":

@@ -20,7 +20,10 @@ ACCELERATION, DIRECTION = "reference acceleration", "reference direction"
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Fit what acceleration and direction of the reference add, where they add something while the stage is fast."""
+    """Look for feedforward missing from the logged force, by the reference's acceleration.
+
+    Acceleration and direction of the reference are fitted; they must add something while the stage is fast.
+    """
     fed = fed_forward(case)
     if fed is None or not lacks_when_fast(case.inverse, fed[1]):
         return
@@ -36,9 +39,10 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
 
 def fed_forward(case: RecordCase) -> tuple[InverseModel, np.ndarray] | None:
-    """Fit the inverse model with what a feedforward adds to the force, and return its part that goes with acceleration.
+    """Fit the inverse model with feedforward of the reference's acceleration and direction.
 
-    That part has the shape (rows,) [N]. Returns None without a reference, or where nothing is lacking.
+    Also returns the part [N] that goes with the acceleration, shape (rows,). Returns None without a reference, or if
+    nothing is missing.
     """
     log, inverse = case.log, case.inverse
     columns = _of_reference(log, inverse.bandwidth)
@@ -57,10 +61,11 @@ def fed_forward(case: RecordCase) -> tuple[InverseModel, np.ndarray] | None:
 
 
 def lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:
-    """Tell whether a force fed forward, shape (rows,) [N], is lacking in both halves of the rows with a fast stage.
+    """Tell whether a fed-forward force [N], (rows,), is missing where the stage is fast, in both halves.
 
-    Where a servo follows well, the reference's acceleration differs from the measured one by what friction at low speed
-    and sticking do: it stands in for them as far as the inverse model lacks them, but not where the stage slides.
+    If a servo follows well, the reference's acceleration differs from the measured one by the effects of friction at
+    low speed and of sticking. It can stand in for these where the inverse model lacks them, but not where the stage
+    slides.
     """
     settings, speed = DoubtSettings.current(), np.abs(inverse.columns[:, 1])
     fast = np.flatnonzero(speed > settings.speed_share_of_a_fast_stage * speed.max())
@@ -77,7 +82,7 @@ def lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:
 
 
 def _of_reference(log: Log, bandwidth: float) -> dict[str, np.ndarray]:
-    """Return acceleration [m/s^2] and direction of the reference, each of shape (n,); {} without a reference."""
+    """Return acceleration [m/s^2] and direction of the reference, (n,) each; {} without one."""
     settings = IdentificationSettings.current()
     if "reference" not in log:
         return {}

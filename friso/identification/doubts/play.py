@@ -16,7 +16,7 @@ from friso.quantities import percent
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name the width of the play where a load that is loose by it explains most of what the fit leaves."""
+    """Name the width of play between motor and load, if it explains most of what the fit leaves."""
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "play" or case.quality.failed or case.quality.rejected:
         return
@@ -35,9 +35,10 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield for each width of play what the motor need not push, of a load that is all of the mass.
+    """Yield the force that the motor saves while the load is loose, for each width of play.
 
-    The load carries friction or not: with friction it slows down while it is loose, and the motor is rid of it.
+    All of the mass is taken as load. The load carries the friction or not: with friction it slows down while it is
+    loose.
     """
     settings, fit, step = DoubtSettings.current(), case.fit, case.log.sample_time
     names = [parameter.name for parameter in fit.problem.parameters]
@@ -61,9 +62,9 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
 def loose_load(
     position: np.ndarray, velocity: np.ndarray, step: float, width: float, slowing: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return velocity [m/s] and acceleration [m/s^2] of a load that a motor drives through play, each of shape (n,).
+    """Return velocity [m/s] and acceleration [m/s^2] of a load driven through play, (n,) each.
 
-    The motor's `position` [m] and `velocity` have the shape (n,), every `step` [s]. Where the load is loose it is
+    The motor's `position` [m] and `velocity` have the shape (n,), every `step` [s]. While the load is loose it is
     slowed down by `slowing` [m/s^2]; where it meets a flank it goes on with the motor, without a bounce.
     """
     place, speed, half = float(position[0]), float(velocity[0]), width / 2

@@ -15,11 +15,11 @@ SLIDING = ("friction.coulomb", "friction.viscous", "friction.viscous_asymmetry")
 
 
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
-    """Compare the highest speed of the record with the speed at which the Stribeck effect has died away.
+    """Withhold friction of a record that is too slow for the Stribeck effect to die away.
 
-    A slower record shows the sum of the effect and of Coulomb friction: dry friction there, of which the latter is at
-    least a quarter. Where the Stribeck velocity is not shown it may be the highest of bearings; where it is, what the
-    effect leaves at twice that is small, and hardly depends on the exponent that was assumed.
+    A slower record shows the sum of the effect and Coulomb friction; of this sum Coulomb friction is at least a
+    quarter. If the Stribeck velocity is not shown it may be the highest of any bearing. If it is shown, the effect is
+    small at twice that velocity, and hardly depends on the exponent assumed.
     """
     if "friction.stribeck_velocity" not in case.flat:
         return

@@ -17,7 +17,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Search for the shift of the force in time, and for the average over force or motion, that fit best.
+    """Search for the shift of the force in time, and the average of force or motion, that fit best.
 
     Shifts and averages double from one to the next, and the best of them is refined once to both sides.
     """
@@ -51,16 +51,19 @@ def _doubling(most: float) -> list[int]:
 
 
 def _with_timing(case: RecordCase, lag: int, width: int) -> InverseModel:
-    """Fit the inverse model with the force `lag` samples later and the motion averaged over `width` samples.
+    """Fit the inverse model with the force `lag` samples later and the motion averaged.
 
-    A negative `width` averages the force instead.
+    The average is over `width` samples; a negative `width` averages the force instead.
     """
     moved = _force_moved(case.log, lag, max(-width, 1))
     return inverse_model(moved, case.inverse.bandwidth, False, case.cart_share, averaged=max(width, 1))
 
 
 def _error_of_equal_averages(case: RecordCase, lag: int, width: int) -> float:
-    """Return the error with force and motion averaged alike: an average of the force alone only hides what is fast."""
+    """Return the error of the inverse model with force and motion averaged alike.
+
+    It serves as a check, because averaging the force alone merely hides what is fast.
+    """
     if width >= 0:
         return np.inf
     moved = _force_moved(case.log, lag, -width)

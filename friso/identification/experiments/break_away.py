@@ -22,8 +22,9 @@ from friso.identification.readings.settings import ReadingSettings
 
 @dataclass(frozen=True)
 class BreakAway:
-    """Static friction [N] from the break-away forces of `ramps`, extrapolated to rate 0, in all
-    and per direction.
+    """Static friction [N] from break-away forces of `ramps`, extrapolated to rate 0.
+
+    It is given for all ramps and per direction.
     """
 
     static: Estimate
@@ -34,8 +35,7 @@ class BreakAway:
 
 
 def static_from_ramps(log: Log, mass: float = 0.0) -> BreakAway:
-    """Estimate static friction from the break-away forces of the ramps in a log; see
-    `rate_effect`.
+    """Estimate static friction from the break-away forces of ramps in a log (`rate_effect`).
 
     Without the `mass` [kg] that moves, the interval allows for the inertia of the heaviest mass that can have moved so
     fast. Raises InputError for a missing channel.

@@ -30,9 +30,7 @@ class FrictionAtSpeeds:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> FrictionAtSpeeds:
-    """Analyse a log of constant speeds, with the masses that are believed to move and the loop's
-    crossover.
-    """
+    """Analyse a log of constant speeds, with the believed masses and the loop's crossover."""
     (log,) = logs
     assert isinstance(log, Log)
     mass, crossover = sum(prior.masses(log)), bandwidth(prior.flat(log))
@@ -41,19 +39,16 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _stated_exponent(prior: Prior) -> float | None:
-    """Return the Stribeck exponent that the user's stage file states, without uncertainty; None
-    where it states none.
-    """
+    """Return the Stribeck exponent of the user's stage file, if stated without uncertainty."""
     if prior.stage is None or not prior.from_user or EXPONENT in {*prior.made_up, *prior.stage.uncertain()}:
         return None
     return prior.stage.flat().get(EXPONENT)
 
 
 def _estimates(result: FrictionAtSpeeds, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return friction in both directions, in the order of its covariance, and the constant
-    force.
+    """Return friction in both directions, in the order of its covariance, and the constant force.
 
-    An exponent that the stage states is none of them.
+    An exponent that the stage states is not included.
     """
     both, bias = result.velocity.both, "bias.stage" if stage and "masses.cart" not in stage.flat() else "bias.cart"
     friction = [both.coulomb, both.viscous, both.static, both.stribeck_velocity]
@@ -83,10 +78,9 @@ def _partial(log: Log) -> bool:
 
 
 def _claims_together(courses: Sequence[Course]) -> str | None:
-    """Claim logs of which most of the way goes at constant speeds, enough for a curve of
-    friction over speed.
+    """Claim logs that mostly move at constant speeds, enough for a curve of friction over speed.
 
-    At the slowest speeds a body may stick and slip: a log that goes one way is one of theirs too.
+    At the slowest speeds a body may stick and slip: a log that goes one way counts too.
     """
     settings = ReadingSettings.current()
     speeds = [course.speeds for course in courses]

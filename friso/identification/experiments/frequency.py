@@ -65,10 +65,9 @@ def _estimates(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
 
 
 def _of_stage_alone(mass: float, stage: Stage) -> bool:
-    """Tell whether a mass line [kg] is rather that of the stage above the mode of a free joint
-    than that of all masses.
+    """Tell whether a mass line [kg] shows the stage alone instead of all moving masses.
 
-    It is that of the two to which it is nearer, as they are believed to be.
+    Above the mode of a free joint the stage moves alone. The line belongs to the believed mass that it is nearer to.
     """
     flat = stage.flat()
     if stage.joint is None or flat["joint.locked"]:
@@ -78,9 +77,7 @@ def _of_stage_alone(mass: float, stage: Stage) -> bool:
 
 
 def _parasitic(model: TwoMass, stage: Stage) -> float | None:
-    """Return the resonance [Hz] of a two-mass model that is rather the stage's parasitic mode
-    than its joint's; else None.
-    """
+    """Return a resonance [Hz] that is the stage's parasitic mode instead of its joint's; else None."""
     flat = stage.flat()
     if "parasitic.frequency" not in flat or "joint.stiffness" not in flat:
         return None

@@ -94,7 +94,10 @@ def swings_of(log: Log) -> HuntingLog:
 
 
 def _sides(values: np.ndarray, hysteresis: float) -> np.ndarray:
-    """Return on which side of 0 values are, 1 or -1, the last side being kept within the hysteresis; shape (n,)."""
+    """Return the side of 0 that values are on, 1 or -1, with hysteresis; shape (n,).
+
+    Values within the hysteresis keep the last side.
+    """
     side = np.where(np.abs(values) > hysteresis, np.sign(values), 0.0)
     last = np.maximum.accumulate(np.where(side != 0, np.arange(len(side)), 0))
     return side[last]

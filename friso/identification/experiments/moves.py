@@ -50,8 +50,9 @@ def _claims(course: Course) -> str | None:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> IdentifiedMoves:
-    """Analyse a log in the machine's own loop, where stage and reference are given, from what
-    other experiments show.
+    """Analyse a log of moves, in the machine's own loop if the user gave a stage and a reference.
+
+    Results of other experiments are taken into account.
     """
     (whole,) = logs
     assert isinstance(whole, Log)
@@ -117,10 +118,9 @@ def _predict(result: IdentifiedMoves, log: Log, prior: Prior, settings: Analysis
 
 
 def _check_prediction(logs: Sequence[Source], other: Log, prior: Prior) -> None:
-    """Check that a log will be identified in the machine's own loop, and that the other can be
-    simulated.
+    """Check that a log can be identified in the machine's own loop, and the other simulated.
 
-    Raises InputError where either is not so.
+    Raises InputError otherwise.
     """
     check_roles(other, ("position", "force", "reference"))
     prior.flat(other)

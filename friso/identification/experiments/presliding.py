@@ -102,15 +102,15 @@ class _Fit:
 
 
 def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
-    """Estimate bristles from a log of position and force whose motion is small beside their
-    break-away.
+    """Estimate bristles from motion that is small against their break-away deflection.
 
-    Of a log with gaps the longest stretch is used. A joint is held, or its deflection is measured.
+    The log holds position and force; if it has gaps, the longest stretch is used. A joint is held, or its deflection
+    is measured.
 
-    The intervals contain by how much the answer changes with a lower low-pass and with the delay that fits best (which
-    is taken where none is given), the doubt about the viscous friction that is taken off the damping, and what the
-    friction that is left unexplained may hide: it falls with speed, which the model leaves out, and bristles of another
-    law bend otherwise. Where much is left, nothing is shown. Raises InputError for missing channels.
+    The intervals contain how much the answer changes with a lower low-pass and with the delay that fits best (which is
+    used if none is given), the doubt about the viscous friction that is subtracted from the damping, and what
+    unexplained friction may hide: friction falls with speed, which the model leaves out, and bristles of another law
+    bend otherwise. If much is left, nothing is shown. Raises InputError for missing channels.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     record = record_of(log, log.longest, between)
@@ -139,9 +139,7 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
 
 
 def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
-    """Return a record with the motion that belongs to a low-pass [Hz], and no more samples than
-    that needs.
-    """
+    """Return a record low-passed and thinned to what a cut-off [Hz] of the force needs."""
     settings = ExperimentSettings.current()
     return record.seen(
         settings.low_pass_of_the_motion * cutoff,
@@ -179,19 +177,17 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
 
 
 def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late: bool) -> _Fit:
-    """Fit again with the mass that the first fit found and, if it is to be looked for (`late`),
-    with the delay that fits best.
-    """
+    """Fit again with the mass from the first fit and, with `late`, with the best-fitting delay."""
     fit = _fit(record, between, cutoff, between.mass, late)
     delayed = replace(between, delay=(between.delay or 0.0) + fit.late)
     return _fit(record, delayed, cutoff, float(fit.values[0]), late)
 
 
 def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
-    """Fit the force at a low-pass by least squares; the bending, in which it is not linear, is
-    searched for.
+    """Fit the force at a low-pass by least squares, with a search for the bending.
 
-    `mass` [kg] is believed to move; with `late`, what a little more delay would do is among the columns.
+    The bending of the bristles is the one nonlinear parameter. `mass` [kg] is believed to move; with `late`, the
+    effect of a little more delay is among the columns.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     equation = _equation(record, between, cutoff, mass, late)
@@ -279,9 +275,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _at_most(total: Estimate) -> Estimate:
-    """Bound the damping of the bristles where viscous friction is not known: it is at most the
-    `total` of the two.
-    """
+    """Bound the damping of the bristles by the `total` with unknown viscous friction."""
     if not total.determined:
         return total
     why = f"its sum with viscous friction, which is not known, is {total.low:.4g} to {total.high:.4g} {total.unit}"

@@ -128,15 +128,14 @@ class _Equation:
 
 
 def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristles | None) -> SlowSliding:
-    """Estimate friction over speed from a log in which the bearing slides slowly, there and
-    back.
+    """Estimate friction over speed from slow sliding there and back.
 
-    It shows static and Coulomb friction and Stribeck velocity. Of a log with gaps the longest stretch is used, and of
-    that no more than the settings say. A joint is held, or its deflection is measured.
+    It shows static and Coulomb friction and the Stribeck velocity. If the log has gaps, the longest stretch is used,
+    up to a number of samples in the settings. A joint is held, or its deflection is measured.
 
-    The intervals contain what a lower low-pass changes, what the intervals of the known mass, bristles and viscous
-    friction do, what the delay does that fits best, and the share of the friction that is left unexplained; contact,
-    mode and exponent are taken as given. Raises InputError for missing channels.
+    The intervals contain what a lower low-pass changes, the intervals of known mass, bristles and viscous friction,
+    the effect of the best-fitting delay, and the share of friction left unexplained; contact, mode and exponent are
+    taken as given. Raises InputError for missing channels.
     """
     settings = ExperimentSettings.current()
     record = record_of(
@@ -175,9 +174,7 @@ def _off(between: Between, contact: MassOnBristles) -> list[tuple[Between, MassO
 
 
 def _parameter_change(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Return by how much a residual, shape (m,), moves what is fitted, whose derivatives are of
-    shape (m, p).
-    """
+    """Return how far a residual, (m,), moves the fitted numbers with derivatives (m, p)."""
     return -np.linalg.lstsq(jacobian, residual, rcond=None)[0]
 
 

@@ -20,8 +20,11 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class Wandering:
-    """How far the stage wanders in one log: RMS about the mean and largest deviation from it [m], its drift over the
-    log [m] by a straight line, and the deviation [m] over time [s], both of shape (n,)."""
+    """How far the stage wanders in one log while its reference stands.
+
+    RMS about the mean and largest deviation from it [m], drift over the log [m] by a straight line, and the deviation
+    [m] over time [s], both of shape (n,).
+    """
 
     name: str
     rms: float
@@ -40,14 +43,17 @@ class StandstillResult:
 
     @property
     def ratios(self) -> tuple[tuple[float, float], ...]:
-        """Return RMS and peak of every log over those of the first; NaN where that does not wander."""
+        """Return the RMS and the peak of every log over those of the first log.
+
+        A ratio is NaN if the first log does not wander.
+        """
         first = self.logs[0]
         pairs = ((log.rms / first.rms if first.rms else np.nan, log.peak, first.peak) for log in self.logs)
         return tuple((rms, peak / least if least else np.nan) for rms, peak, least in pairs)
 
 
 def wandering(log: Log) -> Wandering:
-    """Return how far the stage wanders in a log, about the reference if there is one, without its mean.
+    """Return how far the stage wanders in a log, about its mean distance from the reference.
 
     Raises InputError for a log without a position in SI units.
     """
@@ -74,7 +80,7 @@ def _estimates(result: StandstillResult, stage: Stage | None) -> tuple[Estimate,
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log whose reference is there and stands still, with a body that neither swings nor goes anywhere."""
+    """Claim a log whose reference stands still, and which holds no force."""
     log = course.log
     if "reference" not in log or course.reference_moves or "force" in log:
         return None

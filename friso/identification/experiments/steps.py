@@ -66,11 +66,11 @@ class StepStiffness:
 
 
 def stiffness_from_steps(log: Log) -> StepStiffness:
-    """Estimate the stiffness from steps of the position with the cart fixed, the force
-    low-passed.
+    """Estimate the joint's stiffness from position steps with the cart fixed.
 
-    Windows are the plateaus of the reference, or of the position where there is none. Without two steps between settled
-    windows the stiffness is unknown. Raises InputError for a log without position or force in SI units.
+    The force is low-passed. Windows are the plateaus of the reference, or of the position without one. The stiffness
+    is unknown without two steps between settled windows. Raises InputError for a log without position or force in SI
+    units.
     """
     settings = ExperimentSettings.current()
     position, force = channel(log, "position"), channel(log, "force")
@@ -100,9 +100,7 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
 
 
 def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
-    """Find stretches of a segment over which the reference, else the position, keeps its level
-    long enough to average.
-    """
+    """Find stretches of a segment with a constant reference, or position, long enough to average."""
     least = int(np.ceil(4 / (cutoff * log.sample_time)))
     if part.stop - part.start < 2 * least:
         return []
@@ -121,17 +119,14 @@ def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
 
 
 def _scale(position: np.ndarray, spans: list[slice]) -> float:
-    """Return the size of the larger steps [m]: the median of those that are not small against
-    the largest.
-    """
+    """Return the size of the larger steps [m]: the median without small steps."""
     levels = np.array([np.median(position[s][(s.stop - s.start) // 2 :]) for s in spans])
     sizes = np.abs(np.diff(levels))
     return float(np.median(sizes[sizes >= 0.3 * sizes.max()])) if len(sizes) else 0.0
 
 
 def _secant(position: np.ndarray, force: np.ndarray, spans: list[slice]) -> float:
-    """Return about how much force [N/m] goes with the deflection, by the later half of each
-    plateau.
+    """Return the approximate stiffness [N/m] from the later half of each plateau.
 
     It is 0 without two plateaus.
     """
@@ -170,9 +165,7 @@ def _settled_window(
 
 
 def _drifting(values: np.ndarray) -> tuple[Mean, float]:
-    """Return the mean, and by how much values drift over a window beyond what their scatter
-    explains (two errors).
-    """
+    """Return the mean of a window, and its drift beyond what scatter explains (two errors)."""
     mean = block_mean(values)
     shift = values[len(values) // 2 :].mean() - values[: len(values) // 2].mean()
     return mean, float(max(abs(2 * shift) - 4 * mean.error, 0.0))
@@ -204,8 +197,9 @@ def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str,
 
 
 def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
-    """Fit force = offset + stiffness * deflection + half the hysteresis * direction of the step
-    before.
+    """Estimate hysteresis from forces at deflections reached from both sides.
+
+    The fit is force = offset + stiffness * deflection + half the hysteresis * direction of the last step.
     """
     name, unit, method = "hysteresis", "N", "force at a deflection reached from below minus from above"
     x, force = np.array([[w.position, w.force] for w in windows]).reshape(-1, 2).T
@@ -248,8 +242,9 @@ def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ..
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log whose position rests in several places, without a reference that moves, where
-    force rises with place.
+    """Claim a log whose position rests in several places, at forces that rise with the place.
+
+    Its reference, if any, does not move.
     """
     if course.reference_moves or not course.against_a_spring:
         return None

@@ -128,9 +128,7 @@ def _deflection(log: Log, cutoff: float) -> np.ndarray | None:
 
 
 def _actuator(log: Log, stage_mass: float, cutoff: float) -> np.ndarray | None:
-    """Return the force of the actuator less the stage's inertia [N], low-passed; None where it
-    is not measured.
-    """
+    """Return the actuator's force less the stage's inertia [N], low-passed; None if not measured."""
     if "force" not in log:
         return None
     force = _smooth(log, channel(log, "force"), cutoff)
@@ -147,9 +145,7 @@ def _rate(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
 def _pull(
     log: Log, stiffness: Estimate | float | None, deflected: np.ndarray | None, pushed: np.ndarray | None
 ) -> tuple[np.ndarray, float]:
-    """Return the force on the cart [N], low-passed, and the relative standard deviation of its
-    scale.
-    """
+    """Return the force on the cart [N], low-passed, and the relative deviation of its scale."""
     if stiffness is None:
         return channel(log, "force") if pushed is None else pushed, 0.0  # raises: neither of the two is known
     value, half = (stiffness.value, stiffness.half_width) if isinstance(stiffness, Estimate) else (stiffness, 0.0)
@@ -290,10 +286,10 @@ def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Est
 
 
 def _both(forward: Estimate, backward: Estimate) -> Estimate:
-    """Return the mean of both directions, in which a common offset drops out.
+    """Return the mean of both directions, in which a common offset cancels.
 
-    Where the cart slips in one direction alone it is that one's. What one direction shows and the other bounds is a
-    bound: the offset is not known.
+    If the cart slips in one direction only, its value counts. If one direction gives a value and the other only a
+    bound, the result is a bound, because the offset is not known.
     """
     if not (forward.determined and backward.determined):
         seen, unseen = (forward, backward) if forward.determined else (backward, forward)
@@ -325,8 +321,9 @@ def _offset(forward: Estimate, backward: Estimate) -> Estimate:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StickSlip:
-    """Analyse logs with the joint's stiffness as other experiments show it; else as this log
-    does; else as the stage has it.
+    """Analyse stick-slip logs with the joint's stiffness.
+
+    It comes from other experiments, or from this log, or from the stage file.
     """
     (log,) = logs
     assert isinstance(log, Log)
@@ -344,9 +341,7 @@ def _estimates(result: StickSlip, stage: Stage | None) -> tuple[Estimate, ...]:
 
 
 def _of_joint(stiffness: Estimate, stage: Stage | None) -> bool:
-    """Tell whether a stiffness is that of the stage's joint, and not of the limiter that holds
-    it.
-    """
+    """Tell whether a stiffness is the joint's own, not that of a limiter that holds it."""
     settings = ExperimentSettings.current()
     if stage is None or stage.joint is None or not stiffness.determined:
         return False

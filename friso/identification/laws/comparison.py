@@ -51,10 +51,10 @@ class LawPrediction:
 
 @dataclass(frozen=True)
 class LawComparison:
-    """The friction laws by how well they predict, the best first.
+    """The friction laws, ranked by how well they predict logs, the best first.
 
-    `logs` are the names of those used, `left_out` those that were not, with the reason, and `parts` how many parts were
-    predicted. `unseen` says whether fits began from the stage as it was known before any log.
+    `logs` are the names of the logs used, `left_out` names the others, each with the reason, and `parts` counts the
+    parts that were predicted. `unseen` says whether fits began from the stage as it was before any log.
     """
 
     predictions: tuple[LawPrediction, ...]
@@ -70,9 +70,7 @@ class LawComparison:
 
     @property
     def supported(self) -> tuple[LawPrediction, ...]:
-        """The laws that predict the record, and not clearly worse than the best; none where no law
-        predicts it.
-        """
+        """Return the laws that predict the record about as well as the best; none if none predicts it."""
         settings = LawSettings.current()
         best = self.predictions[0]
         if not self.explained:
@@ -83,11 +81,11 @@ class LawComparison:
 
 
 def _worse(differences: np.ndarray, level: float) -> bool:
-    """Tell whether errors, shape (parts,), are larger than those of another law by more than
-    chance.
+    """Tell whether errors, shape (parts,), exceed those of another law by more than chance.
 
-    They are by more than parts differ by chance, at a level, and by more than laws that predict alike differ: on
-    average or, where single parts stand out, in their sign and median. A law that could not be run for a part is worse.
+    Two tests are made, at half the `level` each: of the mean difference, and of the sign of the differences. The
+    difference must also be larger than between laws that predict alike. A law that could not be run for a part is
+    worse.
     """
     settings = LawSettings.current()
     if not np.isfinite(differences).all():

@@ -37,11 +37,10 @@ class DraggedRecord:
         return float(self.low_pass.time[1] - self.low_pass.time[0])
 
     def friction(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-        """Return the friction force [N] of laws of one structure along the record, low-passed, shape
-        (runs, m).
+        """Return the friction force [N] of laws along the record, low-passed, shape (runs, m).
 
-        The laws are given as flat keys to numbers or arrays of shape (runs,); runs that failed are NaN. The bristles
-        begin unbent.
+        All have one structure, given as flat keys to numbers or arrays of shape (runs,); runs that failed are NaN. The
+        bristles begin unbent.
         """
         settings = LawSettings.current()
         law = flat["friction.model"]

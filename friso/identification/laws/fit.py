@@ -21,9 +21,7 @@ FAR = {"mass": 3.0, "coulomb": 30.0, "gap": 100.0, "stribeck_velocity": 100.0, "
 
 @dataclass(frozen=True)
 class LawFit:
-    """A law fitted to records: the mass [kg], the keys of the law [SI], and the numbers behind
-    them.
-    """
+    """A law fitted to records: mass [kg], keys of the law [SI], and the fitted numbers."""
 
     law: str
     mass: float
@@ -141,9 +139,7 @@ class LawProblem:
         return LawFit(self.law, float(np.exp(best[0])), self.keys(best), best)
 
     def everywhere(self) -> np.ndarray:
-        """Return starts, shape (starts, parameters), with bristles softer and stiffer than known
-        beforehand.
-        """
+        """Return starts, (starts, parameters), with bristles softer and stiffer than believed."""
         settings = LawSettings.current()
         starts = np.tile(self.start, (len(settings.stiffness_factors), 1))
         starts[:, self.names.index("stiffness")] += np.log(settings.stiffness_factors)
@@ -154,8 +150,9 @@ class LawProblem:
         return list(zip(used, self.records, strict=True))
 
     def _weighed(self, rows: np.ndarray, weights: Sequence[np.ndarray]) -> np.ndarray:
-        """Return the residuals of all records, shape (rows, samples), weighed; a large number where
-        a run failed.
+        """Return the weighted residuals of all records, shape (rows, samples).
+
+        They are a large number where a run failed.
         """
         settings = LawSettings.current()
         with np.errstate(invalid="ignore"):  # a run that failed, where its weight is 0

@@ -35,7 +35,7 @@ MOST, PER_BYTE = 256 << 20, 16
 
 
 def is_hdf5(head: bytes) -> bool:
-    """Tell whether the first 520 bytes are those of HDF5, before which MATLAB puts a block."""
+    """Tell whether the first 520 bytes of a file are HDF5; MATLAB puts a block of 512 before."""
     return HDF5 in (head[:8], head[512:520])
 
 
@@ -166,8 +166,9 @@ def lvm_content(path: Path) -> dict[str, Any]:
 
 
 def tdms_channels(path: Path) -> dict[str, Any]:
-    """Read the channels of a TDMS file, and what the library said: a file that ends early is
-    read as far as it goes.
+    """Read the channels of a TDMS file, and the library's messages.
+
+    A file that ends early is read as far as it goes.
     """
     import nptdms
 

@@ -13,11 +13,10 @@ from friso.escapes import one_line
 
 @dataclass(frozen=True)
 class Channel:
-    """A channel of a file: values of shape (n,) as they stand there, with the unit that it
-    states ("" for none).
+    """A channel of a file: its values, (n,), as they stand there, and its unit ("" for none).
 
-    `time` holds the instants in seconds, shape (n,), or None where the file has no time; `source` says where in the
-    file the channel stands ("column 3", "exp1.Y(2)"). Texts are one line each, escaped: messages and tables name them.
+    `time` holds the instants in seconds, shape (n,), or None if the file has no time; `source` says where in the file
+    the channel stands ("column 3", "exp1.Y(2)"). Texts are one line each, escaped: messages and tables name them.
     """
 
     name: str

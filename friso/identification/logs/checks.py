@@ -9,10 +9,9 @@ from friso.identification.logs.settings import LogSettings
 
 
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Return a channel without samples that repeat the one before, stamp [s] and value; and how
-    many there were.
+    """Return a channel without samples that repeat the stamp [s] and value before, and their count.
 
-    Raises LogError for time that decreases and for another value at one stamp.
+    Raises LogError for time that decreases and for another value at the same stamp.
     """
     steps = np.diff(time)
     back = np.flatnonzero(steps < 0)
@@ -68,17 +67,16 @@ def constant(name: str, values: np.ndarray) -> bool:
 
 
 def rises_evenly(values: np.ndarray) -> bool:
-    """Tell whether values rise as those of a clock do, and no measured motion does."""
+    """Tell whether values rise evenly, as a clock does and no measured motion."""
     steps = np.diff(values)
     return bool(values.size > 2 and steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-3, atol=0))
 
 
 def clipped_share(values: np.ndarray) -> float:
-    """Return the share of samples in flat tops at the extremes that show that a signal is
-    clipped.
+    """Return the share of samples in flat tops that show that a signal is clipped.
 
-    A flat top has at least 3 equal samples. The signal enters it with a kink, the step before being at least a fifth of
-    the largest step, or it hardly ever repeats a value elsewhere.
+    A flat top lies at an extreme and has at least 3 equal samples. The signal enters it with a kink, the step before
+    being at least a fifth of the largest step, or it hardly ever repeats a value elsewhere.
     """
     settings = LogSettings.current()
     steps = np.abs(np.diff(values))
@@ -96,10 +94,9 @@ def clipped_share(values: np.ndarray) -> float:
 
 
 def jumps(values: np.ndarray) -> tuple[float, int]:
-    """Return the largest step of a signal and the sample behind it, where it is no part of a
-    motion.
+    """Return the largest step of a signal and the sample behind it, if it is no motion.
 
-    It is many times larger than all steps but a few; else 0 and 0.
+    It is many times larger than all steps but a few; otherwise 0 and 0.
     """
     settings = LogSettings.current()
     steps = np.diff(values)
@@ -125,9 +122,9 @@ def samples_held(values: np.ndarray) -> int:
 
 
 def interpolated(values: np.ndarray) -> int:
-    """Return over how many samples a signal runs in straight lines; 1 where it does not.
+    """Return how many samples lie on each straight piece of a signal; 1 if it has none.
 
-    Its bends all fall on every n-th sample, n up to 20, as those of a slower signal that was resampled.
+    A slower signal that was resampled bends only at every n-th sample, n up to 20.
     """
     settings = LogSettings.current()
     bends = np.abs(np.diff(values, 2))
@@ -146,11 +143,10 @@ def interpolated(values: np.ndarray) -> int:
 def velocity_factor(
     position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]
 ) -> tuple[float, float]:
-    """Return the ratio of the measured velocity [m/s] to the derivative of position [m], and
-    their correlation.
+    """Return measured velocity over the derivative of position, and their correlation.
 
-    Both are sampled every `period` [s], and smoothed over 11 samples; the ratio is that of least squares. NaN and 0
-    where there is nothing to compare.
+    Velocity [m/s] and position [m] are sampled every `period` [s], and smoothed over 11 samples; the ratio is by least
+    squares. Returns NaN and 0 if there is nothing to compare.
     """
     from scipy.signal import savgol_filter
 

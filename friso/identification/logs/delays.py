@@ -25,11 +25,11 @@ def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, par
 
 
 def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: list[slice]) -> str:
-    """Offer the delay of the motion [m] behind the force [N], "" for none; both are sampled
-    every `period` [s].
+    """Write the delay of the motion [m] behind the force [N], sampled every `period` [s].
 
-    For each lag the force is fitted by acceleration, velocity, its sign, position and a constant: against acceleration
-    alone friction would look like a delay, and so would a spring. The lag with the least residual counts.
+    For each lag the force is fitted by acceleration, velocity, its sign, position and a constant: with acceleration
+    alone friction would look like a delay, and so would a spring. The lag with the least residual counts. Returns ""
+    for no delay.
     """
     part = max(parts, key=lambda span: span.stop - span.start)
     place, velocity, acceleration = (_smoothed(position[part], order, period) for order in (0, 1, 2))
@@ -59,11 +59,10 @@ def lag(first: np.ndarray, second: np.ndarray) -> float:
 
 
 def fitted_lag(effect: np.ndarray, causes: np.ndarray) -> float:
-    """Return by how many samples causes, shape (n, p), come after what they sum up to by least
-    squares.
+    """Return by how many samples causes, (n, p), lag behind the effect they add up to.
 
-    It is the lag with the largest share explained, to a fraction of a sample; NaN where that share is below 0.5 or at
-    the border.
+    It is the lag with the largest share explained by least squares, to a fraction of a sample; NaN if that share is
+    below 0.5 or the lag lies at the border.
     """
     return _peak(_explained(effect, causes), 0.5)
 
@@ -97,8 +96,9 @@ def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
 
 
 def _peak(heights: np.ndarray, least: float) -> float:
-    """Return where heights have their peak, by the parabola through the three highest; NaN below
-    `least`.
+    """Return the place of the highest of some values, by a parabola through three of them.
+
+    NaN if it is below `least` or lies at an end.
     """
     i = int(np.argmax(heights))
     if heights[i] < least or i in (0, heights.size - 1):
@@ -109,10 +109,9 @@ def _peak(heights: np.ndarray, least: float) -> float:
 
 
 def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, float]:
-    """Return the mean of the estimates of the blocks of a record and half its 95 % interval
-    (Student).
+    """Return the mean estimate over blocks of a record and half its 95 % interval (Student).
 
-    NaN where fewer than half of the blocks show one.
+    NaN if fewer than half of the blocks show an estimate.
     """
     settings = LogSettings.current()
     from scipy.stats import t as student
@@ -144,9 +143,7 @@ def _line(late: str, early: str, estimate: tuple[float, float], period: float) -
 
 
 def _smoothed(values: np.ndarray, order: int, period: float) -> np.ndarray:
-    """Return the derivative of this order, smoothed, without the ends; all values where there
-    are too few.
-    """
+    """Return the smoothed derivative of an order, without the ends; all values if there are few."""
     settings = LogSettings.current()
     from scipy.signal import savgol_filter
 

@@ -32,13 +32,12 @@ class FileHead:
 
 @dataclass(frozen=True)
 class LogFormat:
-    """A format of logs: its `title`, whether a file is one, and the reader of its channels,
-    which raises LogError.
+    """A format of logs: its `title`, how it is recognised, and the reader of its channels.
 
-    Formats are asked by rank: 0 for those recognised by their first bytes, 1 for those recognised by their first lines,
-    2 for any text. `units`: it can hold units; `times`: its channels come with their instants, which no column of it
-    has to tell. A file that `holds_response` holds a frequency response instead of signals over time, which
-    `read_response` reads.
+    Formats are asked by rank: 0 for those recognised by their first bytes, 1 by their first lines, 2 for any text.
+    `units`: it can hold units; `times`: its channels come with their instants, so that no column has to. A file that
+    `holds_response` holds a frequency response instead of signals over time, which `read_response` reads. Readers
+    raise LogError.
     """
 
     title: str

@@ -147,9 +147,9 @@ def check_gaps(
 def _by_mechanics(
     role: str, readings: Sequence[MotionReading], channels: Sequence[Channel]
 ) -> tuple[Channel | None, str] | None:
-    """Return the channel of those that may have a role that mechanics gives it, and why; None where it tells nothing.
+    """Return the channel that mechanics suggests for a role, and why; None if it says nothing.
 
-    There is no channel where two readings are about as good.
+    The channel is None if two readings are about as good.
     """
     named = {channel.name: channel for one in readings if (channel := one.channel(role)) is not None}
     if not named:
@@ -180,11 +180,10 @@ def _of_units(units: Mapping[str, LogError | None], chosen: Mapping[str, Assigne
 
 
 def _likeliest(role: str, table: ChannelTable, taken: Mapping[str, Channel]) -> tuple[Channel | None, str]:
-    """Return the channel that fits a role best, and why where it is one of several alike; None
-    without any.
+    """Return the channel that fits a role best, and why if it is one of several alike.
 
-    It fits by unit and first letter, of those that change and have no other role. No force follows the position, as a
-    reference does.
+    It fits by unit and first letter, among channels that change and have no other role. No force follows the position,
+    as a reference does. None if no channel fits.
     """
     fits = _fitting(role, table, taken.values())
     if role == "force":
@@ -221,19 +220,15 @@ def _kinds(role: str) -> tuple[str, ...]:
 
 
 def _is_of_another(role: str, unit: str) -> bool:
-    """Tell whether a unit is that of another quantity than the role's, which no scale makes one:
-    rpm of a position.
-    """
+    """Tell whether a unit belongs to another quantity, which no scale converts: rpm of a position."""
     others = {"Hz", *ROLES.values(), *map(ROTARY.unit, ROLES.values())} - {*_kinds(role)}
     return bool(unit) and any(unit_factor(unit, kind) is not None for kind in others)
 
 
 def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Channel | None, str]:
-    """Choose among channels that move as the best for a position does the one that was measured,
-    and say why.
+    """Choose the measured one among channels that move like the best candidate, and say why.
 
-    It is the only one whose name says that it was measured, or the one with the most noise, as what is measured has;
-    None where that cannot be told.
+    It is the only one whose name says that it was measured, or the noisiest. None if that cannot be decided.
     """
     alike = [channel for channel in channels if channel is best or _are_alike(channel, best)]
     if role not in KINDS or len(alike) == 1:
@@ -269,8 +264,9 @@ def _are_alike(one: Channel, other: Channel) -> bool:
 
 
 def _noise(channel: Channel) -> float:
-    """Return the fourth differences of a channel, in which little of a motion is left, relative
-    to its range.
+    """Return the noise of a channel relative to its range, by its fourth differences.
+
+    Little of a motion is left in them.
     """
     finite = channel.values[np.isfinite(channel.values)]
     with np.errstate(all="ignore"):

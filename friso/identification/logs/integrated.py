@@ -43,9 +43,7 @@ def is_needed(
 
 
 def _may_be_a_position(channel: Channel) -> bool:
-    """Tell whether a channel without a role has the unit of a position, or none at all, and
-    changes.
-    """
+    """Tell whether a channel may be a position: no role yet, a fitting unit or none, and it changes."""
     finite = channel.values[np.isfinite(channel.values)]
     if not finite.size or not np.ptp(finite) > 0 or role_of(channel.name) is not None or is_ramp(channel):
         return False
@@ -55,9 +53,7 @@ def _may_be_a_position(channel: Channel) -> bool:
 
 
 def integrated(velocity: np.ndarray, sample_time: float, segments: Sequence[slice]) -> np.ndarray:
-    """Integrate a velocity [m/s], shape (n,), over each of the segments, by the trapezoidal rule
-    [m].
-    """
+    """Integrate a velocity [m/s], (n,), over each segment by the trapezoidal rule [m]."""
     position = np.zeros(len(velocity))
     for part in segments:
         position[part] = cumulative_trapezoid(velocity[part], dx=sample_time, initial=0.0)

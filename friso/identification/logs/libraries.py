@@ -25,9 +25,7 @@ def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
 
 
 def cut_short(channels: Iterable[Channel], stated: Iterable[float | None]) -> list[str]:
-    """Say which channels hold fewer samples than their file states, None for nothing: it was cut
-    short.
-    """
+    """Say which channels hold fewer samples than their file states, because it was cut short."""
     return [
         f"{channel.name} ends early: {channel.values.size} of {count:.15g} samples"
         for channel, count in zip(channels, stated, strict=True)

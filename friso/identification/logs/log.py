@@ -27,18 +27,16 @@ contained in it."""
 
 @dataclass(frozen=True)
 class Log:
-    """What was measured, by role (see `ROLES`): signals of shape (n,), SI, at `time` [s], shape
-    (n,).
+    """What was measured, by role (see `ROLES`): SI signals at `time` [s], all of shape (n,).
 
     On a rotary `axis` angles stand for lengths and torques for forces, under the units of a linear axis. Samples are
-    `sample_time` [s] apart within each of the `segments`; between these there are gaps. `units` holds, for a role whose
-    channel could not be turned into the SI unit of the role (a force in volts without a scale, an angle instead of a
-    length), the unit in which it stands.
+    `sample_time` [s] apart within each of the `segments`; between these there are gaps. `units` holds the unit of each
+    role whose channel could not be converted to SI (a force in volts without a scale, an angle instead of a length).
 
-    `scalars` are single numbers that stood in the file, by name. `read` lists line by line what was read and how,
-    `warnings` what the engineer should know before believing it. `setup` are keys of the stage file that were otherwise
-    while this log was taken ({"joint.stroke": "8 mm"}). `bridged`, shape (n,), is true at samples that were lost and
-    are interpolated; None where none was. `is_excerpt` tells that the log is a part of a longer one.
+    `scalars` are single numbers from the file, by name. `read` lists line by line what was read and how, `warnings`
+    what the engineer should know before believing it. `setup` are keys of the stage file that had other values while
+    this log was taken ({"joint.stroke": "8 mm"}). `bridged`, shape (n,), marks samples that were lost and are
+    interpolated; None if there are none. `is_excerpt` marks a part of a longer log.
     """
 
     name: str
@@ -69,9 +67,7 @@ class Log:
         return max(self.segments, key=lambda part: part.stop - part.start)
 
     def measured(self, part: slice) -> np.ndarray:
-        """Return 1 at the samples of a stretch, shape (k,), that were measured, and 0 at those that
-        were lost.
-        """
+        """Return 1 at measured samples of a stretch, shape (k,), and 0 at samples that were lost."""
         return np.ones(part.stop - part.start) if self.bridged is None else 1.0 - self.bridged[part]
 
     def excerpt(self, count: int) -> Log:
@@ -91,9 +87,7 @@ class Log:
         return replace(self, time=self.time[chosen], signals=signals, segments=part, bridged=bridged, is_excerpt=True)
 
     def per_unit_of_force(self) -> Log:
-        """Return the log on an axis with forces in the unit of its own, where that is none of the
-        axis.
-        """
+        """Return the log with its force in its own unit, if that is not a unit of force."""
         unit = self.units.get("force")
         if unit is None:
             return self

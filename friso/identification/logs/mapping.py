@@ -110,9 +110,7 @@ class Mapping:
 
     @property
     def options(self) -> tuple[str, ...]:
-        """The options that say it, as a shell takes them, but for the set-up, of which there are
-        none.
-        """
+        """Return the mapping as options of the command line, without the set-up, which has none."""
         pairs = (("--map", self.roles), ("--unit", self.units), ("--scale", self.scales))
         several = [option(name, left, right) for name, values in pairs for left, right in values.items()]
         time = None if self.sample_time is None else f"{self.sample_time!r} s"
@@ -162,9 +160,7 @@ def _pair(
 
 
 def guess(what: str, reason: str = "") -> str:
-    """Say what an example assumes that nobody told, and what that makes of the log, to be
-    checked before it is copied.
-    """
+    """Say what an example assumes, and what that implies, to be checked before it is copied."""
     return f" (guessed: {what}{f', {reason}' if reason else ''}; check it)"
 
 
@@ -206,10 +202,9 @@ def mapping_text(mapping: Mapping) -> str:
 
 
 def place_for(log: Path, folder: Path) -> Path:
-    """Return where the mapping of a log can be kept: beside it, or in the folder where that
-    cannot be written.
+    """Return where a log's mapping can be kept: beside it, or in the folder if that is read-only.
 
-    A folder that is write-protected stays so for a superuser.
+    A write-protected folder counts as such even for a superuser.
     """
     beside = sidecar(log)
     writable = os.access(beside.parent, os.W_OK) and beside.parent.stat().st_mode & stat.S_IWUSR
@@ -217,10 +212,9 @@ def place_for(log: Path, folder: Path) -> Path:
 
 
 def load_mapping(log: Path, folder: Path | None = None) -> Mapping | None:
-    """Load the mapping kept for a log: that beside it, else that in the folder; None where there
-    is none.
+    """Load the mapping kept beside a log, or else in the folder; None if there is none.
 
-    Raises LogError for a file that is not one.
+    Raises LogError for a file that is not a mapping.
     """
     for place in [sidecar(log)] + ([sidecar(log, folder)] if folder is not None else []):
         if os.path.isfile(place):  # nor is there one whose name would be too long

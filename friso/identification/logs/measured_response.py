@@ -48,8 +48,9 @@ def column_kind(name: str) -> str | None:
 
 
 def is_response(names: Iterable[str]) -> bool:
-    """Tell whether headings hold a frequency with magnitude and phase, or with real and
-    imaginary part.
+    """Tell whether headings hold a frequency response.
+
+    It has a frequency with magnitude and phase, or with real and imaginary part.
     """
     kinds = {column_kind(name) for name in names}
     return "frequency" in kinds and ({"magnitude", "phase"} <= kinds or {"real", "imaginary"} <= kinds)
@@ -130,9 +131,7 @@ def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, 
 
 
 def response_unit(text: str) -> tuple[float, str, str]:
-    """Return the factor to SI, the SI unit, and both in words; a unit of a kind not known here
-    stays as it is.
-    """
+    """Return the factor to SI, the SI unit, and a description; unknown kinds of unit stay."""
     text = spelled(text)
     for si in (*RESPONSES, "m"):
         if text and unit_factor(text, si) is not None:
@@ -169,9 +168,7 @@ def check_response(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
 
 
 def _of_position(measured: MeasuredResponse) -> MeasuredResponse:
-    """Return the response of the position, where that of the velocity or of the acceleration was
-    measured.
-    """
+    """Return a response as one of position, if velocity or acceleration was measured."""
     rate = re.fullmatch(r"(?P<place>m|rad)/s(?P<twice>\^2)?/(?P<force>.+)", measured.unit)
     if rate is None:
         return measured

@@ -25,12 +25,12 @@ KINDS = ("position", "velocity")
 
 @dataclass(frozen=True)
 class MotionReading:
-    """Two channels read as a force and the motion that it makes, the latter as a `kind`: position or velocity.
+    """Two channels read as a force and the motion that it causes.
 
-    `unexplained` is the share of the force's variance that inertia and friction leave, the mean over time scales; 1
-    where their signs contradict each other. `sign` is -1 where the force pushes against the motion that it makes.
-    `doubt` is 1 where the force goes with the acceleration alone, 2 where it goes with the velocity alone at some time
-    scale, and 4 more where the sign is -1.
+    `kind` says whether the motion is a position or a velocity. `unexplained` is the share of the force's variance that
+    inertia and friction leave, the mean over time scales; 1 if their signs contradict each other. `sign` is -1 if the
+    force acts against the motion that it causes. `doubt` is 1 if the force goes with the acceleration alone, 2 if it
+    goes with the velocity alone at some time scale, and 4 more if the sign is -1.
     """
 
     force: Channel
@@ -41,7 +41,7 @@ class MotionReading:
     doubt: int = 0
 
     def channel(self, role: str) -> Channel | None:
-        """Return the channel that this reading gives a role; None for a role that is none of its own."""
+        """Return the channel that this reading gives a role; None if it has no such role."""
         return self.force if role == "force" else self.motion if role == self.kind else None
 
 
@@ -62,7 +62,7 @@ def motion_readings(forces: Sequence[Channel], motions: Sequence[tuple[Channel, 
 
 
 def is_ramp(channel: Channel) -> bool:
-    """Tell whether a channel rises from sample to sample as a counter or a clock does, whose stamps may jitter."""
+    """Tell whether a channel rises with every sample, as a counter or a clock with jitter does."""
     finite = channel.values[np.isfinite(channel.values)]
     if len(finite) < LogSettings.current().samples_of_a_pair or not (np.diff(finite) > 0).all():
         return False
@@ -77,9 +77,9 @@ def is_counter(channel: Channel) -> bool:
 
 
 def leads(one: Channel, other: Channel) -> bool:
-    """Tell whether a channel goes ahead of another that moves alike, as a reference does of what follows it.
+    """Tell whether a channel leads another that moves alike, as a reference does.
 
-    Their velocities correlate best where the other is shifted back by a sample or more, up to a tenth of the record.
+    Their velocities correlate best if the other is shifted back by a sample or more, up to a tenth of the record.
     """
     signals = [_filled(one), _filled(other)]
     size = len(one.values)
@@ -93,7 +93,7 @@ def leads(one: Channel, other: Channel) -> bool:
 
 
 def _filled(channel: Channel) -> np.ndarray | None:
-    """Return the values of a channel with those that are lost interpolated; None where there are few or no change."""
+    """Return a channel's values with lost ones interpolated; None if few or constant."""
     finite = np.isfinite(channel.values)
     if finite.sum() < LogSettings.current().samples_of_a_reading or not np.ptp(channel.values[finite]) > 0:
         return None

@@ -71,9 +71,7 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
 
 
 def _below_names(lines: Sequence[str], delimiter: str) -> list[tuple[str, str]]:
-    """Return names and the numbers below them in the two rows above a table, which scopes write
-    beside names and units.
-    """
+    """Return names and numbers from two rows above a table, as oscilloscopes write them."""
     if len(lines) < 2:
         return []
     names, values = ([cell.strip() for cell in line.split(delimiter)] for line in lines)
@@ -93,9 +91,7 @@ def _pair(line: str) -> tuple[str, str] | None:
 
 
 def _seconds(number: float, unit: str) -> float | None:
-    """Return a sample time or rate in seconds; None without a unit of either, or for what is not
-    positive.
-    """
+    """Return a sample time, or rate, in seconds; None for another unit or if not positive."""
     for si, power in (("s", 1), ("Hz", -1)):
         if number > 0 and unit and (size := unit_factor(unit, si)) is not None:
             return (number * size) ** power
@@ -103,9 +99,7 @@ def _seconds(number: float, unit: str) -> float | None:
 
 
 def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) -> dict[str, str]:
-    """Return the units of columns where a line lists them, with or without a word for units in
-    front.
-    """
+    """Return the units of columns from a line that lists them, with or without a leading word."""
     for line in lines:
         key, value = _pair(line) or ("", "")
         listed = _OF_UNITS.fullmatch(key) is not None
@@ -127,9 +121,7 @@ def _horizontal(lines: Iterable[str]) -> str:
 
 
 def _units_by_name(pairs: Iterable[tuple[str, str]], names: Sequence[str]) -> dict[str, str]:
-    """Return the units of columns where lines tell them one by one: "position unit: mm", or
-    "position: mm".
-    """
+    """Return units of columns from lines such as "position unit: mm" or "position: mm"."""
     plain = {name.lower(): name for name in names if name}
     units = {}
     for key, value in pairs:

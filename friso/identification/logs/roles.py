@@ -88,10 +88,9 @@ def _compound(word: str) -> list[str]:
 
 
 def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
-    """Return the role that a name stands for, and the word that shows it; None for a name that
-    shows none.
+    """Return the role that a name stands for, and the word that shows it; None for neither.
 
-    The `unit` tells a symbol from the name of an axis: V_soll in mm, v_ist in mm/s.
+    The `unit` distinguishes a symbol from the name of an axis: V_soll in mm, v_ist in mm/s.
     """
     parts = words(name)
     name_words = set(parts)
@@ -118,15 +117,16 @@ def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
 
 
 def wanted_of(name: str, unit: str = "") -> bool:
-    """Tell whether a name is that of a speed, an acceleration or a force that was wanted: rpm_ref, no position."""
+    """Tell whether a name is that of a commanded speed, acceleration or force: rpm_ref."""
     parts = words(name)
     rate = any(part in _KEYS[role] for part in parts for role in ("velocity", "acceleration"))
     return bool({*parts} & _SET) and (rate or _has_unit_of(unit, _RATES)) and role_of(name, unit) is None
 
 
 def _of_symbol(parts: Sequence[str], unit: str) -> tuple[str, str] | None:
-    """Return role and letter of a name that is a symbol and the word of what is, in a unit of
-    that symbol; else None.
+    """Return role and letter of a name like v_ist, in a fitting unit; else None.
+
+    It consists of a symbol and a word for measured values.
     """
     if len(parts) != 2 or parts[0] not in _SYMBOLS or parts[1] not in MEASURED or not unit:
         return None
@@ -140,17 +140,13 @@ def _has_unit_of(unit: str, kinds: Sequence[str]) -> bool:
 
 
 def _is_symbol(parts: Sequence[str], unit: str) -> bool:
-    """Tell whether a name is the symbol of what is no position and the word of what is wanted:
-    v_soll.
-    """
+    """Tell whether a name is a symbol of something other than a position, and commanded: v_soll."""
     of_position = _has_unit_of(unit, _TOLD_BY_UNIT["position"])
     return len(parts) > 1 and parts[0] in _LETTERS and parts[1] in _SET and not of_position
 
 
 def is_wanted(name: str) -> bool:
-    """Tell whether a name says, or hints within a word, that it is what was wanted, and was not
-    measured.
-    """
+    """Tell whether a name says, or hints within a word, that the value was commanded, not measured."""
     return any(word in (name.lower() if len(word) > 2 else words(name)) for word in _SET)
 
 
@@ -169,8 +165,9 @@ def find(table: ChannelTable, name: str, role: str, origin: str = "") -> Channel
 
 
 def _nearest(table: ChannelTable, name: str, role: str) -> str:
-    """Return the name of the channel that is likely meant: one of that role, else one that is no
-    clock, or the most alike.
+    """Return the name of the channel that is likely meant by a misspelled one.
+
+    Channels of the role come first, then all that are no clock.
     """
     meant = {channel.name: (role_of(channel.name) or ("",))[0] for channel in table.channels}
     fitting = [one for one, its in meant.items() if its == role] or [one for one, its in meant.items() if its != "time"]
@@ -180,8 +177,7 @@ def _nearest(table: ChannelTable, name: str, role: str) -> str:
 
 
 def listing(table: ChannelTable, taken: Sequence[Channel] = ()) -> str:
-    """List the channels there are, for a message, but for those that are `taken` for other
-    roles.
+    """List the channels for a message, without those `taken` for other roles.
 
     It also says what was left out as objects.
     """
@@ -194,20 +190,17 @@ def listing(table: ChannelTable, taken: Sequence[Channel] = ()) -> str:
 
 @dataclass(frozen=True)
 class Proposal:
-    """Roles with their channels, and the `rivals` for those of which several channels could be
-    one.
-    """
+    """Roles with their channels, and `rivals` where several channels could have a role."""
 
     chosen: dict[str, AssignedRole]
     rivals: dict[str, tuple[Channel, ...]]
 
 
 def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") -> Proposal:
-    """Give roles to channels: first as the user assigned them, then as names show, then as units
-    do.
+    """Give roles to channels: as the user assigned them, then by their names, then by units.
 
-    Of several channels whose names show a role, the one whose name is nothing else has it. Raises LogError for a name
-    that is not there.
+    Of several channels whose names show a role, the one whose name is nothing else gets it. Raises LogError for an
+    assigned name that is not there.
     """
     chosen = {
         role: AssignedRole(role, find(table, name, role, origin), "as specified", True)
@@ -249,9 +242,7 @@ def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") ->
 
 
 def _only_one(role: str, table: ChannelTable, taken: Sequence[Channel]) -> Channel | None:
-    """Return the only channel in a unit of a role, of those whose names tell nothing of what
-    they are; None without it.
-    """
+    """Return the only channel in a unit of the role whose name says nothing; None otherwise."""
     used = {id(channel) for channel in taken}
     fits = [
         channel
@@ -275,9 +266,7 @@ def of_no_signal(name: str) -> bool:
 
 
 def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, str] | None:
-    """Return the only candidate whose name is that of the role, or else the word alone that
-    shows it.
-    """
+    """Return the only candidate whose name is the role, or is the word for it alone."""
     if len(matches) < 2:
         return None
     for alone in (

@@ -83,8 +83,7 @@ def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: 
 
 
 def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
-    """Return the values of a channel in the unit of its role, with notes on what was done to
-    them.
+    """Return the values of a channel in the unit of its role, with notes on what was done.
 
     Raises LogError.
     """
@@ -133,8 +132,7 @@ def _scaled(role: str, scale: str, unit: str, reading: Reading) -> tuple[float, 
 
 
 def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
-    """Return what has to be told of the unit of a channel before it has that of its role; None
-    for nothing.
+    """Return what is needed to convert a channel to the unit of its role; None if nothing is.
 
     Raises LogError for a scale that does not fit.
     """
@@ -192,9 +190,10 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
 
 
 def _likely_length(channel: Channel, wanted: str) -> tuple[str, str]:
-    """Return the likely unit of a position or a velocity, and how far or fast that is, in words; `wanted` for others.
+    """Return the likely unit of a position or velocity, and its range in words in that unit.
 
-    A travel is between 0.5 mm and 0.5 m, or nearest to that, and a speed between 5 mm/s and 5 m/s.
+    A travel is between 0.5 mm and 0.5 m, or nearest to that, and a speed between 5 mm/s and 5 m/s. Other quantities
+    keep the unit `wanted`.
     """
     most = {LENGTH: 0.5, SPEED: 5.0}.get(wanted)
     if most is None:
@@ -214,10 +213,9 @@ def _span(values: np.ndarray) -> str:
 
 
 def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading, notes: Notes) -> np.ndarray | None:
-    """Return the instants of a channel [s]: from the user's sample time, the time channel, or
-    the file.
+    """Return the instants of a channel [s] from the user's sample time, a time channel, or the file.
 
-    None where there are none. Raises LogError.
+    None if there are none. Raises LogError.
     """
     channel = choice.channel
     if reading.mapping.sample_time is not None:
@@ -252,10 +250,9 @@ def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
 
 
 def _likely_unit(clock: Channel) -> tuple[str, str]:
-    """Return the unit in which the steps of a time are like those of a log, and what they are
-    then, in words.
+    """Return the unit in which a time channel's steps are typical of logs, with the step in words.
 
-    They are between 0.1 ms and 100 ms.
+    Typical steps are between 0.1 ms and 100 ms.
     """
     steps = np.diff(clock.values)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
@@ -284,7 +281,10 @@ def no_time(channel: Channel, reading: Reading) -> LogError:
 
 
 def _may_be_a_clock(channel: Channel) -> bool:
-    """Tell whether a channel is in a unit of time and rises, or in none and rises evenly, and not as a counter."""
+    """Tell whether a channel may be a clock: in a unit of time and rising, or without and even.
+
+    A counter is no clock.
+    """
     return is_clock(channel) or (not channel.unit and is_ramp(channel) and not is_counter(channel))
 
 

@@ -108,9 +108,7 @@ def _may_stand_in_text(character: str) -> bool:
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
-    """Split a line into cells, without quotes and blanks around; spaces inside brackets do not
-    split.
-    """
+    """Split a line into cells without quotes and blanks; spaces in brackets do not split."""
     if delimiter == " ":
         if '"' not in line:
             line = re.sub(r"(?<!\s)\s+(?=[\[(])", "\0", line.strip())  # "Time (s)" is one heading
@@ -120,9 +118,7 @@ def split_line(line: str, delimiter: str) -> list[str]:
 
 
 def csv_cells(line: str, delimiter: str, skipinitialspace: bool = False) -> list[str]:
-    """Split a line as CSV does; the line itself where one cell is longer than Python's reader
-    takes.
-    """
+    """Split a line as CSV; return it whole if a cell is longer than Python's reader takes."""
     try:
         return next(csv.reader([line], delimiter=delimiter, skipinitialspace=skipinitialspace), [])
     except csv.Error:
@@ -201,8 +197,9 @@ _Fit = tuple[tuple[int, bool, int], TextLayout] | None
 def _fits(
     lines: Sequence[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]]
 ) -> tuple[_Fit, _Fit]:
-    """Return how well a delimiter, which gives these rows, and a decimal sign fit, without words
-    in rows and with them.
+    """Return how well a delimiter and a decimal sign fit, without words in rows and with them.
+
+    `rows` is the result of splitting by the delimiter.
     """
     numeric = [[is_number(cell, decimal) for cell in cells] for cells in rows]
 
@@ -228,8 +225,9 @@ def _fit(
 
 
 def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:
-    """Tell whether a row of numbers is followed by one as long (a single number in the lines
-    before is no table).
+    """Tell whether a row of numbers is followed by one as long, as in a table.
+
+    A single number in the lines before a table is not.
     """
     following = next((j for j in range(i + 1, len(rows)) if any(rows[j])), None)
     if following is None or not any(is_row[i + 1 :]):
@@ -240,9 +238,7 @@ def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:
 def _headings(
     lines: Sequence[str], first: int, columns: int, delimiter: str
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return names and units per column, from the one or two lines above the numbers that are as
-    long; () for none.
-    """
+    """Return names and units per column from one or two lines above the numbers; () for none."""
     above = [lines[i].lstrip("#% ") for i in range(first) if lines[i].strip()]
     heads = [_heading_cells(line, columns, delimiter) for line in above[-2:]]
     heads = [head[:columns] + _filled(head[columns:]) for head in heads]  # a line may end with a delimiter

@@ -62,9 +62,7 @@ def read_text(path: Path) -> ChannelTable:
 
 
 def _such_as(cells: Any) -> str:
-    """Return the first of the texts in a column, where it has digits and may be a number to its
-    reader.
-    """
+    """Return an example of a column's texts that look like numbers, for a message."""
     texts = cells.dropna().astype(str).str.strip()
     first = next(iter(texts[texts != ""]), "")
     return f", but texts such as {quoted(first[:40])}" if re.search(r"\d", first) else ""
@@ -114,10 +112,9 @@ class _WithoutDosEnd:
 
 
 def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
-    """The error for the first line with more cells than columns, or for a quotation mark that
-    nothing closes.
+    """Return the error for the first line with too many cells, or for an unclosed quotation mark.
 
-    It has the parser's own words where there is neither.
+    It has the parser's own words if there is neither.
     """
     with path.open(encoding=form.encoding, errors="replace") as file:
         for number, line in enumerate(file, 1):
@@ -149,8 +146,9 @@ def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
 
 
 def _has_comma(path: Path, form: TextLayout) -> bool:
-    """Tell whether a comma stands anywhere after the first numbers (the head showed whole
-    numbers only).
+    """Tell whether a comma stands anywhere after the first numbers of a file.
+
+    The head of the file showed whole numbers only.
     """
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as bytes_:
         at = 0
@@ -160,8 +158,7 @@ def _has_comma(path: Path, form: TextLayout) -> bool:
 
 
 def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.ndarray, str] | None:
-    """Return the values of a column, with "s" for the unit of time stamps; None for a column of
-    texts.
+    """Return a column's values, with "s" if they are time stamps; None for a column of texts.
 
     Raises LogError for a text among numbers.
     """
@@ -228,9 +225,7 @@ def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarr
 
 
 def _time_of_day(texts: Any) -> np.ndarray:
-    """Return the seconds since midnight of texts that end with a time of day, NaN where there is
-    none.
-    """
+    """Return seconds since midnight from texts that end with a time of day; NaN for others."""
     parts = texts.str.extract(rf"{CLOCK}$")
     hours, minutes, seconds = (as_numbers(parts[i].fillna("0").where(parts[0].notna())) for i in range(3))
     behind_colon = texts.str.count(":") == 3  # they may go without their zeros: 9:05:00:7 is 7 ms before 9:05:00:14

@@ -166,11 +166,11 @@ def _evened(name: str, raw: Track) -> Track:
 
 
 def _rounded(raw: Track, even: np.ndarray) -> float:
-    """Return the digit [s] to which stamps of an `even` clock, shape (n,) [s], seem rounded; 0
-    where they scatter otherwise.
+    """Return the digit [s] to which the stamps of an even clock, (n,) [s], seem rounded.
 
-    Between neighbours such a clock has one of two whole numbers of digits, and no stamp is further from it than a
-    digit, half of which is the clock's own offset and rate, which are read off the stamps too.
+    Between neighbours such a clock has one of two whole numbers of digits, and no stamp deviates by more than a digit,
+    half of which is for the clock's offset and rate, which are estimated from the stamps too. Returns 0 if they
+    scatter otherwise.
     """
     settings = LogSettings.current()
     bridges = raw.bridged[1:] | raw.bridged[:-1]
@@ -246,9 +246,7 @@ def _same_instants(first: Track, second: Track) -> bool:
 
 
 def _coincident(base: Track, other: Track) -> bool:
-    """Tell whether the instants of the base within the other's first segment are instants of the
-    other as well.
-    """
+    """Tell whether two tracks share their sampling instants within the other's first segment."""
     part = other.segments[0]
     inside = base.time[(base.time >= other.time[part.start]) & (base.time <= other.time[part.stop - 1])]
     steps = (inside - other.time[part.start]) / other.period
@@ -256,9 +254,7 @@ def _coincident(base: Track, other: Track) -> bool:
 
 
 def _at(base: Track, other: Track, values: np.ndarray) -> np.ndarray:
-    """Return values of a track, shape (n,), at the instants of the base, NaN outside of its
-    segments.
-    """
+    """Return values of a track, (n,), at the instants of the base; NaN outside its segments."""
     resampled = np.full(base.time.size, np.nan)
     slack = LogSettings.current().scatter_of_even_stamps * other.period
     for part in other.segments:

@@ -88,8 +88,9 @@ def spelled(text: str) -> str:
 
 
 def _below(part: str, before: str) -> str:
-    """Return a part of a unit, in brackets where it is a product below a stroke: the Nm of
-    rad/Nm.
+    """Return the text of a unit that follows a division sign, in brackets if it is a product.
+
+    Otherwise "rad/N*m" would read as rad/N times m.
     """
     return f"({part})" if before == "/" and "*" in part else part
 
@@ -163,10 +164,9 @@ def split_heading(heading: str) -> tuple[str, str]:
 
 
 def _last_part(name: str) -> str:
-    """Return the unit with which a name ends, "" for none: "tempo_ms" is in ms, "vel_mm_s" in
-    mm/s.
+    """Return the unit at the end of a name: ms for "tempo_ms", mm/s for "vel_mm_s"; else "".
 
-    A single letter is one where the name says what is measured in it: "force_N", but not "pos_s".
+    A single letter counts only if the name says what is measured: "force_N", but not "pos_s".
     """
     if rate := _RATE.fullmatch(name):
         return f"{rate['length']}/{rate['time'].replace('^', '')}"
@@ -192,10 +192,9 @@ def in_si(unit: str, role_unit: str) -> tuple[float, str]:
 
 
 def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR) -> tuple[float, str]:
-    """Return the factor of a scale such as "35.1507 N/V" for a channel, and what was taken for
-    the channel's unit.
+    """Return the factor of a scale such as "35.1507 N/V", and the unit assumed for the channel.
 
-    The factor leads to the SI unit of the role on that axis. A channel without a unit has the one below the scale's
+    The factor leads to the SI unit of the role on that axis. A channel without a unit gets the unit after the scale's
     stroke. Raises LogError.
     """
     match = re.fullmatch(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S.*?)\s*/\s*(\([^()]+\)|[^/]+)\s*", text)

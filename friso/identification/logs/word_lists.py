@@ -21,9 +21,7 @@ def channel_words() -> dict[str, Any]:
 
 
 def _joined(table: dict[str, Any]) -> dict[str, Any]:
-    """Join the lists of a table whose values are lists, one for each language; tables within it
-    by themselves.
-    """
+    """Join lists of words, one for each language, into one set; nested tables likewise."""
     return {
         key: frozenset(word for words in value.values() for word in words)
         if all(isinstance(words, list) for words in value.values())

@@ -15,12 +15,11 @@ from friso.intervals import COVERAGE
 def drawn_from(
     estimates: Sequence[Estimate], correlation: np.ndarray, parameters: Sequence[FitParameter], inner: np.ndarray
 ) -> np.ndarray:
-    """Draw machines from what a record leaves open, as fitted numbers, shape (draws,
-    parameters).
+    """Draw machines from what a record leaves open, as fitted numbers, (draws, parameters).
 
-    They are drawn about the numbers of the fit, `inner`. What is determined is drawn as its intervals and their
-    `correlation` say. What is not is drawn evenly from the range that is left, or evenly in its logarithm; a parameter
-    without any range is drawn from all of its own.
+    They are drawn about the numbers of the fit, `inner`. Determined quantities are drawn by their intervals and
+    `correlation`. Others are drawn evenly from the range that is left, or evenly in its logarithm; a parameter without
+    any range is drawn from all of its own.
     """
     settings = OutputErrorSettings.current()
     rng = np.random.default_rng(settings.seed_of_draws)
@@ -54,9 +53,7 @@ def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
 
 
 def _of_parameter(name: str, values: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """Return a parameter of drawn machines from the values of their keys; None where keys do not
-    tell it.
-    """
+    """Return a parameter of drawn machines from their keys; None if the keys do not give it."""
     if name in (MASS, SHARE):
         masses = [values[key] for key in ("masses.cart", "masses.stage") if key in values]
         if not masses or (name == SHARE and len(masses) < 2):

@@ -72,6 +72,6 @@ def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:
 
 
 def effect_of(force: np.ndarray, fit: OutputErrorFit, rest: np.ndarray) -> np.ndarray:
-    """Return what a further force [N] on the stage changes of the residual of a fit, `rest`; each of shape (n,)."""
+    """Return how a further force [N] changes the residual of a fit, `rest`; shape (n,) each."""
     inputs = fit.problem.inputs
     return replace(fit.problem, inputs=replace(inputs, force=inputs.force + force)).residuals(fit.inner[None])[0] - rest

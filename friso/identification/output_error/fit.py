@@ -45,10 +45,10 @@ class OutputErrorFit:
         return float(np.sqrt(np.sum(self.residual**2) / max(float(self.problem.counted.sum()), 1.0)))
 
     def explains(self, noise: float, closely: bool = False) -> bool:
-        """Tell whether the fit leaves about the `noise` [N] of the log's force, or `closely` no more
-        than that.
+        """Tell whether the fit explains the log up to about its `noise` [N].
 
-        Of a stage that is held to the log a part of the noise alone passes into the residual.
+        With `closely`, the limit is tighter. If the stage is held to the log, only a part of the noise passes into the
+        residual.
         """
         settings = OutputErrorSettings.current()
         times = settings.noise_ratio_of_a_closed_fit if closely else settings.noise_ratio_of_an_explained_record
@@ -113,8 +113,7 @@ def fit(problem: Problem, free: Sequence[int], starts: np.ndarray, progress: Pro
 def fits(
     problems: Sequence[Problem], free: Sequence[int], starts: np.ndarray, progress: Progress = silent
 ) -> list[OutputErrorFit]:
-    """Fit several problems that differ in nothing but the samples that count, from the same
-    starts.
+    """Fit several problems that differ only in the samples that count, from the same starts.
 
     The starts are simulated once for all of them.
     """
@@ -151,11 +150,10 @@ def _fit(
 
 
 def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.ndarray:
-    """Lay many starts over the ranges of the free parameters, shape (starts, parameters), behind
-    the `first`.
+    """Spread many starts over the ranges of the free parameters, (starts, parameters).
 
-    They find parameters that not every motion shows. Core parameters start about the inverse model's values, for a
-    first fit of them alone to motion that sticks and slips can end anywhere.
+    The start `first` comes first. They find parameters that not every motion shows. Core parameters start near the
+    inverse model's values, since a first fit of them alone to motion that sticks and slips can end anywhere.
     """
     settings = OutputErrorSettings.current()
     low, high = bounds_of(problem)
@@ -175,8 +173,7 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
 
 
 def nearby(fit: OutputErrorFit) -> np.ndarray:
-    """Draw starts that another problem's fit allows, shape (starts, parameters), behind that fit
-    itself.
+    """Draw starts that another problem's fit allows, (starts, parameters), beginning with that fit.
 
     They are drawn from its covariance, several times as wide: the loop of a stage that hunts has optima of its own.
     """
@@ -200,9 +197,7 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
 def _ranked(
     problems: Sequence[Problem], pieces: Sequence[slice], starts: np.ndarray, progress: Progress
 ) -> list[np.ndarray]:
-    """Return the best starts of each problem, shape (tried, parameters), the first start always
-    among them.
-    """
+    """Return the best starts of each problem, (tried, parameters), always with the first one."""
     settings = OutputErrorSettings.current()
     if len(starts) <= settings.starts_refined_first:
         return [starts] * len(problems)
@@ -254,11 +249,10 @@ def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progres
 
 
 def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.ndarray:
-    """Widen a covariance, shape (free, free), so that intervals hold what other inputs make of
-    the numbers.
+    """Widen a covariance, (free, free), so that intervals hold the results of other inputs.
 
-    Each of `moved`, shape (free,), says how far one of these inputs moves the fitted numbers. One input is true, and
-    not one in between: half of the distance would be an interval that never holds the truth.
+    Each of `moved`, shape (free,), says how far one of these inputs moves the fitted numbers. One input is true, not a
+    mean of them: an interval over half of the distance would never hold the truth.
     """
     if not moved:
         return covariance
@@ -271,9 +265,7 @@ def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.nd
 
 
 def _moved_by(inputs: Inputs, problem: Problem, best: np.ndarray, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Return how far other inputs, which a log allows just as well, move the fitted numbers,
-    shape (free,).
-    """
+    """Return how far other inputs that the log allows move the fitted numbers, shape (free,)."""
     settings = OutputErrorSettings.current()
     change = replace(problem, inputs=inputs).residuals(best[None])[0] - rest
     if not np.isfinite(change).all():

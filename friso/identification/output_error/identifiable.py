@@ -153,11 +153,10 @@ def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
 
 
 def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -> bool:
-    """Tell whether a closed loop follows the log: its residual is about that of the stage held
-    to the log.
+    """Tell whether a closed loop follows the log about as well as the stage held to the log.
 
-    Both are compared within the motion's bandwidth [Hz], and where the latter counts, since it holds no noise above
-    that.
+    Their residuals are compared within the motion's bandwidth [Hz], and only where the latter counts, since it holds
+    no noise above that.
     """
     step, counted = looped.problem.inputs.sample_time, direct.problem.counted > 0
     powers = [np.sum(low_pass(fit.residual, step, bandwidth)[counted] ** 2) for fit in (looped, direct)]
@@ -183,9 +182,7 @@ def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
 
 
 def _complete(identifiable: set[str], optional: set[str]) -> set[str]:
-    """Drop the Stribeck curve from what is shown where one of its two parameters is not: alone,
-    neither means anything.
-    """
+    """Drop the Stribeck curve if only one of its parameters is shown: alone it means nothing."""
     effect = set(STRIBECK) & optional
     return identifiable if effect <= identifiable else identifiable - set(CURVE)
 

@@ -49,8 +49,9 @@ class FitParameter:
 
 
 def bends(flat: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the least and the largest length [m] that bristles bend before they slip; angles
-    [rad] on a rotary axis.
+    """Return the least and largest length [m] that bristles bend before they slip.
+
+    They are angles [rad] on a rotary axis.
     """
     settings = OutputErrorSettings.current()
     if axis_of(flat) == LINEAR:
@@ -80,14 +81,12 @@ def is_free(flat: Mapping[str, Any]) -> bool:
 def fit_parameters(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
 ) -> list[FitParameter]:
-    """List the parameters of a stage given as flat keys that a log may show, with their starts
-    and ranges.
+    """List the parameters that a log may show of a stage, with their starts and ranges.
 
-    `levels` holds first values, of mass, Coulomb and viscous friction and offset, from the inverse model. `speed` [m/s]
-    is the highest of the log, and `travel` [m] how far it goes: no bristle bends further, and no Stribeck velocity is
-    higher unless bearings have such. Where it does not go `both_ways`, a constant force and an asymmetry cannot be
-    distinguished from friction, and are left out. Raises InputError for a friction law that is not among those that can
-    be fitted.
+    `levels` holds first values of mass, Coulomb and viscous friction and offset, from the inverse model. `speed` [m/s]
+    is the highest in the log, and `travel` [m] its range: no bristle bends further, and no Stribeck velocity is higher
+    unless bearings have such. If the log does not go `both_ways`, a constant force and an asymmetry cannot be
+    distinguished from friction, and are left out. Raises InputError for a friction law that cannot be fitted.
     """
     mass = levels["mass"]
     parameters = [FitParameter(MASS, "kg", mass, mass / 5, mass * 5)]
@@ -151,17 +150,16 @@ def _exponent(stated: float) -> FitParameter:
 
 
 def _slow(name: str, unit: str, flat: Mapping[str, Any], low: float, high: float) -> FitParameter:
-    """Return a parameter that slow motion alone shows; it starts at what the stage has, which
-    widens its range if need be.
+    """Return a parameter that only slow motion shows, starting at the stage's value.
+
+    Its range is widened to contain that value.
     """
     start = float(flat[name])
     return FitParameter(name, unit, start, float(min(low, start)), float(max(high, start)), core=False)
 
 
 def stages(flat: Mapping[str, Any], parameters: Sequence[FitParameter], inner: np.ndarray) -> dict[str, Any]:
-    """Return the flat keys of the stages that fitted numbers, shape (runs, parameters), make of
-    a stage.
-    """
+    """Return the flat keys of the stages for fitted numbers, shape (runs, parameters)."""
     values = {parameter.name: parameter.outer(column) for parameter, column in zip(parameters, inner.T, strict=True)}
     return {**flat, **keys_of(flat, values)}
 

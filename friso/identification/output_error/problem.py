@@ -45,16 +45,15 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Problem:
-    """A stage as flat keys that follows a log, with the parameters to fit and the force [N] to
-    be met, `target`.
+    """A stage that follows a log, with the parameters to fit and the force [N] to reproduce.
 
-    In a `closed` loop the stage has the controller of its machine and follows the log's reference; the target is the
-    log's force. Otherwise it follows the log's position under the log's force, held to it by a controller of our own
-    whose target is zero: what that has to add is what the model does not explain.
+    In a `closed` loop the stage has its machine's controller and follows the logged reference; `target` is the logged
+    force. Otherwise the logged force acts on the stage, and a controller of friso's own holds it to the logged
+    position; `target` is zero, because whatever that controller has to add is what the model does not explain.
 
-    `start` holds position [m] and velocity [m/s] at the beginning; `counted`, shape (n,), is 0 at the samples that the
-    fit leaves out. `unsettled` are inputs that the log allows as well as those taken, and `sharper` positions [m],
-    smoothed less and less, that the stage may be held to instead.
+    `start` holds position [m] and velocity [m/s] at the beginning; `counted`, shape (n,), is 0 at samples that the fit
+    leaves out. `unsettled` are inputs that the log allows as well as those taken, and `sharper` are positions [m],
+    smoothed less and less, to which the stage may be held instead.
     """
 
     flat: Mapping[str, Any]
@@ -110,9 +109,7 @@ class Problem:
         return replace(self, inputs=inputs, target=target, counted=counted, start=start, unsettled=(), sharper=())
 
     def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
-        """Simulate fitted numbers of shape (runs, parameters), and yield numbers of runs with
-        records, a chunk at a time.
-        """
+        """Simulate fitted numbers, (runs, parameters), in chunks; yield run numbers and records."""
         settings = OutputErrorSettings.current()
         flat = stages(self.flat, self.parameters, inner)
         starts = self._starts(flat, len(inner))
@@ -135,11 +132,10 @@ class Problem:
         return np.where(np.isfinite(residuals), residuals, np.inf)
 
     def jacobians(self, inner: np.ndarray, free: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return the residual and its derivatives for each row of fitted numbers, shape (rows,
-        parameters).
+        """Return residual and derivatives for each row of fitted numbers, shape (rows, parameters).
 
-        The residual has the shape (n,), and the derivatives (n, free) are those to the numbers that are `free` in that
-        row. All come from runs side by side.
+        The residual has the shape (n,), the derivatives (n, free) for the numbers that are `free` in that row. All
+        come from runs side by side.
         """
         owner, number = np.nonzero(free)
         steps = np.array([self._step(inner[row], int(i)) for row, i in zip(owner, number, strict=True)])
@@ -151,11 +147,10 @@ class Problem:
         return [(at[row], slopes[owner == row].T) for row in range(len(inner))]
 
     def linearised(self, inner: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residual of fitted numbers, shape (parameters,), and its derivatives to the
-        `free` ones.
+        """Return the residual of fitted numbers, (parameters,), and its derivatives to the `free` ones.
 
-        The derivatives have the shape (n, free): of the differences to both sides the smaller one at each sample. A
-        break-away that a step just brings about, or prevents, is on one side of it alone, and no derivative.
+        The derivatives have the shape (n, free). At each sample the smaller one of the differences to both sides
+        counts: a break-away that a step just causes, or prevents, appears on one side only and is no derivative.
         """
         numbers = np.flatnonzero(free)
         ahead = np.array([self._step(inner, int(i)) for i in numbers])
@@ -180,8 +175,7 @@ class Problem:
         return size if inner[i] < (parameter.inner(parameter.low) + parameter.inner(parameter.high)) / 2 else -size
 
     def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-        """Return the states at which runs begin: where the log begins and as fast, with bent
-        bristles.
+        """Return the states in which runs begin: where the log begins, at its speed.
 
         The bristles are bent as far as the first force bends them.
         """
@@ -260,11 +254,9 @@ def loop_problem(flat: Mapping[str, Any], log: Log, part: slice, parameters: Seq
 
 
 def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
-    """Say why the controller of a drive that samples is simulated in continuous time all the
-    same.
+    """Say why a sampling drive's controller is simulated in continuous time nevertheless.
 
-    The sentence is empty where it is not, or where the drive does not tell its sample time. `sample_time` [s] is the
-    log's.
+    The sentence is empty if it is not, or if the drive's sample time is not known. `sample_time` [s] is the log's.
     """
     if "drive.sample_time" not in flat:
         return ""
@@ -277,13 +269,11 @@ def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
 def tracking(
     flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter], bandwidth: float
 ) -> Problem:
-    """Set up the stage under the log's force, held to the log's smoothed position by a slow
-    controller.
+    """Set up the stage under the logged force, held to the smoothed logged position.
 
-    `bandwidth` [Hz] is that of the motion. A faster controller, or the noise itself, would shake the bristles of a
-    stage at rest. A log tells neither whether its force is held from sample to sample or follows straight lines, nor
-    how smooth its motion was: these stay unsettled. Raises InputError for a log that never moves for long enough to
-    count.
+    A slow controller holds it; `bandwidth` [Hz] is that of the motion. A faster controller, or noise, would shake the
+    bristles of a stage at rest. A log tells neither whether its force is held between samples or interpolated, nor how
+    smooth its motion was: these stay unsettled. Raises InputError for a log that never moves for long enough.
     """
     identification_settings = IdentificationSettings.current()
     settings = OutputErrorSettings.current()
@@ -346,10 +336,9 @@ def blur_of(position: np.ndarray, smooth: np.ndarray) -> float:
 
 
 def _after_start(count: int, sample_time: float) -> np.ndarray:
-    """Return 0 while a closed loop shows how it was started, and 1 from there on, shape
-    (count,).
+    """Return 0 for the first samples of a closed loop and 1 for all others, shape (count,).
 
-    A log tells but roughly how it was.
+    The first samples show how the loop was started, which a log tells only roughly.
     """
     settings = OutputErrorSettings.current()
     first = round(min(settings.time_of_a_start / sample_time, settings.record_share_of_a_start * count))
@@ -357,9 +346,7 @@ def _after_start(count: int, sample_time: float) -> np.ndarray:
 
 
 def _start(log: Log, part: slice) -> tuple[float, float]:
-    """Return position [m] and velocity [m/s] at the beginning, from a parabola through the first
-    samples.
-    """
+    """Return initial position [m] and velocity [m/s], by a parabola through the first samples."""
     settings = OutputErrorSettings.current()
     time = np.arange(settings.samples_of_first_velocity) * log.sample_time
     slope = np.polyfit(time, log["position"][part][: settings.samples_of_first_velocity], 2)[1]

@@ -81,8 +81,9 @@ def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:
-    """Find where a profile crosses the limit on both sides of its lowest value, and on which
-    side it does not.
+    """Find where a profile crosses the limit on both sides of its minimum.
+
+    Also returns on which sides it does not.
     """
     lowest = int(np.argmin(cost))
     left, right = values[0], values[-1]

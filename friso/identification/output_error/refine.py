@@ -17,9 +17,7 @@ LADDER = np.array([0.1, 1.0, 10.0, 100.0])
 
 @dataclass(frozen=True)
 class Refined:
-    """Refined numbers, shape (starts, parameters), with mean squares of their residuals [N^2],
-    shape (starts,).
-    """
+    """Refined numbers, (starts, parameters), and mean squares of residuals [N^2], (starts,)."""
 
     inner: np.ndarray
     cost: np.ndarray
@@ -33,9 +31,7 @@ def bounds_of(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
 
 
 def costs(pieces: Sequence[Problem], inner: np.ndarray) -> np.ndarray:
-    """Return mean squares of the residuals [N^2], shape (runs,), of fitted numbers, shape (runs,
-    parameters).
-    """
+    """Return mean squares of the residuals [N^2], (runs,), of fitted numbers (runs, parameters)."""
     costs = np.zeros(len(inner))
     for problem in pieces:
         for numbers, record in problem.simulated(inner):
@@ -52,14 +48,13 @@ def refine_fit(
     enough: float,
     progress: Progress = silent,
 ) -> Refined:
-    """Fit all `pieces` of a problem from several starts at once, by Levenberg and Marquardt's
-    method.
+    """Fit all `pieces` of a problem from several starts at once (Levenberg, Marquardt).
 
-    The starts have the shape (starts, parameters); of each the numbers are fitted that are `free`, a mask of that
-    shape. A fit is done when its sum of squares falls by less than the share `enough`.
+    The starts have the shape (starts, parameters); `free`, of the same shape, marks the numbers to fit. A fit is done
+    when its sum of squares falls by less than the share `enough`.
 
-    Of every start several dampings are tried side by side, which costs less than the derivatives do; these are computed
-    anew only where one of them was better. A number at an end of its range from which it is driven out stays there.
+    For every start several dampings are tried side by side, which costs less than the derivatives do; these are
+    recomputed only if one damping was better. A number at an end of its range stays there while it is driven out.
     """
     settings = OutputErrorSettings.current()
     low, high = bounds_of(pieces[0])
@@ -96,8 +91,7 @@ def refine_fit(
 
 
 def _curvature(pieces: Sequence[Problem], inner: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return derivatives of the residual times themselves and times the residual, of each row of
-    numbers.
+    """Return J' J and J' r of each row of numbers, from Jacobian J and residual r.
 
     They are 0 for numbers that are not `free`.
     """

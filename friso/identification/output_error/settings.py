@@ -160,7 +160,7 @@ class OutputErrorSettings(Settings):
 
     # From fitted numbers to keys of the stage file.
     static_error_of_following: float = setting(0.05, "")
-    """Static friction comes out 3 to 6 % too high of stages that follow a log (21 machines, docs/identify.md)."""
+    """Static friction comes out 3 to 6 % too high where a stage follows a log (docs/evidence/identify.md)."""
 
     widest_logarithm: float = setting(0.7, "")
     """Half an interval of the logarithm beyond which a record bounds nothing: linear steps fail by a factor of 2."""

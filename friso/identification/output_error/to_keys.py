@@ -109,9 +109,7 @@ def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
 
 
 def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.ndarray:
-    """Widen the covariance of fitted numbers so that their intervals reach as far as the
-    profiles do.
-    """
+    """Widen the covariance of fitted numbers so that their intervals reach as far as profiles."""
     spread = fit.deviation
     factors = np.ones(len(fit.free))
     for i, number in enumerate(fit.free):

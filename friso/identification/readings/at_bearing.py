@@ -61,11 +61,10 @@ DIRECT = Between()
 
 
 def machine_between(flat: Mapping[str, Any]) -> Between:
-    """Return what lies between the commanded force and the bearing of a stage given as flat
-    keys.
+    """Return what lies between the commanded force and the bearing, from a stage's flat keys.
 
-    A joint is taken to be held by its limiter. The frequency of the parasitic mode is that of both parts of the stage's
-    mass against each other; with the other one held, that of the part on the spring is lower.
+    A joint counts as held by its limiter. The frequency of the parasitic mode is that of both parts of the stage's
+    mass against each other; with one part held, the frequency of the other on the spring is lower.
     """
     drive, joint, mode = (
         {key.removeprefix(name): value for key, value in flat.items() if key.startswith(name)}
@@ -88,10 +87,9 @@ def machine_between(flat: Mapping[str, Any]) -> Between:
 
 
 def believed_between(prior: Prior, log: Log) -> Between:
-    """Return what lies between force and bearing, as other experiments show it or else the stage
-    file has it.
+    """Return what lies between force and bearing, from other experiments or the stage file.
 
-    A stage file states no viscous friction better than to its whole size. Raises InputError.
+    The viscous friction of a stage file counts as uncertain by its whole size. Raises InputError.
     """
     believed = machine_between(prior.believed(log))
     viscous = prior.estimates.get("friction.viscous")
@@ -127,8 +125,9 @@ class BearingRecord:
         return BearingRecord(self.time[:count], self.position[:count], bent, self.force[:count])
 
     def seen(self, cutoff: float, step: int = 1) -> BearingRecord:
-        """Return the record with its motion low-passed at a frequency [Hz], about its start, and
-        every `step`th sample.
+        """Return the record low-passed at a frequency [Hz], from its start, and thinned.
+
+        Every `step`th sample is kept.
         """
         place = low_pass(self.position, self.interval, cutoff)
         bent = None if self.bent is None else low_pass(self.bent, self.interval, cutoff)[::step]
@@ -166,9 +165,7 @@ def record_of(log: Log, part: slice, between: Between) -> BearingRecord:
 
 
 def why_unseen(record: BearingRecord, fewest: int) -> str:
-    """Say why nothing can be read from a record, of which so many samples are needed; "" where
-    it can.
-    """
+    """Say why a record is not usable, if it has too few samples or no force; "" if it is."""
     settings = ReadingSettings.current()
     if len(record.time) < fewest:
         return f"the record has {len(record.time)} samples: {fewest} are needed"
@@ -191,9 +188,7 @@ def why_unseen(record: BearingRecord, fewest: int) -> str:
 
 
 def cutoff_of(record: BearingRecord) -> float:
-    """Choose the low-pass [Hz] for a record: where its motion ends, but no slower than its
-    length allows.
-    """
+    """Choose the low-pass [Hz] for a record: where its motion ends, unless it is too short."""
     settings = ReadingSettings.current()
     highest = motion_bandwidth(record.body, record.interval)
     return max(
@@ -203,11 +198,10 @@ def cutoff_of(record: BearingRecord) -> float:
 
 
 def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the position [m] of the body on the bearing, the force [N] that has arrived, and
-    the acceleration [m/s^2].
+    """Return position [m], force [N] and acceleration [m/s^2] at the bearing, each (n,).
 
-    Each has the shape (n,). The acceleration is that of the whole moving mass: inertia is the mass times that. `mass`
-    [kg] counts where a contact gives way, by the force that goes through it.
+    The force is the one that has arrived there. The acceleration belongs to the whole moving mass: inertia is that
+    mass times it. `mass` [kg] counts where a contact gives way, by the force that goes through it.
     """
     time, acceleration = record.time, rate_of(record.time, rate_of(record.time, record.position))
     force, before = _force_after_delay(time, record.force, between), between.beyond * acceleration
@@ -249,9 +243,7 @@ def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarr
 
 
 def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:
-    """Return the force [N] that a command [N], shape (n,), has become: late by the delay and by
-    the current loop.
-    """
+    """Return the force [N] that a command [N], shape (n,), becomes after delay and current loop."""
     late = CubicSpline(time, command)(np.maximum(time - (between.delay or 0.0), time[0]))
     if not np.isfinite(between.bandwidth):
         return late
@@ -261,9 +253,7 @@ def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) 
 
 
 def _mode_acceleration(time: np.ndarray, acceleration: np.ndarray, mode: StructureMode) -> np.ndarray:
-    """Return the acceleration of the mass of a mode whose base moves with an acceleration
-    [m/s^2], shape (n,).
-    """
+    """Return the acceleration of the mass of a mode, from the acceleration [m/s^2] of its base."""
     settings = ReadingSettings.current()
     omega, step = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / settings.points_per_sample
     fine = CubicSpline(time, acceleration)(

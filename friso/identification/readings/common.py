@@ -87,19 +87,16 @@ def cart(log: Log) -> np.ndarray | None:
 
 
 def on_bearing(log: Log) -> np.ndarray:
-    """Return the position [m] of the body that rides on the bearing, shape (n,): the cart, else
-    the one body measured.
-    """
+    """Return the position [m] of the body on the bearing, shape (n,): of the cart, if measured."""
     moved = cart(log)
     return channel(log, "position") if moved is None else moved
 
 
 def low_pass(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
-    """Low-pass values forth and back by a Butterworth filter, without phase shift, at `cutoff`
-    [Hz].
+    """Low-pass values forth and back, without phase shift, at `cutoff` [Hz] (Butterworth).
 
-    A record sampled too slowly to hold anything above the cut-off, or of fewer samples than the filter's own ends take,
-    is returned as it is.
+    A record sampled too slowly to hold anything above the cut-off, or shorter than the ends of the filter, is returned
+    as it is.
     """
     if cutoff >= 0.45 / sample_time:
         return values
@@ -115,8 +112,7 @@ def _butterworth(sample_time: float, cutoff: float) -> np.ndarray:
 
 
 def rate(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
-    """Differentiate values sampled every `sample_time` [s] and low-passed at `cutoff` [Hz],
-    shape (n,).
+    """Differentiate values, shape (n,), sampled every `sample_time` [s], below `cutoff` [Hz].
 
     The rate of fewer than two values is 0.
     """
@@ -126,10 +122,9 @@ def rate(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
 
 
 def motion_bandwidth(position: np.ndarray, sample_time: float) -> float:
-    """Return the highest frequency [Hz] up to which a position, shape (n,), moves, and stands
-    out of its noise.
+    """Return the highest frequency [Hz] at which a position, (n,), stands out of its noise.
 
-    The noise is taken to be white; 0 where the position stands out nowhere.
+    The noise is taken to be white. Returns 0 if the position stands out nowhere.
     """
     settings = ReadingSettings.current()
     rates, density = welch(
@@ -149,9 +144,7 @@ def motion_bandwidth(position: np.ndarray, sample_time: float) -> float:
 
 
 def robust(values: np.ndarray) -> float:
-    """Return the standard deviation of what most values are like, by the median absolute
-    deviation; 0 of none.
-    """
+    """Return the standard deviation of most values, by the median absolute deviation; 0 of none."""
     if not len(values):
         return 0.0
     return float(NORMAL_MAD * np.median(np.abs(values - np.median(values))))
@@ -199,9 +192,7 @@ def digit_of(signal: np.ndarray) -> float:
 
 
 def turns_of(position: np.ndarray, swing: float) -> np.ndarray:
-    """Return the samples at which a motion [m], shape (n,), turns and goes back by more than
-    `swing` [m].
-    """
+    """Return the samples at which a motion [m], shape (n,), turns back by more than `swing` [m]."""
     turns, values = [], position.tolist()
     lowest = highest = values[0]
     low = high = 0
@@ -236,8 +227,9 @@ class Mean:
 
 
 def block_mean(values: np.ndarray) -> Mean:
-    """Return the mean with the error that its blocks show: neighbouring samples are not
-    independent.
+    """Return the mean and its error, by the scatter of blocks of neighbouring samples.
+
+    Neighbouring samples are not independent.
     """
     count = min(ReadingSettings.current().blocks_of_a_mean, len(values))
     means = np.array([part.mean() for part in np.array_split(values, count)])
@@ -270,8 +262,9 @@ def t_value(freedom: float) -> float:
 
 
 def by_t(name: str, unit: str, mean: Mean, method: str, low: float = 0.0, high: float = 0.0) -> Estimate:
-    """Make an estimate with Student's interval, widened by what is systematic: `low` below and
-    `high` above.
+    """Make an estimate with Student's interval, widened by systematic errors.
+
+    They are `low` below and `high` above the mean.
     """
     half = t_value(mean.freedom) * mean.error
     ends = (mean.value - half - low, mean.value + half + high)
@@ -289,10 +282,9 @@ def solve_normal_equations(square: np.ndarray, product: np.ndarray) -> np.ndarra
 
 
 def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Return the covariance of coefficients, shape (p, p), of a fit of the target, shape (n,),
-    by columns, shape (n, p).
+    """Return the covariance (p, p) of a least-squares fit, by leaving out blocks of the record.
 
-    Blocks of the record are left out in turn.
+    The target, shape (n,), is fitted by columns, shape (n, p).
     """
     settings = ReadingSettings.current()
     parts = zip(
@@ -307,8 +299,7 @@ def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 
 def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray) -> np.ndarray:
-    """Return the correlation, shape (p, p), of quantities with a covariance and systematic
-    errors.
+    """Return the correlation (p, p) of quantities with a covariance and systematic errors.
 
     Systematic `shifts`, shape (m, p), move the quantities together, and doubts of half-width `even`, shape (p,), each
     by itself.
@@ -319,11 +310,10 @@ def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray)
 
 
 def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.ndarray:
-    """Return the deflection [m] of bristles, shape (n,), under a body that makes some moves [m],
-    shape (n - 1,).
+    """Return the deflection [m] of bristles, shape (n,), under a body that moves.
 
-    At the velocities of these moves the bristles come to rest at `ends` [m], shape (n - 1,); they begin from a
-    deflection at the `start` [m]. The solution is exact in each move.
+    The moves [m] have the shape (n - 1,). At their velocities the bristles come to rest at `ends` [m], shape (n - 1,);
+    they begin from the deflection `start` [m]. The solution is exact in each move.
     """
     kept = np.exp(-np.abs(moves) / ends)
     after = np.append(start, np.sign(moves) * ends * (1 - kept))  # each deflection without that before
@@ -340,9 +330,8 @@ def by_direction(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
 def stribeck_curve(
     speeds: np.ndarray, coulomb: float, static: float, velocity: float, exponent: float = 2.0
 ) -> np.ndarray:
-    """Return friction [N] at steady speeds [m/s] without the viscous part, of the shape of the
-    speeds.
+    """Return friction [N] at steady speeds [m/s] by Eq. 4 of the thesis, not the viscous part.
 
-    It is Eq. 4 of the thesis, with Coulomb and static friction [N], the Stribeck velocity [m/s] and the exponent.
+    Arguments are Coulomb and static friction [N], the Stribeck velocity [m/s] and the exponent.
     """
     return coulomb + (static - coulomb) * np.exp(-((speeds / velocity) ** exponent))

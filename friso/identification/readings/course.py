@@ -44,8 +44,9 @@ class Course:
 
     @property
     def signal(self) -> str:
-        """The role of what drives the log from outside: the force injected, else a reference that
-        moves, else the force.
+        """Return the role of the signal that drives the log.
+
+        It is the injected force, or a moving reference, or else the force.
         """
         return external(self.log) or "force"
 
@@ -98,10 +99,9 @@ class Course:
         return len(even) if sum(even) > settings.log_share_of_ramps * len(log.time) * log.sample_time else 0
 
     def _from_none(self, at: float, force: float, lasts: float) -> bool:
-        """Tell whether the force rests at none and then rises evenly to what it is at an instant
-        [s].
+        """Tell whether the force rests at zero and then rises evenly up to an instant [s].
 
-        The rise lasts for some time [s].
+        The rise lasts for the given time [s].
         """
         settings = ReadingSettings.current()
 
@@ -134,9 +134,7 @@ class Course:
 
     @cached_property
     def against_a_spring(self) -> bool:
-        """Whether nothing but the place tells the force with which the position rests here and
-        there.
-        """
+        """Tell whether the position rests at several places, each with its own force."""
         settings = ReadingSettings.current()
         part = self.log.longest
         position, force = self.log["position"][part], self.log["force"][part]
@@ -167,10 +165,9 @@ class Course:
 
 
 def _on_a_spring(places: np.ndarray, forces: np.ndarray) -> bool:
-    """Tell whether the forces at places of successive rests, each shape (n,), rise as those of a
-    spring do.
+    """Tell whether forces at places of successive rests, shape (n,), rise as a spring's do.
 
-    They have to do so from whichever side a place was reached.
+    They must do so from whichever side a place was reached.
     """
     settings = ReadingSettings.current()
     if len(places) < settings.places_of_a_spring or not (np.ptp(places) > 0 and np.ptp(forces) > 0):
@@ -192,18 +189,18 @@ def _on_a_spring(places: np.ndarray, forces: np.ndarray) -> bool:
 
 
 def external(log: Log) -> str | None:
-    """Return the role of what moves a loop from outside: the force injected, else a reference
-    that moves.
+    """Return the role of the signal that moves a loop from outside; None if there is none.
 
-    None without one: a reference that is held constant excites nothing.
+    It is the injected force or else a reference that moves.
     """
     roles = ("disturbance", "reference")
     return next((role for role in roles if role in log and np.ptp(log[role][log.longest]) > 0), None)
 
 
 def _harmonics(period: np.ndarray) -> float:
-    """Count the harmonics of equal power that would spread as those of a signal over one period,
-    shape (samples,).
+    """Return the effective number of harmonics of one period of a signal, shape (samples,).
+
+    It is the number of harmonics of equal power that would spread as much.
     """
     power = np.abs(np.fft.rfft(period)[1:]) ** 2
     return float(power.sum() ** 2 / np.sum(power**2))
@@ -220,9 +217,7 @@ def _rest(position: np.ndarray, samples: int) -> float:
 
 
 def _turns(period: np.ndarray) -> int:
-    """Count how often a signal over one period, shape (samples,), turns back by a share of its
-    range.
-    """
+    """Count how often a signal turns back within one period by a share of its range."""
     least, turns, direction, last = ReadingSettings.current().range_share_of_a_turn * np.ptp(period), 0, 1.0, period[0]
     for value in period:
         if (value - last) * direction > 0:

@@ -23,8 +23,9 @@ from friso.intervals import COVERAGE
 
 @dataclass(frozen=True)
 class Harmonic:
-    """An oscillation over the place: wavelength [m], amplitude [N], and the frequency [Hz] in
-    time at that speed.
+    """A periodic variation of friction along the way.
+
+    It has a wavelength [m], an amplitude [N], and the frequency [Hz] at which it appears at the speed of the log.
     """
 
     wavelength: float
@@ -75,11 +76,10 @@ class FrictionPosition:
 
 
 def friction_position(log: Log, mass: float = 0.0, crossover: float | None = None) -> FrictionPosition:
-    """Read friction along the rail off the passes at constant velocity, `mass` [kg] times
-    acceleration taken off.
+    """Read friction along the rail from passes at constant velocity, without inertia.
 
-    With the loop's `crossover` [Hz] the verdict also asks whether it is quick enough for the oscillations seen. Raises
-    InputError for missing channels.
+    Inertia is `mass` [kg] times acceleration. With the loop's `crossover` [Hz] the verdict also asks whether it is
+    quick enough for the oscillations seen. Raises InputError for missing channels.
     """
     settings = ReadingSettings.current()
     stretches = passes(log)
@@ -141,10 +141,9 @@ def _map(
 
 
 def _length(fields: np.ndarray) -> np.ndarray:
-    """Return the lag, in places, at which the autocorrelation of each field falls to 1/e, shape
-    (fields,).
+    """Return the lag at which the autocorrelation of each field falls to 1/e, shape (fields,).
 
-    It is NaN where the autocorrelation does not fall that far.
+    Lags count places. NaN if the autocorrelation does not fall that far.
     """
     count = fields.shape[1]
     power = np.abs(np.fft.rfft(fields, 2 * count, axis=1)) ** 2
@@ -158,11 +157,10 @@ def _length(fields: np.ndarray) -> np.ndarray:
 
 
 def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
-    """Estimate the length over which the force along the rail stays alike: its autocorrelation
-    falls to 1/e.
+    """Estimate the correlation length of the force along the rail.
 
-    The interval is that of the ratio of found to true length of random fields with exponential correlation, detrended
-    in the same way.
+    Over that length its autocorrelation falls to 1/e. The interval is the ratio of found to true length for random
+    fields with exponential correlation, detrended in the same way.
     """
     settings = ReadingSettings.current()
     name, unit, method = "correlation length", "m", "autocorrelation of the force over position falls to 1/e"
@@ -192,10 +190,9 @@ def _harmonics(flat: np.ndarray, step: float, speed: float) -> tuple[Harmonic, .
 
 
 def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
-    """Return the correlation of the maps, detrended, of all pairs that share at least half of
-    the shorter one's places.
+    """Return the correlation of each pair of maps that share half of the shorter one's places.
 
-    Passes in opposite directions are compared by the friction against the motion.
+    Maps are detrended. Passes in opposite directions are compared by the friction against the motion.
     """
     pairs = []
     for (i, first), (j, second) in combinations(enumerate(maps), 2):
@@ -246,9 +243,7 @@ def _spreads(maps: Iterable[PassMap]) -> dict[str, list[float]]:
 
 
 def _from_to(values: list[float]) -> str:
-    """The least and the largest of some values in words, or one number where they are as good as
-    equal.
-    """
+    """Write the range of some values, or one number if they are nearly equal."""
     return " to ".join(dict.fromkeys((f"{min(values):.2g}", f"{max(values):.2g}")))
 
 

@@ -61,13 +61,12 @@ class FrictionVelocity:
 
 
 def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None) -> FrictionVelocity:
-    """Read friction over speed off the stretches of constant velocity, over the places that all
-    of them share.
+    """Read friction over speed from stretches of constant velocity, over the places they share.
 
-    They are read as they are where they share too little. `mass` [kg] times what is left of acceleration is taken off.
-    The Stribeck curve has the `exponent` of the stage unless the forces refute that, else what the forces leave
-    possible of it is inside all intervals. What the speeds present cannot show is unknown, with the reason. Raises
-    InputError for missing channels.
+    All places are used if they share too few. Inertia, `mass` [kg] times remaining acceleration, is subtracted. The
+    Stribeck curve has the `exponent` of the stage unless the forces refute it; otherwise all intervals allow for every
+    exponent that the forces leave possible. What the speeds cannot show is unknown, with the reason. Raises InputError
+    for missing channels.
     """
     stretches = passes(log)
     used = on_common_places(log, [stretch for stretch in stretches if stretch.steady])
@@ -93,10 +92,10 @@ def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None
 
 
 def _row(stretch: Pass, mass: float) -> tuple[float, float, float, float]:
-    """Return velocity [m/s], force [N] less inertia, half-width [N] of its interval, and swing
-    over velocity, of a stretch.
+    """Return velocity [m/s], friction [N], its half-width [N], and relative swing of a pass.
 
-    The mean of a curve over a swing is off by the square of that, as a share of how far the curve falls.
+    Friction is force without inertia. The mean of a curve over a swing is off by the square of the swing, as a share
+    of how far the curve falls.
     """
     return (
         stretch.velocity,
@@ -109,11 +108,10 @@ def _row(stretch: Pass, mass: float) -> tuple[float, float, float, float]:
 def _together(
     velocities: np.ndarray, forces: np.ndarray, errors: np.ndarray, exponent: float | None
 ) -> tuple[Estimate, Direction, bool]:
-    """Return the constant force, the friction of both directions without it, and whether the
-    forces refute the exponent.
+    """Separate the constant force from friction, and tell whether forces refute the exponent.
 
-    The force follows from least squares of Coulomb, viscous and constant force on all stretches, or with the Stribeck
-    curve where one shows.
+    The constant force follows from least squares of Coulomb, viscous and constant force on all stretches, or with the
+    Stribeck curve if one shows. Also returns the friction of both directions without it.
     """
     name, method = "bias", f"{METHOD}, forward and backward"
     sign = np.sign(velocities)
@@ -140,11 +138,10 @@ def _together(
 
 
 def _deviations(forces: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """Return the standard deviation [N] of each stretch by its half-width in `errors` [N], but
-    no less than the median.
+    """Return the standard deviation [N] of each stretch, at least as large as the median.
 
-    A stretch where the velocity swings counts less; one that happens to be even does not count for more than the
-    others.
+    It follows from half-widths `errors` [N]. A stretch where the velocity swings counts less; one that happens to be
+    even does not count more than the others.
     """
     least = max(float(np.median(errors)), ReadingSettings.current().rounding_of_a_force * float(np.abs(forces).max()))
     return np.maximum(errors, least) / COVERAGE
@@ -179,9 +176,7 @@ def _covariance(
 
 
 def _level(deviations: np.ndarray, errors: np.ndarray) -> float:
-    """Return the standard deviation [N] that all levels of friction share, by the half-widths in
-    `errors` [N].
-    """
+    """Return the standard deviation [N] common to all friction levels, from half-widths [N]."""
     return float(np.average((errors / COVERAGE) ** 2, weights=deviations**-2)) ** 0.5
 
 
@@ -196,11 +191,10 @@ def _nothing(reason: str) -> Direction:
 def _direction(
     velocities: np.ndarray, friction: np.ndarray, errors: np.ndarray, words: str, exponent: float | None, spent: int = 0
 ) -> Direction:
-    """Fit one direction or both: friction [N] positive against the motion, with half-widths
-    `errors` [N].
+    """Fit friction over speed for one direction or both.
 
-    `spent` degrees of freedom are gone before, for the constant force; the `exponent` is that of the stage, if it tells
-    one.
+    Friction [N] is positive against the motion, with half-widths `errors` [N]. `spent` degrees of freedom are already
+    used, for the constant force; `exponent` is the one of the stage, if stated.
     """
     settings = ReadingSettings.current()
     speeds = np.abs(velocities)
@@ -276,10 +270,9 @@ def _fitted(
 
 
 def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: float | None) -> Direction:
-    """Make a direction from a Stribeck curve, what the forces leave open of it inside the
-    intervals.
+    """Make estimates for a direction from a Stribeck curve, with intervals for what stays open.
 
-    Static friction and Stribeck velocity are shown only where speeds reach below the Stribeck velocity.
+    Static friction and Stribeck velocity are shown only if speeds reach below the Stribeck velocity.
     """
     velocity, several = curve.velocity, "several exponents with their Stribeck velocities explain the forces alike"
     if exponent is not None and not curve.refuted:

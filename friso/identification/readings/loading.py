@@ -52,7 +52,8 @@ def stiffness_of_loading(
 
 
 def _spring(products: np.ndarray) -> float:
-    """Return the coefficient of the first signal in a fit of the last by the others, from the
-    scalar products of all.
+    """Return the coefficient of the first signal in a fit of the last one by all others.
+
+    `products` are the scalar products of all signals.
     """
     return float(solve_normal_equations(products[:-1, :-1], products[:-1, -1])[0])

@@ -38,10 +38,10 @@ class Pass:
 
 
 def passes(log: Log) -> tuple[Pass, ...]:
-    """Find all stretches over which the reference, or the body itself without one, goes at
-    constant velocity.
+    """Find all stretches of constant velocity.
 
-    With a reference the motion may be unsteady, which each states. Raises InputError for missing position or force.
+    They are stretches of constant velocity of the reference; without a reference, of the body itself. Each pass states
+    whether its motion was steady. Raises InputError for missing position or force.
     """
     settings = ReadingSettings.current()
     position, velocity = on_bearing(log), _velocity(log)
@@ -59,10 +59,9 @@ def passes(log: Log) -> tuple[Pass, ...]:
 
 
 def on_common_places(log: Log, stretches: Sequence[Pass]) -> tuple[Pass, ...]:
-    """Cut passes of a log to the way that all of them go, where friction is that of the same
-    places.
+    """Cut passes to the way that all of them cover, to compare friction at the same places.
 
-    They stay as they are where that way is too short.
+    They stay as they are if that way is too short.
     """
     settings = ReadingSettings.current()
     position, velocity = on_bearing(log), _velocity(log)
@@ -86,9 +85,7 @@ def places_of(log: Log, stretches: Sequence[Pass]) -> tuple[float, float]:
 
 
 def _velocity(log: Log) -> np.ndarray:
-    """Return the velocity [m/s] of the body on the bearing, shape (n,); NaN in segments that are
-    too short.
-    """
+    """Return the velocity [m/s] of the body on the bearing, (n,); NaN in segments too short."""
     settings = ReadingSettings.current()
     position = on_bearing(log)
     velocity = np.full(len(position), np.nan)
@@ -135,8 +132,9 @@ def _of_motion(velocity: np.ndarray, sample_time: float) -> list[slice]:
 
 
 def _trimmed(mask: np.ndarray, sample_time: float, share: float) -> list[slice]:
-    """Return the stretches of a mask without their ends: what the filter smears, and a share of
-    the start to settle.
+    """Return the stretches of a mask without their ends.
+
+    Both ends are cut by what the filter smears, and the start by a further share to settle.
     """
     settings = ReadingSettings.current()
     edge, least = (
@@ -161,9 +159,7 @@ def _pass(log: Log, span: slice, velocity: np.ndarray) -> Pass:
 
 
 def _digit(position: np.ndarray) -> float:
-    """Return the digit [m] of which all steps of a position are whole numbers; 0 if there is
-    none.
-    """
+    """Return the resolution [m] of a position, if all its steps are multiples of one; else 0."""
     settings = ReadingSettings.current()
     steps = np.abs(np.diff(position))
     steps = steps[steps > settings.rounding_of_a_step * steps.max(initial=0.0)]
@@ -174,11 +170,10 @@ def _digit(position: np.ndarray) -> float:
 
 
 def _quick_swing(position: np.ndarray, sample_time: float, digit: float) -> float:
-    """Return the standard deviation of the velocity [m/s] in lines of its spectrum above the
-    cutoff [Hz].
+    """Return the standard deviation of fast oscillation of the velocity [m/s].
 
-    Lines count that stand clear of noise: a stage that swings quickly goes smoothly for the filter. What is less than a
-    digit [m] is no motion.
+    It is faster than the low-pass shows. Only lines of the spectrum that stand clear of noise count. Less than one
+    digit [m] of the position is no motion.
     """
     settings = ReadingSettings.current()
     window = np.hanning(len(position))

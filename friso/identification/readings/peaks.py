@@ -24,9 +24,7 @@ GAUSSIAN = 0.1325
 
 @dataclass(frozen=True)
 class Peak:
-    """Where the friction is greatest (index), its level [N], and by how much [N] that may be off
-    to either side.
-    """
+    """The greatest friction in a break-away: its sample, its level [N], and its uncertainty [N]."""
 
     at: int
     level: float
@@ -45,8 +43,9 @@ def smoothed(values: np.ndarray, width: float) -> np.ndarray:
 
 
 def scatter(values: np.ndarray) -> float:
-    """Return the standard deviation of white noise on values that change slowly, by second
-    differences; 0 of fewer than 3.
+    """Return the standard deviation of white noise on slowly changing values; 0 of fewer than 3.
+
+    It follows from second differences.
     """
     return float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6)) if len(values) > 2 else 0.0
 

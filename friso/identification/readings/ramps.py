@@ -101,15 +101,11 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
 
 
 def _lowest(push: np.ndarray) -> float:
-    """Return the least value of a push, shape (n,), over the rest before a motion, seen without
-    noise.
-    """
+    """Return the least push during the rest before a motion, smoothed."""
     return float(smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp).min())
 
 
 def _half(push: np.ndarray) -> int:
-    """Return the sample, of shape (n,), at which a push has last risen through half of its way,
-    seen without noise.
-    """
+    """Return the last sample at which a push, shape (n,), smoothed, is below half of its rise."""
     smooth = smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp)
     return int(np.flatnonzero(smooth <= (smooth[0] + smooth[-1]) / 2)[-1])

@@ -24,19 +24,17 @@ _SPEEDS = np.geomspace(1e-4, 10, 2001)
 def break_away(
     force_rate: float, static: float, coulomb: float, bristle_stiffness: float, stribeck_velocity: float
 ) -> float:
-    """Return the least force [N] at which LuGre friction breaks away while the force rises at
-    `force_rate` [N/s].
-    """
+    """Return the least break-away force [N] of LuGre friction at a `force_rate` [N/s]."""
     level = stribeck_curve(_SPEEDS, coulomb, static, 1.0)
     creep = 1 - force_rate / (bristle_stiffness * stribeck_velocity * _SPEEDS)
     return float(max(np.max(level * creep), coulomb))
 
 
 def share_below(force_rate: float) -> float:
-    """Return by what share break-away lies below static friction at most, while the force rises at a rate [N/s].
+    """Return how far break-away may lie below static friction at a force rate [N/s], as a share.
 
-    That holds whatever the Coulomb friction is, where bristle stiffness times Stribeck velocity is no less than that of
-    the settings; 1 for rates so high that nothing can be said.
+    It holds for any Coulomb friction, if bristle stiffness times Stribeck velocity is at least the value in the
+    settings. Returns 1 for rates so high that nothing can be said.
     """
     return min(1 - break_away(force_rate, 1.0, 0.0, ReadingSettings.current().least_bristle_rate, 1.0), 1.0)
 
@@ -44,12 +42,11 @@ def share_below(force_rate: float) -> float:
 def static_friction(
     name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float = 0.0, late: float = 0.0
 ) -> Estimate:
-    """Estimate static friction [N] from break-away forces [N] at force rates [N/s], both
-    positive, shape (n,).
+    """Estimate static friction [N] from break-away forces [N] at force rates [N/s], shape (n,).
 
     Rates that spread are extrapolated to 0; otherwise the interval reaches up to what `share_below` allows.
-    `relative_error` is a standard deviation common to all forces, such as that of a stiffness; by up to `late` [N] they
-    may be too high, having been read after the break-away.
+    `relative_error` is a standard deviation common to all forces, such as that of a stiffness. Forces may be up to
+    `late` [N] too high, because they were read after the break-away.
     """
     if len(forces) < 3:
         low = float(np.min(forces)) if len(forces) else 0.0
@@ -89,9 +86,7 @@ def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: f
 
 
 def _slow_enough() -> float:
-    """Return the force rate [N/s], to a tenth, up to which ramps of one rate show static
-    friction.
-    """
+    """Return the highest force rate [N/s] at which ramps of one rate still show static friction."""
     settings = ReadingSettings.current()
     rates = settings.least_bristle_rate * np.geomspace(1e-6, 1, 145)
     return float(max(rate for rate in rates if share_below(rate) <= 2 * settings.share_extrapolated))
@@ -123,10 +118,9 @@ def _rising(name: str, forces: np.ndarray, rates: np.ndarray) -> Estimate | None
 
 
 def _extrapolated(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float) -> Estimate:
-    """Extrapolate break-away forces to rate 0 by a straight line over rate^(2/3) at the lower
-    rates.
+    """Extrapolate break-away forces to rate 0 by a straight line over rate^(2/3).
 
-    Half of the way extrapolated widens the interval.
+    The line is fitted at the lower rates. Half of the way extrapolated widens the interval.
     """
     settings = ReadingSettings.current()
     rises = _rising(name, forces, rates)

@@ -31,9 +31,7 @@ class Slips:
 
 
 def slips(position: np.ndarray, sample_time: float, cutoff: float) -> Slips:
-    """Find the slips of a body of this position [m], shape (n,), differentiated below `cutoff`
-    [Hz].
-    """
+    """Find the slips in a position [m], shape (n,), differentiated below `cutoff` [Hz]."""
     settings = ReadingSettings.current()
     speed = rate(position, sample_time, cutoff)
     size = np.abs(speed)

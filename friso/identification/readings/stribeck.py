@@ -20,9 +20,7 @@ from friso.identification.readings.settings import ReadingSettings
 
 @dataclass(frozen=True)
 class Possible:
-    """The best value of a parameter, what the forces leave possible of it, and whether that ends
-    within the grid.
-    """
+    """The best value of a parameter, the range that the forces allow, and whether it is closed."""
 
     value: float
     low: float
@@ -51,8 +49,7 @@ class FittedStribeck:
 
 @dataclass(frozen=True)
 class Forces:
-    """Friction [N] against the motion at some speeds [m/s], shape (n,), to which a curve is
-    fitted.
+    """Friction [N] against the motion at speeds [m/s], shape (n,), to which a curve is fitted.
 
     `directions` are 1 or -1; `deviations` [N] weigh each force, and `level` [N] is a deviation that all levels share.
     Directions may share one curve, beside a constant force.
@@ -108,8 +105,9 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
 
 
 def _better(plain: float, least: float, more: int, left: int) -> bool:
-    """Tell whether a curve with so many more parameters than a line leaves less than chance
-    would have it.
+    """Tell whether a curve fits significantly better than a line with fewer parameters (F-test).
+
+    It has `more` parameters than the line, and leaves `left` degrees of freedom.
     """
     settings = ReadingSettings.current()
     return least < plain and (
@@ -231,9 +229,7 @@ class _Grid:
 
 
 def _between(points: np.ndarray, inside: np.ndarray, ratios: bool) -> tuple[float, float]:
-    """Return the least and the greatest point of a grid that lie inside, each by half a step
-    further out.
-    """
+    """Return the range of grid points that lie inside, widened by half a step on each side."""
     (at,) = np.nonzero(inside)
     scale = np.log(points) if ratios else points
     step = float(scale[1] - scale[0]) if len(points) > 1 else 0.0

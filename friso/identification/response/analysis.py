@@ -61,11 +61,11 @@ def analyse(
     period: float | None = None,
     measured: MeasuredResponse | None = None,
 ) -> Bench:
-    """Analyse the logs of one bench, realisations of one experiment; or a response as somebody
-    `measured` it.
+    """Analyse a frequency response, measured or estimated from logs of one experiment.
 
-    `band` [Hz] is that of the models (default: above where friction bends the response); `period` [s] about that of a
-    periodic excitation (default: found). Raises InputError where no response can be estimated.
+    `measured` is a response that another instrument has computed. `band` [Hz] is the band of the models (default:
+    above where friction bends the response); `period` [s] is about the period of the excitation (default: found).
+    Raises InputError if no response can be estimated.
     """
     settings = ResponseSettings.current()
     records = {output: [_record(log, output) for log in logs] for output in _outputs(logs)}
@@ -106,17 +106,16 @@ def analyse(
 
 
 def _outputs(logs: Sequence[Log]) -> list[str]:
-    """List the roles of the outputs that all logs have: the driven mass, and the other one where
-    it is measured.
-    """
+    """List the outputs that all logs have: the driven mass, and the other one if measured."""
     if not logs:
         return []
     return ["position", *(["cart_position"] if all("cart_position" in log for log in logs) else [])]
 
 
 def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
-    """Take a response as somebody else measured it: its scatter alone says how far it can be
-    believed.
+    """Take over a response that another instrument has computed.
+
+    Only the scatter between its lines says how accurate it is.
     """
     output, _, unit = measured.unit.partition("/")
     unknown, lines = np.full(len(measured.frequency), np.nan), len(measured.frequency)
@@ -128,10 +127,10 @@ def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
 
 
 def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[float, ...]:
-    """Return the relative errors with which the two-mass model predicts the outputs of another
-    log, over the band.
+    """Return the relative errors of the two-mass model in predicting another log's outputs.
 
-    The log is excited every `period` [s]. Raises InputError where there is no model.
+    They are taken over the band of the model. The log is excited every `period` [s]. Raises InputError if there is no
+    model.
     """
     if bench.two_masses is None:
         raise InputError("--predict", "no two-mass model", "a response with an antiresonance and a resonance")
@@ -153,10 +152,9 @@ def _record(log: Log, output: str) -> ResponseRecord:
 
 
 def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: float | None) -> FrequencyResponse:
-    """Estimate a response by averaging over periods, or where nothing repeats by the local
-    polynomial method.
+    """Estimate a response by averaging over periods, or else by the local polynomial method.
 
-    Names of the channels are the log's.
+    The second serves records in which nothing repeats. Channels are named as in the log.
     """
     channels = from_log(log, "force", output)[1]
     try:
@@ -230,8 +228,9 @@ def _friction(
     model: TwoMass | None,
     period: float | None,
 ) -> tuple[Drag | None, Explanation | None]:
-    """Return the friction level that explains the departure, and whether a simulation with it
-    does.
+    """Return the friction that explains the departure from the mass line, and how well it does.
+
+    The second is the result of a simulation with that friction.
     """
     if not records or departs is None or model is None or not departs.frequency.determined:
         return None, None

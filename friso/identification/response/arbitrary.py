@@ -19,11 +19,10 @@ OVERLAP = 1 / 36
 
 
 def welch(record: ResponseRecord, resolution: float, channels: Channels | None = None) -> FrequencyResponse:
-    """Estimate a response by Hann segments of 1/`resolution` [Hz] that overlap by half, with
-    coherence.
+    """Estimate a response and its coherence by overlapping Hann segments of 1/`resolution` [Hz].
 
-    It is H1 where the record has no reference. Its variance is that of the output not coherent with the external signal
-    (Bendat, Piersol, Random Data, 4th ed., ch. 9), over the effective number of segments. Leakage is no part of it: a
+    It is H1 if the record has no reference. Its variance is that of the output not coherent with the external signal
+    (Bendat, Piersol, Random Data, 4th ed., ch. 9), over the effective number of segments. Leakage is not included: a
     mode sharper than the resolution comes out too low. Raises InputError for fewer than 4 segments.
     """
     record = record.checked()

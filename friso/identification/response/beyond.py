@@ -30,11 +30,10 @@ MILLI = 1e-3
 
 
 def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-    """Add delay, hold and a compliance for each output to the responses of masses, shape
-    (outputs, lines).
+    """Add delay, hold and a compliance for each output to the responses of masses.
 
-    The `model` tells those of the masses, shape (outputs, n), at any frequencies [Hz], shape (n,), negative ones
-    included.
+    `model` returns the responses of the masses, shape (outputs, n), at any frequencies [Hz], shape (n,), also negative
+    ones. The result has the shape (outputs, lines).
     """
     delay, held, compliances = parameters[DELAY], MILLI * np.sqrt(parameters[HELD]), parameters[COMPLIANCES:, None]
     masses = model(frequency) * np.sinc(frequency * held)
@@ -66,7 +65,8 @@ def believed(response: FrequencyResponse) -> tuple[float, float]:
 
 
 def _longest(response: FrequencyResponse, share: float) -> float:
-    """Return the sample time [s], or where it is not known a share of the period of the highest
-    frequency.
+    """Return the sample time [s] of a response.
+
+    If it is not known, return a share of the period of the highest frequency.
     """
     return response.sample_time or share / float(response.frequency[-1])

@@ -15,10 +15,9 @@ from friso.quantities import percent
 
 
 def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
-    """Say in sentences what speaks for a controller acting from output to input; () where
-    nothing does.
+    """Say what suggests that a controller feeds the output back to the input; () for nothing.
 
-    Without a loop the output's past cannot help to foretell the input beyond the input's own past (Granger 1969,
+    Without a loop the output's past cannot help to predict the input beyond the input's own past (Granger 1969,
     doi:10.2307/1912791; for feedback: Caines, Chan 1975, doi:10.1109/TAC.1975.1101008). An input that repeats is taken
     without its periodic part; one that repeats exactly cannot hold any reaction. Slow or weak loops stay unseen.
 
@@ -38,8 +37,9 @@ def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
 
 
 def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Return input and output without their periodic part, if they have one; None where nothing
-    is left of the input.
+    """Return input and output without the part that repeats periodically.
+
+    The input is None if nothing is left of it.
     """
     try:
         periods = find_periods(record.input)
@@ -56,8 +56,10 @@ def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray |
 
 
 def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[float, float]:
-    """Return the chance of an F-test that the output's past does not help, and the share of the
-    surprise it explains.
+    """Test whether the output's past helps to predict the input.
+
+    Returns the probability of an F-test that it does not help, and the share of the input's unpredicted part that it
+    explains.
     """
     settings = ResponseSettings.current()
     target = driven[settings.past_of_the_input :]
@@ -84,8 +86,9 @@ def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
 
 
 def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tuple[str, ...]:
-    """Say where a direct and an indirect estimate on the same lines differ by more than their
-    deviations.
+    """Say where a direct and an indirect estimate differ by more than their deviations.
+
+    Both must have the same lines.
     """
     settings = ResponseSettings.current()
     _same_lines(direct, indirect)
@@ -102,19 +105,17 @@ def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tupl
 
 
 def measured_open_loop(plant: FrequencyResponse, controller: np.ndarray) -> FrequencyResponse:
-    """Return L = C G from the plant and the controller's response (lines,), complex, [input per
-    output unit].
-    """
+    """Return the open loop L = C G, from plant G and controller C (lines,) [input per output]."""
     loop = plant.times(np.asarray(controller), "loop", plant.channels.input_unit)
     return FrequencyResponse(**{**vars(loop), "channels": Channels("error", "1", "loop", "1")})
 
 
 def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
-    """Return frequencies [Hz] at which |L| passes 1, by rising frequency, each with its
-    interval; () is an answer too.
+    """Return the frequencies [Hz] at which |L| passes 1, each with its interval, rising.
 
-    They are interpolated in logarithms; the interval follows from that of the magnitude and the slope over the lines
-    nearby. Three passages (or five, ...) that the noise does not tell apart are one.
+    They are interpolated in logarithms; the interval follows from the interval of the magnitude and the slope over
+    nearby lines. Three passages (or five, ...) that noise does not tell apart count as one. Returns () if there is
+    none.
     """
     size, place = np.log(np.abs(loop.response)), np.log(loop.frequency)
     band = loop.band()
@@ -136,9 +137,7 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
 
 
 def _merged_passage(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
-    """Return low end, centre and high end of passages taken for one: the middle one, and all
-    that they span.
-    """
+    """Merge passages into one: the centre of the middle one, and the range of them all."""
     return min(low for low, _, _ in group), group[len(group) // 2][1], max(high for _, _, high in group)
 
 

@@ -85,12 +85,11 @@ def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, floa
 
 @dataclass(frozen=True)
 class Drag:
-    """What acts on a rigid mass besides its inertia, at low frequency: a spring and a damper
-    that replace friction.
+    """Spring and damper that describe how friction acts on a rigid mass at low frequency.
 
-    `coulomb` is the friction level that damps as much at the velocity of this record (a random one of standard
-    deviation `velocity`), `sign` is -1 where the output goes against the input; `left` is the share of the departure
-    from the mass line that these do not explain.
+    `coulomb` is the friction level that damps as much at the velocity of this record (random, of standard deviation
+    `velocity`). `sign` is -1 if the output goes against the input. `left` is the share of the departure from the mass
+    line that they do not explain.
     """
 
     mass: Estimate
@@ -106,14 +105,13 @@ class Drag:
 def friction_from_departure(
     response: FrequencyResponse, velocities: Sequence[np.ndarray], limits: tuple[float, float], sign: float = 1.0
 ) -> Drag:
-    """Return the friction level that explains how a response leaves its mass line between
-    `limits` [Hz].
+    """Return the friction that explains how a response leaves its mass line.
 
-    `velocities` are those of the realisations, each of shape (n,), [output unit/s]. Under a broad-band excitation
-    Coulomb friction F acts as a damper sqrt(2/pi) F/standard deviation of the velocity: 1/(m s^2 + d s + k) is fitted.
-    The interval covers that of the damping and the difference between two distributions of the velocity, normal and
-    sinusoidal (gain 4/pi over the amplitude). It is valid while the body slides most of the time. `sign` is -1 where
-    the output goes against the input. Raises InputError for fewer than 8 lines.
+    The departure is fitted between `limits` [Hz]. `velocities` are those of the realisations, each of shape (n,),
+    [output unit/s]. Under a broad-band excitation Coulomb friction F acts as a damper sqrt(2/pi) F/standard deviation
+    of the velocity: 1/(m s^2 + d s + k) is fitted. The interval covers the interval of the damping and the difference
+    between two distributions of the velocity, normal and sinusoidal (gain 4/pi over the amplitude). It is valid while
+    the body slides most of the time. Raises InputError for fewer than 8 lines.
     """
     part = response.between(*limits)
     if len(part.frequency) < 8:
@@ -145,8 +143,9 @@ def friction_from_departure(
 
 
 def _coulomb(damping: Estimate, velocity: float, unit: str) -> Estimate:
-    """Return the Coulomb level behind an equivalent damping, by describing functions of random
-    and sinusoidal motion.
+    """Return the Coulomb friction that damps as much as an equivalent damper.
+
+    The interval spans the describing functions of random and of sinusoidal motion.
     """
     method = "damping at low frequency, as Coulomb friction under random motion"
     if damping.high <= 0:

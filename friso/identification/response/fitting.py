@@ -39,8 +39,9 @@ class ResponseFit:
 
     @property
     def bic(self) -> float:
-        """Bayesian information criterion, scale of the variance unknown (Schwarz 1978,
-        doi:10.1214/aos/1176344136).
+        """Return the Bayesian information criterion, the variance's scale being unknown.
+
+        Schwarz 1978, doi:10.1214/aos/1176344136.
         """
         return self.count * np.log(self.squares / self.count) + len(self.parameters) * np.log(self.count)
 
@@ -89,8 +90,9 @@ def _number(of: Callable[[np.ndarray], float], parameters: np.ndarray) -> float:
 
 
 def deviations(response: FrequencyResponse) -> np.ndarray:
-    """Return deviations as weights, (lines,): not below a thousandth of the response, which no
-    model is right to.
+    """Return the deviation of each line for weighting, at least a thousandth of the response.
+
+    No model is more accurate than that.
     """
     return np.hypot(response.scatter(), 1e-3 * np.abs(response.response))
 
@@ -104,13 +106,13 @@ def refined(
     upper: np.ndarray | float = np.inf,
     believed: Mapping[int, tuple[float, float]] = NOTHING,
 ) -> ResponseFit:
-    """Fit a model's parameters by least squares, weighted by the deviations; responses have the
-    shape (outputs, lines).
+    """Fit a model's parameters to responses by least squares, weighted by their deviations.
 
-    The errors of one line may be correlated between outputs, and those of neighbouring lines with each other, since a
-    model is never quite right: the covariance is the larger of the plain one, scaled by the residual, and one that
-    allows for that (Newey, West 1987, doi:10.2307/1913610). What is `believed` of parameters, by place a value and its
-    deviation, counts as one more observation each; limits only keep the fit from going astray.
+    Responses have the shape (outputs, lines). The errors of one line may be correlated between outputs, and those of
+    neighbouring lines with each other, since a model is never quite right: the covariance is the larger of the plain
+    one, scaled by the residual, and a robust one (Newey, West 1987, doi:10.2307/1913610). `believed` holds values and
+    deviations of parameters by their place; each counts as one more observation. Limits only keep the fit from going
+    astray.
     """
     settings = ResponseSettings.current()
     weight = np.sqrt(2) / deviation
@@ -166,9 +168,7 @@ def _long_run(scores: np.ndarray) -> np.ndarray:
 
 
 def _larger(plain: np.ndarray, robust: np.ndarray) -> np.ndarray:
-    """Raise the deviations of the plain covariance to those of the robust one where these are
-    larger.
-    """
+    """Raise the deviations of the plain covariance to the robust ones where these are larger."""
     ratio = np.diag(robust) / np.maximum(np.diag(plain), np.finfo(float).tiny)
     raised = np.sqrt(np.maximum(ratio, 1.0))
     return plain * raised[:, None] * raised

@@ -48,10 +48,10 @@ class StraightLine:
 
 
 def mass_lines(response: FrequencyResponse, most: int = 3) -> tuple[StraightLine, ...]:
-    """Find the mass lines of a force-to-position response by frequency, at most so many; () is
-    an answer too.
+    """Find the mass lines of a force-to-position response, at most `most`, by frequency.
 
-    Below an antiresonance it is the line of the whole mass, above the resonance that of the driven part.
+    Below an antiresonance it is the line of the whole mass, above the resonance the line of the driven part. Returns
+    () if there is none.
     """
     return straight_lines(response, 2, most=most)
 
@@ -59,10 +59,10 @@ def mass_lines(response: FrequencyResponse, most: int = 3) -> tuple[StraightLine
 def straight_lines(
     response: FrequencyResponse, slope: int, sign: float | None = None, most: int = 3
 ) -> tuple[StraightLine, ...]:
-    """Find bands in which a response falls with `slope` (0, 1 or 2), widest in octaves first,
-    then by frequency.
+    """Find bands in which a response falls with a `slope` of 0, 1 or 2.
 
-    `sign` is 1 or -1 where it is known which way the input acts (default: what most of the band says).
+    The widest in octaves are sought first, and returned by frequency. `sign` is 1 or -1 if the direction of the input
+    is known (default: what most of the band says).
     """
     ordered = response.at((response.frequency > 0) & (np.abs(response.response) > 0))
     bands: list[tuple[int, int, float]] = []
@@ -103,9 +103,7 @@ def _parted(
 def _widest(
     response: FrequencyResponse, slope: int, sign: float | None, start: int, stop: int
 ) -> tuple[int, int, float] | None:
-    """Return first and last line of the widest straight band among those from start to stop,
-    with its sign, or None.
-    """
+    """Return the first and last line of the widest straight band, with its sign; None if none."""
     signs = (1.0, -1.0) if sign is None else (sign,)
     bands = [(*band, its_sign) for its_sign in signs if (band := _straight(response, slope, its_sign, start, stop))]
     return (
@@ -114,8 +112,9 @@ def _widest(
 
 
 def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, stop: int) -> tuple[int, int] | None:
-    """Return the widest band from start to stop with acceptable chi-square and phase, by sums
-    over all pairs of ends.
+    """Return the widest band with acceptable chi-square and phase, between two lines.
+
+    Sums over all pairs of ends are compared.
     """
     settings = ResponseSettings.current()
     if stop - start < settings.lines_of_a_band:
@@ -143,9 +142,7 @@ def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, 
 
 
 def _flat(response: FrequencyResponse, slope: int, sign: float) -> tuple[np.ndarray, ...]:
-    """Return frequency, logarithm of the level, phase off the line, and relative deviation, each
-    (lines,).
-    """
+    """Return frequency, log level, phase off the line, and relative deviation, each (lines,)."""
     value = sign * response.response * (2j * np.pi * response.frequency) ** slope
     relative = response.scatter() / np.abs(response.response)
     return response.frequency, np.log(np.abs(value)), np.angle(value), relative
@@ -169,17 +166,15 @@ def _line(response: FrequencyResponse, slope: int, sign: float, band: slice) -> 
 
 
 def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) -> tuple[float, float, float]:
-    """Return the logarithm of the level of a band, half its interval, and how many independent
-    lines there are.
+    """Return the log level of a band, half its interval, and its number of independent lines.
 
-    A line may bend towards a mode above it (with frequency squared) or from one below (with its inverse): where that is
-    significant, the level is that of the straight end.
+    A line may bend towards a mode above it (with frequency squared) or from one below (with its inverse). If the bend
+    is significant, the level is taken at the straight end.
 
-    The interval covers the noise, the scatter along the band with as many independent lines as the correlation of
-    neighbours leaves, what a bend may hide to second order, and what the phase leaves open: of friction, 1/level is the
-    magnitude times its cosine; of a delay, the magnitude. Where friction makes neighbouring lines scatter, it also
-    makes the mass read high, by up to as much: by 0.1 to 1.0 times the scatter on 23 machines drawn at random
-    (`benchmarks/identify.py`).
+    The interval covers the noise, the scatter along the band, what a bend may hide to second order, and what the phase
+    leaves open: under friction, 1/level is the magnitude times its cosine; under a delay, the magnitude. Friction that
+    makes neighbouring lines scatter also makes the mass read high, by 0.1 to 1.0 times the scatter on 23 machines
+    drawn at random (`benchmarks/identify.py`).
     """
     _, level, phase, relative = (quantity[band] for quantity in _flat(response, slope, sign))
     weight = 1 / (relative**2 / 2 + ResponseSettings.current().scatter_of_a_straight_line ** 2)
@@ -201,10 +196,10 @@ def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) ->
 
 
 def _independent(residual: np.ndarray) -> float:
-    """Return the effective number of independent lines: correlations of neighbours are summed
-    until they are gone.
+    """Return the effective number of independent lines, from the correlation of neighbours.
 
-    That sum comes out too small in a short band; a first-order autoregression does not, which is used if it says less.
+    The sum of correlations comes out too small in a short band. A first-order autoregression does not, and is used if
+    it gives fewer.
     """
     squares = float(np.sum(residual**2))
     if not squares > 0:
@@ -217,8 +212,9 @@ def _independent(residual: np.ndarray) -> float:
 
 
 def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndarray]:
-    """Return shapes (lines,) in which a line may bend: towards the nearer mode, above it or
-    below; both if there is none.
+    """Return the shapes in which a line may bend, (lines,): towards the nearer mode.
+
+    Both shapes are returned if there is no mode.
     """
     frequency, level = _flat(response, slope, 1.0)[:2]
     inside, mean = frequency[band], np.mean(level[band])
@@ -231,8 +227,9 @@ def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndar
 
 
 def _bent(shapes: list[np.ndarray], level: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return columns (lines, 1 or 2) and coefficients of a line: straight, or bent where an
-    F-test at 1 % asks for that.
+    """Fit a line to levels, straight, or bent if an F-test at 1 % asks for it.
+
+    Returns its columns (lines, 1 or 2) and coefficients.
     """
     ones = np.ones((len(level), 1))
     columns, coefficients = ones, np.array([np.average(level, weights=weight)])

@@ -102,9 +102,7 @@ def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tupl
 
 
 def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> tuple[Estimate, ...]:
-    """Return frequencies and damping ratios of resonances and antiresonances within the band, by
-    frequency.
-    """
+    """Return frequencies and damping ratios of resonances and antiresonances in the band."""
     estimates: list[Estimate] = []
     for kind, which in (("resonance", 0), ("antiresonance", 1)):
         inside = [
@@ -133,8 +131,9 @@ def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.nd
 
 
 def _level(fit: ResponseFit, shape: RationalShape, scale: float, which: str, response: FrequencyResponse) -> Estimate:
-    """Return the acceleration per input below all modes (the rigid body alone) or above all
-    (with their residues).
+    """Return the acceleration per input, below all modes or above all modes.
+
+    Below, the rigid body moves alone; above, the residues of the modes are added.
     """
     unit = f"{response.channels.output_unit}/s^2/{response.channels.input_unit}"
     name = f"mass line level, {'below' if which == 'low' else 'above'} the modes"

@@ -19,12 +19,11 @@ MASS, DRAG, SPRING, BEYOND = range(4)
 
 
 def needs_two(model: TwoMass, driven: FrequencyResponse, other: FrequencyResponse | None = None) -> bool:
-    """Tell whether two masses explain responses, over the band of their model, much better than
-    one mass does.
+    """Tell whether two masses explain the responses much better than one mass does.
 
-    The one mass has viscous friction and a spring to ground, and like the two what the drive and all that lies above
-    the band add. An F-test says whether chance explains the difference; since the mode may lie at any line, its level
-    is divided by their number.
+    The one mass has viscous friction and a spring to ground; both models have the same delay and compliance, and both
+    cover the band of the `model`. An F-test says whether the difference may be chance. As the mode could lie at any
+    line, the level of the test is divided by the number of lines.
     """
     settings = ResponseSettings.current()
     responses = [response for response in (driven, other) if response is not None]
@@ -63,9 +62,7 @@ def fit_one_mass(
 
 
 def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Return responses of one mass as each output has it, shape (outputs, lines), over
-    frequencies [Hz].
-    """
+    """Return the responses of one mass at every output, shape (outputs, lines), over [Hz]."""
     mass, outputs = np.exp(parameters[MASS]), len(parameters) - BEYOND - COMPLIANCES
 
     def masses(frequency: np.ndarray) -> np.ndarray:
@@ -76,8 +73,9 @@ def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
 
 
 def _starts(values: np.ndarray, frequency: np.ndarray) -> list[np.ndarray]:
-    """Return starts with corners of friction and spring at none or some frequencies, as large as
-    the first response.
+    """Return starting points for a fit, with different corners of friction and spring.
+
+    All have the magnitude of the first response.
     """
     settings = ResponseSettings.current()
     places = 2 * np.pi * np.array([0.0, *np.geomspace(frequency[0] / 3, frequency[-1], 6)])

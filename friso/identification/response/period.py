@@ -31,10 +31,9 @@ class Periods:
 
 
 def find_periods(signal: np.ndarray, expected: float | None = None) -> Periods:
-    """Find the whole periods of an input, shape (n,), counted back from the last sample at which
-    it repeats.
+    """Find the whole periods of an input, shape (n,), counted back from where it ends.
 
-    `expected` is about how many samples a period has: it is then looked for within 2 % of that. Raises InputError where
+    `expected` is about the number of samples in a period, which is then sought within 2 % of it. Raises InputError if
     the signal does not repeat, or has fewer than two periods.
     """
     stop = _switched_off(signal)
@@ -53,8 +52,9 @@ def find_periods(signal: np.ndarray, expected: float | None = None) -> Periods:
 
 
 def repetition(signal: np.ndarray) -> np.ndarray:
-    """Return the mean squared change of a signal, shape (n,), over lags 0 to n/2, in units of
-    twice its variance.
+    """Return how much a signal, shape (n,), changes over lags of 0 to n/2 samples.
+
+    It is the mean squared change in units of twice the variance.
     """
     centred = signal - signal.mean()
     n, lags = len(centred), np.arange(len(centred) // 2 + 1)
@@ -66,9 +66,7 @@ def repetition(signal: np.ndarray) -> np.ndarray:
 
 
 def _switched_off(signal: np.ndarray) -> int:
-    """Return one past the last sample before the input rests for good, if it does so for more
-    than 10 samples.
-    """
+    """Return the number of samples before the input is switched off, if it is off for over 10."""
     settings = ResponseSettings.current()
     moving = np.flatnonzero(np.abs(signal - signal[-1]) > settings.amplitude_switched_off * np.ptp(signal))
     stop = int(moving[-1]) + 1 if moving.size else 0
@@ -76,8 +74,9 @@ def _switched_off(signal: np.ndarray) -> int:
 
 
 def _shortest(change: np.ndarray) -> int:
-    """Return the shortest lag at which the signal repeats as well as at any, once it has changed
-    at all.
+    """Return the shortest lag at which a signal repeats as well as at any other.
+
+    Lags before the signal has changed do not count.
     """
     away = np.flatnonzero(change > 0.5)
     first = int(away[0]) if away.size else len(change)
@@ -121,8 +120,9 @@ def _near(change: np.ndarray, expected: float) -> int:
 
 
 def _repeating(signal: np.ndarray, samples: int) -> tuple[int, int]:
-    """Return the stretch that repeats: no late start or ragged end, where most samples are
-    unlike those a period off.
+    """Return the first and the last sample of the stretch of a signal that repeats itself.
+
+    Parts at the beginning and the end are cut off if most of their samples differ from those one period away.
     """
     change = np.abs(signal[samples:] - signal[:-samples])
     unlike = change > 8 * 1.4826 * np.median(change) + 1e-5 * np.ptp(signal)

@@ -21,13 +21,12 @@ from friso.identification.response.settings import ResponseSettings
 def multisine(
     records: Sequence[ResponseRecord], period: float | None = None, channels: Channels | None = None
 ) -> FrequencyResponse:
-    """Estimate the response on the excited lines, from one or more realisations of a periodic
-    excitation.
+    """Estimate the response on excited lines from realisations of a periodic excitation.
 
-    A realisation is a record with phases of its own; if it has a reference, the response is the indirect one, that of
-    output and input to the reference. `period` [s] is about how long a period is (default: found). The deviation covers
-    noise and, with two realisations or lines left free in the excitation, nonlinear distortion. Raises InputError for
-    records that are not periodic or do not belong together.
+    A realisation is a record with its own phases. If it has a reference, the response is indirect: output over input,
+    each relative to the reference. `period` [s] is about the length of a period (default: found). The deviation covers
+    noise and, with two realisations or with lines left free in the excitation, nonlinear distortion. Raises InputError
+    for records that are not periodic or do not belong together.
     """
     spectra_of_records, remarks = _together([spectra(record, period) for record in records])
     excited = np.logical_and.reduce([realisation.excited for realisation in spectra_of_records])
@@ -109,8 +108,9 @@ def _averaged(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return output and input over the external signal, averaged over periods, each
-    (realisations, lines).
+    """Return output and input relative to the external signal, each (realisations, lines).
+
+    They are averaged over periods.
     """
     outputs = [realisation.output[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
     inputs = [realisation.input[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
@@ -118,9 +118,7 @@ def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the deviation of the mean, from how realisations differ, and its degrees of
-    freedom, each (lines,).
-    """
+    """Return the deviation of the mean, and its degrees of freedom, from how realisations differ."""
     settings = ResponseSettings.current()
     outputs, inputs = _relative(records, excited)
     count = len(records)
@@ -135,11 +133,10 @@ def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) ->
 
 
 def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarray) -> np.ndarray:
-    """Return distortion (lines,) from what the output holds, beyond noise, at lines that are not
-    excited.
+    """Return the nonlinear distortion (lines,), from the output at lines that are not excited.
 
-    They are lines in the band. What the input itself holds there is taken off with the interpolated response. NaN where
-    there are no such lines.
+    Noise is subtracted, and what the input itself contains at these lines is taken off with the interpolated response.
+    NaN if no line in the band was left free.
     """
     settings = ResponseSettings.current()
     places = np.flatnonzero(excited)

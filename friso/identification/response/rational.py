@@ -19,9 +19,7 @@ from friso.identification.response.settings import ResponseSettings
 
 @dataclass(frozen=True)
 class RationalShape:
-    """What a rational model is made of: a rigid body or not, its modes, and a constant for those
-    beyond the band.
-    """
+    """Structure of a rational model: a rigid body or not, modes, and a constant beyond them."""
 
     rigid: bool
     modes: int
@@ -29,8 +27,9 @@ class RationalShape:
 
     @property
     def nonlinear(self) -> int:
-        """Parameters in front of the linear ones: viscous pole, delay; logarithms of frequencies,
-        then of dampings.
+        """Count the parameters that enter nonlinearly; they come first.
+
+        They are viscous pole and delay, logarithms of frequencies, then logarithms of dampings.
         """
         return 2 + 2 * self.modes
 
@@ -101,15 +100,14 @@ def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.n
 
 
 def rational(parameters: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
-    """Return the response at complex frequencies s [rad/s], shape (lines,), of parameters of
-    this shape.
-    """
+    """Return the response of a rational model at complex frequencies s [rad/s], shape (lines,)."""
     return parameters[shape.nonlinear :] @ _columns(parameters[: shape.nonlinear], shape, s)
 
 
 def _linear_parameters(columns: np.ndarray, values: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the best real linear parameters and the weighted residuals, real and imaginary part
-    after each other.
+    """Return the best linear parameters, real, and the weighted residuals.
+
+    Residuals hold all real parts, then all imaginary parts.
     """
     weight = np.sqrt(2) / deviation
     matrix, right = (columns * weight).T, values * weight
@@ -120,8 +118,10 @@ def _linear_parameters(columns: np.ndarray, values: np.ndarray, deviation: np.nd
 
 
 def bounds(shape: RationalShape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return limits of all parameters: modes within an octave of the band, damping ratios 1e-4
-    to 2, delays of a turn.
+    """Return the lowest and the highest value that the fit allows for each parameter.
+
+    Modes lie within an octave of the band, damping ratios between 1e-4 and 2, and delays turn the phase by at most one
+    radian at the highest frequency.
     """
     low, high, linear = np.abs(s[0]), np.abs(s[-1]), int(shape.rigid) + shape.modes + int(shape.constant)
     rest = np.full(linear, np.inf)
@@ -134,9 +134,7 @@ def bounds(shape: RationalShape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 def _another(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
-    """Return nonlinear parameters with one more mode, at the place and damping that leave the
-    least.
-    """
+    """Return nonlinear parameters with one more mode, where it improves the fit most."""
     settings = ResponseSettings.current()
     before = shape.modes - 1
     best, best_parameters = np.inf, nonlinear
@@ -175,8 +173,9 @@ def _completed(
 
 
 def poles_and_zeros(parameters: np.ndarray, shape: RationalShape) -> tuple[np.ndarray, np.ndarray]:
-    """Return poles of the modes and zeros of the response, those with positive imaginary part,
-    in units of the scale.
+    """Return the poles of the modes and the zeros of the response with positive imaginary part.
+
+    They are in units of the scale.
     """
     omega, damping = np.exp(parameters[2 : 2 + shape.modes]), np.exp(parameters[2 + shape.modes : shape.nonlinear])
     linear = parameters[shape.nonlinear :]

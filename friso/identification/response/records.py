@@ -86,10 +86,10 @@ def _check_signal(name: str, values: np.ndarray, least: int) -> None:
 
 @dataclass(frozen=True)
 class Spectra:
-    """Spectra of one realisation at the harmonics `frequency` [Hz] (lines,), from the first on.
+    """Spectra of one realisation at the harmonics `frequency` [Hz], shape (lines,).
 
-    `input` and `output` are (periods, lines); `reference` (lines,) is that of the external signal, averaged. `excited`
-    (lines,) are the lines that the external signal holds.
+    `input` and `output` are (periods, lines). `reference` (lines,) is the spectrum of the external signal, averaged
+    over periods, and `excited` (lines,) marks the lines that this signal contains.
     """
 
     frequency: np.ndarray
@@ -172,17 +172,14 @@ def _at_other_rate(record: ResponseRecord, step: float) -> ResponseRecord:
 
 
 def _harmonics(signal: np.ndarray, periods: Periods) -> np.ndarray:
-    """Return amplitudes of the harmonics in every period, shape (periods, lines), the signal's
-    drift taken out.
-    """
+    """Return amplitudes of the harmonics in every period, (periods, lines), without drift."""
     samples = signal[periods.start : periods.stop]
     cut = (samples - drift(samples, periods.samples)).reshape(periods.count, periods.samples)
     return np.fft.rfft(cut, axis=1)[:, 1 : (periods.samples - 1) // 2 + 1] * (2 / periods.samples)
 
 
 def drift(signal: np.ndarray, samples: int) -> np.ndarray:
-    """Average a signal, shape (n,), over a moving period: exactly nothing of the harmonics is
-    left.
+    """Average a signal, shape (n,), over a moving period, which removes the harmonics exactly.
 
     At both ends, where no whole period fits, it is continued as a straight line.
     """
@@ -223,12 +220,11 @@ def _excited(driving: np.ndarray) -> np.ndarray:
 
 
 def _transient_periods(reaction: np.ndarray) -> int:
-    """Count the leading periods that are transient, by the output (periods, lines); at least
-    three stay.
+    """Count the leading periods that are transient, by the output (periods, lines).
 
-    Each period is compared with the later half of the others, which show what is usual. Without a transient they are
-    exchangeable: one of them lies furthest off at the front by chance only, and the distance asked for makes that
-    rarer.
+    At least three periods are kept. Each period is compared with the later half of the others. Without a transient
+    they are exchangeable, so that the first is the most distant one by chance only; the distance asked for makes that
+    rare.
     """
     count = len(reaction)
     last = max(3, count // 2)
@@ -240,8 +236,9 @@ def _transient_periods(reaction: np.ndarray) -> int:
 
 
 def _distance(single: np.ndarray, others: np.ndarray) -> float:
-    """Return how far a period lies from the mean of others, in units of their variance, on the
-    middle one of its lines.
+    """Return how far a period lies from the mean of others, in units of their variance.
+
+    The median over its lines is taken.
     """
     variance = np.maximum(np.var(others, axis=0, ddof=1), np.finfo(float).tiny)
     return float(np.median(np.abs(single - others.mean(axis=0)) ** 2 / variance))
@@ -253,11 +250,11 @@ def relative_error(
     band: tuple[float, float],
     period: float | None = None,
 ) -> float:
-    """Return ||G U - Y|| / ||Y|| over the excited lines in `band` [Hz] of a periodic record not
-    seen by the model.
+    """Return ||G U - Y|| / ||Y|| of a model on a periodic record that it was not fitted to.
 
-    `model` gives complex responses at frequencies [Hz]; U and Y are averaged over periods. `period` [s] is about how
-    long one is (default: found). Raises InputError where the record is not periodic or no line lies in the band.
+    `model` gives complex responses G at frequencies [Hz]; U and Y are averaged over periods, on the excited lines in
+    `band` [Hz]. `period` [s] is about the length of a period (default: found). Raises InputError if the record is not
+    periodic or no line lies in the band.
     """
     measured = spectra(record, period)
     inside = measured.excited & (measured.frequency >= band[0]) & (measured.frequency <= band[1])

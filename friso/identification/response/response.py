@@ -27,9 +27,7 @@ class Channels:
 
 @dataclass(frozen=True)
 class ResponseBand:
-    """Limits at 95 %: magnitude [output unit per input unit] and phase [rad], each of shape
-    (lines,).
-    """
+    """Limits at 95 % of magnitude [output per input unit] and phase [rad], shape (lines,)."""
 
     magnitude_low: np.ndarray
     magnitude_high: np.ndarray
@@ -75,18 +73,14 @@ class FrequencyResponse:
         return ResponseBand(np.maximum(size - half, 0.0), size + half, phase - turn, phase + turn)
 
     def frd(self) -> FrequencyResponseData:
-        """Return data of python-control, its frequencies in rad/s; the line at 0 Hz, if any,
-        included.
-        """
+        """Return the response as data of python-control, over rad/s, with a line at 0 Hz if any."""
         from control import FrequencyResponseData
 
         omega = 2 * np.pi * self.frequency
         return FrequencyResponseData(self.response, omega, inputs=[self.channels.input], outputs=[self.channels.output])
 
     def times(self, factor: np.ndarray, output: str, output_unit: str) -> FrequencyResponse:
-        """Return the response to another output: the old one times a known complex `factor` per
-        line, shape (lines,).
-        """
+        """Return the response to another output, by a known complex `factor` per line, (lines,)."""
         size = np.abs(factor)
         return replace(
             self,
@@ -121,11 +115,10 @@ class FrequencyResponse:
         return self.at(inside)
 
     def usable(self, ratio: float = 3.0) -> FrequencyResponse:
-        """Return the lines whose response is at least `ratio` deviations large and whose coherence
-        suffices.
+        """Return the lines that are clear of noise, at least `ratio` deviations large.
 
-        The coherence counts if it is known. The warnings list the lines left out. Raises InputError where none is left:
-        excitation too weak.
+        Their coherence must also suffice, if it is known. Warnings list the lines left out. Raises InputError if none
+        is left, because the excitation is too weak.
         """
         settings = ResponseSettings.current()
         enough = np.abs(self.response) >= ratio * self.deviation
@@ -148,8 +141,7 @@ class FrequencyResponse:
         return replace(self.at(enough), warnings=(*self.warnings, warning))
 
     def scatter(self) -> np.ndarray:
-        """Return deviations (lines,) raised to the scatter between neighbouring lines where that is
-        larger.
+        """Return the deviations (lines,), raised to the scatter between neighbouring lines.
 
         Nonlinear distortion makes the lines of one realisation scatter by more than its noise; a smooth system cannot.
         """

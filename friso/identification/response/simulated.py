@@ -36,11 +36,11 @@ def explained(
     limits: tuple[float, float],
     factors: Sequence[float] = (0.5, 1.0, 2.0),
 ) -> Explanation:
-    """Simulate what Coulomb friction, spring and mass of `drag` make of one period of each
-    realisation's input, (n,).
+    """Simulate the mass, spring and Coulomb friction of `drag` under each realisation's input.
 
-    It is compared with the `measured` response between `limits` [Hz]; the factors, of which 1 must be one, show how the
-    response depends on the amplitude. Raises InputError where `drag` has no friction level or 1 is missing.
+    One period of each input is simulated, shape (n,). The result is compared with the `measured` response between
+    `limits` [Hz]. The `factors`, of which 1 must be one, show how the response depends on the amplitude. Raises
+    InputError if `drag` has no friction level or 1 is missing.
     """
     settings = ResponseSettings.current()
     if not drag.coulomb.value > 0:
@@ -65,12 +65,11 @@ def explained(
 def slid(
     force: np.ndarray, sample_time: float, mass: float, coulomb: float, stiffness: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return position [m] and velocity [m/s], each (lanes, n), of a mass [kg] on a spring [N/m]
-    with Coulomb friction [N].
+    """Simulate a mass [kg] on a spring [N/m] with Coulomb friction [N] under forces [N].
 
-    It is under forces [N] (lanes, n), from rest. Time stepping treats sticking exactly (Moreau 1988,
-    doi:10.1007/978-3-7091-2624-0_1): friction stops the mass where it can within the step. The error is of first order
-    in the sample time.
+    Returns position [m] and velocity [m/s], each of shape (lanes, n) as the forces, from rest. Time stepping treats
+    sticking exactly (Moreau 1988, doi:10.1007/978-3-7091-2624-0_1): friction stops the mass if it can within the step.
+    The error is of first order in the sample time.
     """
     position, velocity = np.zeros(len(force)), np.zeros(len(force))
     positions, velocities = np.empty_like(force), np.empty_like(force)
@@ -84,9 +83,7 @@ def slid(
 
 
 def _unexplained(drag: Drag, measured: FrequencyResponse, simulated: FrequencyResponse) -> float:
-    """Return the share of the departure from the mass line that the simulation leaves, in units
-    of the deviations.
-    """
+    """Return the share of the departure from the mass line that the simulation does not explain."""
     real, imaginary = (
         np.interp(measured.frequency, simulated.frequency, part(simulated.response)) for part in (np.real, np.imag)
     )

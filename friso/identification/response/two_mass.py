@@ -29,11 +29,11 @@ last on, those of `beyond`."""
 
 @dataclass(frozen=True)
 class TwoMass:
-    """A driven mass, a joint and another mass; units follow from the response's: mass is input
-    per acceleration.
+    """A driven mass, a joint and another mass, as fitted to a response.
 
-    `fit` holds the parameters (see the module); `signs` of the two outputs are -1 where they go against the input.
-    `estimates` hold masses, stiffness, damping, viscous friction, delay, antiresonance and resonance.
+    A mass has the unit of input per acceleration. `fit` holds the parameters (see the module); `signs` of the two
+    outputs are -1 if they go against the input. `estimates` hold masses, stiffness, damping, viscous friction, delay,
+    antiresonance and resonance.
     """
 
     signs: tuple[float, float]
@@ -47,18 +47,16 @@ class TwoMass:
         return next(estimate for estimate in self.estimates if estimate.name == name)
 
     def predict(self, frequency: np.ndarray, collocated: bool = True) -> np.ndarray:
-        """Return the response at frequencies [Hz] of the driven mass, or of the other one; complex,
-        of their shape.
-        """
+        """Return the complex response of the driven mass, or of the other, at frequencies [Hz]."""
         which = 0 if collocated else 1
         return self.signs[which] * two_masses(self.fit.parameters, frequency)[which]
 
 
 def two_masses(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Return responses of two masses to a force on the driven one, shape (outputs, lines), over
-    frequencies [Hz].
+    """Return the responses of two masses to a force on the driven one, over frequencies [Hz].
 
-    The other mass has one where there is a compliance for it.
+    Shape (outputs, lines): one output is the driven mass; a second one, for which `parameters` then have a further
+    compliance, is the other mass.
     """
     driven, other, stiffness, damping = np.exp(parameters[:DRAG])
     outputs = len(parameters) - BEYOND - COMPLIANCES
@@ -78,10 +76,9 @@ def fit_two_mass(
     noncollocated: FrequencyResponse | None = None,
     band: tuple[float, float] | None = None,
 ) -> TwoMass:
-    """Fit the two-mass model to force-to-position responses on the same lines, in a `band` [Hz]
-    (default: all of them).
+    """Fit the two-mass model to force-to-position responses in a `band` [Hz] (default: all).
 
-    Raises InputError where there are too few lines or the two responses have different ones.
+    The responses must have the same lines. Raises InputError if they do not, or for too few lines.
     """
     responses = [collocated] if noncollocated is None else [collocated, noncollocated]
     if band is not None:
@@ -122,8 +119,9 @@ def widened(fitted: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
 
 
 def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
-    """Scale the interval of an estimate by the ratio of external to internal scatter of the
-    others, if above 1.
+    """Widen the interval of an estimate if the others scatter by more than their intervals say.
+
+    The factor is the ratio of external to internal scatter of the others, if above 1.
     """
     if not estimate.determined or not all(another.determined and another.half_width > 0 for another in others):
         return estimate
@@ -141,9 +139,7 @@ def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
 
 
 def _sign(response: np.ndarray) -> float:
-    """Return 1 where the mass follows the force (-180 degrees) on most lines, -1 where it goes
-    against it.
-    """
+    """Return 1 if the mass follows the force (-180 degrees) on most lines, else -1."""
     return -1.0 if np.sum(np.cos(np.angle(response))) > 0 else 1.0
 
 
@@ -160,8 +156,9 @@ def _follows(values: np.ndarray, model: np.ndarray) -> None:
 
 
 def _from_modes(response: FrequencyResponse, outputs: int) -> list[np.ndarray]:
-    """Return a start from the first antiresonance and resonance of a rational fit, of whole mass
-    1; [] where it has none.
+    """Return a start from the first antiresonance and resonance of a rational fit.
+
+    The whole mass is 1. Returns [] if it has none.
     """
     try:
         modes = fit_modes(response)
@@ -190,10 +187,9 @@ def _best(
     outside: tuple[np.ndarray, np.ndarray],
     held: Mapping[int, tuple[float, float]],
 ) -> ResponseFit:
-    """Return the best of the fits from the most promising mass ratio, from the modes `seen` and
-    from the next ratio.
+    """Fit two masses from several starts until one fit explains the data; return the best fit.
 
-    The first one that explains the data ends the search.
+    Starts are the most promising mass ratio, the modes `seen`, and the next ratio.
     """
     settings = ResponseSettings.current()
     reach = np.array([FAR] * 3 + [2 * FAR])
@@ -221,8 +217,9 @@ def _best(
 
 
 def _starts(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield starts at the highest place of the first acceleration inside the band, with several
-    mass ratios.
+    """Yield starts with the resonance where the first acceleration is highest within the band.
+
+    They have several mass ratios.
     """
     settings = ResponseSettings.current()
     level = np.abs(values[0]) * (2 * np.pi * frequency) ** 2
@@ -276,9 +273,7 @@ def _estimates(fit: ResponseFit, response: FrequencyResponse) -> tuple[Estimate,
 
 
 def _root(parameters: np.ndarray, zero: bool) -> complex:
-    """Return the zero of the collocated response, or the pole, that is furthest out above the
-    real axis [rad/s].
-    """
+    """Return the pole or the collocated zero with the largest imaginary part [rad/s]."""
     driven, other, stiffness, damping = np.exp(parameters[:DRAG])
     first = np.array([driven, parameters[DRAG] + damping, stiffness])
     second = np.array([other, parameters[OTHER_DRAG] + damping, stiffness])

@@ -69,7 +69,7 @@ def _return_map(item: ShownCase) -> list[Panel]:
 
 
 def _mirrored(hunting: Hunting) -> bool:
-    """Tell whether swings to one side mirror those to the other, so that one curve describes both."""
+    """Tell whether both sides swing alike, so that one curve describes both."""
     return bool(hunting.cycles) and all(cycle.symmetric for cycle in hunting.cycles)
 
 

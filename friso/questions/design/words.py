@@ -139,7 +139,7 @@ def _verified(design: Design) -> tuple[str, str]:
 
 
 def restless(outcome: MachineOutcomes) -> str:
-    """Say how many moves do not come to rest in position, and how many of these swing."""
+    """Say how many moves do not come to rest in position, and how many swing."""
     if not outcome.missed:
         return "all come to rest in position"
     count, swinging = outcome.missed, outcome.swinging

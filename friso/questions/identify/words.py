@@ -223,9 +223,9 @@ def _used(logs: Sequence[Source]) -> Facts:
 
 
 def labels(identification: Identification) -> list[str]:
-    """Return a name for every experiment, of which those of its figures are made.
+    """Return a name for every experiment, from which its figures are named.
 
-    It is its kind, numbered where there are more.
+    It is the kind, with a number if several experiments are of this kind.
     """
     kinds = [experiment.kind for experiment in identification.experiments]
     return [

@@ -109,7 +109,7 @@ class Look:
 
     @property
     def scale(self) -> tuple[str, str, tuple[float, float] | None, bool, tuple[str, ...], tuple[Category, ...]]:
-        """Return what a map or a cloud of these cells needs for its colours."""
+        """Return everything that a map or a cloud needs for its colours."""
         return self.quantity, self.unit, self.limits, self.log, self.colours, self.categories
 
 

@@ -137,7 +137,7 @@ def _percent(part: int, total: int) -> str:
 def verification(runs: xr.Dataset) -> str:
     """Say how many checked outcomes survive a tighter tolerance, with the 95 % interval.
 
-    The interval is that of Clopper and Pearson.
+    The interval is by Clopper and Pearson.
     """
     checked = int(runs.attrs.get("verified_cells", 0))
     if not checked:

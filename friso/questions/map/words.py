@@ -68,7 +68,7 @@ def variable(name: Hashable) -> str:
 def categories_of(name: str, inferred: bool = False) -> dict[str, Category]:
     """Return label and colour of each word of a metric, the worst first.
 
-    With `inferred`, they are those of cells whose word was inferred from neighbours.
+    With `inferred`, return labels and colours for cells whose word was inferred from neighbours.
     """
     words = (metrics()[name] if name in metrics() else metrics()["outcome"]).words
     if inferred:

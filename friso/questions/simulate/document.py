@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 def simulate_document(
     response: xr.Dataset, measures: Measures, name: str, conclusion: str, dwells: Sequence[Dwell]
 ) -> dict[str, Any]:
-    """Return what a run does, and how the solver fared; `name` is that of the stage."""
+    """Return the JSON document of a run: what it does, and how the solver fared.
+
+    `name` is the name of the stage.
+    """
     into_1um, into_10um = measures.settling_time
     return plain_json(
         {

@@ -93,7 +93,7 @@ def _bar(trace: dict[str, Any]) -> dict[str, Any] | None:
 
 
 def _single(part: Any) -> Any:
-    """Return arrays with the precision of a screen, half as long as those of the engine.
+    """Return arrays in single precision, which is enough for a screen and half as long.
 
     The first bytes of all numbers stand before the second ones, which packs better; `page.js` puts them together.
     Numbers that are not finite become null.

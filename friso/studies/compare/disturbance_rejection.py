@@ -17,7 +17,7 @@ ADRC = "adrc"
 
 
 class Rejection(NamedTuple):
-    """Bandwidth of the feedback [Hz], and that of the observer over it."""
+    """The bandwidth of the feedback [Hz], and the observer's bandwidth as a multiple of it."""
 
     bandwidth: float
     observer_ratio: float

@@ -181,7 +181,7 @@ def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
 
 
 def _with_default_correlations(correlations: Correlations, spreads: Mapping[str, float]) -> Correlations:
-    """Return the given correlations, and those of the keys with default spreads."""
+    """Return the correlations given, and default ones for the keys with default spreads."""
     arrays = [tuple(key for key in spreads if key.startswith(f"{array}.")) for array in ELEMENTS]
     levels = TOGETHER if all(key in spreads for key in TOGETHER) else ()
     groups = [(levels, TOGETHER_BY), *((array, 1.0) for array in arrays)]

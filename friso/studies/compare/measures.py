@@ -112,16 +112,21 @@ def _rms(values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LoopRobustness:
-    """For the linear loop of each machine, arrays of shape (count,): whether it is `stable` in all limit cases, and the
-    least modulus `margin` of these (0 where it is not stable)."""
+    """Stability and margin of the linear loop of each machine, arrays of shape (count,).
+
+    `stable` tells whether it is stable in all limit cases, `margin` is the least modulus margin among them (0 where it
+    is not stable).
+    """
 
     stable: np.ndarray
     margin: np.ndarray
 
 
 def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> LoopRobustness:
-    """Return the loops of machines, given as flat keys to SI numbers or arrays;
-    the limit cases are those of the stage."""
+    """Return stability and margin of the machines' linear loops, in the limit cases of a stage.
+
+    `flat` holds the machines as flat keys to SI numbers or arrays (count,).
+    """
     stable, margin = np.ones(count, bool), np.full(count, np.inf)
     for limit_case in limit_cases(stage.flat()).values():
         for which, (settles, distance) in for_poles(flat, limit_case.repeated(count), _robustness):

@@ -92,26 +92,27 @@ class Variant(NamedTuple):
 
 @dataclass(frozen=True)
 class OptionKind:
-    """One way to settle a machine.
+    """An option that `friso compare` can try to bring a machine to rest.
 
     Parameters
     ----------
     name : str
-        What code, and for settings against friction `--also`, call it.
+        Name in code; for settings against friction also the word after `--also`.
     letter, title : str
-        What tables, figures and JSON call it.
+        Names in tables, figures and JSON.
     says : str
-        What it does, with the numbers of words.py in braces.
+        Description, with the numbers of words.py in braces.
     variant : callable
-        Makes the stage that has it. Raises UnavailableError where the machines cannot have it.
+        Returns the machine with this option. Raises UnavailableError for machines that cannot have it.
     line : tuple of str
         Colour and dash of its curves.
     prose : str
-        How it stands in a sentence; default: "the" and its title.
+        Name within a sentence; default: "the" and its title.
     joint : bool
-        Whether a joint has to be bought for it.
+        Whether a joint has to be bought.
     own_loop : bool
-        Whether its linear loop differs from that of the machine as is: rests of the integrator and feedforward do not.
+        Whether its linear loop differs from that of the machine as it is. Pauses of the integrator and feedforward do
+        not change the linear loop.
     """
 
     name: str

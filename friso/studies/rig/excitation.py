@@ -86,8 +86,7 @@ def estimate_plant(logs: Sequence[RigLog]) -> FrequencyResponse:
 
 
 def loop(log: RigLog) -> FrequencyResponse:
-    """Return the open loop: what the controller answers to the force that is commanded in all,
-    turned round."""
+    """Return the open loop: the controller's force over the total force, sign reversed."""
     injected, commanded = log.logged["disturbance"], log.logged["force"]
     record = ResponseRecord(commanded, injected - commanded, log.interval, injected)
     return multisine([record], None, Channels("error", "1", "loop", "1"))

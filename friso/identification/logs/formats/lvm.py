@@ -26,11 +26,10 @@ def read_lvm(path: Path) -> ChannelTable:
 
 
 def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) -> list[tuple[Channel, Any]]:
-    """Return the channels of a segment, each with the number of samples that the header states,
-    or None.
+    """Return the channels of a segment, each with the number of samples that its header states.
 
-    Values stand over an X column in seconds (the first, or one per channel). What the header states of a channel stands
-    above its column, the first column being that of the keys.
+    The number may be None. Values stand over an X column in seconds (the first, or one per channel). Header values
+    stand above the column of their channel; the first column holds the names of the header's keys.
     """
     names, data = segment["Channel names"], np.atleast_2d(np.asarray(segment["data"], dtype=float))
     each_own, none = content.get("X_Columns") == "Multi", content.get("X_Columns") == "No"

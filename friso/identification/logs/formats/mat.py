@@ -49,9 +49,7 @@ def read_mat(path: Path) -> ChannelTable:
 
 
 def _plainly_named(channels: list[Channel]) -> tuple[Channel, ...]:
-    """Return the channels without the name of the variable they stand in, where they differ
-    without it.
-    """
+    """Return the channels without the variable's name, if they are distinct without it."""
     short = [channel.name.rpartition("/")[2] for channel in channels]
     names = [s if short.count(s) == 1 else c.name.replace("/", ".") for s, c in zip(short, channels, strict=True)]
     return tuple(replace(channel, name=name) for channel, name in zip(channels, names, strict=True))
@@ -116,9 +114,7 @@ def _dspace(node: dict[str, Any], name: str) -> list[Channel]:
 
 
 def _with_time(node: dict[str, Any], name: str, walk: _Contents) -> list[Channel]:
-    """Return the channels of Simulink's structure with time: `signals(i).values` over `time` in
-    seconds.
-    """
+    """Return the channels of Simulink's structure with time, `signals(i).values` over `time` [s]."""
     time = np.squeeze(np.asarray(node["time"], dtype=float))
     out = []
     for i, curve in enumerate(_structures(node["signals"])):
@@ -145,9 +141,7 @@ def _text(node: Any) -> str:
 
 
 def _recognise(head: FileHead) -> bool:
-    """Tell a MAT file by its first bytes, or those behind the block that MATLAB puts before
-    HDF5; or by its name.
-    """
+    """Recognise a MAT file by its first bytes, by those behind MATLAB's block, or by its name."""
     start = head.start
     return start.startswith(b"MATLAB ") or is_hdf5(start) or head.path.suffix.lower() == ".mat"
 

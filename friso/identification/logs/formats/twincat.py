@@ -31,7 +31,7 @@ _MARKS = ("Starttime of export", "StartRecord", "SampleTime[ms]", "SymbolName", 
 
 
 def is_twincat(lines: list[str]) -> bool:
-    """Tell whether the first lines are those of a Scope export."""
+    """Tell whether a file with these first lines is a Scope export."""
     first = lines[0] if lines else ""
     if first[:4] != "Name" or not (delimiter := first[4:5]) or delimiter not in DELIMITERS:
         return False
@@ -70,9 +70,7 @@ def read_twincat(path: Path) -> ChannelTable:
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
-    """Split a line into cells: several spaces between two are empty cells, those of groups that
-    have ended.
-    """
+    """Split a line into cells; further spaces are the empty cells of groups that have ended."""
     return [cell.strip() for cell in csv_cells(line, delimiter)]
 
 
@@ -149,9 +147,7 @@ def _source(column: int, info: dict[str, str]) -> str:
 
 
 def _scaled(table: dict[str, list[str]]) -> list[str]:
-    """Write a line for the channels with an offset or a scale, which the exported values
-    contain.
-    """
+    """Write a line on channels with an offset or a scale, which exported values already contain."""
     scaled = []
     for i, name in enumerate(table["Name"]):
         offset, scale = (table.get(key, [])[i : i + 1] for key in ("Offset", "ScaleFactor"))

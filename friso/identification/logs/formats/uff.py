@@ -32,16 +32,13 @@ _KINDS = {8: "{0}", 11: "{0}/s", 12: "{0}/s^2", 9: "{1}", 13: "{1}"}
 
 
 def is_uff(head: bytes) -> bool:
-    """Tell whether the first bytes are a universal file: a line with -1 alone, then the number
-    of a dataset.
-    """
+    """Tell whether a file begins as a universal file: a line with -1, then a dataset's number."""
     lines = [line.strip() for line in head[:400].splitlines() if line.strip()]
     return len(lines) > 1 and lines[0] == b"-1" and lines[1][:4].rstrip(b"bB ").isdigit()
 
 
 def sets_58(path: Path) -> list[dict[str, Any]]:
-    """Return the datasets 58 of a universal file, the code of its units (`units_code`) with
-    each.
+    """Return the datasets 58 of a universal file, each with the code of its units (`units_code`).
 
     Raises LogError for none.
     """
@@ -79,9 +76,7 @@ def read_uff(path: Path) -> ChannelTable:
 
 
 def _unit(data: dict[str, Any]) -> str:
-    """Return the unit of time histories: that of their label, else by the kind of their data in
-    the units of the file.
-    """
+    """Return the unit of a time history, by its label or else by the kind of its data."""
     system = _SYSTEMS.get(data["units_code"])
     kind = _KINDS.get(int(data.get("ordinate_spec_data_type") or 0))
     return label(data, "ordinate_axis_units_lab") or (kind.format(*system) if system and kind else "")
@@ -101,8 +96,7 @@ def _axis(data: dict[str, Any]) -> np.ndarray:
 
 
 def frequency_sets(path: Path) -> tuple[dict[str, Any], np.ndarray, np.ndarray | None]:
-    """Return the frequency response of a universal file, its frequencies, and its coherence or
-    None.
+    """Return the frequency response of a universal file, its frequencies, and any coherence.
 
     Raises LogError for none and for several.
     """

@@ -100,7 +100,7 @@ def _outputs(errors: Sequence[float]) -> str:
 
 
 def _numbers(bench: Bench) -> dict[str, Any]:
-    """Return what a bench shows, for the document."""
+    """Return the results of an analysed frequency response for the JSON document."""
     channels = bench.driven.channels
     return {
         "input": {"name": channels.input, "unit": channels.input_unit},

@@ -67,7 +67,7 @@ def _facts(moves: IdentifiedMoves) -> Facts:
 def _errors(moves: IdentifiedMoves) -> str:
     """Write the relative errors of the simulated record.
 
-    Along the logged position, that of the force alone is meaningful.
+    If the model followed the logged position, only the error of the force has a meaning.
     """
     errors = moves.errors
     if moves.loop is None:

@@ -17,7 +17,7 @@ _COLOURS = (INK, VERMILLION, BLUE, GREEN, ORANGE, PINK)
 
 
 def _facts(result: StandstillResult) -> Facts:
-    """List RMS and peak of every log, and their ratios to those of the first."""
+    """List RMS and peak of every log, and their ratios to the first log."""
     rows = []
     for row, (rms, peak) in zip(result.logs, result.ratios, strict=True):
         against = "" if row is result.logs[0] or not np.isfinite(rms) else f"; {rms:.3g} and {peak:.3g} times the first"
