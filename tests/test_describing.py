@@ -379,7 +379,9 @@ def test_two_motions_under_one_force() -> None:
     from_rest = driven(lambda t: 1.8 * min(1.0, t * 5 / 20), 5.0, [0.0, 0.0, 0.0], 60)
     start = [sliding.real, (10j * np.pi * sliding).real, 0.0]
     assert abs(from_rest / stuck - 1) < 0.15  # near break-away, of which the first harmonic knows little: it is 0.142
-    assert abs(driven(lambda _: 1.8, 5.0, start, 30) / sliding - 1) < 0.2  # docs/evidence/describing.md: 24 % too large, 0.193
+    assert (
+        abs(driven(lambda _: 1.8, 5.0, start, 30) / sliding - 1) < 0.2
+    )  # evidence/describing.md: 24 % too large, 0.193
 
 
 @pytest.mark.parametrize(

@@ -246,7 +246,7 @@ def test_any_linear_mechanics() -> None:
 def test_intervals_are_fine_enough() -> None:
     flat, motion = hunting(8.0).flat(), one_period(hunting(8.0))
     usual, fine = (balanced(flat, *motion, 201, intervals=item * 201) for item in (32, 128))
-    left = 1 - 0.5202174e-3 / np.array([usual.amplitude, fine.amplitude])  # docs/evidence/describing.md: the simulated cycle
+    left = 1 - 0.5202174e-3 / np.array([usual.amplitude, fine.amplitude])  # evidence/describing.md: the simulated cycle
     assert left[1] / left[0] == pytest.approx(1.0, abs=0.05)
 
 
