@@ -9,7 +9,6 @@ from typing import Literal
 import numpy as np
 
 from friso.equations.roles import Role, Steady
-from friso.frequency.parts import FORCE, STAGE, VELOCITY, compensator
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.settings import CheckSettings
 from friso.stage import Stage
@@ -148,6 +147,8 @@ def lags(stages: Ensemble) -> np.ndarray:
     At some frequency below the crossover its gain is a good deal smaller than for a constant error, as a lag's is. The
     force then rises while friction holds the stage, as an integral's does.
     """
+    from friso.frequency.parts import FORCE, STAGE, VELOCITY, compensator
+
     settings, form = CheckSettings.current(), stages.structure
     stiffness, rate = stages.number("stiffness"), stages.number("rate")
     if form.controller is None or form.controller.integral or not np.all(stiffness > 0):

@@ -92,8 +92,8 @@ class Fit:
 @dataclass(frozen=True)
 class Guideline:
     """Everything in `docs/evidence/guideline.md`: how many groups there are by part of the stage, both laws, the worked
-    steps, what a parasitic mode allows; how long it took [s] on how many cores, and how many parts of the sweeps an earlier,
-    interrupted run had left."""
+    steps, what a parasitic mode allows; how long it took [s] on how many cores, and how many parts of the sweeps an
+    earlier, interrupted run had left."""
 
     samples: int
     counts: Mapping[str, Count]
