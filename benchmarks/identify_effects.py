@@ -64,6 +64,9 @@ class Effects:
     on_load: float = 0.0
     digit: float = 0.0
     gain_after: float = 1.0
+    gain_fast: float = 1.0
+    gain_beyond: float = 1.0
+    with_reference: float = 0.0
     sign: float = 1.0
 
 
@@ -73,11 +76,12 @@ def _run(reference, speed, p, step, parts):
     mass, coulomb, static, stribeck, viscous, bristle, kp, kd, ki = p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8]
     grows, place, cogging, pitch = p[9], p[10], p[11], p[12]
     load, stiffness, damping, play = p[13], p[14], p[15], p[16]
-    later, gain, on_load = p[17], p[18], p[19]
+    later, gain, on_load, gain_fast, gain_beyond = p[17], p[18], p[19], p[20], p[21]
     n = len(reference)
     position, force = np.zeros(n), np.zeros(n)
     h = step / parts
     own = mass * (1 - load)
+    top, middle = np.abs(speed).max(), (reference.max() + reference.min()) / 2
     carried = mass * load
     x = v = y = w = z = total = 0.0
     last = 0.0
@@ -89,6 +93,8 @@ def _run(reference, speed, p, step, parts):
         measured = (x - last) / step if k else 0.0
         last = x
         times = gain if 2 * k > n else 1.0
+        times *= gain_fast if abs(speed[k]) > 0.3 * top else 1.0
+        times *= gain_beyond if reference[k] > middle else 1.0
         u = times * (kp * error + kd * (speed[k] - measured) + total)
         u = min(max(u, -later), later)
         force[k] = u
@@ -130,6 +136,7 @@ def simulated(machine: Effects, rng: np.random.Generator) -> Log:
         machine.mass, machine.coulomb, machine.static, machine.stribeck, machine.viscous, machine.bristle, kp, kd, ki,
         machine.load_friction, machine.by_place, machine.cogging, machine.pitch, machine.load, machine.stiffness,
         machine.damping, machine.play, machine.most, machine.gain_after, machine.on_load,
+        machine.gain_fast, machine.gain_beyond,
     ])  # fmt: skip
     position, force = _run(reference, wanted, numbers, STEP, PARTS)
     late = machine.late + (machine.late_at_end - machine.late) * clock / TIME if machine.late_at_end else machine.late
@@ -138,7 +145,7 @@ def simulated(machine: Effects, rng: np.random.Generator) -> Log:
     force = np.clip(force, -machine.logged * np.abs(force).max(), machine.logged * np.abs(force).max())
     force = np.round(force / machine.digit) * machine.digit if machine.digit else force
     position = position + machine.position_noise * rng.standard_normal(len(clock))
-    signals = {"position": position, "force": force}
+    signals = {"position": position, "force": force} | ({"reference": reference} if machine.with_reference else {})
     return Log("log", clock, STEP, signals, (slice(0, len(clock)),))
 
 
@@ -216,8 +223,12 @@ def _coarse(m: dict[str, float], rng: np.random.Generator) -> dict[str, float]:
     return {"digit": m["coulomb"] * rng.uniform(0.15, 0.6)}
 
 
+def _with_reference(m: dict[str, float], rng: np.random.Generator) -> dict[str, float]:
+    return {"with_reference": 1.0}
+
+
 def _gain_switch(m: dict[str, float], rng: np.random.Generator) -> dict[str, float]:
-    return {"gain_after": rng.uniform(0.4, 0.7)}
+    return {rng.choice(["gain_after", "gain_fast", "gain_beyond"]): rng.uniform(0.4, 0.7), "with_reference": 1.0}
 
 
 def _wrong_sign(m: dict[str, float], rng: np.random.Generator) -> dict[str, float]:
@@ -236,12 +247,12 @@ FAMILIES: Mapping[str, tuple[Callable[[dict[str, float], np.random.Generator], d
     "saturated force": (_saturated, ()),
     "clipped log": (_clipped, ("the channel clips",)),
     "coarse force": (_coarse, ("force-digits",)),
-    "gain switch": (_gain_switch, ()),
+    "sound, with reference": (_with_reference, ()),
+    "gain switch": (_gain_switch, ("changing-gains",)),
     "wrong sign": (_wrong_sign, ("the other sign",)),
 }
 """Each family by name: what it adds to a sound machine, and the doubts that are right about it, or words of theirs. A
-saturated force that is logged as it acts, and a controller that switches its gains while the stage follows the log, are
-in the model."""
+saturated force that is logged as it acts is in the model."""
 
 KEYS = {
     "masses.cart": "mass",

@@ -285,10 +285,13 @@ def joint(flat: Flat, deflection: float, rate: float) -> float:
         return stiff * deflection + damp * rate
     force = flat["joint.stiffness"] * deflection + flat["joint.damping"] * rate
     stroke = flat["joint.stroke"]
+    pulls = flat.get("joint.limiter_pulls", True)
     if deflection > stroke:
-        return force + stiff * (deflection - stroke) + damp * rate
+        touch = stiff * (deflection - stroke) + damp * rate
+        return force + (touch if pulls else max(touch, 0.0))
     if deflection < -stroke:
-        return force + stiff * (deflection + stroke) + damp * rate
+        touch = stiff * (deflection + stroke) + damp * rate
+        return force + (touch if pulls else min(touch, 0.0))
     if stroke == 0:
         return force + damp * rate
     return force

@@ -898,7 +898,7 @@ def test_no_progress_stays_of_what_was_abandoned(browsed: Browsed) -> None:
     assert page.locator("#answer progress").count() == 1
     browsed.type("controller.crossover", "8 kg")
     page.wait_for_selector("#keys .wrong")
-    assert page.locator("progress").count() == 0
+    page.wait_for_function("() => !document.querySelector('progress')")
 
 
 def test_two_logs_dropped_at_once_are_both_taken(browsed: Browsed) -> None:

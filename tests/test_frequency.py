@@ -123,7 +123,7 @@ def jacobian(flat: dict, one: Members) -> np.ndarray:
     speed = float(one.speed[0])
     here = {symbol: speed if str(symbol).endswith("velocity") else 0.0 for symbol in model.symbols}
     here |= dict.fromkeys((TIME, *REFERENCE), 0.0)  # it stands
-    modes = {"forward": 1.0, "stroke_ahead": float(one.touched[0])}
+    modes = {"forward": 1.0, "stroke_ahead": float(one.touched[0]), "contact_ahead": 1.0}
     modes |= dict.fromkeys(("plastic_ahead", "slipping_ahead"), float(speed > 0))
     modes |= {switch.name: float(not one.stuck[0]) for switch in model.switches}
     here |= {kink.beyond: modes.get(kink.name, 0.0) for kink in model.kinks}

@@ -17,6 +17,7 @@ from variants import VARIANTS
 from friso.identification.combine import combined
 from friso.identification.doubt import DOUBTS, Doubt, KeyCase, RaisedDoubt, RecordCase, ValueCase, causes, judged_keys
 from friso.identification.doubts import (
+    changing_gains,
     differing_halves,
     gaps,
     little_friction,
@@ -449,6 +450,42 @@ def test_what_friction_does_to_a_servo_that_follows_well_is_no_missing_feedforwa
     assert np.abs(error).max() < 0.02 * np.ptp(log["position"])
     assert inverse.value("mass") == pytest.approx(MASS, rel=0.01)
     assert not [cause for cause in causes_of(followed) if cause.without]
+
+
+@pytest.mark.parametrize("change", ["after", "above", "beyond", "none"])
+def test_a_controller_that_changes_its_gains_is_named(change: str, wording: Wording) -> None:
+    """The reference of a PD servo, by its force, with gains of 0.6 times as much in a part of the record."""
+    log, lag = axis(), 0.02
+    position, speed, force = log["position"], np.abs(np.gradient(log["position"], DT)), log["force"]
+    part = {
+        "after": log.time > 3.5, "above": speed > 0.25, "beyond": position > 0.02
+    }.get(change, np.zeros(len(position), bool))  # fmt: skip
+    error = lfilter([DT / (DT + lag)], [1, -lag / (DT + lag)], force / np.where(part, 0.6, 1.0)) / 3e4
+    followed = replace(log, signals={"position": position, "reference": position + error, "force": force})
+    doubts = [*changing_gains.find(RecordCase(followed, inverse_model(followed, 5.0)))]
+    assert len(doubts) == (change in ("after", "above", "beyond"))
+    for doubt in doubts:
+        assert f"The controller's gains change {change}" in doubt.words
+        assert doubt.size == pytest.approx(0.6, rel=0.15)
+        wording(doubt.words)
+
+
+def test_an_integral_that_stands_while_the_force_is_limited_is_no_change_of_gains() -> None:
+    time = np.arange(0, 6, DT)
+    reference = np.cumsum(np.sin(time) * np.clip(40 * np.sin(2 * np.pi * 0.8 * time), -0.4, 0.4)) * DT
+    noise, most = 0.05 * np.random.default_rng(1).standard_normal(len(time)), 30.0
+    position, force = np.zeros(len(time)), np.zeros(len(time))
+    x = v = total = 0.0
+    for k in range(len(time)):
+        position[k], error = x, reference[k] - x
+        wanted = 8e3 * error + 4e2 * ((reference[k] - reference[k - 1]) / DT - v if k else 0.0) + total
+        force[k] = np.clip(wanted, -most, most)
+        total += 1e5 * error * DT * (abs(wanted) < most)
+        v += DT * (force[k] - COULOMB * np.tanh(v / 1e-3) - VISCOUS * v) / MASS
+        x += DT * v
+    assert np.mean(np.abs(force) == most) > 0.05
+    log = record("limited", DT, position=position, force=force + noise, reference=reference)
+    assert not [*changing_gains.find(RecordCase(log, inverse_model(log)))]
 
 
 def test_a_force_that_is_cut_off_spoils_the_record(wording: Wording) -> None:

@@ -18,8 +18,9 @@ from friso.leaf_springs.beams import beams
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.questions.tune.page import stage_files
+from friso.questions.tune.present_words import DOUBTS
 from friso.questions.tune.question import TuneAnswer
-from friso.questions.tune.words import DOUBTS, UNMADE, answer
+from friso.questions.tune.words import UNMADE, answer
 from friso.remedies.catalogue import remedies
 from friso.remedies.goal import Goal
 from friso.remedies.method import Advice, Unmade, _Session, tune
@@ -124,8 +125,8 @@ def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(tuning: Advice) 
     assert made.stage is not None
     assert made.stage.flat()["joint.stiffness"] == pytest.approx(isolator.stage.flat()["joint.stiffness"], rel=0.01)
     assert made.certainty == "works"
-    assert made.case is not None
-    assert (made.case.verdict, made.case.judgement.hunting.certain) == ("settles", True)
+    assert made.confirmation is not None
+    assert (made.confirmation.verdict, made.confirmation.certain) == ("settles", True)
     length = f"{made.stage.flat()['flexure.length'] * 1e3:.3g} x"
     assert any("2 leaves of" in line and length in line for line in answer(tuning))
     files = stage_files(tuning)

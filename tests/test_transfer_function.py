@@ -4,10 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import control
 import numpy as np
 import pytest
 from scipy import signal
 from scipy.io import savemat
+from variants import VARIANTS
 
 import friso
 from friso.engine.simulate import simulate
@@ -16,7 +18,10 @@ from friso.frequency.drive import DriveTiming
 from friso.frequency.loops import poles
 from friso.frequency.members import limit_cases
 from friso.frequency.parts import FORCE, REFERENCE, compensator
-from friso.hunting import hunting
+from friso.hunting import cannot_hunt, hunting
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import LAGS
+from friso.hunting.loop import lags
 from friso.shown.motion_words import motion_sentences
 from friso.stage import Stage
 
@@ -70,6 +75,20 @@ def test_the_controller_is_its_transfer_function(transfer: tuple[list[float], li
     by_hand = np.polyval(transfer[0], 1j * OMEGA) / np.polyval(transfer[1], 1j * OMEGA)
     ours = response(controlled(ways(*transfer)[way]).flat(), 1j * OMEGA)
     assert np.abs(ours / by_hand - 1).max() < 1e-9
+
+
+@pytest.mark.parametrize("transfer", TRANSFERS.values(), ids=TRANSFERS)
+def test_loops_are_those_of_python_control(transfer: tuple[list[float], list[float]]) -> None:
+    """Open and closed loop of the mass without friction, by arithmetic on transfer functions."""
+    stage = controlled(ways(*transfer)["coefficients"], friction={"model": "none"})
+    plant = control.tf([1.0], [1.7, 0.0, 0.0])
+    opened = plant * control.tf(*transfer)
+    assert np.abs(friso.linear(stage, part="open")(1j * OMEGA) / opened(1j * OMEGA) - 1).max() < 1e-9
+    closed = friso.linear(stage, part="closed")
+    theirs = control.feedback(opened, 1)
+    at = [closed.output_labels.index("stage"), closed.input_labels.index("reference")]
+    ours = np.array([closed(1j * omega)[tuple(at)] for omega in OMEGA])
+    assert np.abs(ours / theirs(1j * OMEGA) - 1).max() < 1e-6
 
 
 def test_sections_are_factors() -> None:
@@ -170,6 +189,33 @@ def test_a_slow_pole_winds_up_as_an_integral_does(pole: float) -> None:
     assert cycle.period == pytest.approx(0.634, rel=0.02)
 
 
+@pytest.mark.inner
+def test_a_lag_that_winds_up_without_an_integral_is_not_surely_calm() -> None:
+    """Two slow poles: "cannot hunt" was told of a stage that simulation shows to hunt."""
+    fast = np.polymul([KD + KP * TAU, KP + KI * TAU, KI], [1.0, 5.0])
+    slow = np.polymul([1.0, 0.02, 0.0002], [TAU, 1.0])
+    half = 2.0 ** np.arange(3, -1, -1)  # C(2 s)/4, half as fast
+    keys = {"numerator": [*map(float, fast * half / 4)], "denominator": [*map(float, slow * half)]}
+    stage = controlled(keys, motion={"kind": "step", "size": "1 mm", "duration": "60 s"})
+    assert friso.simulate(stage).measures.outcome[0] == "swings"
+    verdict = hunting(stage)
+    assert not verdict.certain
+    assert verdict.reason == LAGS
+
+
+@pytest.mark.inner
+@pytest.mark.parametrize("name", [name for name, stage in VARIANTS.items() if cannot_hunt(stage)])
+def test_filters_of_controllers_without_integral_are_no_lags(name: str) -> None:
+    assert not lags(Ensemble.held(VARIANTS[name].flat(), 1)).any()
+
+
+@pytest.mark.inner
+def test_a_filter_that_lags_winds_up() -> None:
+    lag = {"kind": "lead_lag", "zero_frequency": "0.5 Hz", "pole_frequency": "0.005 Hz"}
+    stage = Stage(**{**TABLES, "controller": {**PID, "ki": "0 N/(m*s)", "filters": [lag]}})
+    assert lags(Ensemble.held(stage.flat(), 1)).all()
+
+
 def test_a_verdict_says_that_it_is_on_the_continuous_equivalent() -> None:
     numerator, denominator, _ = signal.cont2discrete((NUMERATOR, DENOMINATOR), SAMPLE, "bilinear")
     keys = {"numerator": [*map(float, numerator.ravel())], "denominator": [*map(float, denominator)]}
@@ -197,6 +243,10 @@ def test_a_loop_of_samples_is_that_of_the_plant_at_them() -> None:
 
 BAD: dict[str, tuple[dict[str, Any], str]] = {
     "improper": ({"numerator": [1.0, 2.0, 3.0], "denominator": [1.0, 4.0]}, "proper"),
+    "more zeros than poles in z": (
+        {"zeros": [0.5, "0.2+0.1j"], "poles": [0.0, 0.3], "gain": 2e3, "sample_time": "1 ms"},
+        "no more zeros than poles",
+    ),
     "unstable": ({"numerator": [100.0, 200.0], "denominator": [1.0, -3.0, 0.0]}, "stable"),
     "unstable in z": ({"numerator": [5.0, 4.0], "denominator": [1.0, -1.1], "sample_time": "1 ms"}, "stable"),
     "lowest power first": (

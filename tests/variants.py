@@ -268,6 +268,13 @@ VARIANTS: dict[str, Stage] = {
     "free, parasitic": stage(
         there_and_back(), friction=lugre(2), joint=free(), parasitic=PARASITIC, controller=van_dijk()
     ),
+    "free, limiter that only pushes": stage(
+        there_and_back(),
+        friction=lugre(2),
+        joint=free("20 um").replace('"100 N*s/m"', '"2e4 N*s/m"') + "\nlimiter_pulls = false",
+        parasitic=PARASITIC,
+        controller=van_dijk(),
+    ),
     "free, no friction, limit": stage(
         step("5 mm"), joint=free("0.3 mm"), controller=gains(**FULL, extra=MEASURED + limit("20 N"))
     ),

@@ -13,11 +13,12 @@ from friso.equations.masses import beyond_stops, stops
 from friso.equations.structure import JointForm
 
 
-def joint_force(form: JointForm, deflection: sp.Expr, rate: sp.Expr) -> tuple[sp.Expr, Component]:
+def joint_force(form: JointForm, deflection: sp.Expr, rate: sp.Expr, limiter_pulls: bool) -> tuple[sp.Expr, Component]:
     """Return the force of the joint on the cart [N], and its kinks, for a deflection [m].
 
     "locked": cart and stage meet through the limiter alone. "touching": the stroke is zero, so that the limiter always
-    touches. "free": the limiter touches where abs(deflection) exceeds the stroke.
+    touches. "free": the limiter touches where abs(deflection) exceeds the stroke. A limiter that does not pull lets go
+    where its damping would outweigh its stiffness.
     """
     contact = key("joint.limiter_stiffness") * deflection + key("joint.limiter_damping") * rate
     leaves = key("joint.stiffness") * deflection + key("joint.damping") * rate
@@ -29,7 +30,14 @@ def joint_force(form: JointForm, deflection: sp.Expr, rate: sp.Expr) -> tuple[sp
     else:
         stroke = key("joint.stroke")
         kinks = touching(deflection)
-        force = leaves + beyond_stops(kinks, contact, key("joint.limiter_stiffness") * stroke)
+        reached = key("joint.limiter_stiffness") * stroke
+        if limiter_pulls:
+            force = leaves + beyond_stops(kinks, contact, reached)
+        else:
+            pushing = stops(contact, reached, "contact")
+            pushes = [touch.beyond * push.beyond for touch, push in zip(kinks, pushing, strict=True)]
+            force = leaves + pushes[0] * (contact - reached) + pushes[1] * (contact + reached)
+            kinks = (*kinks, *pushing)
     outputs = {
         "joint_deflection": Output(deflection, "m", "joint deflection"),
         "joint_force": Output(force, "N", "joint force"),

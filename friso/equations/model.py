@@ -334,7 +334,12 @@ def _mechanics(
     if structure.joint == "rigid":
         states[:0] = stage.under(on_stage - drag, *scales)
     else:
-        on_cart, part = joint_force(structure.joint, stage.position - cart.position, stage.velocity - cart.velocity)
+        on_cart, part = joint_force(
+            structure.joint,
+            stage.position - cart.position,
+            stage.velocity - cart.velocity,
+            structure.limiter_pulls,
+        )
         states[:0] = [*stage.under(on_stage - on_cart, *scales), *cart.under(on_cart - drag, *scales)]
         parts.append(part)
     if friction:

@@ -92,7 +92,7 @@ class Structure:
     `masses` names those given, for a rigid stage, `biased` those on which a constant force acts; `friction_variant` is
     whatever else the friction law's equations depend on (the Stribeck exponent where it is a whole number);
     `load_follows` whether its levels grow with the acceleration of the reference; `reference` is of what its pieces are
-    made.
+    made; `limiter_pulls` whether a touched limiter may pull by its damping.
     """
 
     masses: tuple[str, ...]
@@ -105,6 +105,7 @@ class Structure:
     load_follows: bool = False
     transmission: TransmissionForm | None = None
     reference: ReferenceForm = QUADRATIC
+    limiter_pulls: bool = True
 
     @property
     def standing(self) -> Structure:
@@ -122,6 +123,7 @@ class Structure:
         axis = f"rigid {' and '.join(self.masses)}" if self.joint == "rigid" else f"{self.joint} joint"
         words = {
             axis: True,
+            "limiter that only pushes": not self.limiter_pulls,
             "transmission": self.transmission and not self.plays,
             "transmission with backlash": self.plays,
             "parasitic mode": self.parasitic,
@@ -149,6 +151,7 @@ def structure(flat: Mapping[str, Any]) -> Structure:
         load_follows=load_follows(flat),
         transmission=_transmission_form(flat) if MOTOR_MASS in flat else None,
         reference=motion_of(flat).form(flat) if MOTION_KIND in flat else QUADRATIC,
+        limiter_pulls=_joint_form(flat) != "free" or flat.get("joint.limiter_pulls", True),
     )
 
 

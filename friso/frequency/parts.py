@@ -137,7 +137,8 @@ def _plant(form: Structure) -> _Plant:
         seen.append(loop)
         return Controller(push, Component())
 
-    model = assemble(replace(form, controller=None, biased=("cart",)), control=control)
+    at_rest = replace(form, controller=None, biased=("cart",), limiter_pulls=True)  # what is touched stays so
+    model = assemble(at_rest, control=control)
     (loop,) = seen
     expressions = {name: output.expression for name, output in model.outputs.items()}
     rated = loop.position if loop.rated is None else loop.rated

@@ -138,7 +138,29 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
     limit = least_rate * stages.number("rate")
     growths = [_growths(stages, touched).values() for touched in {False, form.joint == "free"}]
     stable = np.all([growth <= limit for state in growths for growth in state], axis=0)  # and not unknown
-    return stable & ~may_run_away(stages)
+    return stable & ~may_run_away(stages) & ~lags(stages)
+
+
+@np.errstate(all="ignore")
+def lags(stages: Ensemble) -> np.ndarray:
+    """Return which stages have a controller that lags instead of integrating, shape (count,).
+
+    At standstill it pushes ever harder, though it has no integral: at some frequency below the crossover its gain is a
+    good deal smaller than for a constant error. The force then rises while friction holds the stage, as an integral's
+    does.
+    """
+    from friso.frequency.parts import FORCE, STAGE, VELOCITY, compensator
+
+    settings, form = CheckSettings.current(), stages.structure
+    stiffness, rate = stages.number("stiffness"), stages.number("rate")
+    if form.controller is None or form.controller.integral or not np.all(stiffness > 0):
+        return np.zeros(stages.count, bool)
+    lowest, highest = settings.lag_rates
+    omega = np.geomspace(lowest * rate.min(), highest * rate.max(), settings.lag_points)
+    control = compensator(stages.flat, stages.count).take((STAGE, VELOCITY), (FORCE,)).at(1j * omega)[:, :, 0]
+    gain = np.abs(control[..., 0] + 1j * omega * control[..., 1])
+    acts = gain > (stiffness / rate**2)[:, None] * omega**2
+    return np.any(acts & (gain < settings.lag_gain * gain[:, :1]), axis=1)
 
 
 def _growths(stages: Ensemble, touched: bool = False) -> dict[LoopState, np.ndarray]:

@@ -176,6 +176,33 @@ class DoubtSettings(Settings):
     samples_of_a_delay: float = setting(0.25, "")
     """Samples of delay from which on it is told; shorter ones are within the hold of the force."""
 
+    bandwidths_of_a_controller: float = setting(3.0, "")
+    """Cut-off of error and force in bandwidths of the motion: above it the derivative of the error is noise."""
+
+    rows_for_each_gain: int = setting(5, "")
+    """Rows for each gain in either part of a record at least; with fewer a gain fits noise."""
+
+    shares_of_a_part: tuple[float, ...] = setting((0.1, 0.9), "")
+    """Shares of a record between which gains may change: a shorter part shows too little."""
+
+    levels_of_a_part: int = setting(17, "")
+    """Instants, speeds and places at which gains may change: between two of them a twentieth is in the wrong part."""
+
+    power_left_by_changing_gains: float = setting(0.3, "")
+    """Share of the residual's power that two controllers leave at most of what one leaves: of 150 drawn machines with
+    gains 0.4 to 0.7 times as large in a part 149 were told, of 100 sound ones and 100 with a limited force none."""
+
+    deviations_at_a_limit: float = setting(6.0, "")
+    """Deviations of the force's noise below its largest value from which on no limit acts: noise reaches three to
+    either side of a limit."""
+
+    likeness_of_a_law: float = setting(0.8, "")
+    """Correlation of the force with the law of the other part at least: of drawn machines with other gains 0.88 and
+    more; of a stage that hunts, of which two laws fit more, 0.02 to 0.1."""
+
+    logarithm_of_a_gain: float = setting(0.1, "")
+    """Change of the gains, as a logarithm, from which on it is told: clocks that drift apart change the law by less."""
+
     speed_share_of_creeping: float = setting(0.01, "")
     """Share of the highest speed up to which friction is not counted as that of one direction."""
 

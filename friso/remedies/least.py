@@ -178,7 +178,7 @@ def candidates(search: Search) -> Iterator[np.ndarray]:
     further = [home + step * (least - home) for step in STEPS]
     towards = [least + part * (works - least) for part in settings.change_parts]
     tried = np.unique(np.clip([*further, *towards, *others], 0, 1), axis=0)
-    kept = tried[search.measured(tried).meets(search.goal)]
+    kept = tried[search.measured(tried, settings.worst_time).meets(search.goal)]
     kept = kept[np.argsort(wanted(kept), kind="stable")]
     for few in np.array_split(kept, -(-len(kept) // settings.points_looked_at)) if len(kept) else ():
         yield from _robust(search, few)

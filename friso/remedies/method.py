@@ -23,6 +23,7 @@ from friso.platform.extras import missing
 from friso.progress import Progress, silent
 from friso.remedies.catalogue import Remedy, remedies, with_bandwidth
 from friso.remedies.change import ChangeSize, change_size
+from friso.remedies.confirmed import confirmed
 from friso.remedies.goal import Goal
 from friso.remedies.least import least_changes, least_remedy, of_one_key, size_cost
 from friso.remedies.machines import Fleet, MoveRange, draw_fleet
@@ -35,12 +36,10 @@ from friso.remedies.variables import BANDWIDTH
 from friso.remedies.verified import (
     Performance,
     RemedyOutcome,
+    checked,
     missed_parts,
     moving,
-    performance_of,
-    unmet_goals,
     unsettled_parts,
-    verified,
 )
 from friso.remedies.window import windows
 from friso.stage import Stage
@@ -58,8 +57,9 @@ cannot have that of leaf springs; or none of the usual sizes bears the stroke.""
 class Advice:
     """The outcomes of all remedies for a stage, in the order of the catalogue.
 
-    `case` is the check of the stage, and `present` its performance on machines. `limits` gives the bandwidths with
-    enough margin, and `sensitivities` what the edge of hunting depends on. `relaxed` says what to relax if nothing
+    `case` is the check of the stage, `present` its performance on machines, and `unmet` the parts of the goal that it
+    misses or may miss (names of `friso.questions.tune.present_words.DOUBTS`). `limits` gives the bandwidths with enough
+    margin, and `sensitivities` what the edge of hunting depends on. `relaxed` says what to relax if nothing
     works, `interrupted` whether the search was ended early, and `least_sought` whether the least change was sought
     before that.
 
@@ -82,11 +82,12 @@ class Advice:
     as_built: Mapping[str, Any] = field(default_factory=dict)
     correlations: Correlations = field(default_factory=Correlations)
     unmade: Mapping[str, Unmade] = field(default_factory=dict)
+    unmet: tuple[str, ...] = ()
 
     @property
     def needed(self) -> bool:
         """Tell whether the stage as it is fails the goal."""
-        return bool(unmet_goals(self.case, self.present, self.goal))
+        return bool(self.unmet)
 
     @property
     def least(self) -> RemedyOutcome | None:
@@ -123,6 +124,11 @@ class Advice:
         works = (outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
         return tuple(sorted(works, key=self.size))
 
+    @property
+    def recommended(self) -> tuple[RemedyOutcome, ...]:
+        """Return the remedies that are told in full: the least change, and what settles soonest or the next best."""
+        return _recommended(self.working, self.goal)
+
     def made_of_leaves(self, outcome: RemedyOutcome) -> RemedyOutcome | None:
         """Return the outcome of a remedy's joint when made of leaf springs."""
         return next((other for other in self.outcomes if other.remedy.makes == outcome.remedy.name), None)
@@ -136,6 +142,17 @@ class Advice:
 def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
     """Return the settling time [s] of the slowest 5 % with a remedy; infinite if not measured."""
     return np.inf if outcome.measured is None else outcome.measured.slowest(goal)
+
+
+def _recommended(working: Sequence[RemedyOutcome], goal: Goal) -> tuple[RemedyOutcome, ...]:
+    """Choose which remedies to tell in full, of those that work, the least change first.
+
+    They are the least change and what settles soonest; if these are the same, the next larger change follows.
+    """
+    fastest = min(working, key=lambda outcome: slowest(outcome, goal), default=None)
+    if not working or fastest is working[0]:
+        return tuple(working[:2])
+    return (working[0], fastest) if fastest else ()
 
 
 def tune(
@@ -181,16 +198,16 @@ def tune(
     session = _Session(ideal, stage, goal, machines, fresh, unseen, further, budget, report)
     relaxed: tuple[RelaxedGoal, ...] = ()
     sensitivities: Sensitivities | None = None
-    interrupted = False
+    interrupted, unmet = False, missed_parts(present, goal) or ("certain",)
     try:
         if missed_parts(present, goal) and listed and listed[0].name == BANDWIDTH:
             session.tries_one_factor(listed.pop(0), len(listed) > 0)
             answered(session.outcomes[0])
             session.adds_windows()
         report("the stage as it is", 0)
-        case = verified(ideal)
-        present = present.surveyed(ideal, unseen, goal)
-        if not unmet_goals(case, present, goal):
+        case, present = checked(ideal), present.surveyed(ideal, unseen, goal)
+        unmet = missed_parts(present, goal) or unsettled_parts(confirmed(ideal, goal), present, goal)
+        if not unmet:
             listed = []  # nothing has to change
         for joint in (False, True):
             with allowance(settings.tuning_work) as session.allowed:
@@ -209,7 +226,7 @@ def tune(
     return Advice(
         ideal,
         goal,
-        case or verified(ideal),
+        case or checked(ideal),
         present,
         limits(linear_flat(stage, stage.flat())),
         tuple(session.outcomes),
@@ -222,6 +239,7 @@ def tune(
         {name: table for name, table in stage.as_written().items() if name in AS_BUILT},
         correlations,
         session.unmade,
+        unmet,
     )
 
 
@@ -307,15 +325,15 @@ class _Session:
     ) -> None:
         """Try remedies, what changes least first; then the least change, and `further` remedies by what became of them.
 
-        Settings against friction with more keys than what works already changes are left out. Remedies that cannot be
-        verified come last, and only if nothing works.
+        Settings against friction with more keys than what works already changes are left out, and combinations of
+        remedies of which each works alone. Remedies that cannot be verified come last, and only if nothing works.
         """
         verifiable = [remedy for remedy in listed if remedy.verifiable]
         for own in (True, False):
             for remedy in verifiable:
                 keys = min((self._size(one).keys for one in self.outcomes if one.certainty == "works"), default=np.inf)
                 small = not remedy.of_setting or len(remedy.variables) <= keys
-                if small and (remedy.stage is self.stage) == own:
+                if small and (remedy.stage is self.stage) == own and not self._combines(remedy):
                     self.tries(remedy)
             self.tries_less()
         for remedy in further(self.outcomes, self.goal):
@@ -324,6 +342,13 @@ class _Session:
         for remedy in listed:
             if not remedy.verifiable and not self.works:
                 self.tries(remedy)
+
+    def _combines(self, remedy: Remedy) -> bool:
+        """Tell whether a remedy varies what several others vary, each of which works alone."""
+        names = {variable.name for variable in remedy.variables}
+        working = (outcome.remedy for outcome in self.outcomes if outcome.certainty == "works")
+        alone = [varied for one in working if (varied := {variable.name for variable in one.variables}) < names]
+        return set().union(*alone) == names
 
     def adds_windows(self) -> None:
         """Find how far each number of what is told first may vary: of the least change, and of what settles soonest."""
@@ -462,13 +487,13 @@ class _Session:
             except Exhausted:
                 search.cut = True
                 break
-            tries, worked = tries + (outcome.case is not None), worked + spent.used
+            tries, worked = tries + (outcome.confirmation is not None), worked + spent.used
             if outcome.certainty == "works":
                 unsure = outcome
                 break
             unsure = unsure or outcome
             self.outcomes[-1] = unsure
-            # what friso check gave up takes it as long with others
+            # what took too much computing takes as much with others
             if tries == settings.most_tries or worked > settings.verifying_work or "given up" in outcome.doubts:
                 break
         tried = search.points if search.tried else None
@@ -476,12 +501,13 @@ class _Session:
         self.outcomes[-1] = unsure or none
 
     def makes_leaves(self) -> None:
-        """Size leaf springs for every joint that works, and verify them.
+        """Size leaf springs for the joints of remedies that are reported in full, and verify them.
 
         Their search is over, so its work does not limit this.
         """
-        for one in tuple(self.outcomes):
-            if one.remedy.buys_joint and not one.remedy.makes and one.certainty == "works":
+        working = (one for one in self.outcomes if one.certainty == "works" and not one.remedy.makes)
+        for one in _recommended(sorted(working, key=self._size), self.goal):
+            if one.remedy.buys_joint:
                 self._made_of_leaves(one)
 
     def _verified(self, search: Search, shares: np.ndarray, moves_from: float | None = None) -> RemedyOutcome:
@@ -499,20 +525,24 @@ class _Session:
             fleet if moves_from is None else fleet.with_moves_from(moves_from) for fleet in (self.unseen, self.further)
         )
         self.report(f"{remedy.name}: verified on machines not tuned for")
-        measured = performance_of(tuned, unseen, goal, self.drive)
-        doubted, case = missed_parts(measured, goal), None
+        measured, confirmation = moving(tuned, unseen, goal, self.drive), None
+        doubted = missed_parts(measured, goal)
         if not doubted:
             self.report(f"{remedy.name}: verified by its hunting cycles")
-            case = verified(tuned)
-            doubted = unsettled_parts(case, measured, goal)
+            confirmation = confirmed(tuned, goal)
+            doubted = unsettled_parts(confirmation, measured, goal)
+        if not doubted:
+            measured = measured.surveyed(tuned, unseen, goal)
+            doubted = missed_parts(measured, goal)
         if not doubted:
             self.report(f"{remedy.name}: verified on more machines", settings.progress_steps)
-            for part in np.split(np.arange(further.count), [further.count // 3]):
+            ends = [round(part * further.count) for part in settings.further_parts]
+            for part in np.split(np.arange(further.count), ends):
                 if measured.decides(goal) is None:
                     measured = measured.with_further(tuned, further.take(part), goal, self.drive)
             doubted = () if measured.decides(goal) else ("together",)
-        tried = search.points, search.attracted
-        return RemedyOutcome(remedy, tuned, measured, case, doubted, (), *tried, shares=shares, moves_from=moves_from)
+        parts = remedy, tuned, measured, confirmation, doubted, (), search.points, search.attracted
+        return RemedyOutcome(*parts, shares=shares, moves_from=moves_from)
 
 
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
@@ -535,9 +565,9 @@ def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
     if not search.tried:
         return outcome
     points = search.points
-    best = int(points.cost(search.goal).argmin())
-    if not points.meets(search.goal)[best]:
+    if not points.meets(search.goal).any():
         return outcome
+    best = int(points.cost(search.goal).argmin())
     shares = points.shares[best]
     return replace(outcome, stage=search.remedy.tuned(shares), points=points, shares=shares)
 

@@ -48,6 +48,19 @@ class RemedySettings(Settings):
     most_looks: int = setting(12, "")
     """Points looked at on fresh machines; more take minutes and have found nothing better."""
 
+    bandwidths_beside: int = setting(2, "")
+    """Bandwidths on either side at which a tuned stage is judged, down to the distance wanted from hunting and as far
+    up: with two they are 1.095 apart, nearer than the steps of a search for an edge; with fewer a window of hunting
+    slips through, more cost as much each as the stage's own."""
+
+    confirming_work: float = setting(4e8, "")
+    """About 5 s on one core to search what attracts a tuned stage, and as much to judge it and what attracts it beside
+    its bandwidth; most take a tenth. Beyond it the stage is not sure to work."""
+
+    present_check_work: float = setting(3e8, "")
+    """About 4 s on one core to check the stage as it is, of which the words and the keys that matter for the edge of
+    hunting are told; with less, more stages have no edge located."""
+
     verifying_work: float = setting(1.2e9, "")
     """About 15 s on one core; beyond it no other point of the remedy is verified."""
 
@@ -100,8 +113,13 @@ class RemedySettings(Settings):
     """Longer than any move: a point that breaks a constraint is worse than any that does not."""
 
     survey_parts: int = setting(4, "")
-    """Parts in which fresh machines are surveyed: the first tells of most settings that fail, at a quarter of the cost;
-    more leave lanes idle."""
+    """The first of so many parts of the fresh machines is surveyed before the others: it tells of most settings that
+    fail, at a quarter of the cost; with more parts it tells of fewer."""
+
+    further_parts: tuple[float, ...] = setting((1 / 12, 1 / 3), "")
+    """Shares of the further machines after which it is looked whether they decide. With more looks fewer machines are
+    measured, but more settings pass by chance: with these, one in forty of those that are right for just the share
+    wanted, of whom two more looks would let one in thirty pass."""
 
     survey_batch: int = setting(3, "")
     """Points whose machines are surveyed at once: fewer leave cores idle, more are surveyed in vain."""

@@ -8,13 +8,15 @@ from typing import Any, Literal
 
 import numpy as np
 
+from friso.engine.allowance import Exhausted, allowance
 from friso.equations.continuous import slow_gains
 from friso.equations.settings import gain_states
 from friso.frequency.bandwidth import loop_bandwidth
 from friso.frequency.crossover import settled_margin
 from friso.frequency.stiffness import in_series
-from friso.hunting import Case, CheckPart, check_given
+from friso.hunting import Case, check_given
 from friso.remedies.catalogue import Remedy
+from friso.remedies.confirmed import Confirmation
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet, MoveRange
 from friso.remedies.search import TriedPoints
@@ -125,17 +127,24 @@ class Performance:
     def surveyed(self, stage: Stage, machines: Fleet, goal: Goal) -> Performance:
         """Return the performance with a survey of what attracts the machines that meet the rest of the goal.
 
-        Machines are surveyed a few at a time. As soon as something attracts so many that too few can meet the goal,
-        those not surveyed yet are left out: the share is that of fewer machines then.
+        A few machines are surveyed first. If something attracts so many of them that too few can meet the goal, the
+        others are left out: the share is that of fewer machines then.
         """
-        meets, remedy, measured = self._meets_all(goal), Remedy.settled_on("", stage), self
-        for part in np.array_split(np.arange(self.margin.size), RemedySettings.current().survey_parts):
-            if (some := part[meets[part]]).size:
-                surveyed = attraction(remedy, ONE, machines.take(some), goal)
-                measured = replace(measured, attraction=measured.attraction.of_some(surveyed, some))
-                if np.count_nonzero(meets & ~measured._meets_all(goal)) > (1 - goal.share) * self.margin.size:
-                    return measured._first(int(part[-1]) + 1)
-        return measured
+        first, others = np.split(np.arange(machines.count), [machines.count // RemedySettings.current().survey_parts])
+        measured = self._surveyed(stage, machines, first, goal)
+        if np.count_nonzero(self._meets_all(goal) & ~measured._meets_all(goal)) > (1 - goal.share) * machines.count:
+            return measured._first(first.size)
+        return measured._surveyed(stage, machines, others, goal, at_once=True)
+
+    def _surveyed(
+        self, stage: Stage, machines: Fleet, numbers: np.ndarray, goal: Goal, at_once: bool = False
+    ) -> Performance:
+        """Return the performance with a survey of some machines by their numbers, of those that meet the rest."""
+        some = numbers[self._meets_all(goal)[numbers]]
+        if not some.size:
+            return self
+        surveyed = attraction(Remedy.settled_on("", stage), ONE, machines.take(some), goal, at_once=at_once)
+        return replace(self, attraction=self.attraction.of_some(surveyed, some))
 
     def _first(self, count: int) -> Performance:
         """Return what was measured on the first machines alone."""
@@ -146,7 +155,14 @@ class Performance:
 
     def with_further(self, stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
         """Return the performance with further machines measured."""
-        meets = performance_of(stage, machines, goal, drive)._meets_all(goal)
+        settings = RemedySettings.current()
+        moved = replace(
+            self,
+            moves=moves_of_points(Remedy.settled_on("", stage), ONE, machines, goal, rtol=settings.move_rtol),
+            margin=modulus_margins(Remedy.settled_on("", stage), ONE, machines, drive),
+            attraction=Attraction.none(machines.count),
+        )
+        meets = moved._surveyed(stage, machines, np.arange(machines.count), goal, at_once=True)._meets_all(goal)
         sizes = np.append(self.sizes, machines.sizes)
         return replace(self, further=np.append(self.further, meets), sizes=sizes)
 
@@ -170,8 +186,10 @@ def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
 class RemedyOutcome:
     """The outcome of a remedy: its best `stage`, how it performs, and whether it surely works.
 
-    `stage` is None if none was found. Its cycles are checked unless too many machines miss the goal. `doubts` are the
+    `stage` is None if none was found. `doubts` are the
     reasons why it is not sure to work; it works if there are none. `windows` tell how far each number may vary.
+
+    `confirmation` says what attracts the stage itself; None if too many machines miss the goal.
 
     `points` are all settings tried; `attracted` counts those given up because something attracted machines. `shares`
     locate the stage in the remedy's ranges. `cut` tells that the search took too much work, and `untried` that others
@@ -182,7 +200,7 @@ class RemedyOutcome:
     remedy: Remedy
     stage: Stage | None
     measured: Performance | None
-    case: Case | None
+    confirmation: Confirmation | None
     doubts: tuple[str, ...]
     windows: tuple[VariableWindow, ...] = ()
     points: TriedPoints | None = None
@@ -244,39 +262,30 @@ def _stiffness(flat: Mapping[str, Any]) -> float:
     return proportional
 
 
-def verified(stage: Stage) -> Case:
-    """Return the verdict of `friso check` on the stage as it is, by its cycles."""
-    return check_given(stage)
+def checked(stage: Stage) -> Case:
+    """Check a stage as `friso check` does, with less work: it tells the edge of hunting if that is soon located."""
+    try:
+        with allowance(RemedySettings.current().present_check_work):
+            return check_given(stage)
+    except Exhausted:  # in a part that a check does not give up
+        return check_given(stage)
 
 
-def unmet_goals(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
+def unmet_goals(confirmation: Confirmation, measured: Performance, goal: Goal) -> tuple[str, ...]:
     """Return which parts of the goal a stage misses, or may miss.
 
-    They are names of `friso.questions.tune.words.DOUBTS`.
+    They are names of `friso.questions.tune.present_words.DOUBTS`.
     """
-    return (*unsettled_parts(case, measured, goal), *missed_parts(measured, goal))
+    return (*unsettled_parts(confirmation, measured, goal), *missed_parts(measured, goal))
 
 
-def unsettled_parts(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
-    """Return what the stage's verdict, bandwidth and margin leave open."""
-    settings = RemedySettings.current()
-    judgement, edge = case.judgement, case.judgement.margin
-    listed: list[str] = []
-    if judgement.verdict != "settles":
-        listed.append("verdict")
-    elif not judgement.hunting.certain:
-        listed.append("certain")
-    if CheckPart.BANDWIDTHS in judgement.given_up:
-        listed.append("given up")
-    if edge is not None and edge.quiet * goal.distance > 1 and edge.factor < 1:
-        listed.append("distance")
-    if goal.bandwidth_limit is not None and not loop_bandwidth(case.stage) <= goal.bandwidth_limit * (
-        1 + settings.rounded_share
-    ):
+def unsettled_parts(confirmation: Confirmation, measured: Performance, goal: Goal) -> tuple[str, ...]:
+    """Return what the stage's verdicts, bandwidth and margin leave open."""
+    rounded = 1 + RemedySettings.current().rounded_share
+    listed = [*confirmation.doubts]
+    if goal.bandwidth_limit is not None and not loop_bandwidth(confirmation.stage) <= goal.bandwidth_limit * rounded:
         listed.append("bandwidth")
-    if any(_near(window.low, window.high, goal.distance) for window in judgement.windows):
-        listed.append("window")
-    if case.unstable or measured.own_margin < goal.margin * (1 - settings.rounded_share):
+    if confirmation.unstable or measured.own_margin < goal.margin * (2 - rounded):
         listed.append("own margin")
     return tuple(listed)
 
@@ -288,14 +297,3 @@ def missed_parts(measured: Performance, goal: Goal) -> tuple[str, ...]:
     if not listed and np.mean(np.all([*parts.values()], axis=0)) < goal.surely(measured.count):
         listed.append("together")
     return tuple(listed)
-
-
-def _near(low: object, high: object, distance: float) -> bool:
-    """Tell whether a window of hunting lies within a factor `distance` of the present bandwidth.
-
-    `low` and `high` are the ends of the window, as factors on the bandwidth; None means that it goes on as far as the
-    search does.
-    """
-    first = getattr(low, "outside", 0.0) if low is not None else 0.0
-    last = getattr(high, "outside", np.inf) if high is not None else np.inf
-    return bool(first < distance and last > 1 / distance)

@@ -95,7 +95,8 @@ def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.n
 
     `numbers` (n,) select the variables, and `places` (n,) are their new shares.
     """
-    return search.measured(_moved(shares, numbers, places)).meets(search.goal)
+    worst = RemedySettings.current().worst_time  # points that break a constraint cost more
+    return search.measured(_moved(shares, numbers, places), worst).meets(search.goal)
 
 
 def _clear(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:

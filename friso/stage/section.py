@@ -321,6 +321,8 @@ def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
     cause = problem.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
         return _complete(cause, key)
+    if not key:  # no key has a wrong value: what went wrong is friso's own
+        raise cause or ValueError(problem["msg"])
     if problem["type"] == "extra_forbidden":
         near = nearest_name(key, cls.model_fields) or next(iter(cls.model_fields))
         return unknown_key(key, _own_first(cls), _described(cls, near, kind)[1])

@@ -154,7 +154,10 @@ def friction_laws() -> dict[str, type[FrictionSection]]:
 
 
 class Joint(UncertainSection):
-    """The compliant joint between cart and stage; its limiter acts in parallel when touched."""
+    """The compliant joint between cart and stage; its limiter acts in parallel when touched.
+
+    With `limiter_pulls = false` the damping of a free joint's limiter does not hold back what leaves it.
+    """
 
     locked: bool = False
     stiffness: Annotated[Value | None, Quantity("N/m", positive, "2.4 N/mm")] = None
@@ -162,6 +165,7 @@ class Joint(UncertainSection):
     stroke: Annotated[Value | None, Quantity("m", non_negative, "1 mm")] = None
     limiter_stiffness: Annotated[Value, Quantity("N/m", positive, "2e7 N/m")]
     limiter_damping: Annotated[Value, Quantity("N*s/m", non_negative, "100 N*s/m")]
+    limiter_pulls: bool | None = None
 
     @model_validator(mode="after")
     def _free_joint_is_complete(self) -> Self:

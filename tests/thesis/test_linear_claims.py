@@ -201,7 +201,7 @@ def test_curves_are_the_loops_of_the_margins(linear: Linear) -> None:
 def test_what_open_values_touch() -> None:
     touches = {(v.name, name) for v in OPEN for name in NEEDS if v.touches_part(NEEDS[name])}
     every = {"limiter damping", "parasitic mass over stage mass", "parasitic damping ratio", "stroke", "mass"}
-    joint, control = {"joint damping"}, {"alpha", "beta", "low-pass on the derivative alone"}
+    joint, control = {"joint damping", "limiter cannot pull"}, {"alpha", "beta", "low-pass on the derivative alone"}
     assert {parameter for parameter, name in touches if name == PLANT} == every | joint
     assert {parameter for parameter, name in touches if name == FREE} == every | joint | control
     assert {parameter for parameter, name in touches if name == LOCKED_LOOP} == every | control

@@ -749,9 +749,10 @@ def test_values_that_do_not_enter_are_not_ranked() -> None:
     assert entering["E1"] == entering["F7"] == every - control - path
     assert entering["F8"] == every - path
     assert entering["F24"] == entering["F26"] == every - path
-    assert entering["F27"] == every - path - {"joint damping"}
-    assert entering["F12B"] == every - {"alpha", "beta", "joint damping"}
-    assert entering["F11A"] == every - {"acceleration", "distance", "joint damping"}
+    joint = {"joint damping", "limiter cannot pull"}
+    assert entering["F27"] == every - path - joint
+    assert entering["F12B"] == every - {"alpha", "beta"} - joint
+    assert entering["F11A"] == every - {"acceleration", "distance"} - joint
     assert entering["F16B"] == every - {"stroke"}
     assert entering["S35"] == set()
 

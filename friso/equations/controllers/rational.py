@@ -240,7 +240,7 @@ def _times(roots: TransferRoots, sample_time: float | None) -> tuple[np.ndarray,
         pairs = [(-part, np.ones(len(part))) for part in (zeros, poles)]
     else:
         pairs = [(1 - part, (1 + part) * sample_time / 2) for part in (zeros, poles)]
-        lacking = np.ones(len(poles) - len(zeros))  # a zero at z = infinity is the factor 1 - s T/2
+        lacking = np.ones(max(len(poles) - len(zeros), 0))  # a zero at z = infinity is the factor 1 - s T/2
         pairs[0] = np.append(pairs[0][0], lacking), np.append(pairs[0][1], -lacking * sample_time / 2)
     (upper, upper_rate), (lower, lower_rate) = pairs
     largest = 1.0 if sample_time is not None else np.abs(poles).max(initial=0.0)

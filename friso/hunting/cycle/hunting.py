@@ -23,7 +23,7 @@ from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.hunting.cycle.settings import OrbitSettings
-from friso.hunting.loop import LowerGains, far_beyond_a_limit, surely_calm
+from friso.hunting.loop import LowerGains, far_beyond_a_limit, lags, surely_calm
 from friso.stage import Stage
 from friso.stage.standstill import dead_band
 
@@ -49,6 +49,9 @@ DITHERS = "dither keeps the stage moving, so no cycle is searched for: only runs
 
 BY_ITSELF = "its loop is unstable, or not linear even without friction"
 """Reason given when a stage that friction cannot make hunt may still not settle."""
+
+LAGS = "its controller pushes ever harder at standstill, as an integral does, and such cycles are not searched for"
+"""Reason given when a lag in the place of an integral may make a stage hunt."""
 
 GROWS = "with this force limit and no anti-windup swings may grow without bound: a size is where a run was stopped"
 """Reason given when an observed swing may grow without bound, as the loop is unstable at lower gains."""
@@ -225,8 +228,10 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
     """
     checked_rtol(rtol)
     if reason := cannot_hunt(stage):
-        calm = bool(surely_calm(Ensemble.held(stage.flat(), 1))[0])
-        return Hunting((), reason if calm or reason == DITHERS else BY_ITSELF, calm, None)
+        held = Ensemble.held(stage.flat(), 1)
+        calm = bool(surely_calm(held)[0])
+        doubt = LAGS if lags(held)[0] else BY_ITSELF
+        return Hunting((), reason if calm or reason == DITHERS else doubt, calm, None)
     flat = stage.flat()
     kernels([KernelRequest(structure(flat).standing, variational) for variational in (False, True)])
     stages = Ensemble.held(flat, 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,7 +61,7 @@ def response_figure(trace: xr.Dataset) -> Figure:
     reference = Series(time, samples(trace, "reference"), "reference", GREY, "dashed")
     position = Series(time, samples(trace, "position"), "position", BLUE)
     panels = [Panel("Position", _TIME, Axis("Position", "m"), (reference, position))]
-    end = time >= _late(trace)
+    stands = _at_stand(trace)
     for name, title in (
         ("error", "Error"),
         ("force", "Actuator force"),
@@ -69,7 +70,7 @@ def response_figure(trace: xr.Dataset) -> Figure:
         if name in trace:
             values = samples(trace, name)
             line = Series(time, values, title.lower(), BLUE)
-            view = common_range([values[end]], least=2 * min(BANDS)) if name == "error" else None
+            view = common_range([values[stands]], least=2 * min(BANDS)) if name == "error" else None
             panels.append(Panel(title, _TIME, Axis(title, str(trace[name].attrs["units"]), view), (line,)))
     caption = (
         "The whole run; the error is the reference minus the position, at the scale of what follows the move: the move "
@@ -78,15 +79,19 @@ def response_figure(trace: xr.Dataset) -> Figure:
     return Figure("response", "Time response", caption, tuple(panels), subject=str(trace.attrs.get("name", "")))
 
 
-def _late(trace: xr.Dataset) -> float:
-    """Return the time [s] from which a run shows its final behaviour.
+def _at_stand(trace: xr.Dataset) -> np.ndarray:
+    """Tell which samples show how a run behaves where its reference stands, shape (n,): the later half of each stand.
 
-    It is half-way between the last change of the reference and the end of the run.
+    Stands shorter than a tenth of the run are left out. Where no other is left it is the later half of the run.
     """
-    time, reference = samples(trace, "time"), samples(trace, "reference")
-    changes = np.flatnonzero(np.diff(reference))
-    begin = time[changes[-1]] if len(changes) and changes[-1] < 0.9 * len(time) else time[0]
-    return float(begin + (time[-1] - begin) / 2)
+    reference = samples(trace, "reference")
+    count = len(reference)
+    corners = np.unique(np.concatenate([[0], np.flatnonzero(np.diff(reference)) + 1, [count]]))
+    late = np.zeros(count, bool)
+    for begin, end in pairwise(corners.tolist()):
+        if end - begin >= 0.1 * count:
+            late[(begin + end) // 2 : end] = True
+    return late if late.any() else np.arange(count) >= count // 2
 
 
 _TIME = Axis("Time", "s")

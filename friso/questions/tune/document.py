@@ -39,7 +39,7 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
                 "distance": goal.distance,
                 "share": goal.share,
             },
-            "as_is": _performance(tuning.present, tuning) | {"verdict": tuning.case.verdict},
+            "as_is": _performance(tuning.present, tuning) | {"verdict": tuning.case.verdict, "doubts": [*tuning.unmet]},
             "ways": {outcome.remedy.name: _remedy(outcome, tuning) for outcome in tuning.outcomes},
             "edge_moved_by_1_percent": dict(tuning.sensitivities.ranked()) if tuning.sensitivities else {},
             "relaxed": [
@@ -59,17 +59,15 @@ def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:
     if outcome.stage is None or outcome.measured is None:
         why = unsure_why(outcome) if outcome.interrupted else why_unmet(outcome, tuning)
         return {"works": outcome.certainty, "why": why}
-    judgement = outcome.case.judgement if outcome.case else None
-    edge = judgement.margin if judgement else None
+    confirmation = outcome.confirmation
     return {
         "works": outcome.certainty,
         "doubts": [*outcome.doubts],
         "changes": changes(tuning.stage, outcome.stage),
         "keys_changed": tuning.size(outcome).keys,
         "factor": tuning.size(outcome).factor,
-        "verdict": outcome.case.verdict if outcome.case else None,
-        "certain": bool(judgement and judgement.hunting.certain),
-        "edge_factor": None if edge is None else edge.factor,
+        "verdict": confirmation.verdict if confirmation else None,
+        "certain": bool(confirmation and confirmation.certain),
         "windows": [asdict(window) for window in outcome.windows],
         **_performance(outcome.measured, tuning),
     }

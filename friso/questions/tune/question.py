@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
@@ -38,6 +38,9 @@ from friso.remedies import Changeable
 from friso.remedies.goal import Goal
 from friso.remedies.machines import MoveRange
 from friso.stage import Stage
+
+if TYPE_CHECKING:
+    from friso.remedies.verified import RemedyOutcome
 
 _IN_POSITION = Bound("greater than 0 and at most 1", lambda value: (value > 0) & (value <= 1))
 """Deviations [m or rad] that may count as in position."""
@@ -153,8 +156,21 @@ def tune(
         LOGGER.warning(f"no leaf springs are sized for a joint: that takes {install('design')}")
     from friso.remedies.method import tune as tuned
 
-    begins = partial(mention_unstable_loop, chosen)
-    return TuneAnswer(tuned(chosen, goal, seed, correlations, progress=progress, begins=begins))
+    begins, answered = partial(mention_unstable_loop, chosen), partial(_mention, chosen, goal)
+    advice = tuned(chosen, goal, seed, correlations, progress=progress, begins=begins, answered=answered)
+    return TuneAnswer(advice)
+
+
+def _mention(stage: Stage, goal: Goal, outcome: RemedyOutcome) -> None:
+    """Log the first answer if it works, while the search for a better one goes on."""
+    from friso.questions.tune.words import changes, slowest_time
+    from friso.shown.drawing.prefixes import listed
+
+    if outcome.certainty != "works" or outcome.stage is None or outcome.measured is None:
+        return
+    changed = listed(changes(stage, outcome.stage), "and")
+    when = slowest_time(outcome.measured, goal)
+    LOGGER.info(f"this works: {changed}, in position after {when}; others are tried", extra={"meanwhile": True})
 
 
 def _goal(

@@ -22,6 +22,7 @@ from friso.leaf_springs.mechanism import Mechanism
 from friso.platform.extras import install
 from friso.quantities import Quantity, percent, positive
 from friso.questions.design.words import leaf_words
+from friso.questions.tune.present_words import DOUBTS, as_it_is
 from friso.remedies.change import ChangeSize
 from friso.remedies.goal import Goal
 from friso.remedies.least import LEAST
@@ -45,22 +46,6 @@ from friso.shown.machine_words import spread_sentences
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
 from friso.stage.transmission import leading_friction
-
-DOUBTS = {
-    "verdict": "friso check does not say that it settles",
-    "certain": "friso check is not certain that nothing attracts it",
-    "given up": "friso check gave up the search for its edge of hunting",
-    "distance": "its edge of hunting is closer than wanted",
-    "bandwidth": "its bandwidth is above your limit, or not known",
-    "window": "something attracts it at a bandwidth nearby",
-    "own margin": "a settled state of the stage itself has less margin than wanted",
-    "hunting": "something attracts too many of the machines, or may",
-    "settling": "too many of the machines are not in position in time",
-    "margin": "too many of the machines have less modulus margin than wanted",
-    "force": "too many of the machines take more force than there is",
-    "together": "too many of the machines miss one part of the goal or another",
-}
-"""Why a remedy is not sure to work."""
 
 COLUMNS = (
     "Works",
@@ -149,16 +134,14 @@ def answer(tuning: Advice) -> list[str]:
             f"The stage meets the goal as it is: {goal_words(tuning.goal)}. {_brings(tuning.present, tuning)}.",
         ]
     if not tuning.working:
-        return [*lines, *_nothing(tuning)]
-    least, fastest = tuning.least, tuning.fastest
-    assert least is not None
+        return [*lines, *_nothing(tuning), as_it_is(tuning)]
+    least, *others = tuning.recommended
     lines += _in_short(tuning)
     lines += _works(least, tuning, _least_words(tuning))
-    if fastest is not None and fastest is not least:
-        lines += _works(fastest, tuning, "What settles soonest")
-    elif len(tuning.working) > 1:
-        lines += _works(tuning.working[1], tuning, "The next best")
-    return [*lines, f"The goal: {goal_words(tuning.goal)}.{_of_the_drive(tuning)}", *unknown(tuning)]
+    for other in others:
+        lines += _works(other, tuning, "What settles soonest" if other is tuning.fastest else "The next best")
+    goal = f"The goal: {goal_words(tuning.goal)}.{_of_the_drive(tuning)}"
+    return [*lines, as_it_is(tuning), goal, *unknown(tuning)]
 
 
 def _in_short(tuning: Advice) -> Iterator[str]:
@@ -168,10 +151,9 @@ def _in_short(tuning: Advice) -> Iterator[str]:
         return
     times = [slowest_time(outcome.measured, tuning.goal) for outcome in (least, fastest) if outcome.measured]
     if len(times) == 2:
-        before = slowest_time(tuning.present, tuning.goal)
         yield (
             f"Least change: {least.remedy.name.removesuffix(LEAST)}, in position after {times[0]}. Soonest: "
-            f"{fastest.remedy.name}, after {times[1]}. As it is: {before}."
+            f"{fastest.remedy.name}, after {times[1]}."
         )
 
 
@@ -320,9 +302,7 @@ def size_words(size: ChangeSize) -> str:
 def _brings(measured: Performance, tuning: Advice) -> str:
     """Say how many machines meet the goal and how fast, beside the stage as it is."""
     before = slowest_time(tuning.present, tuning.goal)
-    present = percent(tuning.present.share(tuning.goal).probability)
-    met = f" ({present} of the machines meet the goal)" * (before == ABSENT)
-    as_is = "" if measured is tuning.present else f"; as it is: {before}{met}"
+    as_is = "" if measured is tuning.present or before == ABSENT else f"; as it is: {before}"
     meet = share_with_interval(measured.share(tuning.goal))
     when = (
         f"after {slowest_time(measured, tuning.goal)}" if measured.slowest(tuning.goal) else "once the reference stands"
@@ -661,6 +641,11 @@ def assumptions(tuning: Advice) -> list[str]:
             "Settings against friction were not tried together with the bandwidth, nor those of more keys than what "
             "works, as less works."
         )
+    alone = {outcome.remedy.name for outcome in tuning.working}
+    if {"gains", "isolator"} <= alone:
+        lines.append("Gains and isolator were not tried together, as each works alone.")
+    if any(outcome.remedy.buys_joint and outcome not in tuning.recommended for outcome in tuning.working):
+        lines.append("Leaf springs were sized only for joints of what is told first; friso design sizes others.")
     lines.append(
         "Margins include sampling, delay and current loop of the file; hunting and moves are those of a controller in "
         f"continuous time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), "

@@ -15,10 +15,12 @@ from friso_thesis.studies.thesis.studies import STUDIES, ThesisStudy
 if TYPE_CHECKING:
     from friso_thesis.studies.thesis.linear import PartNeeded
 
+LIMITER_PULLS = "joint.limiter_pulls"
+
 SEED = 1
 """Seed of the draws; together with its number it gives a draw, however many there are."""
 
-_OPEN_JOINT_KEYS = frozenset({"joint.damping"})
+_OPEN_JOINT_KEYS = frozenset({"joint.damping", LIMITER_PULLS})
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,10 @@ OPEN: tuple[OpenValue, ...] = (
         "low-pass on the derivative alone", 0.0, 1.0, "", "either", (LOW_PASS,), 0.0,
         "Eq. 6 has it there, as Simulink's PID block; Eq. 7 has it before all terms",
     ),
+    _value(
+        "limiter cannot pull", 0.0, 1.0, "", "either", (LIMITER_PULLS,), 0.0,
+        "Sec. 3.5: a bolt and a locking nut, which touch without being joined; Fig. 3 draws a spring and a damper",
+    ),
 )  # fmt: skip
 """All of them."""
 
@@ -154,6 +160,7 @@ class Draw:
             TUNED_MASS: f"{mass!r} kg",
         }
         changes |= {CRUISE: ratio} if ratio else {}
+        changes |= {LIMITER_PULLS: False} if v["limiter cannot pull"] else {}
         return changes | ({LOW_PASS: "derivative"} if v["low-pass on the derivative alone"] else {})
 
 

@@ -1,0 +1,57 @@
+"""Say which parts of the goal the stage misses as it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.quantities import percent
+from friso.remedies.method import Advice
+from friso.shown.drawing.prefixes import listed, with_unit
+
+DOUBTS = {
+    "verdict": "its own motion does not settle, or something attracts it",
+    "certain": "it is not certain that nothing attracts it",
+    "given up": "what attracts it takes too much computing",
+    "distance": "something attracts it at a bandwidth nearer below than wanted, or may",
+    "bandwidth": "its bandwidth is above your limit, or not known",
+    "window": "something attracts it at a bandwidth little above its own, or may",
+    "own margin": "a settled state of the stage itself has less margin than wanted",
+    "hunting": "something attracts too many of the machines, or may",
+    "settling": "too many of the machines are not in position in time",
+    "margin": "too many of the machines have less modulus margin than wanted",
+    "force": "too many of the machines take more force than there is",
+    "together": "too many of the machines miss one part of the goal or another",
+}
+"""Why a stage is not sure to meet the goal."""
+
+
+def as_it_is(tuning: Advice) -> str:
+    """Say whether the stage as it is has a limit cycle, and which parts of the goal fail on how many machines."""
+    verdict, certain = tuning.case.verdict, tuning.case.judgement.hunting.certain
+    if verdict in ("hunts", "bistable"):
+        own = f"a limit cycle{' after other moves than its own' * (verdict == 'bistable')}, and"
+    else:
+        own = f"{'no' if certain and verdict != 'failed' else 'perhaps a'} limit cycle, but"
+    return f"As it is: {own} {listed([_missed(name, tuning) for name in tuning.unmet], 'and')}."
+
+
+def _missed(name: str, tuning: Advice) -> str:
+    """Say that the stage misses a part of the goal, with the share of machines and moves if these tell it."""
+    present, goal = tuning.present, tuning.goal
+    meets = present.meets(goal)
+    every = np.all([*meets.values()], axis=0)
+    moving = np.all([met for part, met in meets.items() if part != "hunting"], axis=0)
+    if name == "hunting":
+        return (
+            f"something attracts {percent(float(np.mean(~every[moving])))} of the machines that meet the rest, or may"
+        )
+    if name not in meets and name != "together":
+        return DOUBTS[name]
+    missing = percent(float(np.mean(~meets.get(name, every))))
+    late = "before the return or the end of the run" if goal.settle is None else f"within {with_unit(goal.settle, 's')}"
+    return {
+        "settling": f"{missing} of {len(every)} moves do not settle {late}",
+        "margin": f"{missing} of {len(every)} machines have less modulus margin than {goal.margin:g}",
+        "force": f"{missing} of {len(every)} moves take more force than {with_unit(goal.force_limit or 0.0, 'N')}",
+        "together": f"{missing} of {len(every)} machines and moves miss one part of the goal or another",
+    }[name]

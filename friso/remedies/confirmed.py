@@ -1,0 +1,85 @@
+"""Confirm a tuned stage: nothing attracts it at its own bandwidth, nor at those near it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.engine.allowance import Exhausted, allowance
+from friso.engine.kernel import kernels
+from friso.equations.bandwidth import faster
+from friso.equations.structure import structure
+from friso.hunting import Hunting, LoopState, find_attractors, hunting, judge_many, kernels_to_judge, unstable
+from friso.remedies.goal import Goal
+from friso.remedies.settings import RemedySettings
+from friso.stage import Stage
+
+SETTLES = "settles"
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What attracts a stage at its own bandwidth and at those near it, for the goal's distance from hunting.
+
+    `hunting` is what attracts the `stage` itself, searched as thoroughly as `friso check` does, and `word` the verdict
+    on its own motion by fewer starts; None if it takes too much computing. `quiet` tells at which of the `factors` of
+    its bandwidth, from below to above, surely nothing attracts. `unstable` are the states in which its loop is
+    unstable.
+    """
+
+    stage: Stage
+    hunting: Hunting
+    word: str | None
+    factors: np.ndarray
+    quiet: np.ndarray
+    unstable: tuple[LoopState, ...]
+
+    @property
+    def certain(self) -> bool:
+        """Tell whether it is certain what attracts the stage at its own bandwidth."""
+        return self.hunting.certain
+
+    @property
+    def verdict(self) -> str:
+        """Return the verdict at the stage's own bandwidth; "failed" if it was not computed."""
+        own = self.word or "failed"
+        return own if self.hunting.target is None or own != SETTLES else "bistable"
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Return what is not confirmed: names of `friso.questions.tune.present_words.DOUBTS`."""
+        if self.word is None:
+            return ("given up",)
+        parts = {
+            "verdict": self.verdict != SETTLES,
+            "certain": not self.certain,
+            "distance": not self.quiet[self.factors < 1].all(),
+            "window": not self.quiet[self.factors > 1].all(),
+        }
+        return tuple(name for name, holds in parts.items() if holds)
+
+
+@np.errstate(all="ignore")
+def confirmed(stage: Stage, goal: Goal) -> Confirmation:
+    """Judge a stage at its own bandwidth, and what attracts it down to the goal's distance below, and as far above.
+
+    The bandwidths lie closer together than those at which `friso check` looks for an edge of hunting, and what attracts
+    there is searched from more starts than that look takes.
+    """
+    settings = RemedySettings.current()
+    kernels(kernels_to_judge(structure(stage.flat())))
+    steps = settings.bandwidths_beside
+    factors = np.delete(goal.distance ** (np.arange(-steps, steps + 1) / steps), steps)
+    flat, count = stage.flat(), len(factors)
+    word, quiet = None, np.zeros(count, bool)
+    attracting = hunting(stage, work=settings.confirming_work)
+    with allowance(settings.confirming_work) as allowed:
+        try:
+            near = find_attractors(faster(flat, factors), count)
+            quiet = near.certain & ~near.attracts
+            word = str(judge_many(flat, 1, settings.move_rtol)[0])
+        except Exhausted:
+            if allowed.around is not None and allowed.around.left <= 0:
+                raise
+    return Confirmation(stage, attracting, word, factors, quiet, unstable(stage))
