@@ -98,7 +98,7 @@ def unstable(stage: Stage) -> tuple[LoopState, ...]:
 
 
 def leaves_for_good(stage: Stage) -> bool:
-    """Tell whether a motion beyond the range that runs are followed to grows without bound.
+    """Tell whether a stage that has gone beyond the range of all runs diverges for good.
 
     It does if the loop is unstable and no force limit with anti-windup can hold it in a larger swing.
     """

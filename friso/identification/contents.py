@@ -119,9 +119,9 @@ def log_content(path: Path, options: Mapping, folder: Path | None = None) -> Log
 
 
 def _recognised(path: Path, mapping: Mapping) -> tuple[Source, str, str]:
-    """Return the log as it would be identified, its kind, and why.
+    """Return the log as it would be identified, its kind, and the reason for that kind.
 
-    Raises LogError, GapsError for what is open.
+    Raises LogError, and GapsError for what the log does not say.
     """
     if mapping.experiment is not None:
         return log_with_signals(path, mapping, mapping.experiment), mapping.experiment, "as specified"

@@ -62,10 +62,10 @@ class Confirmation:
 
 @np.errstate(all="ignore")
 def confirmed(stage: Stage, goal: Goal) -> Confirmation:
-    """Judge a stage at its own bandwidth, and what attracts it down to the goal's distance below, and as far above.
+    """Judge a stage at its own bandwidth, and at lower and higher ones within the goal's distance.
 
-    The bandwidths lie closer together than those at which `friso check` looks for an edge of hunting, and what attracts
-    there is searched from more starts than that look takes.
+    The bandwidths lie closer together than those at which `friso check` looks for an edge of hunting, and what
+    attracts there is searched from more starts.
     """
     settings = RemedySettings.current()
     kernels(kernels_to_judge(structure(stage.flat())))

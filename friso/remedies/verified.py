@@ -280,7 +280,7 @@ def unmet_goals(confirmation: Confirmation, measured: Performance, goal: Goal) -
 
 
 def unsettled_parts(confirmation: Confirmation, measured: Performance, goal: Goal) -> tuple[str, ...]:
-    """Return what the stage's verdicts, bandwidth and margin leave open."""
+    """Return why the stage itself is not sure to work: its verdicts, bandwidth and margin."""
     rounded = 1 + RemedySettings.current().rounded_share
     listed = [*confirmation.doubts]
     if goal.bandwidth_limit is not None and not loop_bandwidth(confirmation.stage) <= goal.bandwidth_limit * rounded:

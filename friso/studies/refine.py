@@ -102,7 +102,10 @@ class _Grid:
         self.runs = 0
 
     def learn(self, cells: np.ndarray, ask: Ask) -> None:
-        """Ask for cells; those that no stage may have cost no run."""
+        """Have cells computed, and take over their results.
+
+        Cells that no stage may have cost no run.
+        """
         columns = ask(cells)
         for name in columns:
             self.columns.setdefault(name, unfilled(name, self.computed.size))[cells] = columns[name]

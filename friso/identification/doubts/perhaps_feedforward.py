@@ -11,7 +11,11 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Fit what the reference adds, where it adds much but not clearly while the stage is fast."""
+    """Give the mass in case the logged force leaves out a feedforward.
+
+    The reference's acceleration explains much more of the force, but not clearly so while the stage is fast, so that
+    the log does not tell.
+    """
     fed, share = missing_feedforward.fed_forward(case), DoubtSettings.current().error_share_of_a_cause
     if fed is None or fed[0].error >= share * case.inverse.error:
         return

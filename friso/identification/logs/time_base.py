@@ -265,6 +265,6 @@ def _at(base: Track, other: Track, values: np.ndarray) -> np.ndarray:
 
 
 def _runs(covered: np.ndarray, part: slice) -> list[slice]:
-    """Return the stretches of a segment where all is covered."""
+    """Return the stretches of a segment without any sample that is not covered."""
     edges = np.flatnonzero(np.diff(np.r_[False, covered[part], False].astype(np.int8)))
     return [slice(part.start + int(a), part.start + int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

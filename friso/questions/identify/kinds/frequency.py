@@ -60,7 +60,7 @@ def _facts(bench: Bench) -> Facts:
 
 
 def _place(line: StraightLine) -> str:
-    """Say where a line lies."""
+    """Write the kind of a mass line and the band of frequencies that it covers."""
     return f"{line.kind}, {range_with_unit(line.low, line.high, 'Hz')}"
 
 
