@@ -47,6 +47,7 @@ from friso.shown.drawing.figure import Figure
 from friso.stage import Stage
 
 command = command_of("design")
+DESIGN = method.design
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, SPEC = EXAMPLES / "thesis_rig.toml", EXAMPLES / "specs" / "thesis.toml"
@@ -581,3 +582,32 @@ def test_a_specification_that_is_not_met_is_told(
     assert relax["key"] == "position.settling_time"
     assert relax["to"] > relax["from"] == 1e-3
     wording(shown.err)
+
+
+@pytest.mark.parametrize("during", ["hunting_map", "verification"])
+def test_ctrl_c_keeps_the_leaves_and_the_crossover(
+    rig: Stage, spec: Path, small: None, tmp_path: Path, during: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With what is known of hunting by then; before there are leaves it ends without an answer."""
+
+    def interrupted(*_: Any, **__: Any) -> Any:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(method, "design", DESIGN)
+    monkeypatch.setattr(method, during, interrupted)
+    answer = friso.design(rig, spec)
+    assert answer.interrupted
+    assert not answer.failure
+    assert not answer.meets
+    said = answer.sentences()
+    assert said[0].startswith("Interrupted: this is the answer so far. The isolator was not tried in moves, and ")
+    assert ("is not known" in said[0]) is (during == "hunting_map")
+    assert answer.document()["interrupted"]
+    (file,) = answer.report(tmp_path / "design")
+    assert file.name == "design-not-verified.toml"
+    assert friso.load(file).flat()["joint.stroke"] == answer.stage.flat()["joint.stroke"]
+    assert [*answer.figures(), *answer.details()] == []
+    monkeypatch.setattr(method, "leaves", interrupted)
+    with pytest.raises(KeyboardInterrupt) as nothing:
+        method.design(rig, load_spec(spec))
+    assert not isinstance(nothing.value, method.DesignInterrupted)

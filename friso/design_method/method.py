@@ -160,11 +160,43 @@ class Design:
         return self.need.isolator
 
 
+@dataclass(frozen=True)
+class UnfinishedDesign:
+    """What an interruption left of a design: leaf springs, stroke and crossover, not tried in moves.
+
+    `need` tells whether an isolator is needed; `edges` of hunting with it are None if they were not found yet.
+    """
+
+    spec: Spec
+    original: Stage
+    need: Need
+    fitted: LeavesAndCrossover
+    edges: Corners | None
+
+    @property
+    def stage(self) -> Stage:
+        """Return the design so far as a stage."""
+        return self.fitted.stage
+
+    @property
+    def meets(self) -> bool:
+        """Tell whether the specification is met, which nobody knows yet."""
+        return False
+
+
+class DesignInterrupted(KeyboardInterrupt):
+    """Raised by Ctrl-C once there are leaf springs and a crossover; it holds the design `so_far`."""
+
+    def __init__(self, so_far: UnfinishedDesign) -> None:
+        super().__init__()
+        self.so_far = so_far
+
+
 def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Frictions = own_law) -> Design:
     """Design leaf springs, stroke and controller of an isolator.
 
     Edges of hunting are the worst over the stage's own friction and other `laws`. Raises InputError for unusable input,
-    and NoDesign if nothing meets the specification.
+    NoDesign if nothing meets the specification, and DesignInterrupted at Ctrl-C.
     """
     settings = DesignSettings.current()
     base = prepared(stage, spec)
@@ -200,16 +232,20 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
         control = choose_controller(fit.stage, fit.choice.beams, population)
         return tuple(confirmed(fit.task, candidates)), control, hunting_map(fit.stage, spec, population)
 
-    label = "hunting with isolator"
-    isolated, (by_beams, control, edges_map) = both(
-        partial(over, worst, settings.lowest_edge * crossover, settings.above_crossover * crossover, label), examined
-    )
-    edges = worst_edges(isolated)
-    _does_not_hunt(fit, edges, need)
-    softening = fit.task.load / fit.choice.beams.buckling
-    tried, (damped, faster) = both(
-        partial(verification, fit.stage, spec, softening, progress), partial(with_damping, fit)
-    )
+    label, edges = "hunting with isolator", None
+    try:
+        isolated, (by_beams, control, edges_map) = both(
+            partial(over, worst, settings.lowest_edge * crossover, settings.above_crossover * crossover, label),
+            examined,
+        )
+        edges = worst_edges(isolated)
+        _does_not_hunt(fit, edges, need)
+        softening = fit.task.load / fit.choice.beams.buckling
+        tried, (damped, faster) = both(
+            partial(verification, fit.stage, spec, softening, progress), partial(with_damping, fit)
+        )
+    except KeyboardInterrupt:
+        raise DesignInterrupted(UnfinishedDesign(spec, stage, need, fit, edges)) from None
     results = (need.without, tuple(candidates), by_beams, fit, edges, control, edges_map, tried, damped, faster)
     return Design(spec, stage, *results, {law: (without[law], isolated[law]) for law in without}, others.lost)
 

@@ -10,6 +10,7 @@ QUESTION = Question(
     takes=("stage", "spec"),
     folder="design",
     details=True,
-    files=("design.toml", "worst.toml"),
+    files=("design.toml", "worst.toml", "design-not-verified.toml"),
+    answers_interrupted=True,
     runner="friso.cli.runs.design",
 )

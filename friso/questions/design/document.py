@@ -14,17 +14,32 @@ from friso.design_method.choice import Confirmed
 from friso.design_method.edges import Corners
 from friso.design_method.front import Candidate
 from friso.design_method.geometry import Geometry
-from friso.design_method.method import Design, NoDesign
+from friso.design_method.method import Design, NoDesign, UnfinishedDesign
 from friso.design_method.relax import Relaxation
 from friso.design_method.settings import DesignSettings
 from friso.design_method.verification import MachineOutcomes
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.questions.design.window import lower, upper
-from friso.questions.design.words import need_words, refusal
+from friso.questions.design.words import need_words, refusal, so_far
 from friso.shown.documents import plain_json, unit_suffix
 
 
-def design_document(design: Design) -> dict[str, Any]:
-    """Return the whole design except its files."""
+def design_document(design: Design | UnfinishedDesign) -> dict[str, Any]:
+    """Return the whole design except its files; of one that was interrupted, what is decided."""
+    if isinstance(design, UnfinishedDesign):
+        return plain_json(
+            {
+                "conclusion": " ".join(so_far(design)),
+                "interrupted": True,
+                "stage": design.original.name,
+                "spec": design.spec.name,
+                "needed": design.need.isolator,
+                "machine_limit_hz": design.spec.limit,
+                "leaves": _sizes(design.fitted.choice.geometry),
+                "joint": {"stroke_m": design.fitted.task.stroke},
+                "controller": {"crossover_hz": design.stage.flat()[CROSSOVER]},
+            }
+        )
     document = {
         "conclusion": need_words(design.need),
         "stage": design.original.name,

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.design_method.choice import Confirmed
 from friso.design_method.front import Candidate
-from friso.design_method.method import Design
+from friso.design_method.method import Design, UnfinishedDesign
 from friso.design_method.verification import MachineOutcomes
 from friso.frequency.crossover import WANTED
 from friso.questions.design.window_figure import window_figure
@@ -50,8 +50,10 @@ SHARES = 401
 CATEGORIES = (Category("rests in all corners", QUIET), Category("run failed", INK))
 
 
-def design_figures(design: Design) -> tuple[Figure, ...]:
-    """Return all figures in the order in which they are read."""
+def design_figures(design: Design | UnfinishedDesign) -> tuple[Figure, ...]:
+    """Return all figures in the order in which they are read; none of a design that was interrupted."""
+    if isinstance(design, UnfinishedDesign):
+        return ()
     modes = replace(modes_figure(design.fitted.choice.beams), name="design_modes")
     figures = (_map(design), _front(design), modes, window_figure(design), _damping(design), _settling(design))
     return tuple(replace(figure, subject=design.stage.name) for figure in figures)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from friso.design_method.method import Design
+from friso.design_method.method import Design, UnfinishedDesign
 from friso.materials import materials
 from friso.questions.design.figures import design_figures
 from friso.questions.design.leaves import requirement_rows
@@ -24,14 +24,22 @@ LEAVES = 2
 """The step that shows the drawing and the requirements."""
 
 
-def design_files(design: Design) -> dict[str, Content]:
+NOT_VERIFIED = "design-not-verified.toml"
+"""The stage file of a design that was interrupted."""
+
+
+def design_files(design: Design | UnfinishedDesign) -> dict[str, Content]:
     """Return the stage files, the page, the drawing, and every figure in all formats.
 
-    The stage files are the design and the worst machine that was tried with it.
+    The stage files are the design and the worst machine that was tried with it; of a design that was interrupted, the
+    stage so far is the only file.
     """
+    if isinstance(design, UnfinishedDesign):
+        return {NOT_VERIFIED: design.stage.to_toml()}
     figures = design_figures(design)
     images = pictures(figures)
     return {
+        NOT_VERIFIED: None,
         "design.toml": design.stage.to_toml(),
         "worst.toml": design.verification.worst.to_toml(),
         "design.html": design_html(design, figures),

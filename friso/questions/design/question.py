@@ -30,7 +30,7 @@ from friso.stage import Stage, numeric_keys
 
 
 class DesignAnswer(Answer):
-    """A design; `result` is a `Design`, and ``answer.stage`` is the designed stage."""
+    """A design; `result` is a `Design`, after Ctrl-C an `UnfinishedDesign`; ``answer.stage`` is the designed stage."""
 
     status = 2
 
@@ -39,12 +39,23 @@ class DesignAnswer(Answer):
         """Say which requirements are not met; empty if all are."""
         from friso.questions.design.words import shortfall
 
-        return "" if self.result.meets else f"the design does not meet the specification: {shortfall(self.result)}"
+        if self.interrupted or self.result.meets:
+            return ""
+        return f"the design does not meet the specification: {shortfall(self.result)}"
+
+    @property
+    def interrupted(self) -> bool:
+        """Tell whether the design was not verified because Ctrl-C ended the work."""
+        from friso.design_method.method import UnfinishedDesign
+
+        return isinstance(self.result, UnfinishedDesign)
 
     def details(self) -> Sequence[str]:
-        """Return the steps of the method with their reasons."""
+        """Return the steps of the method with their reasons; none of a design that was interrupted."""
         from friso.questions.design.steps import steps
 
+        if self.interrupted:
+            return ()
         return [
             f"{number}. {step.title}: {' '.join(step.sentences)}" for number, step in enumerate(steps(self.result), 1)
         ]
@@ -100,11 +111,14 @@ def design(
         LOGGER.warning(
             "[drive] is taken into account for the margins; hunting and moves are simulated in continuous time"
         )
+    from friso.design_method.method import DesignInterrupted, own_law
     from friso.design_method.method import design as designed
-    from friso.design_method.method import own_law
     from friso.studies.laws.verdicts import frictions_that_keep
 
-    return DesignAnswer(designed(chosen, specification, progress, frictions_that_keep if laws else own_law))
+    try:
+        return DesignAnswer(designed(chosen, specification, progress, frictions_that_keep if laws else own_law))
+    except DesignInterrupted as interrupted:
+        return DesignAnswer(interrupted.so_far)
 
 
 def specification_of(stage: Stage, spec: Spec | str | os.PathLike[str] | None) -> Spec:

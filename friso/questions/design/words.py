@@ -12,9 +12,10 @@ import numpy as np
 
 from friso.design_method.edges import Corners
 from friso.design_method.geometry import Geometry
-from friso.design_method.method import Design, Need, NoDesign
+from friso.design_method.method import Design, LeavesAndCrossover, Need, NoDesign, UnfinishedDesign
 from friso.design_method.relax import Relaxation
 from friso.design_method.verification import MachineOutcomes
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.platform.system import shell_word
 from friso.quantities import outwards, percent
 from friso.questions.map.words import in_sentence
@@ -39,14 +40,35 @@ class DesignStep:
     figures: tuple[str, ...]
 
 
+def so_far(design: UnfinishedDesign) -> list[str]:
+    """Say what is decided of a design that was interrupted, and what is not known of it."""
+    crossover = design.stage.flat()[CROSSOVER]
+    hunts = (
+        "whether the machine hunts with it is not known"
+        if design.edges is None
+        else f"with it the machine {edge(design.edges)}"
+    )
+    return [
+        f"Interrupted: this is the answer so far. The isolator was not tried in moves, and {hunts}.",
+        need_words(design.need),
+        f"The isolator: {isolator(design.fitted, crossover)}.",
+    ]
+
+
+def isolator(fitted: LeavesAndCrossover, crossover: float) -> str:
+    """Describe an isolator by its leaf springs, its stroke and its crossover [Hz]."""
+    springs, stroke = leaf_words(fitted.choice.geometry), size(fitted.task.stroke)
+    return f"{springs}; stroke {stroke} mm to each side, crossover {hertz(crossover)}"
+
+
 def headline(design: Design) -> list[tuple[str, str]]:
     """Return the verdicts with their colours: isolator or not, which one, and whether it holds."""
     return [
         (ORANGE if design.needed else GREEN, need_words(design.need)),
         (
             GREEN,
-            f"The isolator{'' if design.needed else ', designed nevertheless'}: {leaves(design)}; stroke "
-            f"{size(design.fitted.task.stroke)} mm to each side, crossover {hertz(design.controller.crossover)}.",
+            f"The isolator{'' if design.needed else ', designed nevertheless'}: "
+            f"{isolator(design.fitted, design.controller.crossover)}.",
         ),
         _verified(design),
         *([(GREEN, across_laws(design))] if len(design.by_law) > 1 else []),
@@ -252,11 +274,13 @@ def seconds(time: float) -> str:
     return with_unit(time, "s") if math.isfinite(time) else "never"
 
 
-def sentences(design: Design) -> list[str]:
+def sentences(design: Design | UnfinishedDesign) -> list[str]:
     """Return the verdicts on the design."""
+    if isinstance(design, UnfinishedDesign):
+        return so_far(design)
     return [sentence for _, sentence in headline(design)]
 
 
-def next_steps(design: Design, files: Sequence[Path]) -> list[str]:
+def next_steps(design: Design | UnfinishedDesign, files: Sequence[Path]) -> list[str]:
     """Return the command that checks the design."""
     return [f"friso check {shell_word(str(files[0]))}"] if files else []
