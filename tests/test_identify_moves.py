@@ -36,6 +36,7 @@ from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.quality import Quality
 from friso.identification.readings.common import record
+from friso.identification.settings import DoubtSettings
 from friso.identification.stage_file import made_up
 from friso.intervals import COVERAGE
 from friso.progress import silent
@@ -402,7 +403,9 @@ def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, wordi
     acceleration = np.gradient(np.gradient(position, plain.sample_time), plain.sample_time)
     coulomb, mass, pitch, width = FRICTION[0], sum(TWO_MASSES), 0.02, 5e-5
     late = 0.004 * time / time[-1]
-    _, loose = play.loose_load(position, np.gradient(position, plain.sample_time), plain.sample_time, width, 0.0)
+    velocity = np.gradient(position, plain.sample_time)
+    (speed,) = play.loose_loads(position, velocity, plain.sample_time, np.array([width]), np.zeros(1))
+    loose = np.diff(speed, prepend=speed[0]) / plain.sample_time
     log = {
         "cogging": with_force(plain, 0.15 * coulomb * np.sin(2 * np.pi * position / pitch)),
         "friction-by-place": with_force(plain, 0.3 * coulomb * way * np.cos(2 * np.pi * position / 0.1)),
@@ -420,6 +423,14 @@ def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, wordi
     }[effect]  # fmt: skip
     assert abs(doubt.size) == pytest.approx(truth, rel=0.3)
     assert {*doubt.refuses} == {*BRISTLES}
+    if effect == "play":  # as wide as any that is tried, it is something slower
+        widest = replace(
+            case.leading, tried=replace(case.leading.tried, label=max(DoubtSettings.current().plays_tried))
+        )
+        (nameless,) = play.find(replace(case, leading=widest))
+        assert not nameless.words
+        assert not nameless.explains
+        assert nameless.fit is not None
     assert doubt.fit is not None
     off = abs(np.log(fitted.value(MASS) / mass))
     assert off < COVERAGE * np.sqrt(doubt.fit.covariance[0, 0])

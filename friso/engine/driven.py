@@ -21,7 +21,9 @@ CHUNK, FEWEST, MOST = 4e6, 16, 256
 
 @dataclass(frozen=True)
 class Inputs:
-    """Inputs of driven runs: reference [m] and force on the stage [N], shape (n,).
+    """Inputs of driven runs: reference [m], shape (n,), and force on the stage [N].
+
+    The force has the shape (n,), or (runs, n) where each run has its own.
 
     They come every `sample_time` [s]. The force acts besides the controller's. The velocity at each sample is the
     central difference of the reference, and linear between samples. The force is linear too, or constant if `held`, as
@@ -40,15 +42,15 @@ class Inputs:
 
     @property
     def segments(self) -> np.ndarray:
-        """Return the pieces of the engine, shape (1, n + 1, 6): a piece per sample, and the end."""
-        n = len(self.reference)
-        rows = np.zeros((1, n + 1, 6))
-        rows[0, :, 0] = np.arange(n + 1) * self.sample_time
-        rows[0, :-1, 1], rows[0, :-1, 4] = self.reference, self.force
-        rows[0, :-1, 2] = self.velocity
-        rows[0, :-2, 3] = np.diff(rows[0, :-1, 2]) / self.sample_time
+        """Return the pieces of the engine, shape (forces, n + 1, 6): a piece per sample, and the end."""
+        n, force = len(self.reference), np.atleast_2d(self.force)
+        rows = np.zeros((len(force), n + 1, 6))
+        rows[:, :, 0] = np.arange(n + 1) * self.sample_time
+        rows[:, :-1, 1], rows[:, :-1, 4] = self.reference, force
+        rows[:, :-1, 2] = self.velocity
+        rows[:, :-2, 3] = np.diff(rows[0, :-1, 2]) / self.sample_time
         if not self.held:
-            rows[0, :-2, 5] = np.diff(self.force) / self.sample_time
+            rows[:, :-2, 5] = np.diff(force) / self.sample_time
         return rows
 
 
@@ -73,7 +75,7 @@ def run_driven(
     The stages are given as flat keys to SI numbers or arrays of shape (runs,); `starts` has the shape (runs, kept). A
     failed run is NaN from there on, and has its status.
     """
-    count, segments = len(inputs.reference), inputs.segments
+    count, shared = len(inputs.reference), inputs.segments if np.ndim(inputs.force) == 1 else None
     options = RunOptions(
         rtol=rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, budget=BUDGET * count
     )
@@ -85,7 +87,10 @@ def run_driven(
         batch = prepare(kernel, _as_motion(flat, numbers, inputs, size), len(numbers), options, starts[numbers])
         periods = np.full(len(numbers), inputs.sample_time)
         batch = batch._replace(
-            segments=segments, first_steps=periods, longest=periods, windows=np.full(len(numbers), -1)
+            segments=replace(inputs, force=inputs.force[numbers]).segments if shared is None else shared,
+            first_steps=periods,
+            longest=periods,
+            windows=np.full(len(numbers), -1),
         )
         results = empty_results(len(numbers), 1, count + 1, len(kernel.full_state))
         run_batch(kernel, batch, settings, results, options.threads)

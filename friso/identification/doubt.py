@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -18,7 +19,7 @@ from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import InverseModel
 from friso.identification.kinds import in_order
 from friso.identification.logs.log import Log
-from friso.identification.output_error.effects import ExplainedResidual, explained_by_forces
+from friso.identification.output_error.effects import ExplainedResidual, effects_of, explained_by
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.settings import DoubtSettings
 from friso.progress import Progress, silent
@@ -255,12 +256,18 @@ def leading_effect(case: FittedCase) -> LeadingEffect | None:
     The forces of all doubts are tried. None if none of them explains enough.
     """
     best: LeadingEffect | None = None
-    for name in _at("fit"):
-        tries = DOUBTS[name].forces
-        for tried in tries(case) if tries is not None else ():
-            explained = explained_by_forces(case.fit, tried.forces, tried.units, tried.searched)
-            if explained is not None and (best is None or explained.left < best.explained.left):
-                best = LeadingEffect(name, tried, explained)
+    searches = [(name, tries) for name in _at("fit") if (tries := DOUBTS[name].forces) is not None]
+    every = [(name, tried) for name, tries in searches for tried in tries(case)]
+    forces = [force for _, tried in every for force in tried.forces]
+    if not forces:
+        return None
+    effects = iter(effects_of(forces, [unit for _, tried in every for unit in tried.units], case.fit))
+    rest, slopes = case.fit.linearised
+    for name, tried in every:
+        own = [*islice(effects, len(tried.forces))]
+        explained = explained_by(slopes, rest, own, case.fit.problem.counted, tried.searched)
+        if explained is not None and (best is None or explained.left < best.explained.left):
+            best = LeadingEffect(name, tried, explained)
     enough = DoubtSettings.current().power_left_by_an_effect
     return best if best is not None and best.explained.left <= enough else None
 

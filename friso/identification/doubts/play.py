@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,7 +17,11 @@ from friso.quantities import percent
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name the width of play between motor and load, if it explains most of what the fit leaves."""
+    """Name the width of the play where a load that is loose by it explains most of what the fit leaves.
+
+    Where the widest play that is tried explains most, something slower than a play does: it has no name then, and the
+    intervals allow for it.
+    """
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "play" or case.quality.failed or case.quality.rejected:
         return
@@ -31,7 +36,9 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         "and the intervals of the rest allow for it; a dial gauge on the load while the motor turns to and fro shows it"
     )
     wider = reaching_over(case.fit, settings.reach_of_an_effect * np.abs(effect.explained.moved))
-    yield RaisedDoubt(words, width, "m", fit=wider, refuses=dict.fromkeys(BRISTLES, IMITATED), explains=True)
+    slower = np.isclose(width, max(settings.plays_tried))
+    named = RaisedDoubt(words, width, "m", fit=wider, refuses=dict.fromkeys(BRISTLES, IMITATED), explains=True)
+    yield replace(named, words="", explains=False) if slower else named
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
@@ -49,36 +56,37 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
     mass, friction = fit.value(MASS), fit.value("friction.coulomb")
     low, high = settings.plays_tried
     widths = np.geomspace(low, high, 1 + round(np.log(high / low) / np.log(settings.ratio_of_plays)))
-    for slowing in (0.0, friction / (settings.mass_share_of_a_loose_load * mass)):
-        for width in widths:
-            speed, acceleration = loose_load(moved.position, moved.velocity, step, float(width), slowing)
-            lacking = [mass * (moved.acceleration - acceleration)]
-            lacking += [friction * (np.sign(moved.velocity) - np.sign(speed))] if slowing else []
-            yield TriedForces(
-                lacking, [settings.mass_share_of_a_tried_play] * len(lacking), float(width), 2 * len(widths)
-            )
+    slowings = np.repeat([0.0, friction / (settings.mass_share_of_a_loose_load * mass)], len(widths))
+    both = np.tile(widths, 2)
+    for width, slowing, speed in zip(
+        both, slowings, loose_loads(moved.position, moved.velocity, step, both, slowings), strict=True
+    ):
+        acceleration = np.diff(speed, prepend=speed[0]) / step
+        lacking = [mass * (moved.acceleration - acceleration)]
+        lacking += [friction * (np.sign(moved.velocity) - np.sign(speed))] if slowing else []
+        yield TriedForces(lacking, [settings.mass_share_of_a_tried_play] * len(lacking), float(width), 2 * len(widths))
 
 
-def loose_load(
-    position: np.ndarray, velocity: np.ndarray, step: float, width: float, slowing: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return velocity [m/s] and acceleration [m/s^2] of a load driven through play, (n,) each.
+def loose_loads(
+    position: np.ndarray, velocity: np.ndarray, step: float, widths: np.ndarray, slowings: np.ndarray
+) -> np.ndarray:
+    """Return velocities [m/s] of loads that a motor drives through play, shape (loads, n).
 
-    The motor's `position` [m] and `velocity` have the shape (n,), every `step` [s]. While the load is loose it is
-    slowed down by `slowing` [m/s^2]; where it meets a flank it goes on with the motor, without a bounce.
+    The motor's `position` [m] and `velocity` have the shape (n,), every `step` [s]. Each load, of shape (loads,), has a
+    width of play [m] and is slowed down by `slowings` [m/s^2] where it is loose; where it meets a flank it goes on with
+    the motor, without a bounce.
     """
-    place, speed, half = float(position[0]), float(velocity[0]), width / 2
-    speeds = np.empty(len(position))
+    half, less = widths / 2, slowings * step
+    place, speed = np.full(len(widths), position[0]), np.full(len(widths), velocity[0])
+    speeds = np.empty((len(position), len(widths)))
     for k, (motor, goes) in enumerate(zip(position.tolist(), velocity.tolist(), strict=True)):
-        less = max(abs(speed) - slowing * step, 0.0)
-        before, speed = speed, less if speed > 0 else -less
-        place += step * (before + speed) / 2
-        if place > motor + half:
-            place, speed = motor + half, min(speed, goes)
-        elif place < motor - half:
-            place, speed = motor - half, max(speed, goes)
+        before, speed = speed, np.copysign(np.maximum(np.abs(speed) - less, 0.0), speed)
+        place = place + step / 2 * (before + speed)
+        low, high = motor - half, motor + half
+        speed = np.where(place > high, np.minimum(speed, goes), np.where(place < low, np.maximum(speed, goes), speed))
+        place = np.minimum(np.maximum(place, low), high)
         speeds[k] = speed
-    return speeds, np.diff(speeds, prepend=speeds[0]) / step
+    return speeds.T
 
 
 DOUBT = Doubt(

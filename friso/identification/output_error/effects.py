@@ -36,8 +36,7 @@ def explained_by_forces(
     proportion. Returns None where the forces explain no more than chance, the best of so many `searched` ones.
     """
     rest, slopes = fit.linearised
-    effects = [effect_of(unit * force, fit, rest) / unit for force, unit in zip(forces, units, strict=True)]
-    return explained_by(slopes, rest, effects, fit.problem.counted, searched)
+    return explained_by(slopes, rest, effects_of(forces, units, fit), fit.problem.counted, searched)
 
 
 def explained_by(
@@ -55,8 +54,8 @@ def explained_by(
     if not (usable[slopes.shape[1] :].all() and np.isfinite(rest).all()):
         return None
     solution = np.zeros(len(size))
-    scaled = every[:, usable] / size[usable]
-    solution[usable] = np.linalg.lstsq(scaled, -rest, rcond=settings.smallest_singular_value)[0] / size[usable]
+    scaled, smallest = every[:, usable] / size[usable], settings.smallest_singular_value**2
+    solution[usable] = np.linalg.lstsq(scaled.T @ scaled, -rest @ scaled, rcond=smallest)[0] / size[usable]
     left = rest + every[:, usable] @ solution[usable]
     independent = max(float(counted.sum()), 1.0) / correlation_length(left)
     chance = chi2.isf((1 - settings.probability_of_an_effect) / searched, len(effects))
@@ -71,7 +70,11 @@ def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:
     return fit.with_deviations(fit.deviation + further / COVERAGE)
 
 
-def effect_of(force: np.ndarray, fit: OutputErrorFit, rest: np.ndarray) -> np.ndarray:
-    """Return how a further force [N] changes the residual of a fit, `rest`; shape (n,) each."""
-    inputs = fit.problem.inputs
-    return replace(fit.problem, inputs=replace(inputs, force=inputs.force + force)).residuals(fit.inner[None])[0] - rest
+def effects_of(forces: Sequence[np.ndarray], units: Sequence[float], fit: OutputErrorFit) -> list[np.ndarray]:
+    """Return what further forces on the stage change of the residual of a fit, per size, each of shape (n,).
+
+    Each force [N], shape (n,), is one of size 1, and is tried at the size `unit`. All are simulated side by side.
+    """
+    inputs, (rest, _), sizes = fit.problem.inputs, fit.linearised, np.array(units)[:, None]
+    pushed = replace(fit.problem, inputs=replace(inputs, force=inputs.force + sizes * np.array(forces)))
+    return [*(pushed.residuals(np.tile(fit.inner, (len(forces), 1))) - rest) / sizes]

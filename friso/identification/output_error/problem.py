@@ -186,7 +186,7 @@ class Problem:
         reached = {**flat, "motion.size": np.nan, "motion.duration": np.inf}
         starts = self.kernel.settled(reached, beginning, runs)
         if bristles := self.kernel.having(Role.BRISTLE):
-            pull = self.target[0] + self.inputs.force[0] + flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
+            pull = self.target[0] + self.inputs.force[..., 0] + flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
             held = flat.get("friction.static", flat["friction.coulomb"])
             bent = np.clip(pull, -held, held) / flat["friction.bristle_stiffness"]
             starts[:, bristles] = np.reshape(bent, (-1, 1))
@@ -224,10 +224,13 @@ class Problem:
 
         It is computed here instead of by the model's outputs, which takes longer.
         """
-        rows = self.inputs.segments[0, : runs.states.shape[1]]
+        count = runs.states.shape[1]
         off, slip = (
-            rows[:, column] - runs.states[:, :, place]
-            for column, place in ((1, self.kernel.position), (2, self.kernel.velocity))
+            wanted[:count] - runs.states[:, :, place]
+            for wanted, place in (
+                (self.inputs.reference, self.kernel.position),
+                (self.inputs.velocity, self.kernel.velocity),
+            )
         )
         return self.flat[KP] * off + self.flat[KD] * slip
 

@@ -50,7 +50,7 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
     while True:
         near, far = max(low, centre - half), min(high, centre + half)
         values = np.unique([*np.linspace(near, far, settings.points_of_a_profile), centre])
-        fits = _fits(fit, number, others, values)
+        fits = _fits(fit, number, others, values, limit)
         cost = fits.cost
         left, right, open_left, open_right = _ends(values, cost, limit)
         if not ((open_left and near > low) or (open_right and far < high)):
@@ -60,24 +60,46 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
     return Profile(parameter.name, parameter.outer(values), cost, limit, *ends, open_left, open_right), fits
 
 
-def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray) -> Refined:
-    """Fit the other parameters at each of some values of one, shape (values,)."""
+def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray, limit: float) -> Refined:
+    """Fit the other parameters at each of some values of one, shape (values,), as far as that leads to the `limit`."""
     settings = OutputErrorSettings.current()
     starts = np.repeat(fit.inner[None], len(values), axis=0)
     starts[:, number] = values
+    if not others:
+        return Refined(starts, costs([fit.problem], starts))
+    following = starts.copy()
+    following[:, list(others)] += np.outer(values - fit.inner[number], _following(fit, number, others))
+    following = np.clip(following, *bounds_of(fit.problem))
+    stay, follow = costs([fit.problem], np.vstack([starts, following])).reshape(2, -1)
+    inner, cost = np.where((follow < stay)[:, None], following, starts), np.minimum(stay, follow)
+    away = ~np.isclose(values, fit.inner[number], rtol=0, atol=1e-6 * np.ptp(values))
     free = np.zeros(starts.shape, bool)
     free[:, list(others)] = True
-    return (
-        refine_fit(
-            [fit.problem],
-            starts,
-            free,
-            settings.iterations_of_a_profile,
-            settings.cost_share_of_a_profile * WORSE / fit.independent,
-        )
-        if others
-        else Refined(starts, costs([fit.problem], starts))
+    refined = refine_fit(
+        [fit.problem],
+        inner[away],
+        free[away],
+        settings.iterations_of_a_profile,
+        settings.cost_share_of_a_profile * WORSE / fit.independent,
+        aim=limit,
     )
+    inner[away], cost[away] = refined.inner, refined.cost
+    return Refined(inner, cost)
+
+
+def _following(fit: OutputErrorFit, number: int, others: tuple[int, ...]) -> np.ndarray:
+    """Return how far the others follow a number by the derivatives of the fit, shape (others,).
+
+    They stay where the number is not fitted.
+    """
+    if number not in fit.free:
+        return np.zeros(len(others))
+    slopes = fit.linearised[1]
+    along, across = slopes[:, fit.free.index(number)], slopes[:, [fit.free.index(other) for other in others]]
+    size = np.linalg.norm(across, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    rcond = OutputErrorSettings.current().smallest_singular_value
+    return -np.linalg.lstsq(across / size, along, rcond=rcond)[0] / size
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:

@@ -47,6 +47,7 @@ def refine_fit(
     iterations: int,
     enough: float,
     progress: Progress = silent,
+    aim: float = np.inf,
 ) -> Refined:
     """Fit all `pieces` of a problem from several starts at once (Levenberg, Marquardt).
 
@@ -54,7 +55,8 @@ def refine_fit(
     when its sum of squares falls by less than the share `enough`.
 
     For every start several dampings are tried side by side, which costs less than the derivatives do; these are
-    recomputed only if one damping was better. A number at an end of its range stays there while it is driven out.
+    recomputed only if one damping was better. A number at an end of its range stays there while it is driven out. A fit
+    that would not fall to the mean square `aim` at the pace of its last iteration is left as it is.
     """
     settings = OutputErrorSettings.current()
     low, high = bounds_of(pieces[0])
@@ -83,10 +85,13 @@ def refine_fit(
         better = squared[best] < cost[rows]
         done = better & (squared[best] > cost[rows] * (1 - enough))
         damping[rows] = np.where(better, dampings[best], dampings[:, -1] * (LADDER[1] / LADDER[0]) / LADDER[0])
-        moved[:] = False
-        moved[rows[better & ~done]] = True
+        late = np.minimum(squared[best], cost[rows])
+        late -= (iterations - 1 - iteration) * (cost[rows] - late)
         inner[rows[better]], cost[rows[better]] = trials[best][better], squared[best][better]
-        busy[rows[done]] = False
+        left = late > aim
+        busy[rows[done | left]] = False
+        moved[:] = False
+        moved[rows[better & ~done & ~left]] = True
     return Refined(inner, cost)
 
 
