@@ -1529,6 +1529,19 @@ def test_a_stage_that_was_not_confirmed_before_the_interrupt_is_not_said_to_meet
     assert not any("meets the goal as it is" in line for line in answer(advice))
 
 
+def test_relaxations_left_for_want_of_work_are_told(rigid: Stage, tuning: Advice) -> None:
+    """With elements of friction they took half of all work."""
+    fleet = draw_fleet(rigid, Correlations(), 3, 1)
+    search = Search(remedies(rigid, Goal())[0], Goal(settle=0.02), fleet, fleet, rigid, TINY, lambda label: None)
+    search.optimise()
+    outcome = RemedyOutcome(search.remedy, None, None, None, (), (), search.points)
+    with allowance(1.0):
+        assert relaxations([outcome], search.goal, fleet) == ()
+    cut = replace(tuning, outcomes=(), interrupted=False, relaxed_all=False)
+    assert any("Not all relaxations of the goal were tried" in line for line in answer(cut))
+    assert not any("Not all relaxations" in line for line in answer(replace(cut, relaxed_all=True)))
+
+
 def test_costs_order_settings() -> None:
     """What breaks a constraint costs more than what does not, and the more the further it does: where not all machines
     settle, the more the fewer do."""

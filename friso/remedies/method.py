@@ -59,9 +59,9 @@ class Advice:
 
     `case` is the check of the stage, `present` its performance on machines, and `unmet` the parts of the goal that it
     misses or may miss (names of `friso.questions.tune.present_words.DOUBTS`). `limits` gives the bandwidths with enough
-    margin, and `sensitivities` what the edge of hunting depends on. `relaxed` says what to relax if nothing
-    works, `interrupted` whether the search was ended early, and `least_sought` whether the least change was sought
-    before that.
+    margin, and `sensitivities` what the edge of hunting depends on. `relaxed` says what to relax if nothing works, and
+    `relaxed_all` whether all of that was tried; `interrupted` whether the search was ended early, and `least_sought`
+    whether the least change was sought before that.
 
     The tables `as_built` are not used in the search; they and the `correlations` are added to stage files that are
     written. `unmade` gives the reason why no leaf springs make the joint of a remedy.
@@ -83,6 +83,7 @@ class Advice:
     correlations: Correlations = field(default_factory=Correlations)
     unmade: Mapping[str, Unmade] = field(default_factory=dict)
     unmet: tuple[str, ...] = ()
+    relaxed_all: bool = True
 
     @property
     def needed(self) -> bool:
@@ -198,6 +199,7 @@ def tune(
     session = _Session(ideal, stage, goal, machines, fresh, unseen, further, budget, report)
     relaxed: tuple[RelaxedGoal, ...] = ()
     sensitivities: Sensitivities | None = None
+    relaxed_all = True
     interrupted, unmet = False, missed_parts(present, goal) or ("certain",)
     try:
         if missed_parts(present, goal) and listed and listed[0].name == BANDWIDTH:
@@ -216,9 +218,11 @@ def tune(
         session.makes_leaves()
         session.adds_windows()
         if session.outcomes and not session.works:
-            session.tries_large_moves()
-            report("which part of the goal to relax")
-            relaxed = relaxations(session.outcomes, goal, machines.take(np.arange(budget.machines)))
+            with allowance(settings.relaxing_work) as relaxing:
+                session.tries_large_moves()
+                report("which part of the goal to relax")
+                relaxed = relaxations(session.outcomes, goal, machines.take(np.arange(budget.machines)))
+            relaxed_all = not relaxing.exhausted
         sensitivities = edge_sensitivities(ideal, case.judgement.margin)
     except KeyboardInterrupt:
         interrupted = True
@@ -240,6 +244,7 @@ def tune(
         correlations,
         session.unmade,
         unmet,
+        relaxed_all,
     )
 
 
@@ -435,7 +440,10 @@ class _Session:
         return True
 
     def tries_large_moves(self) -> None:
-        """Verify the settings that serve large moves alone, those that serve the smallest moves first."""
+        """Verify the settings that serve large moves alone, those that serve the smallest moves first.
+
+        Where an allowance is used up, the others are left.
+        """
         largest, listed = self.unseen.moves.largest, list[tuple[float, int, np.ndarray, TriedPoints]]()
         for place, outcome in enumerate(self.outcomes):
             points = outcome.points if outcome.remedy.verifiable else None
@@ -449,7 +457,10 @@ class _Session:
             remedy = self.outcomes[place].remedy
             search = Search(remedy, self.goal, self.machines, self.fresh, self.drive, self.budget, self.report)
             search.tried.append(points)
-            outcome = self._verified(search, shares, smallest)
+            try:
+                outcome = self._verified(search, shares, smallest)
+            except Exhausted:
+                return
             if outcome.certainty == "large moves":
                 self.outcomes[place] = outcome
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from friso.design_method.relax import Relaxation
+from friso.engine.allowance import Exhausted
 from friso.quantities import outwards
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
@@ -35,16 +37,18 @@ class RelaxedGoal:
 def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) -> tuple[RelaxedGoal, ...]:
     """Return the cheapest relaxation of each kind, the smallest first.
 
-    The distance from hunting is never relaxed. Machines were surveyed at these points, and nothing attracts them.
+    The distance from hunting is never relaxed. Machines were surveyed at these points, and nothing attracts them. Where
+    an allowance is used up, remedies that come later are left out.
     """
     best: dict[tuple[str, ...], RelaxedGoal] = {}
-    for outcome in outcomes:
-        if outcome.points is None or not outcome.remedy.verifiable:
-            continue
-        for relaxed in _of_remedy(outcome.remedy, outcome.points, goal, machines):
-            keys = tuple(sorted(relaxation.key for relaxation in relaxed.relaxations))
-            if keys not in best or relaxed.factor < best[keys].factor:
-                best[keys] = relaxed
+    with suppress(Exhausted):
+        for outcome in outcomes:
+            if outcome.points is None or not outcome.remedy.verifiable:
+                continue
+            for relaxed in _of_remedy(outcome.remedy, outcome.points, goal, machines):
+                keys = tuple(sorted(relaxation.key for relaxation in relaxed.relaxations))
+                if keys not in best or relaxed.factor < best[keys].factor:
+                    best[keys] = relaxed
     fewest = min(map(len, best), default=0)
     listed = [relaxed for keys, relaxed in best.items() if len(keys) == fewest]
     return tuple(sorted(listed, key=lambda relaxed: relaxed.factor))

@@ -91,6 +91,10 @@ class RemedySettings(Settings):
     few_share: float = setting(0.2, "")
     """A few, as a share of the machines that may miss the goal."""
 
+    relaxing_work: float = setting(8e8, "")
+    """About 10 s on one core to find what serves large moves alone and which part of the goal to relax; machines with
+    elements of friction took five times as long, to find nothing."""
+
     relaxed_points: int = setting(3, "")
     """More points for one relaxation take minutes."""
 

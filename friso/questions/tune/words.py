@@ -373,6 +373,8 @@ def _nothing(tuning: Advice) -> list[str]:
         lines.append(f"Changes of the {'joint' if tuning.goal.controller else 'controller'} were not tried, as told.")
     if not tuning.relaxed and not tuning.interrupted:
         lines.append(_no_relaxation(tuning))
+    if not tuning.relaxed_all:
+        lines.append("Not all relaxations of the goal were tried, as that takes too much computing.")
     return lines
 
 
