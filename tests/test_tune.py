@@ -1500,7 +1500,7 @@ def test_the_parts_of_the_goal_that_the_stage_misses_are_told(tuning: Advice) ->
     two = says("margin", "force", margin=range(5), force=range(10, 20))
     assert "10 % of 50 machines have less modulus margin than 0.5 and 20 % of 50 moves take more force than 10" in two
     attracted = says("hunting", settling=range(10), hunting=range(5, 20))
-    assert "something attracts 25 % of the machines that meet the rest, or may" in attracted
+    assert "25 % of the machines that meet the rest hunt or may hunt" in attracted
     assert "6 % of 50 machines and moves miss one part" in says("together", margin=range(3))
     assert says("distance") == f"As it is: no limit cycle, but {DOUBTS['distance']}."
     doubtful = replace(

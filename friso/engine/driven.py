@@ -23,11 +23,9 @@ CHUNK, FEWEST, MOST = 4e6, 16, 256
 class Inputs:
     """Inputs of driven runs: reference [m], shape (n,), and force on the stage [N].
 
-    The force has the shape (n,), or (runs, n) where each run has its own.
-
-    They come every `sample_time` [s]. The force acts besides the controller's. The velocity at each sample is the
-    central difference of the reference, and linear between samples. The force is linear too, or constant if `held`, as
-    in a sampled drive.
+    The force has the shape (n,), or (runs, n) where each run has its own. Both come every `sample_time` [s]. The force
+    acts besides the controller's. The velocity at each sample is the central difference of the reference, and linear
+    between samples. The force is linear too, or constant if `held`, as in a sampled drive.
     """
 
     reference: np.ndarray

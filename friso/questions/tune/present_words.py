@@ -42,9 +42,7 @@ def _missed(name: str, tuning: Advice) -> str:
     every = np.all([*meets.values()], axis=0)
     moving = np.all([met for part, met in meets.items() if part != "hunting"], axis=0)
     if name == "hunting":
-        return (
-            f"something attracts {percent(float(np.mean(~every[moving])))} of the machines that meet the rest, or may"
-        )
+        return f"{percent(float(np.mean(~every[moving])))} of the machines that meet the rest hunt or may hunt"
     if name not in meets and name != "together":
         return DOUBTS[name]
     missing = percent(float(np.mean(~meets.get(name, every))))

@@ -51,7 +51,7 @@ COLUMNS = (
     "Works",
     "Machines that meet the goal",
     "For moves of",
-    "Slowest twentieth settles in",
+    "95 % settle within",
     "Median",
     "Largest force",
     "Modulus margin",
@@ -304,12 +304,13 @@ def _brings(measured: Performance, tuning: Advice) -> str:
     before = slowest_time(tuning.present, tuning.goal)
     as_is = "" if measured is tuning.present or before == ABSENT else f"; as it is: {before}"
     meet = share_with_interval(measured.share(tuning.goal))
-    when = (
-        f"after {slowest_time(measured, tuning.goal)}" if measured.slowest(tuning.goal) else "once the reference stands"
-    )
+    settled = slowest_time(measured, tuning.goal)
+    share = "fewer than 95 % are in position in time" if settled == ABSENT else f"95 % are in position within {settled}"
+    if not measured.slowest(tuning.goal):
+        share = "95 % are in position once the reference stands"
     return (
         f"Of {measured.count} fresh machines and moves, {meet} meet the goal, {_holds(measured, tuning.goal)}; "
-        f"the slowest twentieth is in position {when}{as_is}"
+        f"{share}{as_is}"
     )
 
 
