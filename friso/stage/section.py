@@ -321,7 +321,7 @@ def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
     cause = problem.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
         return _complete(cause, key)
-    if not key:  # no key has a wrong value: what went wrong is friso's own
+    if not problem["loc"]:  # no key has a wrong value: what went wrong is friso's own
         raise cause or ValueError(problem["msg"])
     if problem["type"] == "extra_forbidden":
         near = nearest_name(key, cls.model_fields) or next(iter(cls.model_fields))
